@@ -1,0 +1,7 @@
+"""RISK-SAC: joint search for safety-critical driving scenarios in SUMO.
+
+Importing this package is cheap on purpose: the service reads its configuration models without
+loading torch or libsumo. The method starts at :mod:`risk_sac.train`.
+"""
+
+__version__ = "0.1.0"

@@ -1,0 +1,41 @@
+"""Every setting of the system, as frozen pydantic models with unit and meaning by each field."""
+
+from risk_sac.config.base import Interval, Settings
+from risk_sac.config.campaign import Budget, CampaignSpec, FamilyName, Requirement, RunSpec
+from risk_sac.config.ego import CarFollowing, EgoConfig, SensorConfig
+from risk_sac.config.learner import (
+    LagrangianConfig,
+    LearnerConfig,
+    ReplayConfig,
+    RewardConfig,
+    SacConfig,
+    SceneOptimizerConfig,
+)
+from risk_sac.config.methods import METHODS, Method, MethodName
+from risk_sac.config.odd import DynamicElements, Environment, Odd, Scenery
+
+__all__ = [
+    "METHODS",
+    "Budget",
+    "CampaignSpec",
+    "CarFollowing",
+    "DynamicElements",
+    "EgoConfig",
+    "Environment",
+    "FamilyName",
+    "Interval",
+    "LagrangianConfig",
+    "LearnerConfig",
+    "Method",
+    "MethodName",
+    "Odd",
+    "ReplayConfig",
+    "Requirement",
+    "RewardConfig",
+    "RunSpec",
+    "SacConfig",
+    "Scenery",
+    "SceneOptimizerConfig",
+    "SensorConfig",
+    "Settings",
+]

@@ -1,0 +1,90 @@
+"""What a user posts, and the runs it expands to.
+
+The same `CampaignSpec` is the REST body, the CLI's YAML and the stored record.
+"""
+
+import hashlib
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, StringConstraints, model_validator
+
+from risk_sac.config.base import Positive, Settings
+from risk_sac.config.ego import EgoConfig
+from risk_sac.config.learner import LearnerConfig
+from risk_sac.config.methods import MethodName
+from risk_sac.config.odd import Odd
+
+FamilyName = Literal["low", "mixed", "dense"]
+Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
+Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+
+
+class Requirement(Settings):
+    """One STL requirement over the published signals; past-time operators only."""
+
+    name: Identifier
+    formula: Annotated[str, Field(min_length=1, max_length=500)]
+    scale: Positive
+    """Physical size of a clear margin, in the formula's unit; robustness is divided by it."""
+
+
+class Budget(Settings):
+    """What each run may spend; equal for all methods of a campaign."""
+
+    episodes: Annotated[int, Field(ge=1, le=100_000)] = 300
+    """Search episodes, rejected scenes included."""
+    evaluation_episodes: Annotated[int, Field(ge=0, le=10_000)] = 0
+    """Episodes of the frozen policy after the search."""
+
+
+class RunSpec(Settings):
+    """One run: the unit of scheduling, checkpoint and retry."""
+
+    family: FamilyName
+    method: MethodName
+    seed: Seed
+    budget: Budget = Budget()
+    ego: EgoConfig = EgoConfig()
+    odd: Odd = Odd()
+    requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
+    learner: LearnerConfig = LearnerConfig()
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the canonical JSON; two runs with the same digest give the same results."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
+
+
+class CampaignSpec(Settings):
+    """Families × methods × seeds on one equal budget."""
+
+    label: Annotated[str, Field(max_length=200)] = ""
+    families: Annotated[tuple[FamilyName, ...], Field(min_length=1, max_length=3)]
+    methods: Annotated[tuple[MethodName, ...], Field(min_length=1, max_length=20)] = ("risk-sac",)
+    seeds: Annotated[tuple[Seed, ...], Field(min_length=1, max_length=100)] = (0,)
+    budget: Budget = Budget()
+    ego: EgoConfig = EgoConfig()
+    odd: Odd = Odd()
+    requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
+    learner: LearnerConfig = LearnerConfig()
+
+    @model_validator(mode="after")
+    def _no_repeats(self) -> Self:
+        for name in ("families", "methods", "seeds"):
+            values = getattr(self, name)
+            if len(set(values)) < len(values):
+                raise ValueError(f"{name} is {list(values)}; wanted each value once")
+        names = [requirement.name for requirement in self.requirements]
+        if len(set(names)) < len(names):
+            raise ValueError(f"requirements are named {names}; wanted each name once")
+        return self
+
+    def runs(self) -> tuple[RunSpec, ...]:
+        """The runs in the order they are queued: seeds outermost, so that early results compare methods."""
+        shared = {name: getattr(self, name) for name in ("budget", "ego", "odd", "requirements", "learner")}
+        return tuple(
+            RunSpec(family=family, method=method, seed=seed, **shared)
+            for seed in self.seeds
+            for family in self.families
+            for method in self.methods
+        )

@@ -1,0 +1,54 @@
+"""The vehicle under test: which SUMO models drive it and what it can see."""
+
+import math
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from risk_sac.config.base import Positive, Settings
+
+CarFollowing = Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"]
+
+
+class SensorConfig(Settings):
+    """Line-of-sight sensor, mounted at the middle of the ego's roof."""
+
+    range_m: Positive = 80.0
+    """Farthest distance at which a body is seen, m."""
+    field_of_view_rad: Annotated[float, Field(gt=0, le=math.tau)] = math.tau
+    """Opening angle centred on the ego's heading, rad."""
+    occlusion: bool = True
+    """Whether vehicles hide what stands behind them."""
+
+
+class EgoConfig(Settings):
+    """SUMO's default driver, with a driver's delay and a driver's view.
+
+    The profile `perfect` reacts within one simulation step and sees everything.
+    """
+
+    profile: Literal["default", "perfect"] = "default"
+    car_following: CarFollowing = "Krauss"
+    reaction_time_s: Annotated[float, Field(ge=0.1, le=3.0)] = 0.5
+    """Time between two decisions (SUMO's actionStepLength), s; a multiple of 0.1."""
+    sensor: SensorConfig | None = SensorConfig()
+    """None: the ego sees everything."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _apply_profile(cls, data: object) -> object:
+        if isinstance(data, dict) and data.get("profile") == "perfect":
+            return {"reaction_time_s": 0.1, "sensor": None, **data}
+        return data
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if abs(self.reaction_time_s * 10 - round(self.reaction_time_s * 10)) > 1e-9:
+            raise ValueError(
+                f"reaction_time_s is {self.reaction_time_s:g}; wanted a multiple of the 0.1 s simulation step"
+            )
+        if self.profile == "perfect" and (self.reaction_time_s > 0.1 or self.sensor is not None):
+            raise ValueError(
+                "profile 'perfect' has no delay and no sensor; leave reaction_time_s and sensor out, or use 'default'"
+            )
+        return self

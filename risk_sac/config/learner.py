@@ -1,0 +1,109 @@
+"""Settings of the method: agent, replay, constraint, reward, scene optimiser.
+
+Defaults hold for all families and methods alike; the README says how they were chosen.
+"""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from risk_sac.config.base import Fraction, NonNegative, Positive, Settings
+
+Count = Annotated[int, Field(ge=1)]
+
+
+class SacConfig(Settings):
+    """Soft Actor-Critic (Haarnoja et al. 2018), Eq. 4."""
+
+    hidden_sizes: Annotated[tuple[Count, ...], Field(min_length=1, max_length=4)] = (128, 128)
+    """Units of each hidden layer, actor and critics alike."""
+    batch_size: Annotated[int, Field(ge=1, le=4096)] = 128
+    discount: Annotated[float, Field(gt=0, lt=1)] = 0.98
+    """γ; 0.98 at 0.1 s looks about 5 s ahead."""
+    actor_learning_rate: Positive = 3e-4
+    critic_learning_rate: Positive = 1e-3
+    temperature_learning_rate: Positive = 3e-4
+    initial_temperature: Positive = 0.2
+    """α at the start."""
+    target_entropy_per_action: float = -1.0
+    """Target entropy divided by the action dimension, nats."""
+    target_rate: Annotated[float, Field(gt=0, le=1)] = 0.005
+    """τ of the target networks' moving average."""
+    warmup_steps: Annotated[int, Field(ge=0)] = 1000
+    """Environment steps with uniformly random actions and no update."""
+    updates_per_step: Annotated[int, Field(ge=0, le=20)] = 1
+
+
+class ReplayConfig(Settings):
+    """Replay memory and its risk-guided priorities, Eq. 9-10."""
+
+    capacity: Annotated[int, Field(ge=1000, le=2_000_000)] = 100_000
+    td_weight: NonNegative = 1.0
+    """w1, on the normalised TD error."""
+    return_weight: NonNegative = 0.5
+    """w2, on the normalised accumulated reward of the episode."""
+    robustness_weight: NonNegative = 0.5
+    """w3, on the normalised negative robustness."""
+    priority_floor: Positive = 0.05
+    """ε > 0: smallest priority, so nothing is forgotten."""
+    correction: Fraction = 0.6
+    """η, exponent of the importance weights."""
+
+
+class LagrangianConfig(Settings):
+    """The dual variable λ, Eq. 1-2 and Alg. 1, l. 16."""
+
+    initial: NonNegative = 0.0
+    learning_rate: Positive = 2e-3
+    """η_λ."""
+    cost_limit: NonNegative = 0.1
+    """d, on the mean realism cost per step."""
+    maximum: Positive = 10.0
+    """Cap on λ, so that a burst of cost cannot drown the risk reward for good."""
+
+
+class RewardConfig(Settings):
+    """R_risk (terms of Eq. 1) and the shaping potential (Eq. 6-8)."""
+
+    valid_collision: NonNegative = 10.0
+    """Bonus for a valid collision."""
+    degenerate_collision: NonNegative = 2.0
+    """Penalty for contact that a validity rule refuses."""
+    ttc_weight: NonNegative = 0.1
+    """Weight of exp(-TTC / ttc_scale_s)."""
+    ttc_scale_s: Positive = 1.0
+    rss_weight: NonNegative = 0.05
+    """Reward per step in which both RSS margins are violated."""
+    softmin_sharpness: Positive = 5.0
+    """β of Eq. 7; robustness is in units of each requirement's scale."""
+    zero_terminal_potential: bool = True
+    """φ = 0 at terminal states, which policy invariance needs; False is Eq. 8 to the letter."""
+
+
+class SceneOptimizerConfig(Settings):
+    """Bayesian optimisation of the scene, Eq. 11."""
+
+    initial_scenes: Annotated[int, Field(ge=2, le=1000)] = 16
+    """Sobol scenes before the first model."""
+    window: Annotated[int, Field(ge=8, le=1000)] = 150
+    """Newest observations the model is fitted to: the policy changes, so old scores go stale."""
+    refit_every: Annotated[int, Field(ge=1)] = 10
+    """Observations between two fits of the kernel's hyper-parameters."""
+    candidates: Annotated[int, Field(ge=16, le=8192)] = 256
+    """Sobol points at which the acquisition is scored before local refinement."""
+    exploration: Fraction = 0.25
+    """Share of scenes drawn at random, so that no region is given up."""
+    running_maximum_rate: Annotated[float, Field(gt=0, le=1)] = 0.1
+    """Smoothing of the running maximum M̄_e towards a new, larger return."""
+
+
+class LearnerConfig(Settings):
+    """Everything a method may tune, the same for all families."""
+
+    sac: SacConfig = SacConfig()
+    replay: ReplayConfig = ReplayConfig()
+    lagrangian: LagrangianConfig = LagrangianConfig()
+    reward: RewardConfig = RewardConfig()
+    scenes: SceneOptimizerConfig = SceneOptimizerConfig()
+    checkpoint_every: Annotated[int, Field(ge=1)] = 20
+    """Episodes between two checkpoints."""

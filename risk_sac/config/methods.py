@@ -1,0 +1,44 @@
+"""The methods as rows of data: base agent × {lagrangian, shaping, replay} × scene sampler."""
+
+from typing import Literal
+
+from risk_sac.config.base import Settings
+
+MethodName = Literal["risk-sac", "risk-sac-only-rper", "risk-sac-only-rs", "sac-lag", "sac", "random", "no-adversary"]
+
+
+class Method(Settings):
+    """One row of the table of methods."""
+
+    agent: Literal["sac", "random", "none"]
+    """`random`: uniform actions; `none`: SUMO drives the adversary vehicles, pedestrians stand."""
+    lagrangian: bool = False
+    """Whether λ follows the realism cost; without it λ stays 0."""
+    shaping: bool = False
+    """Whether robustness shapes the reward (Eq. 6-8)."""
+    replay: Literal["uniform", "rper"] = "uniform"
+    scenes: Literal["botorch", "sobol"] = "sobol"
+    summary: str
+
+
+# Choice: all learners search scenes with BoTorch, so that their rows differ in the learner alone.
+METHODS: dict[MethodName, Method] = {
+    "risk-sac": Method(
+        agent="sac",
+        lagrangian=True,
+        shaping=True,
+        replay="rper",
+        scenes="botorch",
+        summary="The paper's method: SAC with λ, robustness shaping, RPER and BoTorch scenes.",
+    ),
+    "risk-sac-only-rper": Method(
+        agent="sac", lagrangian=True, replay="rper", scenes="botorch", summary="Ablation: no reward shaping."
+    ),
+    "risk-sac-only-rs": Method(
+        agent="sac", lagrangian=True, shaping=True, scenes="botorch", summary="Ablation: uniform replay."
+    ),
+    "sac-lag": Method(agent="sac", lagrangian=True, scenes="botorch", summary="SAC under the realism constraint."),
+    "sac": Method(agent="sac", scenes="botorch", summary="Plain SAC on the risk reward."),
+    "random": Method(agent="random", summary="Control: Sobol scenes and uniformly random actions."),
+    "no-adversary": Method(agent="none", summary="Control: nobody attacks; what remains is the artefact rate."),
+}

@@ -1,0 +1,69 @@
+"""The operational design domain as a user writes it, after ISO 34503's three branches.
+
+Every field may be left out: a family's default ODD fills it. What an ODD does to the search is in
+`risk_sac.scenario.odd`.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator
+
+from risk_sac.config.base import Interval, Settings
+
+SignalType = Literal["none", "fixed_time"]
+CrossingType = Literal["none", "zebra", "signalised"]
+ActorKind = Literal["vehicle", "pedestrian"]
+
+
+def _as_sorted_set(values: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(sorted(set(values)))  # a frozenset has no stable JSON, and so no stable digest
+
+
+SetOf = AfterValidator(_as_sorted_set)
+
+
+class Scenery(Settings):
+    """The road and what regulates it."""
+
+    lanes: Interval | None = None
+    """Lanes per direction on the ego's road."""
+    speed_limit_mps: Interval | None = None
+    """Posted limit, m/s."""
+    signal_types: Annotated[tuple[SignalType, ...], SetOf] | None = None
+    """Kinds of traffic signal the ego may meet."""
+    crossing_types: Annotated[tuple[CrossingType, ...], SetOf] | None = None
+    """Kinds of pedestrian crossing the ego may meet."""
+
+
+class Environment(Settings):
+    """Weather, as far as the simulator knows it."""
+
+    friction: Interval | None = None
+    """Tyre-road friction coefficient, in (0, 1.2]."""
+    visibility_m: Interval | None = None
+    """Meteorological visibility, m; its low end bounds the ego's sensor range."""
+
+
+class DynamicElements(Settings):
+    """Other actors and the limits they keep."""
+
+    actor_kinds: Annotated[tuple[ActorKind, ...], SetOf] | None = None
+    """Kinds of actor that may be present."""
+    ego_speed_mps: Interval | None = None
+    """Initial speed of the ego, m/s."""
+    vehicle_speed_mps: Interval | None = None
+    """Speed of other vehicles, m/s."""
+    vehicle_accel_mps2: Interval | None = None
+    """Longitudinal acceleration of other vehicles, m/s²; low is the hardest braking."""
+    pedestrian_speed_mps: Interval | None = None
+    """Speed of pedestrians, m/s."""
+    pedestrian_accel_mps2: Interval | None = None
+    """Acceleration of pedestrians, m/s²."""
+
+
+class Odd(Settings):
+    """Operational design domain (ISO 34503)."""
+
+    scenery: Scenery = Scenery()
+    environment: Environment = Environment()
+    dynamic: DynamicElements = DynamicElements()

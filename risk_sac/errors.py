@@ -1,0 +1,63 @@
+"""Every error this project raises on purpose.
+
+RiskSacError
+├── ConfigError            a setting is unknown, out of range or contradicts another
+│   ├── OddError           an ODD empties the scene space or contradicts itself
+│   └── FormulaError       a requirement cannot be parsed or monitored online
+├── SceneError             a scene is not a point of its family's space
+│   └── InfeasibleScene    C_hard: the scene's first frame is physically impossible
+├── SimulationError        libsumo refused a command or died
+├── CheckpointError        a checkpoint is missing, damaged or belongs to another run
+└── NotFinite              a number at a boundary is NaN or infinite
+"""
+
+
+class RiskSacError(Exception):
+    """Root of the tree; catch this to catch everything this project raises on purpose."""
+
+
+class ConfigError(RiskSacError):
+    """A setting is wrong. `field` is its dotted path, as a user wrote it."""
+
+    def __init__(self, message: str, *, field: str = "") -> None:
+        super().__init__(message)
+        self.field = field
+
+
+class OddError(ConfigError):
+    """An ODD contradicts itself or leaves no scene to search."""
+
+
+class FormulaError(ConfigError):
+    """An STL formula cannot be parsed, or cannot be monitored online.
+
+    `position` is the 0-based column of the offending text, or None where it has none.
+    """
+
+    def __init__(self, message: str, *, field: str = "", position: int | None = None) -> None:
+        super().__init__(message, field=field)
+        self.position = position
+
+
+class SceneError(RiskSacError):
+    """A scene does not belong to its family's space."""
+
+
+class InfeasibleScene(SceneError):
+    """C_hard rejects the scene; `reason` is the rule's name."""
+
+    def __init__(self, message: str, *, reason: str) -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
+class SimulationError(RiskSacError):
+    """libsumo refused a command, or the simulation ended unexpectedly."""
+
+
+class CheckpointError(RiskSacError):
+    """A checkpoint is missing, damaged, or was written by another run."""
+
+
+class NotFinite(RiskSacError):
+    """A value that must be finite is not; the message names it."""
