@@ -1,0 +1,154 @@
+"""The rewards of RISK-SAC, one pure function per equation.
+
+Every function works elementwise on floats, numpy arrays and torch tensors alike. Masks are 0 or 1,
+in the same kind of container as the values beside them.
+
+Source: RISK-SAC, Sec. III-B and III-C; shaping after Ng, Harada, Russell, "Policy invariance under
+reward transformations", ICML 1999.
+"""
+
+import math
+from typing import TYPE_CHECKING, TypeVar, cast
+
+from risk_sac.config import RewardConfig
+from risk_sac.types import Floats
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+Value = TypeVar("Value", float, Floats, "Tensor")
+
+
+def collision_bonus(valid: Value, bonus: float) -> Value:
+    """Sparse reward for a valid collision, first term of R_risk in (1).
+
+    Args:
+      valid: 1 in the step of a valid collision, else 0.
+      bonus: its size, at least 0.
+    """
+    return bonus * valid
+
+
+def degenerate_penalty(degenerate: Value, penalty: float) -> Value:
+    """What contact costs that a validity rule refuses, as a number to be subtracted.
+
+    Choice: the paper only filters such contacts out. Without a price on them the policy settles for
+    sideswipes, which are far easier to reach than a failure of the ego.
+
+    Args:
+      degenerate: 1 in the step of a degenerate contact, else 0.
+      penalty: its size, at least 0.
+    """
+    return penalty * degenerate
+
+
+def near_miss(ttc_s: Value, weight: float, scale_s: float) -> Value:
+    """Dense near-miss signal, weight · exp(-TTC / scale), the second term of R_risk in (1).
+
+    Args:
+      ttc_s: time to collision, s, at least 0; its cap where there is none.
+      weight: reward at TTC = 0.
+      scale_s: s; the reward falls by e over this much TTC.
+    """
+    decay: Value = math.e ** (-ttc_s / scale_s)  # `**` is the one exponential that all three containers share
+    return weight * decay
+
+
+def rss_violation(longitudinal_m: Value, lateral_m: Value, weight: float) -> Value:
+    """Indicator that a situation is dangerous in the sense of RSS, the third term of R_risk in (1).
+
+    Args:
+      longitudinal_m: longitudinal RSS margin, m; below 0 means violated.
+      lateral_m: lateral RSS margin, m.
+      weight: reward where both are violated; either alone is no danger.
+
+    Source: Shalev-Shwartz et al., "On a formal model of safe and scalable self-driving cars", 2017.
+    """
+    return cast(Value, weight * ((longitudinal_m < 0) & (lateral_m < 0)))  # numpy's stubs lose the width of the float
+
+
+def risk_reward(
+    ttc_s: Value,
+    rss_longitudinal_m: Value,
+    rss_lateral_m: Value,
+    valid_collision: Value,
+    degenerate_collision: Value,
+    config: RewardConfig,
+) -> Value:
+    """Risk reward of one step, R_risk(s, a) of (1).
+
+    R_risk = bonus · [valid] - penalty · [degenerate] + w_ttc · exp(-TTC / scale) + w_rss · [RSS violated]
+
+    Args:
+      ttc_s: time to collision after the step, s.
+      rss_longitudinal_m: longitudinal RSS margin after the step, m.
+      rss_lateral_m: lateral RSS margin after the step, m.
+      valid_collision: 1 if the step ended in a valid collision.
+      degenerate_collision: 1 if it ended in contact that a validity rule refuses.
+      config: sizes of the four terms.
+    """
+    sparse = collision_bonus(valid_collision, config.valid_collision) - degenerate_penalty(
+        degenerate_collision, config.degenerate_collision
+    )
+    dense = near_miss(ttc_s, config.ttc_weight, config.ttc_scale_s) + rss_violation(
+        rss_longitudinal_m, rss_lateral_m, config.rss_weight
+    )
+    return sparse + dense
+
+
+def penalised_reward(risk_reward: Value, cost: Value, dual_variable: float) -> Value:
+    """Penalised reward.
+
+    R(s, a) = R_risk(s, a) - λ C_real(s, a)                                          (3)
+
+    Args:
+      risk_reward: R_risk.
+      cost: realism cost C_real, at least 0.
+      dual_variable: λ ≥ 0, the current one: a stored R would keep a stale λ.
+    """
+    return risk_reward - dual_variable * cost
+
+
+def potential(robustness: Value) -> Value:
+    """Potential of a state, φ(s) = -ρ(Φ, s): the closer to a violation, the higher.
+
+    Args:
+      robustness: soft-min robustness ρ(Φ, s) of (7), in units of the requirements' scales.
+    """
+    return -robustness
+
+
+def shaping(potential: Value, next_potential: Value, discount: float) -> Value:
+    """Potential-based shaping term.
+
+    F(s, a, s') = γ φ(s') - φ(s)                                                     (6)
+
+    Args:
+      potential: φ(s).
+      next_potential: φ(s'); 0 at a terminal s' if the optimal policy is to stay the same.
+      discount: γ in (0, 1).
+    """
+    return discount * next_potential - potential
+
+
+def shaped_reward(
+    reward: Value, robustness: Value, next_robustness: Value, discount: float, terminated: Value
+) -> Value:
+    """Shaped reward, on which the policy is trained.
+
+    R'(s, a) = R(s, a) + F(s, a, s') = R(s, a) - γ ρ(Φ, s') + ρ(Φ, s)                (8)
+
+    Deviation: φ(s') = 0 where `terminated` is 1. Ng et al. need it for policy invariance: otherwise
+    γ φ(s_T) is paid out once per episode and never taken back, so an episode that ends early at low
+    robustness earns more than its risk reward says. Pass 0 everywhere for (8) to the letter, and pass 0
+    for time-limit truncation in any case, since the value of s' is still bootstrapped there.
+
+    Args:
+      reward: penalised reward R of (3).
+      robustness: ρ(Φ, s).
+      next_robustness: ρ(Φ, s').
+      discount: γ in (0, 1).
+      terminated: 1 where s' is terminal and its potential is to be 0, else 0.
+    """
+    next_potential = potential(next_robustness) * (1.0 - terminated)
+    return reward + shaping(potential(robustness), next_potential, discount)
