@@ -8,7 +8,7 @@ reward transformations", ICML 1999.
 """
 
 import math
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar
 
 from risk_sac.config import RewardConfig
 from risk_sac.types import Floats
@@ -64,7 +64,7 @@ def rss_violation(longitudinal_m: Value, lateral_m: Value, weight: float) -> Val
 
     Source: Shalev-Shwartz et al., "On a formal model of safe and scalable self-driving cars", 2017.
     """
-    return cast(Value, weight * ((longitudinal_m < 0) & (lateral_m < 0)))  # numpy's stubs lose the width of the float
+    return weight * ((longitudinal_m < 0) & (lateral_m < 0))  # type: ignore[return-value]  # numpy's stubs lose float64
 
 
 def risk_reward(
