@@ -1,0 +1,51 @@
+"""The dual variable λ, which prices the realism cost.
+
+Source: RISK-SAC, Sec. III-B, Eq. 1-2, and Alg. 1, l. 15-16.
+"""
+
+import math
+
+from risk_sac.config.learner import LagrangianConfig
+from risk_sac.errors import NotFinite
+
+
+def dual_step(dual_variable: float, mean_cost: float, config: LagrangianConfig) -> float:
+    """One projected step of gradient ascent on the dual of (2).
+
+    λ ← min([λ + η_λ (C̄_real - d)]_+, λ_max)
+
+    Deviation: λ is capped at λ_max, which the paper does not do, so that a burst of cost cannot drown
+    the risk reward for good.
+
+    Args:
+      dual_variable: λ ≥ 0.
+      mean_cost: C̄_real, mean realism cost of the mini-batch.
+      config: η_λ, d and λ_max.
+
+    Returns:
+      The next λ, in [0, λ_max].
+
+    Source: RISK-SAC, Alg. 1, l. 16.
+    """
+    ascended = dual_variable + config.learning_rate * (mean_cost - config.cost_limit)
+    return min(max(ascended, 0.0), config.maximum)
+
+
+class DualVariable:
+    """λ over a run; stays 0 where the method has no constraint."""
+
+    def __init__(self, config: LagrangianConfig, *, enabled: bool) -> None:
+        self._config = config
+        self._enabled = enabled
+        self.value = min(config.initial, config.maximum) if enabled else 0.0
+
+    def update(self, mean_cost: float) -> None:
+        """Step λ on the mean realism cost of a mini-batch.
+
+        Raises:
+          NotFinite: `mean_cost` is NaN or infinite.
+        """
+        if not math.isfinite(mean_cost):
+            raise NotFinite(f"mean realism cost is {mean_cost}; wanted a finite number. Check C_soft.")
+        if self._enabled:
+            self.value = dual_step(self.value, mean_cost, self._config)

@@ -1,0 +1,123 @@
+"""Off-policy learner: agent, replay memory and dual variable under one roof.
+
+It knows no environment, so it works on anything with box-shaped observations and actions; scaling
+actions from [-1, 1] to an environment's box is the caller's.
+
+Source: RISK-SAC, Alg. 1, l. 7 and 9-16.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from risk_sac.agents.lagrangian import DualVariable
+from risk_sac.agents.replay import Replay, RiskPrioritizedReplay, Transition, UniformReplay, Vector
+from risk_sac.agents.sac import SacAgent, UpdateResult
+from risk_sac.config.learner import LearnerConfig
+from risk_sac.config.methods import Method
+from risk_sac.risk.reward import Value, penalised_reward, shaped_reward
+
+
+class Learner:
+    """What happens between two environment steps."""
+
+    def __init__(
+        self, observation_size: int, action_size: int, method: Method, config: LearnerConfig, seed: int
+    ) -> None:
+        self._method = method
+        self._config = config
+        self._action_size = action_size
+        self._agent = SacAgent(observation_size, action_size, config.sac, seed)
+        replay = RiskPrioritizedReplay if method.replay == "rper" else UniformReplay
+        self._replay: Replay = replay(observation_size, action_size, config.replay)
+        self._dual = DualVariable(config.lagrangian, enabled=method.lagrangian)
+        self._generator = np.random.default_rng(seed)
+        self._steps = 0
+
+    @property
+    def dual_variable(self) -> float:
+        """λ."""
+        return self._dual.value
+
+    @property
+    def temperature(self) -> float:
+        """α."""
+        return self._agent.temperature
+
+    def act(self, observation: Vector, explore: bool = True) -> Vector:
+        """Action in [-1, 1], `action_size`; uniformly random in the first `warmup_steps` explored steps."""
+        if explore and self._steps < self._config.sac.warmup_steps:
+            return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
+        return self._agent.act(observation, explore)  # Alg. 1, l. 7
+
+    def observe(self, transition: Transition) -> None:
+        """Store what a step has brought."""
+        self._steps += 1
+        self._replay.add(transition, self._td_error(transition))  # Alg. 1, l. 12
+
+    def update(self) -> UpdateResult | None:
+        """Learn from memory, `updates_per_step` times; None during the warm-up.
+
+        Raises:
+          NotFinite: learning has diverged.
+        """
+        result = None
+        if self._steps >= self._config.sac.warmup_steps and len(self._replay):
+            for _ in range(self._config.sac.updates_per_step):
+                result = self._update_once()
+        return result
+
+    def state(self) -> dict[str, Any]:
+        """Everything the next step depends on, generators included; tensors, arrays and plain values."""
+        return {
+            "agent": self._agent.state(),
+            "replay": self._replay.state(),
+            "dual_variable": self._dual.value,
+            "generator": self._generator.bit_generator.state,
+            "steps": self._steps,
+        }
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continue from `state()`, as if never interrupted.
+
+        Raises:
+          CheckpointError: the state is of another shape.
+        """
+        self._replay.load(state["replay"])
+        self._agent.load(state["agent"])
+        self._dual.value = state["dual_variable"]
+        self._generator.bit_generator.state = state["generator"]
+        self._steps = state["steps"]
+
+    def _update_once(self) -> UpdateResult:
+        batch = self._replay.sample(self._config.sac.batch_size, self._generator)  # Alg. 1, l. 13
+        reward = self._reward(batch.risk_reward, batch.cost, batch.robustness, batch.next_robustness, batch.terminated)
+        result = self._agent.update(batch, reward)  # Alg. 1, l. 14
+        self._replay.update(batch.indices, result.td_errors)
+        self._dual.update(batch.cost.mean().item())  # Alg. 1, l. 15-16
+        return result
+
+    def _reward(
+        self, risk_reward: Value, cost: Value, robustness: Value, next_robustness: Value, terminated: Value
+    ) -> Value:
+        # Deviation: formed when sampled, so λ is today's and not the one in force when the step was taken.
+        reward = penalised_reward(risk_reward, cost, self._dual.value)  # Alg. 1, l. 9
+        if not self._method.shaping:
+            return reward
+        vanishing = terminated * float(self._config.reward.zero_terminal_potential)
+        return shaped_reward(reward, robustness, next_robustness, self._config.sac.discount, vanishing)  # Alg. 1, l. 10
+
+    def _td_error(self, transition: Transition) -> float:
+        """|δ| at insertion (Alg. 1, l. 11); uniform replay does without."""
+        if self._method.replay == "uniform":
+            return 0.0
+        reward = self._reward(
+            transition.risk_reward,
+            transition.cost,
+            transition.robustness,
+            transition.next_robustness,
+            float(transition.terminated),
+        )
+        return self._agent.td_error(
+            transition.observation, transition.action, reward, transition.next_observation, transition.terminated
+        )

@@ -1,0 +1,251 @@
+"""Replay memory, uniform or risk-guided.
+
+The reward is not stored: its parts are, so that the learner forms it with the current dual variable
+when it samples.
+
+Source: RISK-SAC, Sec. III-D and Alg. 1, l. 11-13.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from risk_sac.agents.priority import TermScales, importance_weights, priority
+from risk_sac.agents.sum_tree import Indices, SumTree
+from risk_sac.config.learner import ReplayConfig
+from risk_sac.errors import CheckpointError, NotFinite
+from risk_sac.types import Floats
+
+Vector = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Transition:
+    """One step of an episode, with the parts of its reward apart."""
+
+    observation: Vector
+    action: Vector  # in [-1, 1]
+    risk_reward: float  # R_risk(s, a)
+    cost: float  # C_soft(s, a)
+    robustness: float  # ρ(Φ, s)
+    next_robustness: float  # ρ(Φ, s')
+    next_observation: Vector
+    terminated: bool  # the world ended; False where only the time limit did, so that s' is bootstrapped
+    accumulated_reward: float  # R̂: the episode's reward up to and including this step
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batch:
+    """Sampled transitions; float32 tensors with `n` rows."""
+
+    observation: Tensor  # n x observation_size
+    action: Tensor  # n x action_size
+    risk_reward: Tensor  # n
+    cost: Tensor  # n
+    robustness: Tensor  # n
+    next_robustness: Tensor  # n
+    next_observation: Tensor  # n x observation_size
+    terminated: Tensor  # n, 0 or 1
+    weight: Tensor  # n, importance weights in (0, 1]
+    indices: Indices  # n, the slots they came from
+
+
+class Replay(Protocol):
+    """What the learner needs of a replay memory."""
+
+    def __len__(self) -> int: ...
+
+    def add(self, transition: Transition, td_error: float) -> None:
+        """Store a transition over the oldest one once full; `td_error` is |δ|."""
+
+    def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
+        """Draw with replacement; at least one transition must be stored."""
+
+    def update(self, indices: Indices, td_errors: Floats) -> None:
+        """Take note of the |δ| just measured on sampled transitions."""
+
+    def state(self) -> dict[str, Any]:
+        """Everything sampling depends on, the filled part only; tensors and plain values."""
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continue from `state()`; raises CheckpointError if it is of another shape."""
+
+
+class Storage:
+    """Ring buffer of transitions, one packed row each, so that a batch is one gather."""
+
+    def __init__(self, observation_size: int, action_size: int, capacity: int) -> None:
+        self._widths = [observation_size, action_size, observation_size, 1, 1, 1, 1, 1]
+        self._rows = np.zeros((capacity, sum(self._widths)), np.float32)
+        self._next = 0
+        self.size = 0
+
+    @property
+    def capacity(self) -> int:
+        """Transitions that fit."""
+        return len(self._rows)
+
+    def add(self, transition: Transition) -> int:
+        """Store a transition and return its slot."""
+        scalars = (
+            transition.risk_reward,
+            transition.cost,
+            transition.robustness,
+            transition.next_robustness,
+            transition.terminated,
+        )
+        row = self._rows[self._next]
+        np.concatenate((transition.observation, transition.action, transition.next_observation, scalars), out=row)
+        if not np.isfinite(row).all():
+            raise NotFinite(f"wanted a transition of finite numbers, got {transition}. Check the environment.")
+        slot = self._next
+        self._next = (slot + 1) % self.capacity
+        self.size = max(self.size, slot + 1)
+        return slot
+
+    def gather(self, indices: Indices, weight: Floats) -> Batch:
+        """The transitions at `indices`, with their importance weights."""
+        rows = torch.from_numpy(self._rows.take(indices, axis=0))
+        observation, action, next_observation, *scalars = torch.split(rows, self._widths, dim=1)
+        risk_reward, cost, robustness, next_robustness, terminated = (column.squeeze(1) for column in scalars)
+        return Batch(
+            observation=observation,
+            action=action,
+            risk_reward=risk_reward,
+            cost=cost,
+            robustness=robustness,
+            next_robustness=next_robustness,
+            next_observation=next_observation,
+            terminated=terminated,
+            weight=torch.from_numpy(weight.astype(np.float32)),
+            indices=indices,
+        )
+
+    def state(self) -> dict[str, Any]:
+        """The filled rows and where the next one goes."""
+        return {"rows": torch.from_numpy(self._rows[: self.size].copy()), "next": self._next}
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continue from `state()`."""
+        rows = state["rows"].numpy()
+        if rows.shape[1] != self._rows.shape[1] or len(rows) > self.capacity or not 0 <= state["next"] < self.capacity:
+            raise CheckpointError(
+                f"replay rows in the checkpoint are {rows.shape} with the next at {state['next']}; wanted at most"
+                f" {self._rows.shape}. Resume with the sizes and replay.capacity of the run that wrote it."
+            )
+        self.size = len(rows)
+        self._rows[: self.size] = rows
+        self._next = int(state["next"])
+
+
+class UniformReplay:
+    """Every stored transition is equally likely."""
+
+    def __init__(self, observation_size: int, action_size: int, config: ReplayConfig) -> None:
+        self._storage = Storage(observation_size, action_size, config.capacity)
+
+    def __len__(self) -> int:
+        return self._storage.size
+
+    def add(self, transition: Transition, td_error: float) -> None:
+        """Store a transition; `td_error` has no influence."""
+        self._storage.add(transition)
+
+    def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
+        """Draw uniformly with replacement; all weights are 1."""
+        return self._storage.gather(generator.integers(len(self), size=batch_size), np.ones(batch_size))
+
+    def update(self, indices: Indices, td_errors: Floats) -> None:
+        """Nothing to note."""
+
+    def state(self) -> dict[str, Any]:
+        """The stored transitions."""
+        return self._storage.state()
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continue from `state()`."""
+        self._storage.load(state)
+
+
+class RiskPrioritizedReplay:
+    """RPER: transitions are drawn in proportion to (9) and weighted by (10).
+
+    The measured terms of (9) are kept for every transition, so each leaf of the tree equals (9) under
+    the current scales at any time. The scales are taken from all stored terms again, and the tree is
+    rebuilt, whenever the number of additions has doubled or grown by RESCALE_EVERY.
+    """
+
+    # About 1 ms of work for 100,000 stored, spread over this many additions.
+    RESCALE_EVERY = 1000
+
+    def __init__(self, observation_size: int, action_size: int, config: ReplayConfig) -> None:
+        self._config = config
+        self._storage = Storage(observation_size, action_size, config.capacity)
+        self._terms = np.zeros((3, config.capacity))  # |δ|, R̂, -ρ
+        self._tree = SumTree(config.capacity)
+        self._scales = TermScales(np.zeros(3), np.zeros(3))
+        self._additions = 0
+        self._rescale_at = 1
+
+    def __len__(self) -> int:
+        return self._storage.size
+
+    def add(self, transition: Transition, td_error: float) -> None:
+        """Store a transition with its priority."""
+        terms = (td_error, transition.accumulated_reward, -transition.robustness)
+        if not np.isfinite(terms).all():
+            raise NotFinite(f"|δ|, R̂ and -ρ are {terms}; wanted finite numbers. Check the reward and the monitor.")
+        slot = self._storage.add(transition)
+        self._terms[:, slot] = terms
+        self._additions += 1
+        if self._additions < self._rescale_at:
+            self._refresh(np.array([slot]))
+            return
+        self._rescale_at = self._additions + min(self._additions, self.RESCALE_EVERY)
+        self._scales = TermScales.of(self._terms[:, : len(self)])
+        self._rebuild()
+
+    def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
+        """Draw in proportion to priority, one transition from each of `batch_size` equal slices of the total.
+
+        Choice: stratified, as Schaul et al. do; the expected count of a transition stays batch_size · P(i).
+        """
+        fractions = (np.arange(batch_size) + generator.random(batch_size)) / batch_size
+        indices = self._tree.find(fractions)
+        probabilities = self._tree[indices] / self._tree.total
+        return self._storage.gather(indices, importance_weights(probabilities, len(self), self._config.correction))
+
+    def update(self, indices: Indices, td_errors: Floats) -> None:
+        """Replace |δ| of sampled transitions; of a repeated index the last one holds."""
+        self._terms[0, indices] = td_errors
+        self._refresh(indices)
+
+    def state(self) -> dict[str, Any]:
+        """The stored transitions, their terms and the scales."""
+        return {
+            "storage": self._storage.state(),
+            "terms": torch.from_numpy(self._terms[:, : len(self)].copy()),
+            "lowest": torch.from_numpy(self._scales.lowest.copy()),
+            "inverse_spread": torch.from_numpy(self._scales.inverse_spread.copy()),
+            "additions": self._additions,
+            "rescale_at": self._rescale_at,
+        }
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continue from `state()`."""
+        self._storage.load(state["storage"])
+        self._terms[:, : len(self)] = state["terms"].numpy()
+        self._scales = TermScales(state["lowest"].numpy(), state["inverse_spread"].numpy())
+        self._additions = int(state["additions"])
+        self._rescale_at = int(state["rescale_at"])
+        self._rebuild()
+
+    def _refresh(self, indices: Indices) -> None:
+        self._tree.set(indices, priority(self._terms[:, indices], self._scales, self._config))
+
+    def _rebuild(self) -> None:
+        self._tree.rebuild(priority(self._terms[:, : len(self)], self._scales, self._config))
