@@ -1,0 +1,122 @@
+"""Bayesian optimisation of scenes with BoTorch."""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from risk_sac.config import SceneOptimizerConfig
+from risk_sac.scene_optimizer import surrogate
+from risk_sac.scene_optimizer.base import State, check_identity, check_told
+from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
+from risk_sac.scene_optimizer.sobol import SobolSequence
+from risk_sac.types import Floats
+
+NEIGHBOURS = 64  # candidates around the best observed scenes; Sobol points alone are sparse in 12 dimensions
+PARENTS = 4
+NEIGHBOUR_DEVIATION = 0.1
+
+
+class BotorchOptimizer:
+    """Sobol scenes first, then those of largest log expected improvement under a Gaussian process.
+
+    Choice: the policy changes under the optimiser, so only the newest `config.window` observations are kept, and a
+    share `config.exploration` of scenes is drawn at random.
+
+    Every random number of an ask derives from the seed and the number of asks, so the generator has no state to save
+    and neither reads nor moves a global one.
+    """
+
+    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:  # Alg. 1, l. 1
+        self._identity: State = {"kind": "botorch", "dimension": dimension, "seed": seed}
+        self._dimension = dimension
+        self._config = config
+        self._seed = seed
+        self._sobol = SobolSequence(dimension, seed)
+        self._points: Floats = np.empty((0, dimension))  # n x d, oldest first, n <= window
+        self._returns: Floats = np.empty(0)  # n, R̄_e; NaN = rejected
+        self._maximum: RunningMaximum | None = None
+        self._asked = 0
+        self._told = 0
+        self._fitted_at = 0  # value of _told at the last refit
+        self._hyperparameters: surrogate.Hyperparameters | None = None
+
+    def ask(self) -> Floats:  # Alg. 1, l. 4
+        """See `SceneOptimizer.ask`."""
+        random = np.random.default_rng((self._seed, self._asked))
+        self._asked += 1
+        if self._told < self._config.initial_scenes:
+            return self._sobol.draw()[0].numpy()
+        if random.random() < self._config.exploration:
+            return random.random(self._dimension)
+        values = self._values()
+        if np.ptp(values) == 0:  # nothing tells the scenes apart yet, so keep filling the space
+            return self._sobol.draw()[0].numpy()
+        return self._propose(values, random)
+
+    def tell(self, u: Floats, mean_return: float | None) -> float | None:  # Alg. 1, l. 21-22
+        """See `SceneOptimizer.tell`."""
+        point = check_told(u, mean_return, self._dimension)
+        value = np.nan if mean_return is None else mean_return
+        self._points = np.concatenate((self._points, point[None]))[-self._config.window :]
+        self._returns = np.append(self._returns, value)[-self._config.window :]
+        self._told += 1
+        if mean_return is None:
+            return None
+        self._maximum = update_running_maximum(self._maximum, mean_return, self._config.running_maximum_rate)
+        return objective(mean_return, self._maximum.smoothed)
+
+    def scores(self) -> Floats:
+        """f_e of every kept observation, oldest first, `n`.
+
+        M̄_e moves, so all are recomputed against the current one. Choice: a rejected scene is stated to be as bad as
+        the worst scored one (1 if there is none), so that the model learns to avoid C_hard without the cliff in f
+        that a fixed large penalty would fit.
+        """
+        smoothed = 0.0 if self._maximum is None else self._maximum.smoothed
+        scores = objective(self._returns, smoothed)
+        rejected = np.isnan(scores)
+        worst = scores[~rejected].max() if not rejected.all() else 1.0
+        return np.where(rejected, worst, scores)
+
+    def _values(self) -> Floats:
+        return -self.scores()  # f_e is minimised; this is the only change of its sign
+
+    def _propose(self, values: Floats, random: np.random.Generator) -> Floats:
+        points, targets = torch.from_numpy(self._points), torch.from_numpy(values)
+        if self._hyperparameters is None or self._told - self._fitted_at >= self._config.refit_every:
+            self._hyperparameters = surrogate.fit(points, targets, self._hyperparameters)
+            self._fitted_at = self._told
+        model = surrogate.condition(points, targets, self._hyperparameters)
+        proposal: Floats = surrogate.propose(model, points, self._candidates(values, random)).numpy()
+        return proposal
+
+    def _candidates(self, values: Floats, random: np.random.Generator) -> Tensor:
+        everywhere = SobolSequence(self._dimension, int(random.integers(2**31))).draw(self._config.candidates)
+        parents = self._points[np.argsort(-values, kind="stable")[:PARENTS]]
+        parents = parents[np.arange(NEIGHBOURS) % len(parents)]  # NEIGHBOURS x d
+        near = np.clip(parents + NEIGHBOUR_DEVIATION * random.standard_normal(parents.shape), 0.0, 1.0)
+        return torch.cat((everywhere, torch.from_numpy(near)))
+
+    def state(self) -> State:
+        """See `SceneOptimizer.state`."""
+        return {
+            **self._identity,
+            "position": self._sobol.position,
+            "points": torch.from_numpy(self._points.copy()),
+            "returns": torch.from_numpy(self._returns.copy()),
+            "maximum": None if self._maximum is None else tuple(self._maximum),
+            "asked": self._asked,
+            "told": self._told,
+            "fitted_at": self._fitted_at,
+            "hyperparameters": None if self._hyperparameters is None else dict(self._hyperparameters),
+        }
+
+    def load(self, state: State) -> None:
+        """See `SceneOptimizer.load`."""
+        check_identity(state, self._identity)
+        self._sobol.seek(state["position"])
+        self._points = state["points"].numpy().copy()
+        self._returns = state["returns"].numpy().copy()
+        self._maximum = None if state["maximum"] is None else RunningMaximum(*state["maximum"])
+        self._asked, self._told, self._fitted_at = state["asked"], state["told"], state["fitted_at"]
+        self._hyperparameters = None if state["hyperparameters"] is None else dict(state["hyperparameters"])

@@ -1,0 +1,244 @@
+import io
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.config import SceneOptimizerConfig
+from risk_sac.errors import CheckpointError, NotFinite, SceneError
+from risk_sac.scene_optimizer import (
+    BotorchOptimizer,
+    RunningMaximum,
+    SceneOptimizer,
+    SobolOptimizer,
+    objective,
+    update_running_maximum,
+)
+from risk_sac.types import Floats
+
+QUICK = SceneOptimizerConfig(initial_scenes=6, window=24, refit_every=5, candidates=64)
+KINDS = (SobolOptimizer, BotorchOptimizer)
+returns = st.floats(-100, 100)
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def drive(optimizer: SceneOptimizer, episodes: int, score: Callable[[int, Floats], float | None]) -> Floats:
+    """Scenes asked for, `episodes x d`."""
+    asked = []
+    for episode in range(episodes):
+        u = optimizer.ask()
+        optimizer.tell(u, score(episode, u))
+        asked.append(u)
+    return np.array(asked)
+
+
+def bowl(episode: int, u: Floats) -> float | None:
+    """Deterministic in its arguments; a corner is rejected."""
+    return None if u[0] > 0.8 else float(math.sin(7 * episode) * 0.05 - ((u - 0.3) ** 2).sum())
+
+
+# Equation 11
+
+
+@pytest.mark.parametrize(
+    ("mean_return", "maximum", "expected"),
+    [(0.5, 2.0, 1.5 / 2.001), (2.0, 2.0, 0.0), (3.0, 2.0, 0.0), (-3.0, -1.0, 2 / 1.001), (-0.25, 0.0, 250.0)],
+)
+def test_objective_literals(mean_return, maximum, expected):
+    assert objective(mean_return, maximum) == pytest.approx(expected, rel=1e-12)
+
+
+def test_objective_is_elementwise():
+    scores = objective(np.array([0.5, 2.0, np.nan]), 2.0)
+    np.testing.assert_allclose(scores, [1.5 / 2.001, 0.0, np.nan])
+
+
+@given(returns, returns, returns)
+def test_objective_is_never_negative_and_falls_with_the_return(a, b, maximum):
+    low, high = sorted((a, b))
+    assert 0 <= objective(high, maximum) <= objective(low, maximum)
+
+
+def test_running_maximum_literals():
+    first = update_running_maximum(None, 1.0, 0.1)
+    second = update_running_maximum(first, 3.0, 0.1)
+    third = update_running_maximum(second, 0.0, 0.1)
+    assert first == RunningMaximum(1.0, 1.0)
+    assert second == pytest.approx(RunningMaximum(3.0, 1.2))
+    assert third == pytest.approx(RunningMaximum(3.0, 1.38))
+
+
+@given(st.lists(returns, min_size=1, max_size=30), st.floats(0.01, 1))
+def test_running_maximum_rises_towards_the_largest_return_and_never_past_it(values, rate):
+    maximum = None
+    for value in values:
+        before = maximum
+        maximum = update_running_maximum(before, value, rate)
+        assert maximum.smoothed <= maximum.largest == max(value, before.largest if before else value)
+        assert before is None or maximum.smoothed >= before.smoothed
+
+
+# What both optimisers promise
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_asks_are_points_of_the_unit_cube(kind):
+    asked = drive(kind(3, QUICK, 0), 20, bowl)
+    assert asked.shape == (20, 3)
+    assert asked.dtype == np.float64
+    assert asked.min() >= 0
+    assert asked.max() <= 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_same_seed_asks_the_same_scenes_and_another_seed_others(kind):
+    first, again, other = (drive(kind(3, QUICK, seed), 20, bowl) for seed in (4, 4, 5))
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("interrupted_at", [0, 1, 5, 13, 21])
+def test_resumed_run_equals_one_never_interrupted(kind, interrupted_at):
+    whole = drive(kind(3, QUICK, 1), 30, bowl)
+    before, after = kind(3, QUICK, 1), kind(3, QUICK, 1)
+    drive(before, interrupted_at, bowl)
+    stored = io.BytesIO()
+    torch.save(before.state(), stored)
+    drive(before, 3, bowl)  # a state must not change with the optimiser it was taken from
+    stored.seek(0)
+    after.load(torch.load(stored, weights_only=True))
+    rest = drive(after, 30 - interrupted_at, lambda episode, u: bowl(episode + interrupted_at, u))
+    np.testing.assert_array_equal(rest, whole[interrupted_at:])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_global_generators_and_dtype_are_neither_moved_nor_read(kind):
+    torch.manual_seed(0)
+    torch_before, numpy_before = torch.get_rng_state(), np.random.get_state()[1].copy()  # noqa: NPY002
+    asked = drive(kind(3, QUICK, 2), 20, bowl)
+    assert torch.equal(torch.get_rng_state(), torch_before)
+    np.testing.assert_array_equal(np.random.get_state()[1], numpy_before)  # noqa: NPY002
+    assert torch.get_default_dtype() == torch.float32
+    torch.manual_seed(1)
+    np.testing.assert_array_equal(drive(kind(3, QUICK, 2), 20, bowl), asked)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_tell_returns_the_objective_and_none_for_a_rejected_scene(kind):
+    optimizer = kind(2, QUICK, 0)
+    u = optimizer.ask()
+    assert optimizer.tell(u, None) is None
+    assert optimizer.tell(u, 2.0) == 0.0
+    assert optimizer.tell(u, 0.5) == pytest.approx(1.5 / 2.001)
+    assert optimizer.tell(u, 4.0) == 0.0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_numbers_that_are_not_finite_are_refused(kind, bad):
+    optimizer = kind(2, QUICK, 0)
+    with pytest.raises(NotFinite, match="mean_return"):
+        optimizer.tell(np.array([0.5, 0.5]), bad)
+    with pytest.raises(NotFinite, match="u is"):
+        optimizer.tell(np.array([0.5, bad]), 1.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("bad", [[0.5], [0.5, 1.1], [-0.1, 0.5], [[0.5, 0.5]]])
+def test_points_outside_the_unit_cube_are_refused(kind, bad):
+    with pytest.raises(SceneError, match="wanted"):
+        kind(2, QUICK, 0).tell(np.array(bad), 1.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_state_of_another_optimiser_is_refused(kind):
+    state = kind(2, QUICK, 0).state()
+    with pytest.raises(CheckpointError, match="dimension"):
+        kind(3, QUICK, 0).load(state)
+    with pytest.raises(CheckpointError, match="seed"):
+        kind(2, QUICK, 1).load(state)
+    with pytest.raises(CheckpointError, match="kind"):
+        KINDS[kind is SobolOptimizer](2, QUICK, 0).load(state)
+
+
+# What the Bayesian optimiser adds
+
+
+def test_all_scores_are_recomputed_when_the_maximum_moves():
+    optimizer = BotorchOptimizer(1, SceneOptimizerConfig(running_maximum_rate=1.0), 0)
+    optimizer.tell(np.array([0.1]), 1.0)
+    optimizer.tell(np.array([0.2]), 0.5)
+    np.testing.assert_allclose(optimizer.scores(), [0.0, 0.5 / 1.001])
+    optimizer.tell(np.array([0.3]), 2.0)
+    np.testing.assert_allclose(optimizer.scores(), [1 / 2.001, 1.5 / 2.001, 0.0])
+
+
+def test_rejected_scene_is_stated_to_be_as_bad_as_the_worst():
+    optimizer = BotorchOptimizer(1, SceneOptimizerConfig(running_maximum_rate=1.0), 0)
+    optimizer.tell(np.array([0.1]), None)
+    np.testing.assert_array_equal(optimizer.scores(), [1.0])
+    optimizer.tell(np.array([0.2]), 2.0)
+    optimizer.tell(np.array([0.3]), -1.0)
+    np.testing.assert_allclose(optimizer.scores(), [3 / 2.001, 0.0, 3 / 2.001])
+
+
+def test_only_the_newest_observations_are_kept():
+    optimizer = BotorchOptimizer(1, SceneOptimizerConfig(window=8, running_maximum_rate=1.0), 0)
+    for value in range(20):
+        optimizer.tell(np.array([0.5]), float(value))
+    np.testing.assert_allclose(optimizer.scores(), [objective(float(value), 19.0) for value in range(12, 20)])
+
+
+@pytest.mark.parametrize("score", [lambda episode, u: 0.25, lambda episode, u: None], ids=["equal", "rejected"])
+def test_observations_without_information_fill_the_space(score):
+    asked = drive(BotorchOptimizer(3, QUICK.model_copy(update={"exploration": 0.0}), 0), 40, score)
+    np.testing.assert_array_equal(asked, drive(SobolOptimizer(3, QUICK, 0), 40, score))
+
+
+def test_repeated_scene_and_extreme_returns_do_not_break_the_model():
+    optimizer = BotorchOptimizer(2, QUICK.model_copy(update={"exploration": 0.0}), 0)
+    for value in (1e9, -1e9, 1e-9, 0.0, 1.0, 2.0, 3.0, None):
+        optimizer.tell(np.array([0.5, 0.5]), value)
+        assert np.isfinite(optimizer.ask()).all()
+
+
+def test_exploration_of_one_never_builds_a_model():
+    optimizer = BotorchOptimizer(2, QUICK.model_copy(update={"exploration": 1.0}), 0)
+    drive(optimizer, 20, bowl)
+    assert optimizer.state()["hyperparameters"] is None
+
+
+def test_finds_the_optimum_of_a_noisy_function_far_more_often_than_sobol():
+    centre = np.array([0.2, 0.7, 0.6, 0.35])
+
+    def risk(u: Floats) -> float:
+        return float(np.exp(-8 * ((u[:4] - centre) ** 2).sum()))  # two of six parameters do not matter
+
+    def hits(optimizer: SceneOptimizer, seed: int) -> int:
+        noise = np.random.default_rng(seed + 100).normal(scale=0.1, size=80)
+        asked = drive(optimizer, 80, lambda episode, u: None if u[5] > 0.85 else risk(u) + noise[episode])
+        return sum(risk(u) > 0.6 for u in asked)
+
+    for seed in range(3):
+        found = hits(BotorchOptimizer(6, SceneOptimizerConfig(), seed), seed)
+        by_chance = hits(SobolOptimizer(6, SceneOptimizerConfig(), seed), seed)
+        assert found >= 12
+        assert found >= 4 * by_chance
+
+
+def test_learns_to_avoid_rejected_scenes():
+    optimizer = BotorchOptimizer(2, SceneOptimizerConfig(exploration=0.0), 0)
+    asked = drive(optimizer, 60, lambda episode, u: None if u[0] > 0.5 else float(u[1] + 0.1 * math.sin(episode)))
+    assert (asked[20:, 0] > 0.5).mean() < 0.2
