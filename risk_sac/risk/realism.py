@@ -1,0 +1,116 @@
+"""Realism cost.
+
+C_real(s, a) = C_hard(s, a) + C_soft(s, a)                                           (5)
+
+Choice: C_hard acts on the whole episode. A scene that breaks one of its rules is rejected before the
+first step, so what remains during an episode is C_soft, in [0, 1].
+
+Written in plain floats: for the handful of adversaries of a scene that is faster than numpy.
+
+Source: RISK-SAC, Sec. III-B.
+"""
+
+from collections.abc import Sequence
+from typing import Literal
+
+from risk_sac.types import Floats
+
+JERK_SCALE_MPS3 = 20.0  # at which the jerk term saturates: full braking from rest to 9 m/s² in about 0.5 s
+COMFORT_MPS2 = 3.0  # about what adaptive cruise control keeps to; drivers exceed it in emergencies only
+COMFORT_SHARE = 0.5  # of an actor's limit, where that is less: pedestrians have a comfort level too
+CLOSE_GAP_M = 2.0  # an extreme proximity: less than half a car
+CLOSING_SCALE_MPS = 15.0  # closing speed at which the closeness term saturates; above, no driver could react
+
+MIN_INITIAL_TTC_S = 1.0  # a shorter one leaves a default driver (0.5 s delay) no chance: the scene itself collides
+MIN_INITIAL_GAP_M = 0.5  # bodies placed closer than traffic ever stands
+
+HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc"]
+
+
+def jerk_term(accel_mps2: float, previous_accel_mps2: float, step_s: float) -> float:
+    """Abrupt control of one adversary, min(|Δa| / (dt · scale), 1)."""
+    return min(abs(accel_mps2 - previous_accel_mps2) / (step_s * JERK_SCALE_MPS3), 1.0)
+
+
+def acceleration_term(accel_mps2: float, limit_mps2: float) -> float:
+    """Excess acceleration of one adversary, max(|a| - comfort, 0) / (limit - comfort), at most 1.
+
+    Args:
+      accel_mps2: its acceleration.
+      limit_mps2: greatest absolute acceleration that it is capable of, above 0.
+    """
+    comfort = min(COMFORT_MPS2, COMFORT_SHARE * limit_mps2)
+    return min(max(abs(accel_mps2) - comfort, 0.0) / (limit_mps2 - comfort), 1.0)
+
+
+def closeness_term(gap_m: float, previous_gap_m: float, step_s: float) -> float:
+    """Sudden extreme proximity of one adversary to the ego, nearness · closing speed / scale.
+
+    nearness = max(1 - gap / close, 0) grows from 0 at the edge of the extreme proximity to 1 at contact, and
+    the closing speed is (previous gap - gap) / dt. The product costs only what is both near and sudden: a queue
+    at a light is near but slow, a distant oncoming car is fast but far, and neither is unrealistic. A body that
+    appears inside the close gap within one step, which no physical motion explains, costs the most.
+    """
+    nearness = 1.0 - gap_m / CLOSE_GAP_M
+    closing_mps = (previous_gap_m - gap_m) / step_s
+    if nearness <= 0.0 or closing_mps <= 0.0:
+        return 0.0
+    return min(nearness, 1.0) * min(closing_mps / CLOSING_SCALE_MPS, 1.0)
+
+
+def soft_cost(
+    accel_mps2: Floats | Sequence[float],
+    previous_accel_mps2: Floats | Sequence[float],
+    limit_mps2: Floats | Sequence[float],
+    gap_m: Floats | Sequence[float],
+    previous_gap_m: Floats | Sequence[float],
+    step_s: float,
+) -> float:
+    """Soft realism cost of one step, C_soft(s, a) of (5).
+
+    C_soft = 1/3 · max_k jerk_k + 1/3 · max_k excess_k + 1/3 · max_k closeness_k
+
+    Choice: over the adversaries the worst counts, not the mean, or one adversary could behave as it liked in
+    the shadow of others that do nothing.
+
+    Args:
+      accel_mps2: `n`, acceleration of each adversary in this step.
+      previous_accel_mps2: `n`, in the step before.
+      limit_mps2: `n`, greatest absolute acceleration of each.
+      gap_m: `n`, distance between each adversary's body and the ego's.
+      previous_gap_m: `n`, one step before.
+      step_s: dt.
+
+    Returns:
+      In [0, 1]; 0 without adversaries.
+    """
+    jerk = excess = closeness = 0.0
+    for accel, previous, limit, gap, previous_gap in zip(
+        *map(_as_list, (accel_mps2, previous_accel_mps2, limit_mps2, gap_m, previous_gap_m)), strict=True
+    ):
+        jerk = max(jerk, jerk_term(accel, previous, step_s))
+        excess = max(excess, acceleration_term(accel, limit))
+        closeness = max(closeness, closeness_term(gap, previous_gap, step_s))
+    return (jerk + excess + closeness) / 3.0
+
+
+def broken_hard_rule(overlaps: bool, gap_m: float, ttc_s: float) -> HardRule | None:
+    """C_hard of (5): the rule by which the first frame is physically implausible, or None.
+
+    Args:
+      overlaps: whether any two bodies overlap.
+      gap_m: smallest distance between the ego's body and another.
+      ttc_s: smallest time to collision of the ego.
+    """
+    if overlaps:
+        return "initial_overlap"
+    if gap_m < MIN_INITIAL_GAP_M:
+        return "initial_gap"
+    if ttc_s < MIN_INITIAL_TTC_S:
+        return "initial_ttc"
+    return None
+
+
+def _as_list(values: Floats | Sequence[float]) -> Sequence[float]:
+    # numpy's own scalars are several times slower than floats in the loop above
+    return values if isinstance(values, list | tuple) else values.tolist()  # type: ignore[union-attr]

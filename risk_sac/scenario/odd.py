@@ -1,0 +1,168 @@
+"""From an ODD to the scene space it bounds and the STL requirements it implies.
+
+Source: RISK-SAC, Sec. II-A; ISO 34503 for the ODD's branches.
+"""
+
+from typing import Any, TypeVar
+
+from risk_sac.config import Interval, Odd, Requirement, Settings
+from risk_sac.errors import OddError
+from risk_sac.scenario.space import SceneSpace
+
+GRAVITY_MPS2 = 9.81
+MIN_TTC_S = 1.5  # below it a conflict counts as serious in traffic conflict studies
+PEDESTRIAN_GAP_M = 1.0  # what a driver leaves beside a pedestrian at the very least
+STANDING_MPS = 0.5  # slower than that, an ego counts as standing
+EMERGENCY_BRAKING_MPS2 = 9.0  # of SUMO's default passenger car, on dry asphalt
+BRAKING_HOLD_S = 0.5  # braking shorter than that is a correction, not an emergency stop
+
+# What every value of a field must lie in; an ODD outside it describes no road on Earth.
+SENSIBLE: dict[str, Interval] = {
+    "scenery.lanes": Interval(low=1, high=10),
+    "scenery.speed_limit_mps": Interval(low=1, high=60),
+    "environment.friction": Interval(low=0.05, high=1.2),
+    "environment.visibility_m": Interval(low=1, high=100_000),
+    "dynamic.ego_speed_mps": Interval(low=0, high=60),
+    "dynamic.vehicle_speed_mps": Interval(low=0, high=60),
+    "dynamic.vehicle_accel_mps2": Interval(low=-12, high=12),
+    "dynamic.pedestrian_speed_mps": Interval(low=0, high=10),
+    "dynamic.pedestrian_accel_mps2": Interval(low=-10, high=10),
+}
+
+Branch = TypeVar("Branch", bound=Settings)
+
+
+def intersect(default: Odd, user: Odd) -> Odd:
+    """The ODD that both allow, field by field.
+
+    Args:
+      default: the family's, complete.
+      user: narrows it; a field left out keeps the default's.
+
+    Raises:
+      OddError: a field of the user's is physically senseless or leaves nothing of the default's.
+    """
+    check(user)
+    return Odd(
+        scenery=_intersect_branch("scenery", default.scenery, user.scenery),
+        environment=_intersect_branch("environment", default.environment, user.environment),
+        dynamic=_intersect_branch("dynamic", default.dynamic, user.dynamic),
+    )
+
+
+def check(odd: Odd) -> None:
+    """Refuse an ODD that contradicts physics, whatever the family.
+
+    Raises:
+      OddError: naming the field.
+    """
+    for path, sensible in SENSIBLE.items():
+        interval = field(odd, path)
+        if interval is not None and not (interval.low in sensible and interval.high in sensible):
+            raise _error(path, interval, f"bounds within {_text(sensible)}")
+    for path in ("dynamic.vehicle_accel_mps2", "dynamic.pedestrian_accel_mps2"):
+        interval = field(odd, path)
+        if interval is not None and not interval.low < 0 < interval.high:
+            raise _error(path, interval, "low < 0 < high, so that actors can both brake and accelerate")
+    for path in ("scenery.signal_types", "scenery.crossing_types", "dynamic.actor_kinds"):
+        if field(odd, path) == ():
+            raise _error(path, (), "at least one kind, or the field left out")
+
+
+def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
+    """The scenes that lie in the ODD.
+
+    Args:
+      space: the family's scenes; each parameter may name an ODD field as a further bound.
+      odd: complete for the fields that are named; a field left out bounds nothing.
+
+    Raises:
+      OddError: naming the parameter that is left without a value.
+    """
+    bounds = {}
+    for parameter in space.parameters:
+        interval = field(odd, parameter.odd) if parameter.odd else None
+        if interval is None:
+            continue
+        if interval.low > parameter.high or interval.high < parameter.low:
+            raise _error(
+                str(parameter.odd),
+                interval,
+                f"an overlap with [{parameter.low:g}, {parameter.high:g}] {parameter.unit}, "
+                f"the bounds of scene parameter {parameter.name!r} in the {space.family!r} family",
+            )
+        bounds[parameter.name] = interval
+    return space.narrow(bounds)
+
+
+def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement, ...]:
+    """The STL requirements that an ego has to meet in this ODD, thresholds included.
+
+    - TTC: a second of margin after the ego's reaction, and never under MIN_TTC_S.
+    - RSS: the signals only look at actors whose other margin is used up already, so each says by itself whether a
+      situation is dangerous; one has its slope along the lane, the other across it.
+    - Pedestrians: a minimum gap, unless the ego stands and lets them pass.
+    - Red light: the signal turns negative when the stop line is crossed and is distance before; it is not latched by
+      `historically`, which would keep a legal stop close to the line as the worst margin of the whole episode.
+    - Braking: BRAKING_HOLD_S on end at nine tenths of what the car, or the worst friction of the ODD, friction · g,
+      can give means that the ego had no reserve left.
+
+    Args:
+      odd: complete, as `intersect` returns it.
+      reaction_time_s: of the ego.
+
+    Returns:
+      TTC, RSS and braking always; pedestrians and red light where the ODD has them.
+    """
+    ttc_s = max(MIN_TTC_S, reaction_time_s + 1.0)
+    friction = odd.environment.friction
+    grip_mps2 = EMERGENCY_BRAKING_MPS2 if friction is None else friction.low * GRAVITY_MPS2
+    braking_mps2 = round(0.9 * min(grip_mps2, EMERGENCY_BRAKING_MPS2), 3)
+    requirements = [
+        Requirement(name="safe_ttc", formula=f"ttc_s >= {ttc_s:g}", scale=ttc_s),
+        Requirement(name="rss_longitudinal", formula="rss_longitudinal_m >= 0", scale=10.0),
+        Requirement(name="rss_lateral", formula="rss_lateral_m >= 0", scale=1.0),
+    ]
+    if "pedestrian" in (odd.dynamic.actor_kinds or ()):
+        formula = f"pedestrian_gap_m >= {PEDESTRIAN_GAP_M:g} or ego_speed_mps <= {STANDING_MPS:g}"
+        requirements.append(Requirement(name="pedestrian_gap", formula=formula, scale=5.0))
+    if set(odd.scenery.signal_types or ()) - {"none"}:
+        requirements.append(Requirement(name="no_red_light_entry", formula="red_light_m >= 0", scale=2.0))
+    formula = f"not historically[0,{BRAKING_HOLD_S:g}] (ego_braking_mps2 >= {braking_mps2:g})"
+    requirements.append(Requirement(name="bounded_braking", formula=formula, scale=braking_mps2))
+    return tuple(requirements)
+
+
+def field(odd: Odd, path: str) -> Any:
+    """The value of an ODD field by its dotted path, such as "dynamic.ego_speed_mps"."""
+    branch, name = path.split(".")
+    return getattr(getattr(odd, branch), name)
+
+
+def _intersect_branch(branch: str, default: Branch, user: Branch) -> Branch:
+    values = {}
+    for name in type(default).model_fields:
+        ours, theirs = getattr(default, name), getattr(user, name)
+        if theirs is None or ours is None:
+            values[name] = ours if theirs is None else theirs
+            continue
+        values[name] = common = _common(ours, theirs)
+        if not common:
+            raise _error(f"{branch}.{name}", theirs, f"an overlap with {_text(ours)}, which the family supports")
+    return type(default)(**values)
+
+
+def _common(ours: Any, theirs: Any) -> Any:
+    """Intersection of two intervals or two sets; None or () if it is empty."""
+    if isinstance(ours, Interval):
+        low, high = max(ours.low, theirs.low), min(ours.high, theirs.high)
+        return Interval(low=low, high=high) if low <= high else None
+    return tuple(kind for kind in ours if kind in theirs)
+
+
+def _error(path: str, got: Any, wanted: str) -> OddError:
+    return OddError(f"odd.{path} is {_text(got)}; wanted {wanted}", field=f"odd.{path}")
+
+
+def _text(value: Any) -> str:
+    return f"[{value.low:g}, {value.high:g}]" if isinstance(value, Interval) else f"{{{', '.join(value)}}}"
