@@ -1,0 +1,149 @@
+"""A run's state on disk: written whole or not at all, and read only if every byte is as written.
+
+A file is an 8-byte magic, the SHA-256 of the rest, and a `torch.save` archive that `weights_only=True` reads, so a
+damaged file is told from a good one before anything in it is parsed, and no file can run code.
+"""
+
+import contextlib
+import hashlib
+import io
+import os
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from risk_sac.errors import CheckpointError
+
+State = dict[str, Any]
+"""Nested dicts, lists and tuples of tensors, arrays, None, bool, int (of any size), float, str and bytes."""
+
+MAGIC = b"RISKSAC1"
+_HEADER_BYTES = len(MAGIC) + hashlib.sha256().digest_size
+_ARRAY = "__ndarray__"  # weights_only knows tensors but no arrays: {_ARRAY: tensor} stands for one
+_PLAIN = (type(None), bool, int, float, str, bytes)
+
+
+def save(path: Path, state: State, run_digest: str) -> None:
+    """Replace the checkpoint at `path` in one step; a crash at any moment leaves the old or the new one.
+
+    One writer per path. Tensors are stored as they are on the CPU, views without the storage they look into.
+
+    Args:
+        path: in an existing folder.
+        state: what to store; keys are str or int.
+        run_digest: `RunSpec.digest` of the run it belongs to.
+
+    Raises:
+        OSError: the folder is missing, unwritable or full; an old checkpoint stays as it was.
+        TypeError: the state holds something `load` could not read back; the message says where.
+    """
+    archive = io.BytesIO()
+    torch.save({"run_digest": run_digest, "state": _encode(state, "state")}, archive)
+    payload = archive.getbuffer()
+    temporary = path.with_name(f".{path.name}.tmp")  # same folder: a rename across file systems is not atomic
+    try:
+        with temporary.open("wb") as file:
+            file.write(MAGIC)
+            file.write(hashlib.sha256(payload).digest())
+            file.write(payload)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise
+    _sync_folder(path.parent)  # makes the rename itself survive a power cut
+
+
+def load(path: Path, run_digest: str) -> State:
+    """Read a checkpoint back, tensors on the CPU.
+
+    Raises:
+        CheckpointError: it is missing, is no checkpoint, is damaged, or belongs to another run.
+        OSError: it exists but cannot be read.
+    """
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError as error:
+        raise CheckpointError(f"there is no checkpoint at {path}; start the run from its first episode") from error
+    _verify(content, path)
+    try:
+        stored = torch.load(io.BytesIO(content[_HEADER_BYTES:]), map_location="cpu", weights_only=True)
+        found, state = stored["run_digest"], stored["state"]
+    except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError, TypeError) as error:
+        raise CheckpointError(
+            f"checkpoint {path} is undamaged but holds something else than a run's state; delete it"
+        ) from error
+    if found != run_digest:
+        raise CheckpointError(
+            f"checkpoint {path} belongs to the run {found}; wanted {run_digest}. Its specification has changed since: "
+            "give the new run another folder"
+        )
+    decoded: State = _decode(state)
+    return decoded
+
+
+def _verify(content: bytes, path: Path) -> None:
+    if not content.startswith(MAGIC):
+        raise CheckpointError(
+            f"{path} starts with {content[: len(MAGIC)]!r}; a checkpoint starts with {MAGIC!r}. It was written by "
+            "something else, or its start is damaged; delete it"
+        )
+    stored, actual = content[len(MAGIC) : _HEADER_BYTES], hashlib.sha256(content[_HEADER_BYTES:]).digest()
+    if stored != actual:
+        raise CheckpointError(
+            f"checkpoint {path} is damaged or cut short: its {len(content)} bytes have SHA-256 {actual.hex()}, and "
+            f"{stored.hex() or 'nothing'} was stored; delete it and start the run again"
+        )
+
+
+def _sync_folder(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _encode(value: object, where: str) -> object:
+    """The same tree without arrays, on the CPU and free of autograd; `where` names the spot in errors."""
+    if type(value) in _PLAIN:  # exact: a subclass such as numpy.float64 or an enum would not load
+        return value
+    if isinstance(value, torch.Tensor):
+        return _compact(value.detach().cpu())
+    if isinstance(value, np.ndarray):
+        return {_ARRAY: _tensor_of(value, where)}
+    if isinstance(value, list | tuple) and type(value) in (list, tuple):  # a named tuple would come back as a tuple
+        items = [_encode(item, f"{where}[{index}]") for index, item in enumerate(value)]
+        return items if isinstance(value, list) else tuple(items)
+    if isinstance(value, dict):
+        if not all(type(key) in (str, int) and key != _ARRAY for key in value):
+            raise TypeError(f"{where} has keys {list(value)}; wanted str or int, none of them {_ARRAY!r}")
+        return {key: _encode(item, f"{where}[{key!r}]") for key, item in value.items()}
+    raise TypeError(f"{where} is a {type(value).__name__}; a checkpoint holds tensors, arrays and plain values only")
+
+
+def _compact(tensor: torch.Tensor) -> torch.Tensor:
+    return tensor if tensor.untyped_storage().nbytes() == tensor.nbytes else tensor.clone()
+
+
+def _tensor_of(array: np.ndarray[Any, Any], where: str) -> torch.Tensor:
+    own = array if array.flags.c_contiguous and array.flags.writeable else array.copy(order="C")
+    try:
+        return torch.from_numpy(own)
+    except TypeError as error:
+        raise TypeError(f"{where} is an array of {array.dtype}; wanted numbers or bool") from error
+
+
+def _decode(value: Any) -> Any:
+    if isinstance(value, dict):
+        if _ARRAY in value:
+            return value[_ARRAY].numpy()
+        return {key: _decode(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(_decode(item) for item in value)
+    return value

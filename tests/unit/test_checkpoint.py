@@ -1,0 +1,237 @@
+import errno
+import io
+import os
+import pickle
+from collections import namedtuple
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from risk_sac import checkpoint
+from risk_sac.errors import CheckpointError
+
+RUN = "a" * 64
+
+
+def example_state():
+    torch_generator = torch.Generator().manual_seed(3)
+    parameters = [torch.nn.Parameter(torch.arange(3.0))]
+    optimizer = torch.optim.Adam(parameters, fused=True)
+    parameters[0].sum().backward()
+    optimizer.step()
+    return {
+        "episode": 20,
+        "dual_variable": 0.1 + 0.2,
+        "best": float("inf"),
+        "nothing": None,
+        "flag": True,
+        "name": "ε",
+        "blob": b"\x00\xff",
+        "pair": (1, 2.5),
+        "records": [{"steps": 3}, {"steps": 4}],
+        "weights": torch.linspace(0, 1, 7, dtype=torch.float64),
+        "torch_generator": torch_generator.get_state(),
+        "optimizer": optimizer.state_dict(),
+        "observations": np.arange(12, dtype=np.float32).reshape(3, 4),
+        "mask": np.array([True, False]),
+        "scalar": np.array(2.5),
+        "pcg64": np.random.default_rng(7).bit_generator.state,
+        "mt19937": np.random.MT19937(7).state,
+        "philox": np.random.Philox(7).state,
+    }
+
+
+def assert_same(found, wanted):
+    assert type(found) is type(wanted)
+    if isinstance(wanted, dict):
+        assert list(found) == list(wanted)
+        for key in wanted:
+            assert_same(found[key], wanted[key])
+    elif isinstance(wanted, list | tuple):
+        assert len(found) == len(wanted)
+        for one, other in zip(found, wanted, strict=True):
+            assert_same(one, other)
+    elif isinstance(wanted, torch.Tensor):
+        assert found.dtype == wanted.dtype
+        assert torch.equal(found, wanted)
+    elif isinstance(wanted, np.ndarray):
+        assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape)
+        np.testing.assert_array_equal(found, wanted)
+    else:
+        assert found == wanted
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    path = tmp_path / "run.ckpt"
+    checkpoint.save(path, example_state(), RUN)
+    return path
+
+
+def test_state_survives_the_round_trip_with_types_and_bits(path):
+    assert_same(checkpoint.load(path, RUN), example_state())
+    assert [entry.name for entry in path.parent.iterdir()] == ["run.ckpt"]
+
+
+@pytest.mark.parametrize("kind", [np.random.PCG64, np.random.MT19937, np.random.Philox])
+def test_numpy_generators_continue_where_they_were(tmp_path, kind):
+    before, after = np.random.Generator(kind(1)), np.random.Generator(kind(2))
+    before.random(5)
+    checkpoint.save(tmp_path / "g", {"rng": before.bit_generator.state}, RUN)
+    after.bit_generator.state = checkpoint.load(tmp_path / "g", RUN)["rng"]
+    np.testing.assert_array_equal(after.random(10), before.random(10))
+
+
+@pytest.mark.parametrize(
+    "array",
+    [
+        np.arange(10)[::-2],
+        np.asfortranarray(np.arange(6.0).reshape(2, 3)),
+        np.broadcast_to(np.float32(1), (2, 2)),
+        np.empty((0, 4)),
+        np.array([2**63], dtype=np.uint64),
+    ],
+    ids=["reversed", "fortran", "read-only", "empty", "uint64"],
+)
+def test_unusual_arrays_survive(tmp_path, array):
+    checkpoint.save(tmp_path / "a", {"array": array}, RUN)
+    assert_same(checkpoint.load(tmp_path / "a", RUN)["array"], array)
+
+
+def test_loaded_arrays_can_be_written_to(path):
+    loaded = checkpoint.load(path, RUN)["observations"]
+    loaded[0, 0] = 5
+
+
+def test_view_does_not_drag_its_whole_storage_along(tmp_path):
+    big, big_array = torch.zeros(1_000_000), np.zeros(1_000_000)
+    checkpoint.save(tmp_path / "v", {"few": big[:10], "array": big_array[:10]}, RUN)
+    assert (tmp_path / "v").stat().st_size < 10_000
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.0001, 0.001, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.9999])
+def test_truncation_is_noticed(path, fraction):
+    content = path.read_bytes()
+    path.write_bytes(content[: int(len(content) * fraction)])
+    with pytest.raises(CheckpointError, match=r"run\.ckpt"):
+        checkpoint.load(path, RUN)
+
+
+def test_truncation_around_the_header_and_by_one_byte_is_noticed(path):
+    content = path.read_bytes()
+    for length in (*range(60), len(content) - 1):
+        path.write_bytes(content[:length])
+        with pytest.raises(CheckpointError, match=r"run\.ckpt"):
+            checkpoint.load(path, RUN)
+    path.write_bytes(content + b"\x00")
+    with pytest.raises(CheckpointError, match="damaged"):
+        checkpoint.load(path, RUN)
+
+
+def test_every_flipped_bit_is_noticed(path):
+    content = path.read_bytes()
+    positions = np.random.default_rng(0).integers(len(content) * 8, size=50)
+    for position in (0, 70, *positions):
+        damaged = bytearray(content)
+        damaged[position // 8] ^= 1 << (position % 8)
+        path.write_bytes(damaged)
+        with pytest.raises(CheckpointError, match="damaged"):
+            checkpoint.load(path, RUN)
+
+
+def test_missing_file_is_named(tmp_path):
+    with pytest.raises(CheckpointError, match=r"no checkpoint at .*gone\.ckpt"):
+        checkpoint.load(tmp_path / "gone.ckpt", RUN)
+
+
+def test_checkpoint_of_another_run_is_refused(path):
+    with pytest.raises(CheckpointError, match=r"belongs to the run aaaa.*wanted bbbb"):
+        checkpoint.load(path, "b" * 64)
+
+
+def test_file_of_another_program_is_refused(tmp_path):
+    path = tmp_path / "model.pt"
+    torch.save({"weights": torch.zeros(2)}, path)
+    with pytest.raises(CheckpointError, match="starts with b'PK"):
+        checkpoint.load(path, RUN)
+
+
+class Bomb:
+    def __reduce__(self):
+        return os.mkdir, ("bomb",)
+
+
+@pytest.mark.parametrize("content", [Bomb(), [1, 2], {"state": {}}], ids=["code", "list", "no digest"])
+def test_well_signed_file_with_foreign_content_is_refused_and_never_run(tmp_path, monkeypatch, content):
+    monkeypatch.chdir(tmp_path)
+    archive = io.BytesIO()
+    torch.save(content, archive, pickle_module=pickle)
+    payload = archive.getvalue()
+    path = tmp_path / "x"
+    path.write_bytes(checkpoint.MAGIC + checkpoint.hashlib.sha256(payload).digest() + payload)
+    with pytest.raises(CheckpointError, match="something else"):
+        checkpoint.load(path, RUN)
+    assert not (tmp_path / "bomb").exists()
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        ({"a": [0, np.float64(1)]}, r"state\['a'\]\[1\] is a float64"),
+        ({"a": {1, 2}}, r"state\['a'\] is a set"),
+        ({"a": np.array(["x"])}, r"state\['a'\] is an array of <U1"),
+        ({"a": namedtuple("Pair", "a b")(1, 2)}, r"state\['a'\] is a Pair"),
+        ({2.5: 0}, "state has keys"),
+        ({"__ndarray__": 0}, "state has keys"),
+    ],
+)
+def test_what_could_not_be_read_back_is_refused_when_saving(path, value, message):
+    before = path.read_bytes()
+    with pytest.raises(TypeError, match=message):
+        checkpoint.save(path, value, RUN)
+    assert path.read_bytes() == before
+
+
+def test_missing_folder_is_an_os_error(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        checkpoint.save(tmp_path / "gone" / "run.ckpt", {}, RUN)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes anywhere")
+def test_unwritable_folder_leaves_the_old_checkpoint(path):
+    path.parent.chmod(0o500)
+    try:
+        with pytest.raises(PermissionError):
+            checkpoint.save(path, {"episode": 40}, RUN)
+    finally:
+        path.parent.chmod(0o700)
+    assert_same(checkpoint.load(path, RUN), example_state())
+
+
+def test_temporary_name_that_cannot_be_opened_leaves_the_old_checkpoint(path):
+    (path.parent / ".run.ckpt.tmp").mkdir()
+    with pytest.raises(IsADirectoryError):
+        checkpoint.save(path, {"episode": 40}, RUN)
+    assert_same(checkpoint.load(path, RUN), example_state())
+
+
+@pytest.mark.parametrize("function", ["fsync", "replace"])
+def test_full_disk_leaves_the_old_checkpoint_and_no_litter(path, monkeypatch, function):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, function, full)
+    with pytest.raises(OSError, match="No space left"):
+        checkpoint.save(path, {"episode": 40}, RUN)
+    monkeypatch.undo()
+    assert [entry.name for entry in path.parent.iterdir()] == ["run.ckpt"]
+    assert_same(checkpoint.load(path, RUN), example_state())
+
+
+def test_leftover_of_a_killed_writer_is_overwritten(path):
+    (path.parent / ".run.ckpt.tmp").write_bytes(b"half a checkpoint")
+    checkpoint.save(path, {"episode": 40}, RUN)
+    assert checkpoint.load(path, RUN) == {"episode": 40}
+    assert [entry.name for entry in path.parent.iterdir()] == ["run.ckpt"]
