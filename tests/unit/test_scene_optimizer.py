@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
@@ -64,6 +64,7 @@ def test_objective_is_elementwise():
     np.testing.assert_allclose(scores, [1.5 / 2.001, 0.0, np.nan])
 
 
+@settings(deadline=None)
 @given(returns, returns, returns)
 def test_objective_is_never_negative_and_falls_with_the_return(a, b, maximum):
     low, high = sorted((a, b))
@@ -79,6 +80,7 @@ def test_running_maximum_literals():
     assert third == pytest.approx(RunningMaximum(3.0, 1.38))
 
 
+@settings(deadline=None)
 @given(st.lists(returns, min_size=1, max_size=30), st.floats(0.01, 1))
 def test_running_maximum_rises_towards_the_largest_return_and_never_past_it(values, rate):
     maximum = None
