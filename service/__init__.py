@@ -1,0 +1,1 @@
+"""RISK-SAC as a service: campaigns over REST, executed in worker processes."""

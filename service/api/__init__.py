@@ -1,0 +1,1 @@
+"""Routes, thin: parse, call the manager or the store, map errors once."""

@@ -1,0 +1,67 @@
+"""Records as response bodies."""
+
+from risk_sac.types import Outcome
+from service import records
+from service.errors import StorageError
+from service.progress import progress
+from service.schemas import Campaign, CampaignSummary, Episode, Failure, Run
+from service.series import load_series
+from service.settings import ServiceSettings
+
+
+def campaign_body(campaign: records.Campaign, settings: ServiceSettings) -> Campaign:
+    """A campaign in full."""
+    return Campaign(
+        **dict(summary_body(campaign, settings)),
+        runs=[Run.model_validate(run) for run in campaign.runs],
+        spec=campaign.spec,
+    )
+
+
+def summary_body(campaign: records.Campaign, settings: ServiceSettings) -> CampaignSummary:
+    """A campaign in a list."""
+    return CampaignSummary.model_validate(
+        {
+            "id": campaign.id,
+            "label": campaign.spec.label,
+            "state": campaign.state,
+            "reason": campaign.reason,
+            "created_at": campaign.created_at,
+            "started_at": campaign.started_at,
+            "finished_at": campaign.finished_at,
+            "progress": progress(campaign, settings.max_workers),
+        }
+    )
+
+
+def episode_body(episode: records.Episode) -> Episode:
+    """An episode in a list."""
+    return Episode.model_validate(_fields(episode))
+
+
+def failure_body(campaign_id: str, episode: records.Episode, settings: ServiceSettings) -> Failure:
+    """A contact with its time series, or with the reason why there is none."""
+    body = _fields(episode)
+    try:
+        if episode.series is None:
+            raise StorageError("no time series was recorded")
+        folder = settings.run_folder(campaign_id, episode.run_id) / "failures"
+        body |= {"series": load_series(folder / episode.series), "series_problem": None}
+    except StorageError as error:
+        body |= {"series": None, "series_problem": str(error)}
+    return Failure.model_validate(body)
+
+
+def tier_outcomes(tier: str) -> tuple[Outcome, ...]:
+    """Outcomes that a tier of failures admits: `valid`, or `raw` for all contacts."""
+    return (Outcome.FAILURE,) if tier == "valid" else (Outcome.FAILURE, Outcome.DEGENERATE)
+
+
+def _fields(episode: records.Episode) -> dict[str, object]:
+    record = episode.record
+    names = (name for name in Episode.model_fields if name not in ("id", "run_id", "wall_s"))
+    return {name: getattr(record, name) for name in names} | {
+        "id": episode.id,
+        "run_id": episode.run_id,
+        "wall_s": episode.wall_s,
+    }

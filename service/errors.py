@@ -1,0 +1,40 @@
+"""Errors of the service; `service.api.problems` maps them to HTTP statuses.
+
+RiskSacError
+└── ServiceError
+    ├── NotFoundError      no such campaign, run or failure
+    ├── CursorError        a page cursor that this service did not issue
+    ├── StorageError       the database or the data folder refused
+    └── TransitionError    a change of state that the table of transitions does not allow
+"""
+
+from risk_sac.errors import RiskSacError
+
+
+class ServiceError(RiskSacError):
+    """Root of the service's errors."""
+
+
+class NotFoundError(ServiceError):
+    """Nothing has this id; `field` is the path parameter and `got` its value."""
+
+    def __init__(self, message: str, *, field: str, got: str) -> None:
+        super().__init__(message)
+        self.field = field
+        self.got = got
+
+
+class CursorError(ServiceError):
+    """A page cursor that was not issued by this service."""
+
+    def __init__(self, got: str) -> None:
+        super().__init__(f"cursor is {got!r}; wanted the `next` of an earlier page, unchanged")
+        self.got = got
+
+
+class StorageError(ServiceError):
+    """The database or the data folder refused a read or a write; the message is the reason."""
+
+
+class TransitionError(ServiceError):
+    """A state change outside the table of transitions: a bug, never a user's mistake."""

@@ -1,0 +1,33 @@
+"""Exclusive use of a folder by one process, given back by the kernel when that process dies."""
+
+import fcntl
+from pathlib import Path
+from typing import IO
+
+from service.errors import StorageError
+
+
+def try_lock(folder: Path) -> IO[bytes]:
+    """Lock a folder; close the returned file to give it back.
+
+    Raises:
+      StorageError: another process holds it.
+    """
+    handle = _open(folder)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        handle.close()
+        raise StorageError(f"folder {str(folder)!r} is in use by another process; stop it or use another") from error
+    return handle
+
+
+def wait_for_lock(folder: Path) -> IO[bytes]:
+    """Lock a folder once its holder lets go; close the returned file to give it back."""
+    handle = _open(folder)
+    fcntl.flock(handle, fcntl.LOCK_EX)
+    return handle
+
+
+def _open(folder: Path) -> IO[bytes]:
+    return (folder / ".lock").open("ab")

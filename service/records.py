@@ -1,0 +1,89 @@
+"""What the store hands out: frozen snapshots of campaigns, runs and episodes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.types import EpisodeRecord, RunMetrics
+from service.campaigns import State
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """One run of a campaign. Times are seconds since the epoch."""
+
+    number: int  # in the order of the queue, over all campaigns
+    campaign_id: str
+    id: str  # family-method-seed, unique within the campaign
+    family: str
+    method: str
+    seed: int
+    spec_digest: str
+    state: State
+    reason: str | None  # why it failed
+    started_at: float | None
+    finished_at: float | None
+    episodes_total: int  # search and evaluation
+    episodes_done: int
+    rejected: int
+    raw_collisions: int
+    failures: int
+    busy_s: float  # wall time spent so far, earlier attempts included
+    metrics: RunMetrics | None
+    evaluation: RunMetrics | None
+    digest: str | None  # of the results; None until it succeeded
+    versions: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Campaign:
+    """A campaign with its runs in the order they are queued."""
+
+    number: int
+    id: str
+    spec: CampaignSpec
+    state: State
+    reason: str | None
+    created_at: float
+    started_at: float | None
+    finished_at: float | None
+    runs: tuple[Run, ...]
+
+    def run_spec(self, run: Run) -> RunSpec:
+        """What a worker needs to know to execute one of the runs."""
+        alone = {"families": (run.family,), "methods": (run.method,), "seeds": (run.seed,)}
+        (spec,) = self.spec.model_copy(update=alone).runs()
+        return spec
+
+    def failed(self, reason: str) -> "Campaign":
+        """The same campaign, failed for a reason that could not be written down yet."""
+        runs = tuple(run if run.state.final else replace(run, state=State.FAILED, reason=reason) for run in self.runs)
+        return replace(self, state=State.FAILED, reason=reason, runs=runs)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Episode:
+    """One stored episode."""
+
+    number: int  # in the order of arrival, over all campaigns
+    run_id: str
+    record: EpisodeRecord
+    series: str | None  # file name of its full time series
+    wall_s: float
+
+    @property
+    def id(self) -> str:
+        """Unique within the campaign, and the same whenever the same campaign is run again."""
+        return f"{self.run_id}-{self.record.phase}-{self.record.index}"
+
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page(Generic[T]):
+    """A part of a list; `last` is the number to continue after, None at the end."""
+
+    items: tuple[T, ...]
+    last: int | None
