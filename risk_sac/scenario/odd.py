@@ -117,7 +117,7 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
     ttc_s = max(MIN_TTC_S, reaction_time_s + 1.0)
     friction = odd.environment.friction
     grip_mps2 = EMERGENCY_BRAKING_MPS2 if friction is None else friction.low * GRAVITY_MPS2
-    braking_mps2 = round(0.9 * min(grip_mps2, EMERGENCY_BRAKING_MPS2), 3)
+    braking_mps2 = round(0.9 * min(grip_mps2, EMERGENCY_BRAKING_MPS2), 2)
     requirements = [
         Requirement(name="safe_ttc", formula=f"ttc_s >= {ttc_s:g}", scale=ttc_s),
         Requirement(name="rss_longitudinal", formula="rss_longitudinal_m >= 0", scale=10.0),

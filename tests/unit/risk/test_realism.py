@@ -1,0 +1,81 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.risk.realism import (
+    CLOSE_GAP_M,
+    acceleration_term,
+    broken_hard_rule,
+    closeness_term,
+    jerk_term,
+    soft_cost,
+)
+
+
+def test_jerk_is_measured_against_its_scale() -> None:
+    assert jerk_term(1.0, 0.0, 0.1) == pytest.approx(0.5)  # 10 of 20 m/s³
+    assert jerk_term(0.0, 1.0, 0.1) == pytest.approx(0.5)
+    assert jerk_term(8.0, -8.0, 0.1) == 1.0
+
+
+def test_acceleration_costs_only_beyond_comfort() -> None:
+    assert acceleration_term(-3.0, 8.0) == 0.0
+    assert acceleration_term(-5.5, 8.0) == pytest.approx(0.5)  # half way from 3 to 8
+    assert acceleration_term(8.0, 8.0) == 1.0
+    assert acceleration_term(9.0, 8.0) == 1.0
+
+
+def test_a_pedestrians_comfort_is_half_of_its_limit() -> None:
+    assert acceleration_term(1.5, 3.0) == 0.0
+    assert acceleration_term(2.25, 3.0) == pytest.approx(0.5)
+
+
+def test_closeness_costs_what_is_both_near_and_sudden() -> None:
+    assert closeness_term(0.5, 1.25, 0.1) == pytest.approx(0.375)  # nearness 0.75, closing at 7.5 of 15 m/s
+    assert closeness_term(0.5, 0.5, 0.1) == 0.0  # near, standing
+    assert closeness_term(0.5, 2.0, 0.1) == pytest.approx(0.75)
+    assert closeness_term(30.0, 33.0, 0.1) == 0.0  # fast, far
+    assert closeness_term(0.5, 0.2, 0.1) == 0.0  # opening
+    assert closeness_term(0.0, 9.0, 0.1) == 1.0
+
+
+def test_soft_cost_is_the_mean_of_the_worst_terms() -> None:
+    # jerk 0.5 of the first, excess 0.5 and no jerk of the second, closeness 0.375 of the second
+    cost = soft_cost([1.0, -5.5], [0.0, -5.5], [8.0, 8.0], [20.0, 0.5], [20.0, 1.25], 0.1)
+    assert cost == pytest.approx((0.5 + 0.5 + 0.375) / 3)
+
+
+def test_soft_cost_takes_arrays_and_lists_alike() -> None:
+    columns = [[1.0, -4.0], [0.5, 2.0], [8.0, 3.0], [1.0, 3.0], [1.5, 2.0]]
+    assert soft_cost(*map(np.array, columns), 0.1) == soft_cost(*columns, 0.1)
+
+
+def test_without_adversaries_nothing_costs() -> None:
+    assert soft_cost([], [], [], [], [], 0.1) == 0.0
+
+
+def test_calm_driving_costs_nothing() -> None:
+    assert soft_cost([0.0], [0.0], [8.0], [CLOSE_GAP_M], [CLOSE_GAP_M + 1], 0.1) == 0.0
+
+
+accels, gaps = st.floats(-50, 50), st.floats(0, 100)
+
+
+@given(st.lists(st.tuples(accels, accels, st.floats(0.1, 12), gaps, gaps), max_size=6), st.sampled_from([0.05, 0.1]))
+def test_soft_cost_stays_in_the_unit_interval(rows: list[tuple[float, ...]], step_s: float) -> None:
+    columns = [list(column) for column in zip(*rows, strict=True)] or [[]] * 5
+    assert 0.0 <= soft_cost(*columns, step_s) <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("overlaps", "gap_m", "ttc_s", "rule"),
+    [
+        (True, 0.0, 0.0, "initial_overlap"),
+        (False, 0.2, 10.0, "initial_gap"),
+        (False, 5.0, 0.9, "initial_ttc"),
+        (False, 0.5, 1.0, None),
+    ],
+)
+def test_each_hard_rule_is_named(overlaps: bool, gap_m: float, ttc_s: float, rule: str | None) -> None:
+    assert broken_hard_rule(overlaps, gap_m, ttc_s) == rule

@@ -1,0 +1,88 @@
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.config import RewardConfig
+from risk_sac.risk import reward
+
+CONFIG = RewardConfig(valid_collision=10, degenerate_collision=2, ttc_weight=0.1, ttc_scale_s=2.0, rss_weight=0.05)
+finite = st.floats(-1e3, 1e3)
+
+
+def test_each_term_of_the_risk_reward_matches_its_hand_computed_value() -> None:
+    assert reward.collision_bonus(1.0, 10.0) == 10.0
+    assert reward.degenerate_penalty(1.0, 2.0) == 2.0
+    assert reward.near_miss(2.0, 0.1, 2.0) == pytest.approx(0.036787944117144235)  # 0.1 / e
+    assert reward.rss_violation(-1.0, -0.1, 0.05) == 0.05
+
+
+@pytest.mark.parametrize(("longitudinal_m", "lateral_m"), [(-1.0, 0.0), (0.0, -1.0), (1.0, 1.0)])
+def test_one_violated_rss_margin_is_no_danger(longitudinal_m: float, lateral_m: float) -> None:
+    assert reward.rss_violation(longitudinal_m, lateral_m, 0.05) == 0.0
+
+
+def test_risk_reward_adds_its_terms() -> None:
+    dense = 0.1 * math.exp(-0.5)
+    assert reward.risk_reward(1.0, -1.0, -1.0, 1.0, 0.0, CONFIG) == pytest.approx(10.05 + dense)
+    assert reward.risk_reward(1.0, -1.0, 1.0, 0.0, 1.0, CONFIG) == pytest.approx(dense - 2.0)
+
+
+def test_degenerate_contact_never_pays_more_than_no_contact() -> None:
+    for ttc_s in (0.0, 0.5, 10.0):
+        contact = reward.risk_reward(ttc_s, -1.0, -1.0, 0.0, 1.0, CONFIG)
+        assert contact < reward.risk_reward(ttc_s, 1.0, 1.0, 0.0, 0.0, CONFIG)
+
+
+@given(st.floats(0, 10), st.floats(0, 10))
+def test_near_miss_falls_with_ttc_and_stays_within_its_weight(one: float, other: float) -> None:
+    low, high = sorted((one, other))
+    assert 0.0 <= reward.near_miss(high, 0.1, 1.0) <= reward.near_miss(low, 0.1, 1.0) <= 0.1
+
+
+def test_floats_arrays_and_tensors_agree() -> None:
+    columns = [[0.5, 3.0], [-1.0, 2.0], [-0.5, -1.0], [1.0, 0.0], [0.0, 1.0]]
+    floats = [reward.risk_reward(*row, CONFIG) for row in zip(*columns, strict=True)]
+    arrays = reward.risk_reward(*map(np.array, columns), CONFIG)
+    tensors = reward.risk_reward(*(torch.tensor(c, dtype=torch.float64) for c in columns), CONFIG)
+    np.testing.assert_allclose(arrays, floats, rtol=1e-15)
+    np.testing.assert_allclose(tensors.numpy(), floats, rtol=1e-7)  # torch raises e to a power in single precision
+
+
+def test_penalised_reward_is_equation_3() -> None:
+    assert reward.penalised_reward(1.0, 0.4, 2.5) == 0.0
+    assert reward.penalised_reward(1.0, 0.4, 0.0) == 1.0
+
+
+def test_shaping_is_equation_6() -> None:
+    assert reward.shaping(2.0, 3.0, 0.5) == -0.5
+
+
+def test_shaped_reward_is_equation_8_to_the_letter_when_nothing_is_terminal() -> None:
+    # R - γ ρ(s') + ρ(s) = 1 - 0.5 · 3 + 2
+    assert reward.shaped_reward(1.0, 2.0, 3.0, 0.5, 0.0) == 1.5
+
+
+def test_terminal_states_have_potential_zero() -> None:
+    assert reward.shaped_reward(1.0, 2.0, -3.0, 0.5, 1.0) == 3.0
+    shaped = reward.shaped_reward(*(torch.tensor([x, x]) for x in (1.0, 2.0, -3.0)), 0.5, torch.tensor([0.0, 1.0]))
+    assert shaped.tolist() == [4.5, 3.0]
+
+
+@given(finite, finite, finite, st.floats(0.01, 0.99))
+def test_shaped_reward_equals_reward_plus_shaping_of_the_potentials(r: float, a: float, b: float, g: float) -> None:
+    shaping = reward.shaping(reward.potential(a), reward.potential(b), g)
+    assert reward.shaped_reward(r, a, b, g, 0.0) == pytest.approx(r + shaping, abs=1e-9)
+
+
+@given(st.lists(st.floats(-3, 3), min_size=2, max_size=50), st.floats(0.5, 0.999))
+def test_shaping_of_an_episode_telescopes_to_the_first_states_potential(robustness: list[float], g: float) -> None:
+    """The policy cannot change Σ γ^t F = -φ(s_0), so the optimal policy stays the same."""
+    last = len(robustness) - 2
+    total = sum(
+        g**t * reward.shaped_reward(0.0, robustness[t], robustness[t + 1], g, float(t == last)) for t in range(last + 1)
+    )
+    assert total == pytest.approx(-reward.potential(robustness[0]), abs=1e-9)

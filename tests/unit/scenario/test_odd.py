@@ -1,0 +1,140 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.config import DynamicElements, Environment, Interval, Odd, Scenery
+from risk_sac.errors import OddError
+from risk_sac.scenario.odd import intersect, narrow, requirements_from_odd
+from risk_sac.scenario.space import Parameter, SceneSpace
+
+
+def interval(low: float, high: float) -> Interval:
+    return Interval(low=low, high=high)
+
+
+DEFAULT = Odd(
+    scenery=Scenery(
+        lanes=interval(2, 3),
+        speed_limit_mps=interval(8, 16),
+        signal_types=("fixed_time", "none"),
+        crossing_types=("none", "zebra"),
+    ),
+    environment=Environment(friction=interval(0.5, 1.0), visibility_m=interval(100, 2000)),
+    dynamic=DynamicElements(
+        actor_kinds=("pedestrian", "vehicle"),
+        ego_speed_mps=interval(0, 15),
+        vehicle_speed_mps=interval(0, 20),
+        vehicle_accel_mps2=interval(-8, 3),
+        pedestrian_speed_mps=interval(0, 4),
+        pedestrian_accel_mps2=interval(-4, 3),
+    ),
+)
+SPACE = SceneSpace(
+    "low",
+    (
+        Parameter("lead_speed_mps", "m/s", 5, 18, "speed of the leader", "dynamic.vehicle_speed_mps"),
+        Parameter("gap_m", "m", 5, 40, "gap to the leader"),
+    ),
+)
+
+
+def test_an_empty_odd_is_the_default() -> None:
+    assert intersect(DEFAULT, Odd()) == DEFAULT
+
+
+def test_intersection_narrows_the_given_fields_and_keeps_the_rest() -> None:
+    user = Odd(scenery=Scenery(signal_types=("none",)), dynamic=DynamicElements(vehicle_speed_mps=interval(10, 30)))
+    both = intersect(DEFAULT, user)
+    assert both.dynamic.vehicle_speed_mps == interval(10, 20)
+    assert both.scenery.signal_types == ("none",)
+    assert both.environment == DEFAULT.environment
+    assert both.dynamic.actor_kinds == DEFAULT.dynamic.actor_kinds
+
+
+@given(st.tuples(st.floats(0, 60), st.floats(0, 60)).map(sorted))
+def test_intersection_is_the_set_of_common_values(bounds: list[float]) -> None:
+    low, high = bounds
+    user = Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(low, high)))
+    if low > 20:
+        with pytest.raises(OddError, match="vehicle_speed_mps"):
+            intersect(DEFAULT, user)
+    else:
+        assert intersect(DEFAULT, user).dynamic.vehicle_speed_mps == interval(low, min(high, 20))
+
+
+@pytest.mark.parametrize(
+    ("user", "field", "message"),
+    [
+        (
+            Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(25, 30))),
+            "odd.dynamic.vehicle_speed_mps",
+            r"odd.dynamic.vehicle_speed_mps is \[25, 30\]; wanted an overlap with \[0, 20\]",
+        ),
+        (
+            Odd(scenery=Scenery(crossing_types=("signalised",))),
+            "odd.scenery.crossing_types",
+            r"is \{signalised\}; wanted an overlap with \{none, zebra\}",
+        ),
+        (Odd(scenery=Scenery(signal_types=())), "odd.scenery.signal_types", "wanted at least one kind"),
+        (Odd(dynamic=DynamicElements(actor_kinds=())), "odd.dynamic.actor_kinds", "wanted at least one kind"),
+        (Odd(dynamic=DynamicElements(ego_speed_mps=interval(-1, 10))), "odd.dynamic.ego_speed_mps", r"\[0, 60\]"),
+        (Odd(environment=Environment(friction=interval(0, 1))), "odd.environment.friction", r"\[0.05, 1.2\]"),
+        (Odd(environment=Environment(friction=interval(0.5, 1.3))), "odd.environment.friction", r"\[0.05, 1.2\]"),
+        (Odd(environment=Environment(visibility_m=interval(-5, 9))), "odd.environment.visibility_m", "wanted"),
+        (Odd(scenery=Scenery(lanes=interval(0, 2))), "odd.scenery.lanes", r"\[1, 10\]"),
+        (
+            Odd(dynamic=DynamicElements(vehicle_accel_mps2=interval(1, 3))),
+            "odd.dynamic.vehicle_accel_mps2",
+            "low < 0 < high",
+        ),
+        (
+            Odd(dynamic=DynamicElements(pedestrian_accel_mps2=interval(-2, 0))),
+            "odd.dynamic.pedestrian_accel_mps2",
+            "low < 0 < high",
+        ),
+    ],
+)
+def test_a_bad_odd_is_refused_by_field_with_got_and_wanted(user: Odd, field: str, message: str) -> None:
+    with pytest.raises(OddError, match=message) as caught:
+        intersect(DEFAULT, user)
+    assert caught.value.field == field
+
+
+def test_the_odd_narrows_the_parameters_that_name_one_of_its_fields() -> None:
+    odd = intersect(DEFAULT, Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(10, 12))))
+    speed, gap = narrow(SPACE, odd).parameters
+    assert (speed.low, speed.high) == (10, 12)
+    assert (gap.low, gap.high) == (5, 40)
+
+
+def test_an_odd_that_empties_the_space_names_the_parameter() -> None:
+    odd = intersect(DEFAULT, Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(19, 20))))
+    with pytest.raises(OddError, match=r"\[19, 20\]; wanted an overlap with \[5, 18\] m/s.*'lead_speed_mps'") as caught:
+        narrow(SPACE, odd)
+    assert caught.value.field == "odd.dynamic.vehicle_speed_mps"
+
+
+def test_requirements_follow_the_odd() -> None:
+    everything = {r.name for r in requirements_from_odd(DEFAULT, 0.5)}
+    assert everything == {
+        "safe_ttc",
+        "rss_longitudinal",
+        "rss_lateral",
+        "pedestrian_gap",
+        "no_red_light_entry",
+        "bounded_braking",
+    }
+    motorway = Odd(scenery=Scenery(signal_types=("none",)), dynamic=DynamicElements(actor_kinds=("vehicle",)))
+    left_out = everything - {r.name for r in requirements_from_odd(intersect(DEFAULT, motorway), 0.5)}
+    assert left_out == {"pedestrian_gap", "no_red_light_entry"}
+
+
+def test_thresholds_follow_the_odd_and_the_reaction_time() -> None:
+    slow = {r.name: r.formula for r in requirements_from_odd(DEFAULT, 1.2)}
+    assert slow["safe_ttc"] == "ttc_s >= 2.2"
+    # 0.9 · 0.5 · 9.81
+    assert slow["bounded_braking"] == "not historically[0,0.5] (ego_braking_mps2 >= 4.41)"
+    dry = intersect(DEFAULT, Odd(environment=Environment(friction=interval(1.0, 1.0))))
+    quick = {r.name: r.formula for r in requirements_from_odd(dry, 0.1)}
+    assert quick["safe_ttc"] == "ttc_s >= 1.5"
+    assert quick["bounded_braking"].endswith(">= 8.1)")  # 0.9 · min(9.81, 9)
