@@ -86,7 +86,8 @@ class SceneOptimizerConfig(Settings):
     initial_scenes: Annotated[int, Field(ge=2, le=1000)] = 16
     """Sobol scenes before the first model."""
     window: Annotated[int, Field(ge=8, le=1000)] = 150
-    """Newest observations the model is fitted to: the policy changes, so old scores go stale."""
+    """Newest observations the model is fitted to: the policy changes, so old scores go stale. An ask takes about
+    0.05 s at 150, 0.1 s at 300 and seconds at 1000."""
     refit_every: Annotated[int, Field(ge=1)] = 10
     """Observations between two fits of the kernel's hyper-parameters."""
     candidates: Annotated[int, Field(ge=16, le=8192)] = 256
@@ -94,7 +95,7 @@ class SceneOptimizerConfig(Settings):
     exploration: Fraction = 0.25
     """Share of scenes drawn at random, so that no region is given up."""
     running_maximum_rate: Annotated[float, Field(gt=0, le=1)] = 0.1
-    """Smoothing of the running maximum M̄_e towards a new, larger return."""
+    """Share of the way that M̄_e moves towards the largest mean return so far, in every episode."""
 
 
 class LearnerConfig(Settings):

@@ -111,7 +111,7 @@ def test_same_seed_asks_the_same_scenes_and_another_seed_others(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("interrupted_at", [0, 1, 5, 13, 21])
+@pytest.mark.parametrize("interrupted_at", [1, 5, 21])
 def test_resumed_run_equals_one_never_interrupted(kind, interrupted_at):
     whole = drive(kind(3, QUICK, 1), 30, bowl)
     before, after = kind(3, QUICK, 1), kind(3, QUICK, 1)
