@@ -98,11 +98,11 @@ class Storage:
             transition.next_robustness,
             transition.terminated,
         )
-        row = self._rows[self._next]
-        np.concatenate((transition.observation, transition.action, transition.next_observation, scalars), out=row)
+        row = np.concatenate((transition.observation, transition.action, transition.next_observation, scalars))
         if not np.isfinite(row).all():
             raise NotFinite(f"wanted a transition of finite numbers, got {transition}. Check the environment.")
         slot = self._next
+        self._rows[slot] = row
         self._next = (slot + 1) % self.capacity
         self.size = max(self.size, slot + 1)
         return slot

@@ -1,0 +1,105 @@
+import io
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+
+from risk_sac.agents.learner import Learner
+from risk_sac.agents.replay import Transition
+from risk_sac.config import METHODS, LagrangianConfig, LearnerConfig, MethodName, ReplayConfig, RewardConfig, SacConfig
+from risk_sac.errors import CheckpointError
+
+Make = Callable[..., Transition]
+CONFIG = LearnerConfig(
+    sac=SacConfig(hidden_sizes=(8,), batch_size=16, warmup_steps=20),
+    replay=ReplayConfig(capacity=1000),
+    lagrangian=LagrangianConfig(learning_rate=0.01, cost_limit=0.1),
+)
+LEARNING: tuple[MethodName, ...] = ("risk-sac", "risk-sac-only-rper", "risk-sac-only-rs", "sac-lag", "sac")
+
+
+def learner(method: MethodName = "risk-sac", config: LearnerConfig = CONFIG, seed: int = 0) -> Learner:
+    return Learner(3, 2, METHODS[method], config, seed)
+
+
+def live(subject: Learner, steps: int, make: Make, stream: np.random.Generator) -> list[list[float]]:
+    """Runs the learner on random experience and returns all that it decided."""
+    trace = []
+    for _ in range(steps):
+        drawn = make(stream)
+        trace.append(subject.act(drawn.observation).tolist())
+        subject.observe(drawn)
+        result = subject.update()
+        trace.append([subject.dual_variable, subject.temperature, result.critic_loss if result else -1.0])
+    return trace
+
+
+@pytest.mark.parametrize("method", LEARNING)
+def test_resumed_learner_equals_one_never_interrupted_bit_for_bit(method: MethodName, random_transition: Make) -> None:
+    original, resumed = learner(method), learner(method, seed=5)
+    live(original, 60, random_transition, np.random.default_rng(0))
+    file = io.BytesIO()
+    torch.save(original.state(), file)
+    file.seek(0)
+    resumed.load(torch.load(file, weights_only=True))
+    traces = [live(each, 60, random_transition, np.random.default_rng(1)) for each in (original, resumed)]
+    assert traces[0] == traces[1]
+
+
+def test_same_seed_same_decisions(random_transition: Make) -> None:
+    traces = [live(learner(seed=seed), 50, random_transition, np.random.default_rng(0)) for seed in (1, 1, 2)]
+    assert traces[0] == traces[1]
+    assert traces[0] != traces[2]
+
+
+def test_warm_up_acts_at_random_and_learns_nothing(random_transition: Make) -> None:
+    subject = learner()
+    stream = np.random.default_rng(0)
+    before = subject.act(np.ones(3, np.float32), explore=False)
+    for _ in range(CONFIG.sac.warmup_steps - 1):
+        assert (np.abs(subject.act(np.ones(3, np.float32))) <= 1.0).all()
+        subject.observe(random_transition(stream))
+        assert subject.update() is None
+    assert np.array_equal(subject.act(np.ones(3, np.float32), explore=False), before)
+    subject.observe(random_transition(stream))
+    assert subject.update() is not None
+    assert not np.array_equal(subject.act(np.ones(3, np.float32), explore=False), before)
+
+
+def test_nothing_is_learned_from_an_empty_memory() -> None:
+    config = CONFIG.model_copy(update={"sac": CONFIG.sac.model_copy(update={"warmup_steps": 0})})
+    assert learner(config=config).update() is None
+
+
+@pytest.mark.parametrize("method", LEARNING)
+def test_dual_variable_rises_with_cost_only_where_the_method_constrains_it(
+    method: MethodName, transition: Make
+) -> None:
+    subject = learner(method)
+    for _ in range(CONFIG.sac.warmup_steps):
+        subject.observe(transition(cost=0.6))
+    subject.update()
+    # λ = 0 + 0.01 (0.6 - 0.1)
+    assert subject.dual_variable == pytest.approx(0.005 if METHODS[method].lagrangian else 0.0)
+
+
+def test_reward_is_formed_with_the_current_dual_variable_and_shaping() -> None:
+    subject = learner()
+    subject._dual.value = 2.0
+    columns = [np.array(column) for column in ([1.0, 1.0], [0.3, 0.3], [0.5, 0.5], [-0.2, -0.2], [0.0, 1.0])]
+    # R = 1 - 2 · 0.3 = 0.4; F = 0.98 · 0.2 + 0.5, and 0 + 0.5 where s' is terminal.
+    assert subject._reward(*columns) == pytest.approx([1.096, 0.9])
+    assert learner("sac-lag")._reward(*columns) == pytest.approx([1.0, 1.0])
+
+
+def test_equation_8_to_the_letter_pays_the_terminal_potential() -> None:
+    config = CONFIG.model_copy(update={"reward": RewardConfig(zero_terminal_potential=False)})
+    assert learner(config=config)._reward(0.0, 0.0, 0.5, -0.2, 1.0) == pytest.approx(0.98 * 0.2 + 0.5)
+
+
+def test_state_of_another_problem_is_refused(random_transition: Make) -> None:
+    subject = learner()
+    live(subject, 5, random_transition, np.random.default_rng(0))
+    with pytest.raises(CheckpointError):
+        Learner(4, 2, METHODS["risk-sac"], CONFIG, 0).load(subject.state())

@@ -1,0 +1,85 @@
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from torch.distributions import Independent, Normal, TanhTransform, TransformedDistribution
+
+from risk_sac.agents.networks import LOG_STD_MAX, LOG_STD_MIN, Policy, TwinCritics, bounded_log_std, tanh_gaussian
+
+
+def test_log_prob_of_a_hand_computed_case() -> None:
+    action, log_prob = tanh_gaussian(torch.tensor([[0.0]]), torch.tensor([[0.0]]), torch.tensor([[1.0]]))
+    # tanh(1) = 0.76159; log N(1; 0, 1) = -1.41894; log(1 - tanh(1)²) = -0.86756
+    assert action.item() == pytest.approx(0.7615942)
+    assert log_prob.item() == pytest.approx(-1.4189385 + 0.8675617)
+
+
+@given(
+    st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 1), st.floats(-3, 3)), min_size=1, max_size=6),
+)
+def test_log_prob_agrees_with_torch_distributions(rows: list[tuple[float, float, float]]) -> None:
+    mean, log_std, noise = torch.tensor(rows, dtype=torch.float64).T.unsqueeze(1)  # each 1 x action_size
+    base = Independent(Normal(mean, log_std.exp()), 1)
+    reference = TransformedDistribution(base, TanhTransform(cache_size=1))
+    action, log_prob = tanh_gaussian(mean, log_std, noise)
+    unsquashed = mean + log_std.exp() * noise
+    expected = base.log_prob(unsquashed) - TanhTransform().log_abs_det_jacobian(unsquashed, action).sum(-1)
+    torch.testing.assert_close(log_prob, expected)
+    if unsquashed.abs().max() < 5.0:  # beyond, the reference loses digits inverting tanh
+        torch.testing.assert_close(log_prob, reference.log_prob(action), rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(("mean", "log_std"), [(0.0, 0.0), (0.7, -1.0), (-1.0, 0.3)])
+def test_density_integrates_to_one_over_the_actions(mean: float, log_std: float) -> None:
+    # Midpoints of a grid over (-1, 1) in a = tanh(u), so the Jacobian is what makes the sum 1.
+    count = 400_001
+    grid = (torch.arange(count, dtype=torch.float64) + 0.5) * (2.0 / count) - 1.0
+    noise = ((torch.atanh(grid) - mean) / math.exp(log_std)).unsqueeze(1)
+    action, log_prob = tanh_gaussian(torch.full_like(noise, mean), torch.full_like(noise, log_std), noise)
+    torch.testing.assert_close(action.squeeze(1), grid)
+    assert log_prob.exp().sum().item() * 2.0 / count == pytest.approx(1.0, abs=1e-4)
+
+
+def test_log_prob_and_its_gradient_stay_finite_where_tanh_saturates() -> None:
+    mean = torch.tensor([[40.0, -40.0]], requires_grad=True)
+    action, log_prob = tanh_gaussian(mean, torch.zeros(1, 2), torch.zeros(1, 2))
+    log_prob.sum().backward()
+    assert action.tolist() == [[1.0, -1.0]]
+    # log(1 - tanh²(40)) = 2 log 2 - 80
+    assert log_prob.item() == pytest.approx(2.0 * (80.0 - 2.0 * math.log(2.0) - 0.5 * math.log(2.0 * math.pi)))
+    assert torch.isfinite(mean.grad).all()
+
+
+@given(st.floats(-1e6, 1e6))
+def test_log_std_stays_within_its_bounds(raw: float) -> None:
+    assert LOG_STD_MIN <= bounded_log_std(torch.tensor(raw)).item() <= LOG_STD_MAX
+
+
+def test_stacked_critics_equal_two_separate_networks() -> None:
+    critics = TwinCritics(3, 2, (8, 5), torch.Generator().manual_seed(0))
+    observation, action = torch.randn(7, 3), torch.rand(7, 2)
+    values = critics(observation, action)
+    for twin in range(2):
+        hidden = torch.cat((observation, action), dim=1)
+        for layer, (weight, bias) in enumerate(zip(critics.weights, critics.biases, strict=True)):
+            hidden = hidden @ weight[twin] + bias[twin]
+            hidden = hidden.relu() if layer < 2 else hidden
+        torch.testing.assert_close(values[twin], hidden.squeeze(1))
+    assert not torch.equal(values[0], values[1])
+
+
+def test_initialisation_follows_the_seed_and_leaves_the_global_generator_alone() -> None:
+    before = torch.get_rng_state()
+    first, same, other = (Policy(4, 2, (16,), torch.Generator().manual_seed(seed)) for seed in (1, 1, 2))
+    assert torch.equal(torch.get_rng_state(), before)
+    assert torch.equal(first.weights[0], same.weights[0])
+    assert not torch.equal(first.weights[0], other.weights[0])
+
+
+def test_initial_weights_fill_the_range_of_a_linear_layer() -> None:
+    policy = Policy(100, 2, (200,), torch.Generator().manual_seed(0))
+    assert np.abs(policy.weights[0].detach().numpy()).max() == pytest.approx(0.1, rel=1e-3)
+    assert policy.weights[0].std().item() == pytest.approx(0.1 / math.sqrt(3.0), rel=0.02)

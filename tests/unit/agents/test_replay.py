@@ -1,0 +1,186 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+
+from risk_sac.agents.priority import TermScales, priority
+from risk_sac.agents.replay import Replay, RiskPrioritizedReplay, Transition, UniformReplay
+from risk_sac.config import ReplayConfig
+from risk_sac.errors import CheckpointError, NotFinite
+
+Make = Callable[..., Transition]
+CONFIG = ReplayConfig(capacity=1000)
+KINDS = pytest.mark.parametrize("kind", [UniformReplay, RiskPrioritizedReplay])
+
+
+def filled(kind: type[Replay], count: int, make: Make, seed: int = 0) -> Replay:
+    replay = kind(3, 2, CONFIG)
+    generator = np.random.default_rng(seed)
+    for _ in range(count):
+        replay.add(make(generator), float(generator.exponential()))
+    return replay
+
+
+@KINDS
+def test_a_batch_holds_what_was_stored(kind: type[Replay], transition: Make) -> None:
+    replay = kind(3, 2, CONFIG)
+    replay.add(
+        transition(0.5, cost=0.2, robustness=-1.5, next_robustness=2.5, terminated=True, accumulated_reward=9.0), 0.1
+    )
+    batch = replay.sample(4, np.random.default_rng(0))
+    assert batch.observation.tolist() == [[0.5, 0.5, 0.5]] * 4
+    assert batch.next_observation.tolist() == [[1.5, 1.5, 1.5]] * 4
+    assert batch.action.numpy() == pytest.approx(np.full((4, 2), np.tanh(0.5)))
+    assert batch.risk_reward.tolist() == [0.5] * 4
+    assert batch.cost.numpy() == pytest.approx(np.full(4, 0.2))
+    assert batch.robustness.tolist() == [-1.5] * 4
+    assert batch.next_robustness.tolist() == [2.5] * 4
+    assert batch.terminated.tolist() == [1.0] * 4
+    assert batch.weight.tolist() == [1.0] * 4
+    assert batch.indices.tolist() == [0] * 4
+    assert {tensor.dtype for tensor in (batch.observation, batch.terminated, batch.weight)} == {torch.float32}
+
+
+@KINDS
+def test_the_oldest_transition_gives_way_once_full(kind: type[Replay], transition: Make) -> None:
+    replay = kind(3, 2, CONFIG)
+    for value in range(CONFIG.capacity + 10):
+        replay.add(transition(float(value)), 1.0)
+    assert len(replay) == CONFIG.capacity
+    batch = replay.sample(4096, np.random.default_rng(0))
+    assert batch.risk_reward.min() >= 10.0
+    assert batch.risk_reward.max() == CONFIG.capacity + 9
+
+
+@KINDS
+@pytest.mark.parametrize("field", ["risk_reward", "cost", "next_robustness"])
+def test_a_transition_that_is_not_finite_is_refused(kind: type[Replay], field: str, transition: Make) -> None:
+    with pytest.raises(NotFinite):
+        kind(3, 2, CONFIG).add(transition(**{field: float("nan")}), 1.0)
+
+
+@pytest.mark.parametrize("changes", [{"accumulated_reward": float("inf")}, {"robustness": float("-inf")}])
+def test_a_priority_that_is_not_finite_is_refused(changes: dict[str, float], transition: Make) -> None:
+    replay = RiskPrioritizedReplay(3, 2, CONFIG)
+    with pytest.raises(NotFinite):
+        replay.add(transition(**changes), 1.0)
+    with pytest.raises(NotFinite):
+        replay.add(transition(), float("nan"))
+    assert len(replay) == 0
+
+
+def test_uniform_draws_every_transition_equally_often(random_transition: Make) -> None:
+    replay = filled(UniformReplay, 50, random_transition)
+    counts = np.bincount(replay.sample(50_000, np.random.default_rng(1)).indices, minlength=50)
+    assert ((counts - 1000.0) ** 2 / 1000.0).sum() < 86.0  # χ² at 49 degrees of freedom, p = 0.001
+
+
+def test_rper_draws_in_proportion_to_the_priorities(random_transition: Make) -> None:
+    replay = filled(RiskPrioritizedReplay, 50, random_transition)
+    expected = expected_priorities(replay)
+    expected /= expected.sum()
+    generator = np.random.default_rng(1)
+    # Independent draws, one per call: within a call they are stratified.
+    indices = np.concatenate([replay.sample(1, generator).indices for _ in range(20_000)])
+    counts = np.bincount(indices, minlength=50)
+    assert ((counts - 20_000 * expected) ** 2 / (20_000 * expected)).sum() < 86.0
+    # Stratified: no count is further than one draw from its expectation.
+    counts = np.bincount(replay.sample(1000, generator).indices, minlength=50)
+    assert np.abs(counts - 1000 * expected).max() <= 2.0
+
+
+def test_rper_weights_follow_equation_10(random_transition: Make) -> None:
+    replay = filled(RiskPrioritizedReplay, 40, random_transition)
+    priorities = expected_priorities(replay)
+    batch = replay.sample(64, np.random.default_rng(2))
+    weights = (40 * priorities[batch.indices] / priorities.sum()) ** -CONFIG.correction
+    assert batch.weight.numpy() == pytest.approx(weights / weights.max(), rel=1e-6)
+
+
+def test_rper_prefers_risk_and_surprise(transition: Make) -> None:
+    replay = RiskPrioritizedReplay(3, 2, CONFIG)
+    for slot in range(64):
+        replay.add(transition(robustness=-2.0 if slot == 7 else 1.0), 5.0 if slot == 9 else 0.1)
+    counts = np.bincount(replay.sample(4096, np.random.default_rng(0)).indices, minlength=64)
+    assert set(np.argsort(counts)[-2:]) == {7, 9}
+    assert counts.min() > 0
+
+
+def test_rper_is_uniform_while_nothing_tells_transitions_apart(transition: Make) -> None:
+    replay = RiskPrioritizedReplay(3, 2, CONFIG)
+    for _ in range(30):
+        replay.add(transition(), 0.7)
+    batch = replay.sample(30, np.random.default_rng(0))
+    assert sorted(batch.indices) == list(range(30))
+    assert batch.weight.tolist() == [1.0] * 30
+
+
+def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(random_transition: Make) -> None:
+    replay = RiskPrioritizedReplay(3, 2, CONFIG)
+    generator = np.random.default_rng(3)
+    for _ in range(2500):
+        replay.add(random_transition(generator), float(generator.exponential()))
+        if generator.uniform() < 0.2:
+            indices = replay.sample(16, generator).indices
+            replay.update(indices, generator.exponential(size=16))
+    leaves = replay._tree[np.arange(len(replay))]
+    assert np.array_equal(leaves, priority(replay._terms, replay._scales, CONFIG))
+    assert replay._tree.total == pytest.approx(leaves.sum(), rel=1e-14)
+
+
+def test_rper_scales_follow_what_is_stored(random_transition: Make) -> None:
+    replay = filled(RiskPrioritizedReplay, 512, random_transition)  # a power of two: just rescaled
+    scales = TermScales.of(replay._terms[:, :512])
+    assert np.array_equal(replay._scales.lowest, scales.lowest)
+    assert np.array_equal(replay._scales.inverse_spread, scales.inverse_spread)
+
+
+@KINDS
+def test_a_loaded_replay_draws_what_the_original_draws(kind: type[Replay], random_transition: Make) -> None:
+    original = filled(kind, 1300, random_transition)  # has wrapped around
+    generator = np.random.default_rng(4)
+    original.update(original.sample(64, generator).indices, generator.exponential(size=64))
+    loaded = kind(3, 2, CONFIG)
+    loaded.load(original.state())
+    assert len(loaded) == len(original)
+    for replay in (original, loaded):
+        stream = np.random.default_rng(5)
+        for _ in range(800):  # crosses a rescaling
+            replay.add(random_transition(stream), float(stream.exponential()))
+            drawn = replay.sample(8, stream)
+            replay.update(drawn.indices, stream.exponential(size=8))
+    first, second = (replay.sample(256, np.random.default_rng(6)) for replay in (original, loaded))
+    assert np.array_equal(first.indices, second.indices)
+    assert torch.equal(first.weight, second.weight)
+    assert torch.equal(first.observation, second.observation)
+
+
+@KINDS
+def test_a_state_does_not_change_with_its_owner(kind: type[Replay], random_transition: Make) -> None:
+    replay = filled(kind, 20, random_transition)
+    state, again = replay.state(), kind(3, 2, CONFIG)
+    replay.update(np.arange(20), np.full(20, 99.0))
+    again.load(state)
+    replay = filled(kind, 20, random_transition)
+    draws = [each.sample(50, np.random.default_rng(0)).indices for each in (replay, again)]
+    assert np.array_equal(*draws)
+
+
+@KINDS
+def test_a_state_of_another_shape_is_refused(kind: type[Replay], random_transition: Make) -> None:
+    state = filled(kind, 5, random_transition).state()
+    with pytest.raises(CheckpointError, match="rows"):
+        kind(4, 2, CONFIG).load(state)
+    state = filled(kind, 1000, random_transition).state()
+    with pytest.raises(CheckpointError, match="capacity"):
+        kind(3, 2, ReplayConfig(capacity=1000)).load(state | larger(state))
+
+
+def larger(state: dict[str, object]) -> dict[str, object]:
+    rows = torch.zeros(1001, 13)
+    return {"storage": {"rows": rows, "next": 0}} if "storage" in state else {"rows": rows}
+
+
+def expected_priorities(replay: RiskPrioritizedReplay) -> np.ndarray:
+    return priority(replay._terms[:, : len(replay)], replay._scales, CONFIG)

@@ -1,0 +1,78 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from risk_sac.agents.sum_tree import SumTree
+
+priorities = st.floats(0.0, 1e6, allow_subnormal=False)
+
+
+def test_find_walks_the_cumulative_sum() -> None:
+    tree = SumTree(4)
+    tree.rebuild(np.array([1.0, 0.0, 2.0, 1.0]))  # ends at 1, 1, 3, 4
+    assert tree.total == 4.0
+    assert tree.find(np.array([0.0, 0.2, 0.25, 0.7, 0.75, 0.999])).tolist() == [0, 0, 2, 2, 3, 3]
+
+
+def test_find_crosses_blocks() -> None:
+    tree = SumTree(100)
+    tree.rebuild(np.ones(100))
+    assert tree.find((np.arange(100) + 0.5) / 100).tolist() == list(range(100))
+
+
+@given(hnp.arrays(np.float64, st.integers(1, 200), elements=st.integers(0, 2**20).map(float)), st.data())
+def test_total_is_exactly_the_sum_after_any_writes(values: np.ndarray, data: st.DataObject) -> None:
+    # Whole numbers add without rounding, so nothing but the exact sum passes.
+    tree = SumTree(len(values))
+    tree.rebuild(values)
+    for _ in range(3):
+        indices = np.array(data.draw(st.lists(st.integers(0, len(values) - 1), min_size=1, max_size=20)))
+        written = np.array(data.draw(st.lists(st.integers(0, 2**20), min_size=len(indices), max_size=len(indices))))
+        tree.set(indices, written.astype(float))
+        values[indices] = written
+    assert tree.total == values.sum()
+    assert (tree[np.arange(len(values))] == values).all()
+
+
+def test_total_does_not_drift_over_a_million_writes() -> None:
+    generator = np.random.default_rng(0)
+    tree = SumTree(1000)
+    for _ in range(4000):
+        tree.set(generator.integers(1000, size=256), generator.uniform(size=256) * 10.0 ** generator.integers(-8, 8))
+    assert tree.total == pytest.approx(math.fsum(tree[np.arange(1000)]), rel=1e-14)
+
+
+@given(
+    hnp.arrays(np.float64, st.integers(1, 100), elements=st.sampled_from([0.0, 1e-12, 0.1, 0.3, 1.0, 7.0, 1e9])).filter(
+        lambda values: values.sum() > 0
+    ),
+    st.lists(st.floats(0.0, 1.0), min_size=1, max_size=50),
+)
+def test_find_never_returns_a_leaf_of_priority_zero(values: np.ndarray, fractions: list[float]) -> None:
+    tree = SumTree(128)
+    tree.rebuild(values)
+    found = tree.find(np.array(fractions))
+    assert (found < len(values)).all()
+    assert (values[found] > 0).all()
+
+
+@given(hnp.arrays(np.float64, st.integers(1, 300), elements=st.integers(0, 1000).map(float)), st.data())
+def test_find_agrees_with_a_linear_scan(values: np.ndarray, data: st.DataObject) -> None:
+    values[data.draw(st.integers(0, len(values) - 1))] += 1.0
+    tree = SumTree(300)
+    tree.rebuild(values)
+    prefixes = data.draw(st.lists(st.integers(0, int(values.sum()) - 1), min_size=1, max_size=20))
+    fractions = (np.array(prefixes) + 0.5) / values.sum()
+    ends = np.cumsum(values)
+    assert tree.find(fractions).tolist() == [int(np.argmax(ends > prefix)) for prefix in prefixes]
+
+
+def test_rebuild_forgets_what_was_there() -> None:
+    tree = SumTree(64)
+    tree.rebuild(np.ones(64))
+    tree.rebuild(np.ones(3))
+    assert tree.total == 3.0
