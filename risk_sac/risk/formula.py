@@ -23,60 +23,17 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from risk_sac.errors import FormulaError
+from risk_sac.risk.lexer import Token, tokens
 from risk_sac.risk.signals import SIGNALS
 
 MAX_DEPTH = 40  # nested operators
 MAX_COMPARISONS = 5000  # by the windows of one formula in one step, about 1 ms
 MAX_MAGNITUDE = 1e9  # of any number in a formula, so that arithmetic stays finite
 
-_TOKEN = re.compile(
-    r"(?P<number>(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?)|(?P<word>[A-Za-z_]\w*)"
-    r"|(?P<symbol><->|->|<=|>=|!==|!=|==|&&|\|\||[-+*/()\[\],:<>!&|=])|(?P<space>\s+)|(?P<unknown>.)",
-    re.ASCII,
-)
 _BOUND = re.compile(r"\d{1,6}(\.\d{0,6})?")  # no exponents: 1e999999999 would fill memory as an exact fraction
 
-_ALIASES = {
-    "H": "historically",
-    "O": "once",
-    "S": "since",
-    "Y": "prev",
-    "!": "not",
-    "&": "and",
-    "&&": "and",
-    "|": "or",
-    "||": "or",
-    "->": "implies",
-}
-_PAST_OF = {
-    **dict.fromkeys(("always", "G"), "historically"),
-    **dict.fromkeys(("eventually", "F"), "once"),
-    **dict.fromkeys(("until", "U", "unless", "W"), "since"),
-    **dict.fromkeys(("next", "X", "s_next", "sX"), "prev"),
-}
-# rtamt's robustness of iff and of equalities has the wrong sign or none: a true `p iff q` can come out negative.
-_REWRITES = {
-    **dict.fromkeys(("iff", "<->"), "(p implies q) and (q implies p)"),
-    "xor": "(p or q) and not (p and q)",
-    **dict.fromkeys(("==", "="), "abs(x - c) <= tolerance"),
-    **dict.fromkeys(("!=", "!=="), "abs(x - c) >= tolerance"),
-    "rise": "p and not prev p",
-    "fall": "not p and prev p",
-    **dict.fromkeys(("s_prev", "sY"), "prev"),
-    **dict.fromkeys(("sqrt", "exp", "pow"), "+, -, *, / by a number, and abs"),
-    **dict.fromkeys(("true", "false"), "a comparison"),
-}
 _COMPARISONS = ("<=", "<", ">=", ">")
 _RESERVED = {"historically", "once", "since", "prev", "not", "and", "or", "implies", "abs"}
-
-
-@dataclass(frozen=True, slots=True)
-class Token:
-    """One word, number or symbol, its spelling made canonical."""
-
-    kind: str
-    text: str
-    position: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +68,7 @@ def parse(formula: str, step_s: float, horizon_steps: int) -> Node:
     Raises:
       FormulaError: with position and reason.
     """
-    parser = _Parser(_tokens(formula), Fraction(str(step_s)), len(formula))
+    parser = _Parser(tokens(formula), Fraction(str(step_s)), len(formula))
     node = parser.whole()
     back = memory(node)
     if back > horizon_steps:
@@ -147,27 +104,6 @@ def comparisons(node: Node) -> int:
 def signals_of(node: Node) -> set[str]:
     """Names of the signals that a formula speaks about."""
     return {node.text} if node.op == "signal" else set[str]().union(*map(signals_of, node.children))
-
-
-def _tokens(formula: str) -> list[Token]:
-    tokens = []
-    for match in _TOKEN.finditer(formula):
-        kind, text, position = str(match.lastgroup), match.group(), match.start()
-        if kind == "unknown":
-            raise FormulaError(f"column {position}: unknown character {text!r}", position=position)
-        if text in _PAST_OF:
-            raise FormulaError(
-                f"column {position}: {text!r} looks into the future, which an online monitor does not know; "
-                f"use the past-time operator {_PAST_OF[text]!r}",
-                position=position,
-            )
-        if text in _REWRITES:
-            raise FormulaError(
-                f"column {position}: {text!r} is not supported; use {_REWRITES[text]}", position=position
-            )
-        if kind != "space":
-            tokens.append(Token(kind, _ALIASES.get(text, text), position))
-    return tokens
 
 
 class _Parser:

@@ -3,11 +3,12 @@
 Source: RISK-SAC, Sec. II-A; ISO 34503 for the ODD's branches.
 """
 
+import math
 from typing import Any, TypeVar
 
 from risk_sac.config import Interval, Odd, Requirement, Settings
 from risk_sac.errors import OddError
-from risk_sac.scenario.space import SceneSpace
+from risk_sac.scenario.space import Parameter, SceneSpace
 
 GRAVITY_MPS2 = 9.81
 MIN_TTC_S = 1.5  # below it a conflict counts as serious in traffic conflict studies
@@ -81,15 +82,17 @@ def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
     """
     bounds = {}
     for parameter in space.parameters:
-        interval = field(odd, parameter.odd) if parameter.odd else None
-        if interval is None:
+        allowed = field(odd, parameter.odd) if parameter.odd else None
+        if allowed is None:
             continue
-        if interval.low > parameter.high or interval.high < parameter.low:
+        interval = _share(parameter, allowed) if parameter.categories else allowed
+        if interval is None or interval.low > parameter.high or interval.high < parameter.low:
+            supported = parameter.categories or Interval(low=parameter.low, high=parameter.high)
             raise _error(
                 str(parameter.odd),
-                interval,
-                f"an overlap with [{parameter.low:g}, {parameter.high:g}] {parameter.unit}, "
-                f"the bounds of scene parameter {parameter.name!r} in the {space.family!r} family",
+                allowed,
+                f"an overlap with {_text(supported)}, the values of scene parameter {parameter.name!r} "
+                f"in the {space.family!r} family",
             )
         bounds[parameter.name] = interval
     return space.narrow(bounds)
@@ -137,6 +140,18 @@ def field(odd: Odd, path: str) -> Any:
     """The value of an ODD field by its dotted path, such as "dynamic.ego_speed_mps"."""
     branch, name = path.split(".")
     return getattr(getattr(odd, branch), name)
+
+
+def _share(parameter: Parameter, allowed: tuple[str, ...]) -> Interval | None:
+    """The part of a parameter's bounds that stands for the allowed categories; None if there is none."""
+    middle = (parameter.low + parameter.high) / 2  # belongs to the upper half
+    lower, upper = (category in allowed for category in parameter.categories)
+    if not lower and not upper:
+        return None
+    return Interval(
+        low=parameter.low if lower else middle,
+        high=parameter.high if upper else math.nextafter(middle, parameter.low),
+    )
 
 
 def _intersect_branch(branch: str, default: Branch, user: Branch) -> Branch:

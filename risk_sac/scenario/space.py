@@ -21,13 +21,19 @@ class Parameter:
     low: float
     high: float
     meaning: str
-    odd: str | None = None  # the ODD field whose interval bounds it too, such as "dynamic.vehicle_speed_mps"
+    odd: str | None = None  # the ODD field that bounds it too, such as "dynamic.vehicle_speed_mps"
+    categories: tuple[str, ...] = ()  # where that field is a set: what the lower and the upper half stand for
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low <= self.high):
             raise SceneError(
                 f"parameter {self.name!r} has bounds [{self.low:g}, {self.high:g}]; wanted finite low <= high"
             )
+        if len(self.categories) not in (
+            0,
+            2,
+        ):  # of three, an ODD could leave out the middle one, and a box has no holes
+            raise SceneError(f"parameter {self.name!r} has categories {self.categories}; wanted none or two")
 
 
 @dataclass(frozen=True)

@@ -109,9 +109,32 @@ def test_the_odd_narrows_the_parameters_that_name_one_of_its_fields() -> None:
 
 def test_an_odd_that_empties_the_space_names_the_parameter() -> None:
     odd = intersect(DEFAULT, Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(19, 20))))
-    with pytest.raises(OddError, match=r"\[19, 20\]; wanted an overlap with \[5, 18\] m/s.*'lead_speed_mps'") as caught:
+    with pytest.raises(OddError, match=r"\[19, 20\]; wanted an overlap with \[5, 18\].*'lead_speed_mps'") as caught:
         narrow(SPACE, odd)
     assert caught.value.field == "odd.dynamic.vehicle_speed_mps"
+
+
+CROSSING = Parameter("crossing", "1", 0, 1, "", "scenery.crossing_types", ("zebra", "signalised"))
+
+
+@pytest.mark.parametrize(
+    ("allowed", "low", "high"),
+    [
+        (("none", "zebra"), 0.0, 0.49999999999999994),
+        (("signalised",), 0.5, 1.0),
+        (("zebra", "signalised"), 0.0, 1.0),
+    ],
+)
+def test_a_set_in_the_odd_narrows_a_category(allowed: tuple[str, ...], low: float, high: float) -> None:
+    odd = Odd(scenery=Scenery(crossing_types=allowed))
+    [crossing] = narrow(SceneSpace("mixed", (CROSSING,)), odd).parameters
+    assert (crossing.low, crossing.high) == (low, high)
+
+
+def test_a_set_that_leaves_no_category_names_the_parameter() -> None:
+    odd = Odd(scenery=Scenery(crossing_types=("none",)))
+    with pytest.raises(OddError, match=r"is \{none\}; wanted an overlap with \{zebra, signalised\}.*'crossing'"):
+        narrow(SceneSpace("mixed", (CROSSING,)), odd)
 
 
 def test_requirements_follow_the_odd() -> None:

@@ -76,3 +76,8 @@ def test_a_parameter_needs_ordered_finite_bounds() -> None:
     for low, high in ((2.0, 1.0), (float("nan"), 1.0), (0.0, float("inf"))):
         with pytest.raises(SceneError, match="wanted finite low <= high"):
             Parameter("gap_m", "m", low, high, "")
+
+
+def test_a_category_is_one_of_two() -> None:
+    with pytest.raises(SceneError, match="wanted none or two"):
+        Parameter("crossing", "1", 0, 1, "", "scenery.crossing_types", ("none", "zebra", "signalised"))
