@@ -15,6 +15,7 @@ MIN_TTC_S = 1.5  # below it a conflict counts as serious in traffic conflict stu
 PEDESTRIAN_GAP_M = 1.0  # what a driver leaves beside a pedestrian at the very least
 STANDING_MPS = 0.5  # slower than that, an ego counts as standing
 EMERGENCY_BRAKING_MPS2 = 9.0  # of SUMO's default passenger car, on dry asphalt
+RED_LIGHT_HOLD_S = 1.0
 BRAKING_HOLD_S = 0.5  # braking shorter than that is a correction, not an emergency stop
 
 # What every value of a field must lie in; an ODD outside it describes no road on Earth.
@@ -105,8 +106,8 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
     - RSS: the signals only look at actors whose other margin is used up already, so each says by itself whether a
       situation is dangerous; one has its slope along the lane, the other across it.
     - Pedestrians: a minimum gap, unless the ego stands and lets them pass.
-    - Red light: the signal turns negative when the stop line is crossed and is distance before; it is not latched by
-      `historically`, which would keep a legal stop close to the line as the worst margin of the whole episode.
+    - Red light: the signal is the distance to the line, and negative only in the step that crosses it; the entry is held
+      for RED_LIGHT_HOLD_S, not for good, or a legal stop near the line would stay the worst margin of the episode.
     - Braking: BRAKING_HOLD_S on end at nine tenths of what the car, or the worst friction of the ODD, friction · g,
       can give means that the ego had no reserve left.
 
@@ -130,7 +131,8 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
         formula = f"pedestrian_gap_m >= {PEDESTRIAN_GAP_M:g} or ego_speed_mps <= {STANDING_MPS:g}"
         requirements.append(Requirement(name="pedestrian_gap", formula=formula, scale=5.0))
     if set(odd.scenery.signal_types or ()) - {"none"}:
-        requirements.append(Requirement(name="no_red_light_entry", formula="red_light_m >= 0", scale=2.0))
+        formula = f"historically[0,{RED_LIGHT_HOLD_S:g}] (red_light_m >= 0)"
+        requirements.append(Requirement(name="no_red_light_entry", formula=formula, scale=2.0))
     formula = f"not historically[0,{BRAKING_HOLD_S:g}] (ego_braking_mps2 >= {braking_mps2:g})"
     requirements.append(Requirement(name="bounded_braking", formula=formula, scale=braking_mps2))
     return tuple(requirements)

@@ -155,7 +155,7 @@ SHIPPED_FORMULAS: dict[str, Any] = {
     "rss_longitudinal": (">=", "rss_longitudinal_m", 0),
     "rss_lateral": (">=", "rss_lateral_m", 0),
     "pedestrian_gap": ("or", (">=", "pedestrian_gap_m", 1), ("<=", "ego_speed_mps", 0.5)),
-    "no_red_light_entry": (">=", "red_light_m", 0),
+    "no_red_light_entry": ("historically", (0, 10), (">=", "red_light_m", 0)),
     "bounded_braking": ("not", ("historically", (0, 5), (">=", "ego_braking_mps2", 5.3))),
 }
 
