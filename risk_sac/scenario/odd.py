@@ -106,7 +106,7 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
     - RSS: the signals only look at actors whose other margin is used up already, so each says by itself whether a
       situation is dangerous; one has its slope along the lane, the other across it.
     - Pedestrians: a minimum gap, unless the ego stands and lets them pass.
-    - Red light: the signal is the distance to the line, and negative only in the step that crosses it; the entry is held
+    - Red light: the signal is the distance to the line, and negative only in the step that crosses it; that is held
       for RED_LIGHT_HOLD_S, not for good, or a legal stop near the line would stay the worst margin of the episode.
     - Braking: BRAKING_HOLD_S on end at nine tenths of what the car, or the worst friction of the ODD, friction · g,
       can give means that the ego had no reserve left.
