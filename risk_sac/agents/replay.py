@@ -245,7 +245,7 @@ class RiskPrioritizedReplay:
         self._rebuild()
 
     def _refresh(self, indices: Indices) -> None:
-        self._tree.set(indices, priority(self._terms[:, indices], self._scales, self._config))
+        self._tree.set(indices, priority(self._terms.take(indices, axis=1), self._scales, self._config))
 
     def _rebuild(self) -> None:
         self._tree.rebuild(priority(self._terms[:, : len(self)], self._scales, self._config))
