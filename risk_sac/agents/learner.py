@@ -19,7 +19,7 @@ from risk_sac.risk.reward import Value, penalised_reward, shaped_reward
 
 
 class Learner:
-    """What happens between two environment steps."""
+    """What happens between two environment steps; of the method it reads `lagrangian`, `shaping` and `replay`."""
 
     def __init__(
         self, observation_size: int, action_size: int, method: Method, config: LearnerConfig, seed: int
@@ -94,6 +94,7 @@ class Learner:
         reward = self._reward(batch.risk_reward, batch.cost, batch.robustness, batch.next_robustness, batch.terminated)
         result = self._agent.update(batch, reward)  # Alg. 1, l. 14
         self._replay.update(batch.indices, result.td_errors)
+        # The plain mean, as printed: RPER draws costly transitions more often, so λ leans to the safe side.
         self._dual.update(batch.cost.mean().item())  # Alg. 1, l. 15-16
         return result
 

@@ -98,7 +98,8 @@ class Storage:
             transition.next_robustness,
             transition.terminated,
         )
-        row = np.concatenate((transition.observation, transition.action, transition.next_observation, scalars))
+        parts = (transition.observation, transition.action, transition.next_observation, scalars)
+        row = np.concatenate(parts, dtype=np.float32)
         if not np.isfinite(row).all():
             raise NotFinite(f"wanted a transition of finite numbers, got {transition}. Check the environment.")
         slot = self._next

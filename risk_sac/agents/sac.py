@@ -15,7 +15,7 @@ from torch import Tensor
 from risk_sac.agents.networks import Policy, TwinCritics, tanh_gaussian
 from risk_sac.agents.replay import Batch, Vector
 from risk_sac.config.learner import SacConfig
-from risk_sac.errors import NotFinite
+from risk_sac.errors import CheckpointError, NotFinite
 from risk_sac.types import Floats
 
 
@@ -202,15 +202,25 @@ class SacAgent:
         )
 
     def load(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`."""
+        """Continue from `state()`.
+
+        Raises:
+          CheckpointError: the state is of other networks; the agent is not to be used any further.
+        """
         state = copy.deepcopy(state)  # the optimisers would share its tensors
-        self._policy.load_state_dict(state["policy"])
-        self._critics.load_state_dict(state["critics"])
-        self._targets.load_state_dict(state["targets"])
-        self._log_temperature.data.copy_(state["log_temperature"])
-        self._critic_optimizer.load_state_dict(state["critic_optimizer"])
-        self._actor_optimizer.load_state_dict(state["actor_optimizer"])
-        self._generator.set_state(state["generator"])
+        try:
+            self._policy.load_state_dict(state["policy"])
+            self._critics.load_state_dict(state["critics"])
+            self._targets.load_state_dict(state["targets"])
+            self._log_temperature.data.copy_(state["log_temperature"])
+            self._critic_optimizer.load_state_dict(state["critic_optimizer"])
+            self._actor_optimizer.load_state_dict(state["actor_optimizer"])
+            self._generator.set_state(state["generator"])
+        except (KeyError, RuntimeError, ValueError) as error:
+            raise CheckpointError(
+                f"agent in the checkpoint does not fit: {error}. Resume with the learner.sac.hidden_sizes of the run"
+                " that wrote it."
+            ) from error
 
     def _update_critics(self, batch: Batch, reward: Tensor) -> tuple[Tensor, Tensor]:
         with torch.no_grad():

@@ -98,6 +98,12 @@ def test_equation_8_to_the_letter_pays_the_terminal_potential() -> None:
     assert learner(config=config)._reward(0.0, 0.0, 0.5, -0.2, 1.0) == pytest.approx(0.98 * 0.2 + 0.5)
 
 
+def test_state_of_other_networks_is_refused() -> None:
+    wider = CONFIG.model_copy(update={"sac": CONFIG.sac.model_copy(update={"hidden_sizes": (9,)})})
+    with pytest.raises(CheckpointError, match="hidden_sizes"):
+        learner(config=wider).load(learner().state())
+
+
 def test_state_of_another_problem_is_refused(random_transition: Make) -> None:
     subject = learner()
     live(subject, 5, random_transition, np.random.default_rng(0))
