@@ -9,6 +9,7 @@ from fastapi.openapi.utils import get_openapi
 
 from risk_sac import __version__
 from service.api import campaigns, catalogue
+from service.api.body import body_schemas
 from service.api.context import Context
 from service.api.problems import add_problem_handlers
 from service.errors import StorageError
@@ -67,12 +68,16 @@ def opened(settings: ServiceSettings, executor: Executor) -> Iterator[Context]:
 
 def openapi(app: FastAPI) -> dict[str, Any]:
     """The app's OpenAPI document, with every error response declared as a problem."""
+    if app.openapi_schema is not None:
+        return app.openapi_schema
     document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
+    document["components"]["schemas"] |= body_schemas()
     for operations in document["paths"].values():
         for operation in operations.values():
             for status, response in operation["responses"].items():
                 if int(status) >= 400:
                     response["content"] = {"application/problem+json": response["content"]["application/json"]}
+    app.openapi_schema = document
     return document
 
 

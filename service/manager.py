@@ -5,9 +5,8 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-from risk_sac.problem import check_campaign
-
 from risk_sac.config import CampaignSpec
+from risk_sac.problem import check_campaign
 from service.campaigns import State
 from service.errors import StorageError
 from service.events import EpisodeDone, Event, Failed, Finished
@@ -20,6 +19,7 @@ from service.store import Store
 logger = logging.getLogger(__name__)
 
 TICK_S = 1.0  # how soon a write that the disk refused is tried again
+UNKILLABLE_S = 10.0  # how long after SIGKILL a worker may take to vanish
 
 
 @dataclass(slots=True)
@@ -46,7 +46,7 @@ class Manager:
         self._active: dict[int, _Active] = {}
         self._lock = threading.RLock()
         self._stopping = False
-        self._thread = threading.Thread(target=self._work, name="manager")
+        self._thread = threading.Thread(target=self._work, name="manager", daemon=True)
 
     @property
     def alive(self) -> bool:
@@ -65,13 +65,18 @@ class Manager:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop all workers at their next episode boundary, leave their runs queued, and return."""
+        """Stop all workers at their next episode boundary, leave their runs queued, and return.
+
+        Runs whose worker cannot even be killed stay `running`; the next start puts them back in the queue.
+        """
         with self._lock:
             self._stopping = True
             for number in self._active:
                 self._executor.cancel(number)
         self._executor.wake()
-        self._thread.join()
+        self._thread.join(self._settings.grace_s + UNKILLABLE_S)
+        if self._thread.is_alive():
+            logger.error("workers of runs %s did not end", sorted(self._active))
 
     def submit(self, spec: CampaignSpec) -> Campaign:
         """Queue a campaign.

@@ -4,12 +4,12 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 
-from risk_sac.config import CampaignSpec
 from risk_sac.types import Outcome
 from service import records
+from service.api.body import DOCUMENTED_BODY, PostedCampaign
 from service.api.context import Service
 from service.api.pages import Cursor, Limit, decode_cursor, encode_cursor
-from service.api.responses import INVALID, MALFORMED, STORAGE, UNKNOWN, Responses
+from service.api.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses
 from service.api.views import campaign_body, episode_body, failure_body, summary_body, tier_outcomes
 from service.records import Page
 from service.results import results
@@ -32,8 +32,8 @@ ACCEPTED: Responses = {
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
 
 
-@router.post("", status_code=202, responses=ACCEPTED | MALFORMED)
-def post_campaign(spec: CampaignSpec, service: Service, response: Response) -> Campaign:
+@router.post("", status_code=202, responses=ACCEPTED | MALFORMED | NOT_JSON, openapi_extra=DOCUMENTED_BODY)
+def post_campaign(spec: PostedCampaign, service: Service, response: Response) -> Campaign:
     """Queue a campaign: families × methods × seeds on one equal budget."""
     campaign = service.manager.submit(spec)
     response.headers["Location"] = f"/v1/campaigns/{campaign.id}"

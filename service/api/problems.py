@@ -11,6 +11,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.routing import compile_path
 
 from risk_sac.config import CampaignSpec
 from risk_sac.errors import ConfigError
@@ -20,8 +21,12 @@ from service.schemas import FieldProblem, Problem
 logger = logging.getLogger(__name__)
 
 LONGEST_VALUE = 200
-# How this project words an error: "reaction_time_s is 0.55; wanted a multiple of 0.1".
-_HOUSE_STYLE = re.compile(r"(?P<field>\w+) (?:is|are named) (?P<got>.+?); (?:wanted )?(?P<wanted>.+)", re.DOTALL)
+# How this project words an error: "reaction_time_s is 0.55; wanted a multiple of 0.1", or where the
+# field goes without saying: "column 3: got 'x', wanted a signal".
+_HOUSE_STYLES = (
+    re.compile(r"(?P<field>[\w.]+) (?:is|are named) (?P<got>.+?); (?:wanted )?(?P<wanted>.+)", re.DOTALL),
+    re.compile(r"(?P<field>).*?\bgot (?P<got>.+?)[,;] wanted (?P<wanted>.+)", re.DOTALL),
+)
 _LIMITS = {
     "greater_than": "> {gt}",
     "greater_than_equal": ">= {ge}",
@@ -36,7 +41,10 @@ _LIMITS = {
     "too_long": "at most {max_length} entries",
     "missing": "a value",
     "finite_number": "a finite number",
-    "json_invalid": "valid JSON",
+    "float_type": "a number",
+    "int_type": "an integer",
+    "model_type": "a JSON object",
+    "tuple_type": "a JSON array",
 }
 
 Location = tuple[int | str, ...]
@@ -72,8 +80,7 @@ async def _invalid_request(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     found = error.errors()
     if any(item["type"] == "json_invalid" for item in found):
-        position, reason = found[0]["loc"][-1], found[0]["ctx"]["error"]
-        return problem(request, HTTPStatus.BAD_REQUEST, f"the body is no JSON: {reason} at character {position}")
+        return problem(request, HTTPStatus.BAD_REQUEST, f"the body is no JSON: {found[0]['ctx']['error']}")
     locations = [item["loc"] for item in found]
     causes = [item for item in found if not _follows(item["loc"], locations)]
     errors = [_field_problem(item) for item in causes]
@@ -87,9 +94,11 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
     detail = str(error.detail)
     if status is HTTPStatus.NOT_FOUND:
         detail = f"nothing is at {request.url.path}; /docs lists all routes"
+    headers = dict(error.headers or {})
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
-        detail = f"{request.url.path} does not answer {request.method}"
-    return problem(request, status, detail, headers=dict(error.headers or {}))
+        headers["Allow"] = allowed = ", ".join(sorted(_methods(request))) or headers["Allow"]
+        detail = f"{request.url.path} does not answer {request.method}; it answers {allowed}"
+    return problem(request, status, detail, headers=headers)
 
 
 async def _bad_config(request: Request, error: Exception) -> JSONResponse:
@@ -123,6 +132,13 @@ async def _bug(request: Request, error: Exception) -> JSONResponse:
     return problem(request, HTTPStatus.INTERNAL_SERVER_ERROR, detail)
 
 
+def _methods(request: Request) -> set[str]:
+    """Methods that some route answers at this path; Starlette names only those of the first."""
+    paths: dict[str, dict[str, Any]] = request.app.openapi()["paths"]
+    matching = (methods for path, methods in paths.items() if compile_path(path)[0].match(request.url.path))
+    return {method.upper() for methods in matching for method in methods}
+
+
 def _follows(location: Location, others: Sequence[Location]) -> bool:
     """Whether an error only repeats one inside it: a list "too short" once its bad entries are dropped."""
     return any(len(other) > len(location) and other[: len(location)] == location for other in others)
@@ -130,27 +146,38 @@ def _follows(location: Location, others: Sequence[Location]) -> bool:
 
 def _field_problem(item: dict[str, Any]) -> FieldProblem:
     location: Location = item["loc"]
-    path = [str(part) for part in location if part not in ("body", "query", "path")]
+    path = _dotted(location)
     message = str(item["msg"]).removeprefix("Value error, ")
-    got, wanted = _shown(item.get("input")), _wanted(item, location)
+    got = "nothing" if item["type"] == "missing" else _shown(item.get("input"))
+    wanted = _wanted(item, location)
     if item["type"] == "value_error":
         field, stated, wanted = _parse(message)
-        path += [field] if field else []
+        path = f"{path}.{field}".strip(".")
         got = stated or got
-    return FieldProblem(field=_ascii(".".join(path)), message=message, got=got, wanted=wanted)
+    return FieldProblem(field=_ascii(path), message=message, got=got, wanted=wanted)
+
+
+def _dotted(location: Location) -> str:
+    """`requirements[0].name`, without the part that says where in the request it was."""
+    parts = location[1:] if location[0] in ("body", "query", "path") else location
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
 
 
 def _wanted(item: dict[str, Any], location: Location) -> str:
     if item["type"] == "extra_forbidden":
         return f"one of {', '.join(_known_fields(location[1:-1]))}"
     template = _LIMITS.get(item["type"])
-    return template.format(**item.get("ctx", {})) if template else str(item["msg"]).removeprefix("Input should be ")
+    if template:
+        return template.format(**item.get("ctx", {}))
+    return str(item["msg"]).removeprefix("Input should be ").partition(",")[0]
 
 
 def _parse(message: str) -> tuple[str, str, str]:
     """Field, got and wanted of a message in house style; the whole message is wanted where it is not."""
-    match = _HOUSE_STYLE.fullmatch(message)
-    return (match["field"], match["got"], match["wanted"]) if match else ("", "", message)
+    for style in _HOUSE_STYLES:
+        if match := style.fullmatch(message):
+            return match["field"], match["got"], match["wanted"]
+    return "", "", message
 
 
 def _known_fields(location: Location) -> list[str]:

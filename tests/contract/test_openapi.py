@@ -1,0 +1,53 @@
+from pathlib import Path
+
+import httpx
+import pytest
+import schemathesis
+import yaml
+from hypothesis import HealthCheck, settings
+
+from service.app import create_app, openapi
+from service.openapi import document
+from service.settings import ServiceSettings
+
+COMMITTED = Path(__file__).parents[2] / "openapi.yaml"
+
+schema = schemathesis.openapi.from_dict(openapi(create_app(ServiceSettings())))
+
+
+def test_committed_document_is_what_the_app_generates():
+    assert COMMITTED.read_text(encoding="utf-8") == document(), "run `python -m service.openapi`"
+
+
+def test_served_document_is_the_committed_one(base_url):
+    assert httpx.get(f"{base_url}/openapi.json").json() == yaml.safe_load(COMMITTED.read_text(encoding="utf-8"))
+
+
+def test_every_error_is_declared_as_a_problem():
+    for path, operations in yaml.safe_load(COMMITTED.read_text(encoding="utf-8"))["paths"].items():
+        for method, operation in operations.items():
+            for status, response in operation["responses"].items():
+                wanted = "application/problem+json" if int(status) >= 400 else "application/json"
+                assert list(response["content"]) == [wanted], (method, path, status)
+
+
+@schema.parametrize()
+@settings(max_examples=8, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
+def test_no_response_contradicts_the_document(case, base_url):
+    # A formula or a cursor can be wrong in ways that no JSON schema can say.
+    case.call_and_validate(base_url=base_url, excluded_checks=[schemathesis.checks.positive_data_acceptance])
+
+
+@pytest.mark.parametrize("path", ["/", "/v1", "/v1/campaigns/", "/v1/campaigns/x/y/z", "/v1/families/low"])
+def test_unknown_route_is_a_problem(base_url, path):
+    response = httpx.get(base_url + path)
+    assert response.status_code == 404
+    assert response.headers["content-type"] == "application/problem+json"
+    assert response.json()["instance"] == path
+
+
+def test_wrong_method_is_a_problem_that_names_the_right_ones(base_url):
+    response = httpx.delete(f"{base_url}/v1/campaigns")
+    assert response.status_code == 405
+    assert response.headers["content-type"] == "application/problem+json"
+    assert response.headers["allow"] == "GET, POST"
