@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+STEP_S = 0.1  # one control step is one simulation step
+
 
 class Kind(IntEnum):
     """What body an actor has."""
@@ -59,16 +61,22 @@ class Frame:
     x_m: Floats
     y_m: Floats
     heading_rad: Floats
-    speed_mps: Floats  # along the heading, never negative
-    lateral_mps: Floats  # across the heading, positive to the left
+    vx_mps: Floats  # velocity over the last step, east
+    vy_mps: Floats  # north
+    speed_mps: Floats  # along the lane or the walking direction, never negative
+    lateral_mps: Floats  # across the lane, positive to the left
     accel_mps2: Floats
     length_m: Floats
     width_m: Floats
-    visible: Bools  # to the ego's sensor; the ego itself is True
     signal: Signal
     stop_line_m: float  # ego's front bumper to its next signal's stop line; negative once past; inf without one
     simulator_collisions: tuple[tuple[str, str], ...] = ()  # SUMO's own list, a cross-check only
     teleported: tuple[str, ...] = ()
+
+    @property
+    def ego_speed_mps(self) -> float:
+        """Speed of the ego."""
+        return float(self.speed_mps[0])
 
 
 class Outcome(StrEnum):

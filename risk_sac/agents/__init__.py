@@ -1,1 +1,1 @@
-"""Soft actor-critic under a realism constraint, with risk-guided replay. Start at `learner`."""
+"""The learners: soft actor-critic, replay, dual variable, and the control that learns nothing."""

@@ -1,0 +1,1 @@
+"""Scenario families, their scene spaces, and what an ODD makes of them."""

@@ -1,0 +1,287 @@
+"""The closed loop as a Gymnasium environment: adversaries act, SUMO and its ego answer.
+
+Registered as RiskSAC/Low-v0, RiskSAC/Mixed-v0 and RiskSAC/Dense-v0. The reward is R_risk alone; the
+realism cost and the robustness come in `info`, because λ and the shaping belong to the learner.
+
+Source: RISK-SAC, Alg. 1, l. 5 and 8.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.config import FamilyName, RewardConfig, RunSpec
+from risk_sac.errors import InfeasibleScene, SimulationError
+from risk_sac.geometry import RelativeView, relative_view
+from risk_sac.observation import LIMIT, Encoder
+from risk_sac.problem import Problem
+from risk_sac.risk.publish import in_charge, publish
+from risk_sac.risk.realism import broken_hard_rule, soft_cost
+from risk_sac.risk.reward import risk_reward
+from risk_sac.risk.rss import LONGITUDINAL_CAP_M, margins
+from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
+from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
+from risk_sac.scenario.limits import Limits, limits_from_odd
+from risk_sac.sim.collision import Contact, History, agrees, find_contact, touching_pairs, verdicts
+from risk_sac.sim.control import Adversaries
+from risk_sac.sim.ego import Perception
+from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.trace import Trace
+from risk_sac.types import STEP_S, Bools, Collision, Floats, Frame, Kind, Role, Scene
+
+FEASIBLE_TRIES = 100
+Observation = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Measures:
+    """What one frame says about risk."""
+
+    view: RelativeView
+    visible: Bools  # n
+    ttc_s: Floats  # n
+    rss_longitudinal_m: Floats  # n
+    rss_lateral_m: Floats  # n
+    gap_m: Floats  # n
+    signals: dict[str, float]
+    robustness: Floats  # M, scaled
+    soft_min: float
+
+
+class RiskSacEnv(gym.Env[Observation, Observation]):
+    """One problem; `reset` takes a scene, or draws feasible ones by itself."""
+
+    metadata = {"render_modes": []}  # noqa: RUF012  # Gymnasium's own declaration
+
+    def __init__(self, problem: Problem, reward: RewardConfig, *, controlled: bool = True) -> None:
+        """Prepares, but starts no simulation.
+
+        Args:
+          problem: what to falsify.
+          reward: the terms of R_risk, and β of the soft minimum.
+          controlled: False leaves the adversary vehicles to SUMO and lets pedestrians stand: a control.
+        """
+        self.problem = problem
+        self._reward = reward
+        self._controlled = controlled
+        self._sim = SumoSimulation(problem.ego)
+        self._perception = Perception(problem.ego.sensor, problem.visibility_m)
+        self._monitor = Monitor(problem.requirements, STEP_S, problem.family.horizon_steps)
+        self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
+        self.observation_size = self._encoder.size
+        self.action_size = 2 * len(problem.family.adversaries)
+        self.action_space = gym.spaces.Box(-1.0, 1.0, (self.action_size,), np.float32)
+        self.observation_space = gym.spaces.Box(-LIMIT, LIMIT, (self.observation_size,), np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Starts an episode.
+
+        Args:
+          seed: reseeds the generator that SUMO's seed, and a scene where none is given, are drawn from.
+          options: `{"scene": Scene}` to start from that scene.
+
+        Raises:
+          InfeasibleScene: the given scene breaks a rule of C_hard.
+          SceneError: it is no point of the problem's space.
+          SimulationError: no feasible scene was found, or SUMO failed.
+        """
+        super().reset(seed=seed)
+        if options and "scene" in options:
+            return self._start(options["scene"])
+        for _ in range(FEASIBLE_TRIES):
+            try:
+                return self._start(self.problem.space.from_unit(self.np_random.random(self.problem.space.dimension)))
+            except InfeasibleScene:
+                continue
+        raise SimulationError(f"none of {FEASIBLE_TRIES} random scenes of {self.problem.family.name!r} is feasible")
+
+    def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """One control step of 0.1 s.
+
+        Args:
+          action: two entries in [-1, 1] per adversary, see `risk_sac.sim.control`.
+
+        Returns:
+          Observation, R_risk, whether the ego touched something, whether the horizon is reached, and
+          `info` with `cost` (C_soft), `robustness` (soft minimum) and, at a contact, `collision`.
+        """
+        if self._controlled:
+            self._adversaries.command(np.clip(action, -1.0, 1.0).tolist(), self._sim)
+        before, self._frame = self._frame, self._sim.step()
+        previous, self._measures = self._measures, self._measure(self._frame, before)
+        self._steps += 1
+        self._inside_limits &= not self._controlled or self._adversaries.keep_limits(self._frame)
+        self._teleported |= bool(self._frame.teleported)
+        contact = find_contact(before, self._frame, self._measures.view)
+        self._remember(action)
+        collision = None if contact is None else self._judge(contact)
+        self._touched.update(self._frame.ids[i] for pair in touching_pairs(self._frame) for i in pair)
+        cost = self._cost(before, self._frame, previous, self._measures)
+        valid = collision is not None and collision.valid
+        reward = risk_reward(
+            self._measures.signals["ttc_s"],
+            self._measures.signals["rss_longitudinal_m"],
+            self._measures.signals["rss_lateral_m"],
+            float(valid),
+            float(collision is not None and not valid),
+            self._reward,
+        )
+        truncated = self._steps >= self.problem.family.horizon_steps
+        info: dict[str, Any] = {"cost": cost, "robustness": self._measures.soft_min}
+        if collision is not None:
+            info["collision"] = collision
+        return self._observe(), reward, collision is not None, truncated, info
+
+    @property
+    def trace(self) -> Trace:
+        """Everything recorded since the last reset."""
+        return self._trace
+
+    @property
+    def min_ttc_s(self) -> float:
+        """Smallest TTC of the episode so far, over the actors the ego answers for."""
+        return self._min_ttc_s
+
+    @property
+    def min_robustness(self) -> float:
+        """Smallest soft-min robustness of the episode so far."""
+        return self._min_robustness
+
+    def close(self) -> None:
+        """Ends the simulation."""
+        self._sim.close()
+
+    def _start(self, scene: Scene) -> tuple[Observation, dict[str, Any]]:
+        self._unit_scene = self.problem.space.to_unit(scene)
+        layout = self.problem.family.layout(scene.values)
+        self._limits = limits_from_odd(self.problem.odd, layout.friction)
+        sumo_seed = int(self.np_random.integers(2**31 - 1))
+        self._frame = self._sim.reset(layout, sumo_seed, controlled=self._controlled)
+        self._adversaries = Adversaries(self.problem.family, self._limits, layout, self._frame)
+        self._monitor.reset()
+        self._perception.reset()
+        self._trace = Trace(self._monitor.names)
+        self._steps = 0
+        self._inside_limits, self._teleported = True, False
+        self._touched: set[str] = set()
+        self._ever_visible: set[str] = set()
+        self._min_ttc_s, self._min_rss_m, self._peak_braking, self._min_robustness = (
+            TTC_CAP_S,
+            LONGITUDINAL_CAP_M,
+            0.0,
+            ROBUSTNESS_CLIP,
+        )
+        self._started_s = self._frame.time_s
+        self._measures = self._measure(self._frame, None)
+        self._check_feasible(scene)
+        self._remember(None)
+        return self._observe(), {"robustness": self._measures.soft_min}
+
+    def _check_feasible(self, scene: Scene) -> None:
+        """C_hard of Eq. 5."""
+        measures = self._measures
+        overlaps = bool(measures.view.overlap.any() or touching_pairs(self._frame))
+        rule = broken_hard_rule(overlaps, float(measures.gap_m.min()), measures.signals["ttc_s"])
+        if rule is not None:
+            raise InfeasibleScene(f"scene of {scene.family!r} breaks {rule}: {dict(scene.values)}", reason=rule)
+
+    def _measure(self, frame: Frame, before: Frame | None) -> Measures:
+        view = relative_view(frame)
+        visible, hidden = self._perception.update(frame, view)
+        self._sim.hide(hidden)
+        ttc_s = time_to_collision(view)
+        longitudinal, lateral = margins(view, self.problem.rss)
+        gap_m = view.gap
+        signals = publish(frame, before, view, ttc_s, longitudinal, lateral, gap_m)
+        robustness = self._monitor.update(signals)
+        rho = float(soft_min(robustness, self._reward.softmin_sharpness))
+        self._ever_visible.update(id_ for id_ in frame.ids[1:] if id_ not in hidden)
+        self._min_ttc_s = min(self._min_ttc_s, signals["ttc_s"])
+        self._min_robustness = min(self._min_robustness, rho)
+        self._peak_braking = max(self._peak_braking, signals["ego_braking_mps2"])
+        danger = np.maximum(longitudinal, lateral)
+        self._min_rss_m = min(self._min_rss_m, float(danger.min(where=in_charge(view), initial=np.inf)))
+        return Measures(view, visible, ttc_s, longitudinal, lateral, gap_m, signals, robustness, rho)
+
+    def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
+        """C_soft of Eq. 5 over the adversaries."""
+        if before.ids != frame.ids:  # somebody left the net, far from the ego: compare those who stayed
+            return 0.0
+        adversary = self._adversaries.rows(frame)
+        others = adversary - 1
+        return soft_cost(
+            frame.accel_mps2[adversary],
+            before.accel_mps2[adversary],
+            self._adversaries.accel_limits(frame),
+            now.gap_m[others],
+            previous.gap_m[others],
+            STEP_S,
+        )
+
+    def _judge(self, contact: Contact) -> Collision:
+        frame = self._frame
+        other, ego = frame.ids[contact.other], frame.ids[0]
+        visible_for_s = self._perception.visible_for(other, frame.time_s)
+        history = History(
+            started_s=self._started_s,
+            teleported=self._teleported,
+            spawn_overlap=False,  # C_hard rejected such scenes before the first step
+            inside_limits=self._inside_limits,
+            touched_before=other in self._touched,
+            visible_for_s=visible_for_s,
+            ever_visible=other in self._ever_visible,
+        )
+        return Collision(
+            time_s=contact.time_s - self._started_s,
+            other_id=other,
+            other_kind=Kind(int(frame.kind[contact.other])).name.lower(),
+            other_role=Role(int(frame.role[contact.other])).name.lower(),
+            contact_x_m=contact.x_m,
+            contact_y_m=contact.y_m,
+            ego_zone=contact.ego_zone,
+            other_zone=contact.other_zone,
+            ego_speed_mps=frame.ego_speed_mps,
+            other_speed_mps=float(frame.speed_mps[contact.other]),
+            relative_speed_mps=contact.relative_speed_mps,
+            lateral_offset_m=contact.lateral_offset_m,
+            min_ttc_s=self._min_ttc_s,
+            min_rss_margin_m=self._min_rss_m,
+            visible_for_s=visible_for_s,
+            ego_peak_braking_mps2=self._peak_braking,
+            min_robustness=self._min_robustness,
+            simulator_agrees=agrees(frame, ego, other),
+            verdicts=verdicts(contact, frame, history),
+        )
+
+    def _remember(self, action: Observation | None) -> None:
+        m = self._measures
+        self._trace.frames.append(self._frame)
+        self._trace.others.append((m.gap_m, m.ttc_s, m.rss_longitudinal_m, m.rss_lateral_m, m.visible))
+        self._trace.robustness.append(m.robustness)
+        self._trace.soft_min.append(m.soft_min)
+        if action is not None:
+            self._trace.actions.append(np.array(action, dtype=np.float32))
+
+    def _observe(self) -> Observation:
+        time_left = 1.0 - self._steps / self.problem.family.horizon_steps
+        m = self._measures
+        return self._encoder.encode(self._frame, m.view, m.gap_m, m.visible, m.robustness, self._unit_scene, time_left)
+
+
+def make_default(family: FamilyName) -> RiskSacEnv:
+    """The family's default problem, as registered with Gymnasium."""
+    spec = RunSpec(family=family, method="risk-sac", seed=0)
+    return RiskSacEnv(Problem.from_spec(spec), spec.learner.reward)
+
+
+def register_envs() -> None:
+    """Registers the three families; Gymnasium calls it through the package's entry point."""
+    for family in ("low", "mixed", "dense"):
+        id_ = f"RiskSAC/{family.capitalize()}-v0"
+        if id_ not in gym.registry:
+            gym.register(id_, entry_point="risk_sac.env:make_default", kwargs={"family": family})

@@ -1,0 +1,80 @@
+"""The falsification problem a run poses: which ego, in which ODD, judged by which requirements.
+
+Everything a campaign can get wrong beyond its types is found here, without loading torch or libsumo.
+"""
+
+from dataclasses import dataclass
+
+from risk_sac.config import CampaignSpec, EgoConfig, Odd, Requirement, RunSpec
+from risk_sac.errors import ConfigError
+from risk_sac.risk.rss import RssParameters
+from risk_sac.risk.stl import check_requirements
+from risk_sac.scenario.families import FAMILIES, Family
+from risk_sac.scenario.limits import GRAVITY_MPS2, limits_from_odd
+from risk_sac.scenario.odd import intersect, narrow, requirements_from_odd
+from risk_sac.scenario.space import SceneSpace
+from risk_sac.types import STEP_S
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What stays the same over all episodes of a run."""
+
+    family: Family
+    odd: Odd  # complete: the family's default narrowed by the user's
+    space: SceneSpace  # the family's, narrowed by the ODD
+    ego: EgoConfig
+    requirements: tuple[Requirement, ...]  # the ODD's, then the user's
+    rss: RssParameters
+
+    @classmethod
+    def from_spec(cls, spec: RunSpec) -> "Problem":
+        """Translates a run's settings.
+
+        Raises:
+          OddError: the ODD contradicts itself or leaves no scene.
+          FormulaError: a user's requirement cannot be monitored online.
+          ConfigError: a user's requirement takes the name of a shipped one.
+        """
+        family = FAMILIES[spec.family]
+        odd = intersect(family.odd, spec.odd)
+        shipped = requirements_from_odd(odd, spec.ego.reaction_time_s)
+        check_requirements(spec.requirements, STEP_S, family.horizon_steps)
+        taken = {requirement.name for requirement in shipped}
+        for index, requirement in enumerate(spec.requirements):
+            if requirement.name in taken:
+                raise ConfigError(
+                    f"requirement name {requirement.name!r} is taken by a shipped one; wanted a name not in "
+                    f"{sorted(taken)}",
+                    field=f"requirements[{index}].name",
+                )
+        return cls(
+            family=family,
+            odd=odd,
+            space=narrow(family.space, odd),
+            ego=spec.ego,
+            requirements=(*shipped, *spec.requirements),
+            rss=_rss_parameters(odd, spec.ego),
+        )
+
+    @property
+    def visibility_m(self) -> float:
+        """The worst visibility the ODD admits, m; it bounds the ego's sensor."""
+        visibility = self.odd.environment.visibility_m
+        return float("inf") if visibility is None else visibility.low
+
+
+def _rss_parameters(odd: Odd, ego: EgoConfig) -> RssParameters:
+    """RSS under the ODD: the ego's delay, the worst grip for its own braking, the others' hardest braking."""
+    limits = limits_from_odd(odd, friction=1.0)
+    grip = odd.environment.friction.low * GRAVITY_MPS2 if odd.environment.friction else GRAVITY_MPS2
+    return RssParameters(
+        response_s=ego.reaction_time_s, brake_min_mps2=min(4.5, grip), brake_max_mps2=limits.brake_mps2
+    )
+
+
+def check_campaign(spec: CampaignSpec) -> None:
+    """Refuses a campaign that could not run; see `Problem.from_spec` for the errors."""
+    for family in spec.families:
+        run = next(run for run in spec.runs() if run.family == family)
+        Problem.from_spec(run)

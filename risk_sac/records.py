@@ -1,0 +1,17 @@
+"""Episode records as JSON, exactly and back."""
+
+from pydantic import TypeAdapter
+
+from risk_sac.types import EpisodeRecord
+
+_RECORDS = TypeAdapter(list[EpisodeRecord])
+
+
+def records_to_json(records: list[EpisodeRecord]) -> str:
+    """Canonical JSON; floats keep every bit."""
+    return _RECORDS.dump_json(records).decode()
+
+
+def records_from_json(text: str) -> list[EpisodeRecord]:
+    """The inverse of `records_to_json`."""
+    return _RECORDS.validate_json(text)

@@ -1,0 +1,15 @@
+"""Time to collision under constant velocity, in the plane."""
+
+from risk_sac.geometry import RelativeView, time_to_contact
+from risk_sac.types import Floats
+
+TTC_CAP_S = 10.0  # longer times carry no risk and would only stretch the scale
+
+
+def time_to_collision(view: RelativeView) -> Floats:
+    """TTC of the ego with each other actor, `n`, s, capped at `TTC_CAP_S`.
+
+    Bodies are swept as oriented boxes, so crossing and oncoming conflicts count as much as following;
+    for a leader in the same lane it equals gap / closing speed (Hayward 1972).
+    """
+    return time_to_contact(view).clip(max=TTC_CAP_S)

@@ -1,0 +1,65 @@
+"""What the ego perceives: a line-of-sight sensor and the memory of who was seen since when."""
+
+import math
+
+import numpy as np
+
+from risk_sac.config import SensorConfig
+from risk_sac.geometry import RelativeView, line_of_sight
+from risk_sac.types import Bools, Frame, Kind
+
+
+def visible(view: RelativeView, vehicle: Bools, sensor: SensorConfig | None, visibility_m: float) -> Bools:
+    """Which of the `n` other actors the ego's sensor sees.
+
+    Args:
+      view: the others in the ego's frame.
+      vehicle: `n`; vehicles occlude what is behind them, pedestrians do not.
+      sensor: None sees everything.
+      visibility_m: the weather's bound on the sensor's range.
+    """
+    if sensor is None:
+        return np.ones(len(view.x), dtype=np.bool_)
+    reach = min(sensor.range_m, visibility_m)
+    seen: Bools = view.x * view.x + view.y * view.y <= reach * reach
+    if sensor.field_of_view_rad < math.tau:
+        seen &= np.abs(np.arctan2(view.y, view.x)) <= sensor.field_of_view_rad / 2
+    if sensor.occlusion:
+        seen &= line_of_sight(view, vehicle)
+    return seen
+
+
+class Perception:
+    """Who is hidden now, and since when each visible actor has been visible without a break."""
+
+    def __init__(self, sensor: SensorConfig | None, visibility_m: float) -> None:
+        self._sensor = sensor
+        self._visibility_m = visibility_m
+        self._seen_since: dict[str, float] = {}
+
+    def reset(self) -> None:
+        """Forgets the previous episode."""
+        self._seen_since.clear()
+
+    def update(self, frame: Frame, view: RelativeView) -> tuple[Bools, frozenset[str]]:
+        """Looks at a frame.
+
+        Returns:
+          `n - 1` flags of the other actors, and the ids that must be hidden from the ego's models.
+        """
+        others = frame.ids[1:]
+        seen = visible(view, frame.kind[1:] == Kind.VEHICLE, self._sensor, self._visibility_m)
+        since = self._seen_since
+        hidden = []
+        for id_, flag in zip(others, seen.tolist(), strict=True):
+            if flag:
+                since.setdefault(id_, frame.time_s)
+            else:
+                since.pop(id_, None)
+                hidden.append(id_)
+        return seen, frozenset(hidden)
+
+    def visible_for(self, id_: str, time_s: float) -> float:
+        """How long `id_` has been visible without a break, s; 0 if it is hidden."""
+        since = self._seen_since.get(id_)
+        return 0.0 if since is None else time_s - since

@@ -1,0 +1,276 @@
+"""Algorithm 1 of RISK-SAC: one run from its settings to its results.
+
+Source: RISK-SAC, Algorithm 1; each line is tagged where it happens. Lines 9-16 live one level down, in
+`risk_sac.agents.learner`, because the reward is formed when a batch is sampled.
+"""
+
+import logging
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import torch
+
+from risk_sac import checkpoint
+from risk_sac.agents.learner import Learner
+from risk_sac.agents.random import RandomAgent
+from risk_sac.agents.replay import Transition
+from risk_sac.config import METHODS, RunSpec
+from risk_sac.env import RiskSacEnv
+from risk_sac.errors import InfeasibleScene
+from risk_sac.metrics import MetricsAccumulator, results_digest
+from risk_sac.problem import Problem
+from risk_sac.records import records_from_json, records_to_json
+from risk_sac.risk.reward import penalised_reward, shaped_reward
+from risk_sac.scene_optimizer import BotorchOptimizer, SceneOptimizer, SobolOptimizer
+from risk_sac.trace import write_series
+from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
+
+logger = logging.getLogger(__name__)
+
+CHECKPOINT = "checkpoint"
+FAILURES = "failures"
+PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
+
+
+class Observer(Protocol):
+    """Who wants to know how a run goes, and may end it."""
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
+        """After each episode; `series` names its file below `failures/` if the ego touched something."""
+
+    def should_stop(self) -> bool:
+        """Polled between episodes."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunSummary:
+    """What a run leaves behind."""
+
+    metrics: RunMetrics  # of the search
+    evaluation: RunMetrics | None  # of the frozen policy, if the budget has evaluation episodes
+    digest: str  # of all records: the same spec gives the same digest
+    finished: bool  # False when the observer ended it
+    versions: Mapping[str, str]
+    wall_s: float  # of this process; excludes what was done before a resume
+
+
+def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
+    """Executes a run, or goes on with one whose checkpoint lies in `folder`.
+
+    Args:
+      spec: what to run.
+      folder: gets the checkpoint and, below `failures/`, the time series of every contact.
+      observer: told of each episode.
+
+    Raises:
+      ConfigError: the spec poses no problem that can be run.
+      CheckpointError: the checkpoint is damaged or of another run.
+      OSError: the folder cannot be written.
+    """
+    started = time.monotonic()
+    torch.set_num_threads(1)
+    run = Run(spec, folder)
+    try:
+        run.resume()
+        total = spec.budget.episodes + spec.budget.evaluation_episodes
+        while len(run.records) < total and not observer.should_stop():
+            record, series = run.episode(len(run.records))  # Alg. 1, l. 3
+            observer.episode(record, run.metrics_after(record), series)
+            if len(run.records) % spec.learner.checkpoint_every == 0:
+                run.save()
+        run.save()
+    finally:
+        run.close()
+    return run.summary(finished=len(run.records) == total, wall_s=time.monotonic() - started)
+
+
+class Run:
+    """The state of a run between two episodes."""
+
+    def __init__(self, spec: RunSpec, folder: Path) -> None:
+        self._spec = spec
+        self._folder = folder
+        self._method = METHODS[spec.method]
+        self._problem = Problem.from_spec(spec)
+        self._env = RiskSacEnv(self._problem, spec.learner.reward, controlled=self._method.agent != "none")
+        observation_size, action_size = self._env.observation_size, self._env.action_size
+        self._optimizer: SceneOptimizer  # Alg. 1, l. 1
+        optimizer = BotorchOptimizer if self._method.scenes == "botorch" else SobolOptimizer
+        self._optimizer = optimizer(self._problem.space.dimension, spec.learner.scenes, spec.seed)
+        self._agent: Learner | RandomAgent  # Alg. 1, l. 2
+        if self._method.agent == "sac":
+            self._agent = Learner(observation_size, action_size, self._method, spec.learner, spec.seed)
+        else:
+            self._agent = RandomAgent(action_size, spec.seed)
+        self.records: list[EpisodeRecord] = []
+        self._search = MetricsAccumulator(self._problem.family.horizon_steps)
+        self._evaluation = MetricsAccumulator(self._problem.family.horizon_steps)
+
+    def episode(self, index: int) -> tuple[EpisodeRecord, str | None]:
+        """One episode of Algorithm 1, lines 4 to 22; in the evaluation phase the policy is frozen.
+
+        Choice: scenes keep coming from the method's own sampler during evaluation, since it is the pair of
+        sampler and policy that generates scenarios.
+        """
+        learning = index < self._spec.budget.episodes
+        seed = episode_seed(self._spec.seed, index)
+        point = self._optimizer.ask()  # Alg. 1, l. 4
+        scene = self._problem.space.from_unit(point)
+        tally = Tally()
+        try:
+            observation, info = self._env.reset(seed=seed, options={"scene": scene})  # Alg. 1, l. 5
+        except InfeasibleScene as infeasible:
+            self._optimizer.tell(point, None)
+            return self._record(index, seed, scene.values, tally, objective=None, rejected=infeasible.reason), None
+        robustness = info["robustness"]
+        for _ in range(self._problem.family.horizon_steps):  # Alg. 1, l. 6
+            action = self._agent.act(observation, explore=learning)  # Alg. 1, l. 7
+            next_observation, reward, terminated, truncated, info = self._env.step(action)  # Alg. 1, l. 8
+            tally.add(reward, info["cost"], self._shaped(reward, info, robustness, terminated))
+            if learning:
+                self._agent.observe(  # Alg. 1, l. 9-12
+                    Transition(
+                        observation=observation,
+                        action=action,
+                        risk_reward=reward,
+                        cost=info["cost"],
+                        robustness=robustness,
+                        next_robustness=info["robustness"],
+                        next_observation=next_observation,
+                        terminated=terminated,
+                        accumulated_reward=tally.shaped_return,
+                    )
+                )
+                self._agent.update()  # Alg. 1, l. 13-16
+            observation, robustness = next_observation, info["robustness"]
+            if terminated or truncated:  # Alg. 1, l. 17-19
+                break
+        objective = self._optimizer.tell(point, tally.shaped_return / tally.steps)  # Alg. 1, l. 21-22
+        collision = info.get("collision")
+        record = self._record(index, seed, scene.values, tally, objective, collision=collision)
+        return record, self._keep_series(record)
+
+    def _shaped(self, reward: float, info: Mapping[str, float], robustness: float, terminated: bool) -> float:
+        """R' of this step under today's λ; what the scene optimiser and the record see."""
+        penalised = penalised_reward(reward, info["cost"], self._agent.dual_variable)
+        if not self._method.shaping:
+            return penalised
+        config = self._spec.learner
+        vanishing = float(terminated and config.reward.zero_terminal_potential)
+        return shaped_reward(penalised, robustness, info["robustness"], config.sac.discount, vanishing)
+
+    def _record(
+        self,
+        index: int,
+        seed: int,
+        scene: Mapping[str, float],
+        tally: "Tally",
+        objective: float | None,
+        *,
+        rejected: str = "",
+        collision: Collision | None = None,
+    ) -> EpisodeRecord:
+        if rejected:
+            outcome, reason = Outcome.REJECTED, rejected
+        elif collision is None:
+            outcome, reason = Outcome.SAFE, ""
+        else:
+            outcome = Outcome.FAILURE if collision.valid else Outcome.DEGENERATE
+            reason = ", ".join(rule for rule, passed in collision.verdicts.items() if not passed)
+        before = self.records[-1].environment_steps if self.records else 0
+        record = EpisodeRecord(
+            index=index,
+            phase="train" if index < self._spec.budget.episodes else "evaluate",
+            seed=seed,
+            scene=scene,
+            outcome=outcome,
+            reason=reason,
+            steps=tally.steps,
+            risk_return=tally.risk_return,
+            shaped_return=tally.shaped_return,
+            mean_cost=tally.cost / tally.steps if tally.steps else 0.0,
+            min_ttc_s=self._env.min_ttc_s,
+            min_robustness=self._env.min_robustness,
+            objective=objective,
+            dual_variable=self._agent.dual_variable,
+            temperature=self._agent.temperature,
+            environment_steps=before + tally.steps,
+            collision=collision,
+        )
+        self.records.append(record)
+        return record
+
+    def _keep_series(self, record: EpisodeRecord) -> str | None:
+        if record.collision is None:
+            return None
+        name = f"{record.index:06d}.npz"
+        write_series(self._folder / FAILURES / name, self._env.trace.series())
+        return name
+
+    def metrics_after(self, record: EpisodeRecord) -> RunMetrics:
+        """Counts a record, in its own phase."""
+        return (self._search if record.phase == "train" else self._evaluation).add(record)
+
+    def summary(self, *, finished: bool, wall_s: float) -> RunSummary:
+        """What the run has achieved so far."""
+        return RunSummary(
+            metrics=self._search.metrics(),
+            evaluation=self._evaluation.metrics() if self._spec.budget.evaluation_episodes else None,
+            digest=results_digest(self.records),
+            finished=finished,
+            versions={name: version(name) for name in PACKAGES},
+            wall_s=wall_s,
+        )
+
+    def save(self) -> None:
+        """Writes the checkpoint; only ever called between episodes."""
+        state = {
+            "records": records_to_json(self.records),
+            "optimizer": self._optimizer.state(),
+            "agent": self._agent.state(),
+        }
+        checkpoint.save(self._folder / CHECKPOINT, state, self._spec.digest)
+
+    def resume(self) -> None:
+        """Goes on from the folder's checkpoint, if there is one."""
+        path = self._folder / CHECKPOINT
+        if not path.exists():
+            return
+        state = checkpoint.load(path, self._spec.digest)
+        self.records = records_from_json(state["records"])
+        self._optimizer.load(state["optimizer"])
+        self._agent.load(state["agent"])
+        for record in self.records:
+            self.metrics_after(record)
+        logger.info("resumed after %d episodes", len(self.records))
+
+    def close(self) -> None:
+        """Ends the simulation."""
+        self._env.close()
+
+
+@dataclass(slots=True)
+class Tally:
+    """Sums over one episode."""
+
+    steps: int = 0
+    risk_return: float = 0.0
+    shaped_return: float = 0.0
+    cost: float = 0.0
+
+    def add(self, reward: float, cost: float, shaped: float) -> None:
+        """Counts one step."""
+        self.steps += 1
+        self.risk_return += reward
+        self.cost += cost
+        self.shaped_return += shaped
+
+
+def episode_seed(run_seed: int, index: int) -> int:
+    """Seed of one episode; the same for every method, so that methods meet the same background traffic."""
+    return int(np.random.SeedSequence((run_seed, index)).generate_state(1)[0] >> 1)
