@@ -222,10 +222,12 @@ class Series(Body):
     """T x n; 0 = east, counter-clockwise."""
     speed_mps: RealRows
     """T x n."""
+    lateral_mps: RealRows
+    """T x n; positive to the left."""
     accel_mps2: RealRows
     """T x n."""
     visible: list[list[bool | None]]
-    """T x n; to the ego's sensor."""
+    """T x n; to the ego's sensor. Null for the ego itself, here and in what follows."""
     distance_m: RealRows
     """T x n, to the ego."""
     ttc_s: RealRows
@@ -241,7 +243,7 @@ class Series(Body):
     soft_min: Reals
     """T."""
     actions: RealRows
-    """T x a, of the adversaries, normalised."""
+    """T x a, of the adversaries, normalised: what led to the step."""
     signal: list[str]
     """T; colour ahead of the ego: none | green | yellow | red."""
 

@@ -1,6 +1,7 @@
 """Full time series of a contact, from the file its worker wrote."""
 
 import zipfile
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -21,11 +22,12 @@ def load_series(path: Path) -> Series:
       StorageError: the file is missing, damaged, or lacks an array.
     """
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        # Opened here: numpy leaves a file open that it opened itself and found damaged.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
             return Series.model_validate({name: _plain(name, arrays[name]) for name in Series.model_fields})
     except FileNotFoundError as error:
         raise StorageError(f"the time series {path.name!r} is gone") from error
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise StorageError(f"the time series {path.name!r} is damaged: {error}") from error
 
 

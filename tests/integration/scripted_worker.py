@@ -1,0 +1,109 @@
+"""A worker that speaks the real protocol and does what its run's seed says.
+
+Runs as `python -m scripted_worker FOLDER` in place of `service.worker`.
+"""
+
+import errno
+import os
+import signal
+import sys
+import threading
+import time
+from pathlib import Path
+
+from risk_sac.config import RunSpec
+from risk_sac.types import EpisodeRecord, Outcome, RunMetrics
+from service.events import EpisodeDone, Event, Failed, Finished, encode
+
+WELL_BEHAVED, DIES, HANGS, BABBLES, DISK_FULL, EXITS = 0, 9, 15, 7, 28, 3
+EPISODE_S = 0.05
+
+
+def main() -> None:
+    folder = Path(sys.argv[1])
+    stopping = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: stopping.set())
+    spec = RunSpec.model_validate_json(sys.stdin.buffer.readline())
+    threading.Thread(target=leave_with_server, daemon=True).start()
+    checkpoint = folder / "checkpoint"
+    done = int(checkpoint.read_text()) if checkpoint.exists() else 0
+    for index in range(done, spec.budget.episodes):
+        if stopping.is_set() and spec.seed != HANGS:
+            break
+        if index == 2:
+            misbehave(spec.seed)
+        time.sleep(EPISODE_S)
+        send(EpisodeDone(record=record(index), metrics=metrics(index + 1), series=None, wall_s=EPISODE_S))
+        done = index + 1
+        if done % 3 == 0:
+            checkpoint.write_text(str(done))
+    finished = done == spec.budget.episodes
+    send(Finished(finished=finished, metrics=metrics(done), evaluation=None, digest="d", versions={}, wall_s=1.0))
+
+
+def leave_with_server() -> None:
+    while os.read(0, 4096):
+        pass
+    os._exit(0)
+
+
+def misbehave(seed: int) -> None:
+    if seed == DIES:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if seed == BABBLES:
+        os.write(1, b"Loading net-file from 'low.net.xml' ... done (3ms).\n")
+        time.sleep(60)
+    if seed == DISK_FULL:
+        send(Failed(reason=f"storage failed: {os.strerror(errno.ENOSPC)}", storage=True))
+        sys.exit(1)
+    if seed == EXITS:
+        sys.exit("Traceback: the policy is NaN")
+
+
+def send(event: Event) -> None:
+    os.write(1, encode(event))
+
+
+def record(index: int) -> EpisodeRecord:
+    return EpisodeRecord(
+        index=index,
+        phase="train",
+        seed=index,
+        scene={},
+        outcome=Outcome.SAFE,
+        reason="",
+        steps=100,
+        risk_return=0.0,
+        shaped_return=0.0,
+        mean_cost=0.0,
+        min_ttc_s=float("inf"),
+        min_robustness=0.0,
+        objective=None,
+        dual_variable=0.0,
+        temperature=0.0,
+        environment_steps=100 * (index + 1),
+    )
+
+
+def metrics(episodes: int) -> RunMetrics:
+    return RunMetrics(
+        episodes=episodes,
+        rejected=0,
+        raw_collisions=0,
+        failures=0,
+        environment_steps=100 * episodes,
+        ecr=0.0,
+        ecr_low=0.0,
+        ecr_high=0.5,
+        window_ecr=0.0,
+        efficiency=0.0,
+        cost_rate=0.0,
+        dispersion=None,
+        steps_per_failure=None,
+        dual_variable=0.0,
+        temperature=0.0,
+    )
+
+
+if __name__ == "__main__":
+    main()

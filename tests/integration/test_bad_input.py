@@ -1,0 +1,114 @@
+"""What a user can get wrong, and what the service says to it."""
+
+import json
+
+import pytest
+
+
+def low(**spec):
+    return json.dumps({"families": ["low"]} | spec)
+
+
+def requirement(formula):
+    return low(requirements=[{"name": "mine", "formula": formula, "scale": 1.0}])
+
+
+@pytest.mark.parametrize(
+    ("body", "field", "got", "wanted"),
+    [
+        ("{}", "families", "nothing", "a value"),
+        ("[]", "", "[]", "a JSON object"),
+        ('{"families": ["high"]}', "families[0]", '"high"', "'low', 'mixed' or 'dense'"),
+        ('{"families": []}', "families", "[]", "at least 1 entries"),
+        ('{"families": ["low", "low"]}', "families", "['low', 'low']", "each value once"),
+        (low(methods=["sca"]), "methods[0]", '"sca"', "'risk-sac'"),
+        (low(episodes=3), "episodes", "3", "one of budget, ego, families"),
+        (low(budget={"episods": 3}), "budget.episods", "3", "one of episodes, evaluation_episodes"),
+        (low(budget={"episodes": -1}), "budget.episodes", "-1", ">= 1"),
+        (low(budget={"episodes": "3"}), "budget.episodes", '"3"', "an integer"),
+        (low(budget={"episodes": float("nan")}), "budget.episodes", "NaN", "an integer"),
+        (low(ego={"reaction_time_s": float("nan")}), "ego.reaction_time_s", "NaN", "a finite number"),
+        (low(ego={"reaction_time_s": float("inf")}), "ego.reaction_time_s", "Infinity", "a finite number"),
+        (low(ego={"reaction_time_s": 0.55}), "ego.reaction_time_s", "0.55", "a multiple of the 0.1 s"),
+        (low(seeds=[-1]), "seeds[0]", "-1", ">= 0"),
+        (low(label="x" * 201), "label", '"xxx', "at most 200 characters"),
+        (low(odd={"environment": {"friction": {"low": 2, "high": 1}}}), "odd.environment.friction", "2", "low <= high"),
+        (low(odd={"dynamic": {"ego_speed_mps": {"low": 60, "high": 70}}}), "odd.dynamic.ego_speed_mps", "", ""),
+        (requirement("ttc_s >="), "requirements[0].formula", "'the end'", "a signal, a number or '('"),
+        (requirement("sped > 1"), "requirements[0].formula", "", ""),
+        (requirement("always (ttc_s > 1)"), "requirements[0].formula", "", ""),
+        (requirement("once[0:500] (ttc_s > 1)"), "requirements[0].formula", "", ""),
+    ],
+)
+def test_a_bad_campaign_is_refused_by_field_got_and_wanted(client, body, field, got, wanted):
+    response = client.post("/v1/campaigns", content=body, headers={"content-type": "application/json"})
+    assert response.status_code == 422, response.text
+    assert response.headers["content-type"] == "application/problem+json"
+    problem = response.json()
+    assert problem["instance"] == "/v1/campaigns"
+    (error,) = problem["errors"]
+    assert error["field"].startswith(field)
+    assert got in error["got"]
+    assert wanted in error["wanted"]
+    assert error["wanted"]
+    assert error["message"] in problem["detail"]
+
+
+@pytest.mark.parametrize(
+    ("body", "detail"),
+    [
+        (b"", "EOF while parsing"),
+        (b'{"families": ["low"', "EOF while parsing"),
+        (b"families: [low]", "expected ident"),
+        (b'{"label": "\xff"}', "the body is no JSON"),
+        (b"[" * 100_000, "recursion limit"),
+        (b'{"seeds": [' + b"9" * 5000 + b"]}", "number out of range"),
+        (b'{"label": "\\ud800"}', "hex escape"),
+    ],
+)
+def test_a_body_that_is_no_json_is_refused(client, body, detail):
+    response = client.post("/v1/campaigns", content=body, headers={"content-type": "application/json"})
+    assert response.status_code == 400
+    assert detail in response.json()["detail"]
+
+
+def test_every_mistake_is_named_at_once(client):
+    body = low(budget={"episodes": 0, "evaluation_episodes": -1}, seeds=[1.5])
+    problem = client.post("/v1/campaigns", content=body, headers={"content-type": "application/json"}).json()
+    fields = [error["field"] for error in problem["errors"]]
+    assert fields == ["seeds[0]", "budget.episodes", "budget.evaluation_episodes"]
+
+
+def test_a_body_of_another_type_is_refused(client):
+    response = client.post("/v1/campaigns", content=low(), headers={"content-type": "text/plain"})
+    assert response.status_code == 415
+    assert "got" not in response.json()["detail"]
+    assert "'text/plain'; wanted application/json" in response.json()["detail"]
+
+
+@pytest.mark.parametrize(
+    ("path", "status", "field"),
+    [
+        ("/v1/campaigns/none", 404, "campaign_id"),
+        ("/v1/campaigns/none/results", 404, "campaign_id"),
+        ("/v1/campaigns/none/episodes", 404, "campaign_id"),
+        ("/v1/campaigns/none/failures", 404, "campaign_id"),
+        ("/v1/campaigns/none/failures/x", 404, "campaign_id"),
+        ("/v1/campaigns/%00%ff", 404, "campaign_id"),
+        ("/v1/campaigns?limit=0", 422, "limit"),
+        ("/v1/campaigns?limit=many", 422, "limit"),
+        ("/v1/campaigns?cursor=AAAA", 422, "cursor"),
+        ("/v1/campaigns?cursor=OTk5OTk5OTk5OTk5OTk5OTk5OTk5OTk=", 422, "cursor"),
+        ("/v1/campaigns/none/failures?tier=all", 422, "tier"),
+        ("/v1/campaigns/none/episodes?outcome=crash", 422, "outcome"),
+    ],
+)
+def test_a_bad_address_is_refused_by_field(client, path, status, field):
+    response = client.get(path)
+    assert response.status_code == status
+    assert response.json()["status"] == status
+    assert [error["field"] for error in response.json()["errors"]] == [field]
+
+
+def test_cancelling_what_does_not_exist_is_404(client):
+    assert client.post("/v1/campaigns/none/cancel").status_code == 404

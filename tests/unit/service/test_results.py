@@ -1,0 +1,31 @@
+from dataclasses import replace
+
+import pytest
+
+from risk_sac.config import CampaignSpec
+from service.campaigns import State
+from service.results import interval, results
+
+
+def test_totals_are_per_family_and_method_over_the_seeds(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random"), seeds=(0, 1)))
+    sac = [replace(metrics, ecr=0.25), replace(metrics, ecr=0.75, failures=3, dispersion=0.5)]
+    runs = tuple(
+        replace(run, metrics=sac[run.seed] if run.method == "sac" else None, state=State.RUNNING)
+        for run in campaign.runs
+    )
+    found = results(replace(campaign, runs=runs))
+    assert not found.complete
+    assert [run.metrics is not None for run in found.runs] == [True, False, True, False]
+    (total,) = found.totals
+    assert (total.method, total.runs, total.episodes, total.failures) == ("sac", 2, 8, 4)
+    assert (total.ecr, total.dispersion, total.steps_per_failure) == (0.5, 0.5, 200.0)
+    assert total.ecr_low <= 0.5 <= total.ecr_high
+
+
+def test_one_run_keeps_its_wilson_interval_and_more_are_bootstrapped(metrics):
+    assert interval([metrics]) == (metrics.ecr_low, metrics.ecr_high)
+    assert interval([replace(metrics, ecr=0.4)] * 5) == pytest.approx((0.4, 0.4))
+    low, high = interval([replace(metrics, ecr=ecr) for ecr in (0.0, 0.2, 0.4, 0.6, 0.8)])
+    assert 0.1 < low < 0.25  # the mean of five draws from these is 0.4 ± 0.25
+    assert 0.55 < high < 0.7

@@ -1,0 +1,80 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from risk_sac.trace import PER_ACTOR, PER_OTHER, write_series
+from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
+from service import schemas
+from service.api.views import episode_body
+from service.errors import StorageError
+from service.records import Episode
+from service.series import load_series
+
+
+@pytest.mark.parametrize(
+    ("record", "body", "added"),
+    [
+        (RunMetrics, schemas.Metrics, set()),
+        (Collision, schemas.Collision, set()),
+        (EpisodeRecord, schemas.Episode, {"id", "run_id", "wall_s"}),
+    ],
+)
+def test_a_body_has_every_field_of_its_record(record, body, added):
+    assert {field.name for field in dataclasses.fields(record)} | added == set(body.model_fields)
+
+
+def test_numbers_that_are_not_finite_are_null(episode):
+    event = episode(3, Outcome.FAILURE)
+    body = episode_body(Episode(number=1, run_id="r", record=event.record, series=None, wall_s=0.5))
+    assert body.min_ttc_s is None
+    assert body.collision.min_ttc_s is None
+    assert body.collision.min_robustness is None
+    assert body.collision.ego_speed_mps == 9.0
+
+
+def arrays(steps=3, actors=2):
+    rows = np.arange(steps * actors, dtype=float).reshape(steps, actors)
+    rows[1, 1] = np.nan
+    series = dict.fromkeys((*PER_ACTOR, *PER_OTHER), rows)
+    return series | {
+        "time_s": np.arange(steps) / 10,
+        "ids": np.array(["ego", "lead"]),
+        "kind": np.array([0, 1], dtype=np.int8),
+        "role": np.array([0, 1], dtype=np.int8),
+        "length_m": np.array([4.6, 0.5]),
+        "width_m": np.array([1.8, 0.5]),
+        "visible": np.array([[np.nan, 1.0], [np.nan, np.nan], [np.nan, 0.0]]),
+        "requirements": np.array(["safe_ttc"]),
+        "robustness": np.array([[1.0], [np.inf], [-1.0]]),
+        "soft_min": np.zeros(steps),
+        "actions": np.zeros((steps, 4), dtype=np.float32),
+        "signal": np.array([0, 3, 1], dtype=np.int8),
+    }
+
+
+def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
+    write_series(tmp_path / "a.npz", arrays())
+    series = load_series(tmp_path / "a.npz")
+    assert series.x_m == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
+    assert series.visible == [[None, True], [None, None], [None, False]]
+    assert series.kind == ["vehicle", "pedestrian"]
+    assert series.role == ["ego", "adversary"]
+    assert series.signal == ["none", "red", "green"]
+    assert series.robustness == [[1.0], [None], [-1.0]]
+    assert len(series.actions[0]) == 4
+
+
+def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):
+    path = tmp_path / "a.npz"
+    with pytest.raises(StorageError, match=r"'a\.npz' is gone"):
+        load_series(path)
+    write_series(path, arrays())
+    whole = path.read_bytes()
+    for size in range(0, len(whole), 97):
+        path.write_bytes(whole[:size])
+        with pytest.raises(StorageError, match="is damaged"):
+            load_series(path)
+    path.write_bytes(whole[:200] + bytes(byte ^ 0xFF for byte in whole[200:260]) + whole[260:])
+    with pytest.raises(StorageError, match="is damaged"):
+        load_series(path)
