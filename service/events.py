@@ -33,6 +33,7 @@ class EpisodeDone(Message):
     type: Literal["episode"] = "episode"
     record: EpisodeRecord
     metrics: RunMetrics
+    """Of the episode's phase so far."""
     series: FileName | None
     """File of its full time series in the run's folder `failures`, if the ego touched something."""
     wall_s: float

@@ -71,7 +71,10 @@ class Ledger:
                 _count(run, Outcome(row.outcome), -1)
             _fill(row, event)
             _count(run, event.record.outcome, +1)
-            run.metrics = _json(event.metrics)
+            if event.record.phase == "train":
+                run.metrics = _json(event.metrics)
+            else:
+                run.evaluation = _json(event.metrics)
             run.busy_s += event.wall_s
 
     def end_run(self, number: int, state: State, reason: str | None = None, result: Finished | None = None) -> None:

@@ -52,7 +52,9 @@ def test_search_and_evaluation_episodes_of_one_index_are_two(store, ledger, epis
     number = start(store, ledger)
     ledger.add_episode(number, episode(0))
     ledger.add_episode(number, episode(0, phase="evaluate"))
-    assert store.campaign(campaign.id).runs[0].episodes_done == 2
+    (run, *_) = store.campaign(campaign.id).runs
+    assert run.episodes_done == 2
+    assert run.metrics == run.evaluation == episode(0).metrics
 
 
 def test_a_record_comes_back_with_its_numbers_that_are_not_finite(store, ledger, episode):

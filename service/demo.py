@@ -1,0 +1,210 @@
+"""`python -m service.demo`: start the service, let RISK-SAC search, say what it found."""
+
+import argparse
+import contextlib
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+
+START_S = 60.0
+STOP_S = 60.0
+POLL_S = 1.0
+FINAL = ("succeeded", "failed", "cancelled")
+
+Json = dict[str, Any]
+
+
+class DemoError(Exception):
+    """The demo cannot go on; the message says why."""
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the demo; returns the exit status: 0 with a valid failure found, 1 without."""
+    options = _parser().parse_args(arguments)
+    console = Console()
+    try:
+        with _service(options.data_dir, console) as url:
+            campaign = _follow(url, _post(url, options)["id"], console)
+            found = _collect(url, campaign)
+    except DemoError as error:
+        console.print(f"demo failed: {error}", style="bold red", markup=False)
+        return 1
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    options.out.write_text(json.dumps(found, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    _summarise(found, console)
+    console.print(f"results: {options.out}; recorded failures: {options.data_dir}/campaigns/{campaign['id']}")
+    return _verdict(found, console)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m service.demo", description=__doc__)
+    parser.add_argument("--family", default="mixed", help="scenario family")
+    parser.add_argument("--methods", nargs="+", default=["risk-sac", "random"], help="search methods, side by side")
+    parser.add_argument("--episodes", type=int, default=150, help="search episodes of each run")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="one run per method and seed")
+    parser.add_argument("--out", type=Path, default=Path("results/demo.json"), help="where the results go")
+    parser.add_argument(
+        "--data-dir",
+        type=Path,
+        default=Path("results") / time.strftime("demo-%Y%m%d-%H%M%S"),
+        help="where the service keeps its database and the recorded failures",
+    )
+    return parser
+
+
+@contextlib.contextmanager
+def _service(data_dir: Path, console: Console) -> Iterator[str]:
+    """The service on a free loopback port, stopped at the end."""
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    data_dir.mkdir(parents=True, exist_ok=True)
+    log = data_dir / "service.log"
+    environment = os.environ | {
+        "RISK_SAC_HOST": "127.0.0.1",
+        "RISK_SAC_PORT": str(port),
+        "RISK_SAC_DATA_DIR": str(data_dir),
+    }
+    with log.open("wb") as stream:
+        process = subprocess.Popen([sys.executable, "-m", "service"], env=environment, stdout=stream, stderr=stream)
+    try:
+        url = f"http://127.0.0.1:{port}"
+        _wait_until_up(url, process, log)
+        console.print(f"service: {url} (log: {log})")
+        yield url
+    finally:
+        process.terminate()
+        try:
+            process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _wait_until_up(url: str, process: subprocess.Popen[bytes], log: Path) -> None:
+    deadline = time.monotonic() + START_S
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            raise DemoError(f"the service ended with status {process.returncode}; its log is {log}")
+        try:
+            _call(f"{url}/healthz")
+        except DemoError:
+            time.sleep(0.1)
+        else:
+            return
+    raise DemoError(f"the service did not answer within {START_S:g} s; its log is {log}")
+
+
+def _post(url: str, options: argparse.Namespace) -> Json:
+    spec = {
+        "label": "demo",
+        "families": [options.family],
+        "methods": options.methods,
+        "seeds": options.seeds,
+        "budget": {"episodes": options.episodes},
+    }
+    return _call(f"{url}/v1/campaigns", spec)
+
+
+def _call(url: str, body: Json | None = None) -> Json:
+    """GET, or POST where there is a body.
+
+    Raises:
+      DemoError: the service does not answer, or answers with a problem.
+    """
+    data = None if body is None else json.dumps(body).encode()
+    request = urllib.request.Request(url, data, {"content-type": "application/json"})
+    try:
+        with urllib.request.urlopen(request, timeout=30) as response:
+            answer: Json = json.load(response)
+            return answer
+    except urllib.error.HTTPError as error:
+        with error:
+            raise DemoError(f"{url} answered {error.code}: {json.load(error).get('detail')}") from error
+    except OSError as error:
+        raise DemoError(f"{url} does not answer: {error}") from error
+
+
+def _follow(url: str, campaign_id: str, console: Console) -> Json:
+    """The campaign once it has ended, with a bar that moves until then."""
+    columns = (BarColumn(bar_width=15), MofNCompleteColumn(), TextColumn("episodes  {task.fields[figures]}"))
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("search", total=None, figures="")
+        while True:
+            campaign = _call(f"{url}/v1/campaigns/{campaign_id}")
+            seen = campaign["progress"]
+            bar.update(task, completed=seen["episodes_done"], total=seen["episodes_total"], figures=_figures(campaign))
+            if campaign["state"] in FINAL:
+                return campaign
+            time.sleep(POLL_S)
+
+
+def _figures(campaign: Json) -> str:
+    seen = campaign["progress"]
+    eta = "?" if seen["eta_s"] is None else f"{seen['eta_s']:.0f} s"
+    return (
+        f"{seen['raw_collisions']} collisions, {seen['failures']} valid  "
+        f"ECR {_number(seen['window_ecr'])}  λ {_number(seen['dual_variable'])}  ETA {eta}"
+    )
+
+
+def _collect(url: str, campaign: Json) -> Json:
+    base = f"{url}/v1/campaigns/{campaign['id']}"
+    return {
+        "campaign": campaign,
+        "results": _call(f"{base}/results"),
+        "failures": _call(f"{base}/failures?limit=500")["items"],
+    }
+
+
+def _summarise(found: Json, console: Console) -> None:
+    table = Table(title="What the search found", box=SIMPLE_HEAD, collapse_padding=True, pad_edge=False)
+    for name in ("method", "episodes", "collisions", "valid", "ECR", "95 %", "ES", "cost", "OFD", "steps/valid"):
+        table.add_column(name, justify="left" if name == "method" else "right")
+    for total in found["results"]["totals"]:
+        table.add_row(
+            total["method"],
+            str(total["episodes"]),
+            str(total["raw_collisions"]),
+            str(total["failures"]),
+            _number(total["ecr"]),
+            f"{_number(total['ecr_low'])}-{_number(total['ecr_high'])}",
+            _number(total["efficiency"]),
+            _number(total["cost_rate"], 3),
+            _number(total["dispersion"]),
+            _number(total["steps_per_failure"], 0),
+        )
+    console.print(table)
+
+
+def _verdict(found: Json, console: Console) -> int:
+    campaign = found["campaign"]
+    if campaign["state"] != "succeeded":
+        console.print(f"campaign {campaign['state']}: {campaign['reason']}", style="bold red", markup=False)
+        return 1
+    failures = campaign["progress"]["failures"]
+    if failures == 0:
+        console.print("no valid failure was found; try more --episodes or another --seeds", style="bold red")
+        return 1
+    console.print(f"{failures} valid failures of the ego found", style="bold green")
+    return 0
+
+
+def _number(value: float | None, digits: int = 2) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())
