@@ -24,7 +24,7 @@ from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.rss import LONGITUDINAL_CAP_M, margins
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
-from risk_sac.scenario.limits import Limits, limits_from_odd
+from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, History, agrees, find_contact, touching_pairs, verdicts
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Perception

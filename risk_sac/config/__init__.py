@@ -34,8 +34,8 @@ __all__ = [
     "RewardConfig",
     "RunSpec",
     "SacConfig",
-    "Scenery",
     "SceneOptimizerConfig",
+    "Scenery",
     "SensorConfig",
     "Settings",
 ]

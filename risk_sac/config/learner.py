@@ -54,11 +54,11 @@ class LagrangianConfig(Settings):
     """The dual variable λ, Eq. 1-2 and Alg. 1, l. 16."""
 
     initial: NonNegative = 0.0
-    learning_rate: Positive = 2e-3
+    learning_rate: Positive = 5e-4
     """η_λ."""
-    cost_limit: NonNegative = 0.1
+    cost_limit: NonNegative = 0.2
     """d, on the mean realism cost per step."""
-    maximum: Positive = 10.0
+    maximum: Positive = 2.0
     """Cap on λ, so that a burst of cost cannot drown the risk reward for good."""
 
 

@@ -1,1 +1,1 @@
-"""Measures of risk and realism, and the requirements they are judged by; each module is one family of pure functions."""
+"""Measures of risk and realism, and the requirements they are judged by; one family of pure functions a module."""

@@ -13,7 +13,7 @@ from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Role
 
 VEHICLE_LENGTH_M = 4.6
-KERB_M = 6.55  # of the mixed and dense roads from their axis: two lanes of 3.3 m each, and 5 cm inside
+KERB_M = 6.55  # of the mixed road from its axis: two lanes of 3.3 m each, and 5 cm inside
 
 EGO = "ego"
 LEFT, STRAIGHT, RIGHT = range(3)
@@ -122,7 +122,6 @@ LOW = Family(
 
 ZEBRA_M, SIGNAL_M = 300.0, 700.0  # centres of the two crossings on the mixed road
 CROSSING_HALF_WIDTH_M = 2.0
-HALF_CROSSING_M = 1.9  # a little inside, so that SUMO maps a person there to nothing else
 
 
 def _mixed(xi: Mapping[str, float]) -> Layout:
@@ -166,7 +165,9 @@ def _mixed(xi: Mapping[str, float]) -> Layout:
                 speed_mps=xi["pedestrian_speed_mps"],
             ),
         ),
-        crossings=tuple(Area(c - HALF_CROSSING_M, c + HALF_CROSSING_M, -KERB_M, KERB_M) for c in (ZEBRA_M, SIGNAL_M)),
+        crossings=tuple(
+            Area(c - CROSSING_HALF_WIDTH_M, c + CROSSING_HALF_WIDTH_M, -KERB_M, KERB_M) for c in (ZEBRA_M, SIGNAL_M)
+        ),
         roadway=(Area(0.0, 1000.0, -KERB_M, KERB_M),),
         signal="signal",
         signal_offset_s=xi["signal_offset_s"],
@@ -208,8 +209,10 @@ MIXED = Family(
 )
 
 
-APPROACH_M = 231.9  # length of each approach of the dense intersection
-CORNER_M = 9.0  # half the square in the middle of the intersection that turning vehicles sweep
+APPROACH_M = 230.4  # length of each approach of the dense intersection
+DENSE_KERB_M = 8.05  # of its roads from their axis: half the median, two lanes, and 5 cm inside
+NEAR_M, FAR_M = 15.6, 19.6  # its crossings' edges from the centre
+CORNER_M = 10.5  # half the square in the middle of the intersection that turning vehicles sweep
 _LEG_AFTER = {
     "south": ("west", "north", "east"),  # destination after a left turn, straight on, a right turn
     "north": ("east", "south", "west"),
@@ -278,21 +281,21 @@ def _dense(xi: Mapping[str, float]) -> Layout:
             PedestrianStart(
                 id="pedestrian",
                 role=Role.ADVERSARY,
-                x_m=KERB_M + xi["pedestrian_setback_m"],
-                y_m=-16.1 + xi["pedestrian_offset_m"],
+                x_m=DENSE_KERB_M + xi["pedestrian_setback_m"],
+                y_m=-(NEAR_M + FAR_M) / 2 + xi["pedestrian_offset_m"],
                 heading_rad=math.pi,
                 speed_mps=xi["pedestrian_speed_mps"],
             ),
         ),
         crossings=(
-            Area(-KERB_M, KERB_M, 14.2, 18.0),
-            Area(-KERB_M, KERB_M, -18.0, -14.2),
-            Area(14.2, 18.0, -KERB_M, KERB_M),
-            Area(-18.0, -14.2, -KERB_M, KERB_M),
+            Area(-DENSE_KERB_M, DENSE_KERB_M, NEAR_M, FAR_M),
+            Area(-DENSE_KERB_M, DENSE_KERB_M, -FAR_M, -NEAR_M),
+            Area(NEAR_M, FAR_M, -DENSE_KERB_M, DENSE_KERB_M),
+            Area(-FAR_M, -NEAR_M, -DENSE_KERB_M, DENSE_KERB_M),
         ),
         roadway=(
-            Area(-KERB_M, KERB_M, -250.0, 250.0),
-            Area(-250.0, 250.0, -KERB_M, KERB_M),
+            Area(-DENSE_KERB_M, DENSE_KERB_M, -250.0, 250.0),
+            Area(-250.0, 250.0, -DENSE_KERB_M, DENSE_KERB_M),
             Area(-CORNER_M, CORNER_M, -CORNER_M, CORNER_M),
         ),
         signal="centre",

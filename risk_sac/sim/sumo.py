@@ -212,15 +212,18 @@ class SumoSimulation:
 
         A person that changes ground is replaced by a fresh one: SUMO crashes when moveToXY takes a person
         from a crossing to a car lane or a walking area (eclipse-sumo/sumo#17257), from a sidewalk it does not.
+        So is one that SUMO moved to a lane without registering it on that lane's edge: drivers look at
+        registered persons only, and would be blind to it.
         """
         ground = None if id_ in self._hidden else self._ground(walker)
         person, stands_on = self._persons.get(id_, ("", None))
-        if person and ground is not stands_on:
+        if person and (ground is not stands_on or not _registered(person)):
             libsumo.person.remove(person)
             del self._persons[id_]
+            stands_on = None
         if ground is None:
             return
-        if ground is not stands_on:
+        if stands_on is None:
             self._persons_added += 1
             person = f"{id_}#{self._persons_added}"  # re-using an id within one step fails
             edge = self._layout.ego.route[0]
@@ -321,6 +324,11 @@ class SumoSimulation:
             return Signal.NONE, math.inf
         _, _, distance_m, state = ahead[0]
         return COLOURS.get(state.lower(), Signal.NONE), distance_m
+
+
+def _registered(person: str) -> bool:
+    lane: str = libsumo.person.getLaneID(person)
+    return lane.rpartition("_")[0] == libsumo.person.getRoadID(person)
 
 
 def _compass(heading_rad: float) -> float:

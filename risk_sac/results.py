@@ -1,0 +1,93 @@
+"""What `risk-sac run` leaves in its folder, and how it is read back.
+
+results.json    the spec, the metrics and every contact; rewritten at each checkpoint and at the end
+episodes.jsonl  one `EpisodeRecord` per line
+failures/       the time series of every contact, see `risk_sac.trace`
+checkpoint      from which the run goes on
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError
+from risk_sac.types import EpisodeRecord, RunMetrics
+
+RESULTS = "results.json"
+EPISODES = "episodes.jsonl"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """An episode in which the ego touched something."""
+
+    id: str  # the episode's index, six digits
+    series: str  # file of its time series, relative to results.json
+    episode: EpisodeRecord
+
+    @classmethod
+    def of(cls, episode: EpisodeRecord) -> "Contact":
+        """The contact of an episode, its file named as the run names it."""
+        id_ = f"{episode.index:06d}"
+        return cls(id=id_, series=f"failures/{id_}.npz", episode=episode)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Results:
+    """Results of one run."""
+
+    spec: RunSpec
+    spec_digest: str
+    finished: bool
+    metrics: RunMetrics | None = None  # of the search; None before its first episode
+    evaluation: RunMetrics | None = None  # of the frozen policy
+    digest: str | None = None  # of all records; None while the run goes on
+    versions: Mapping[str, str] | None = None
+    wall_s: float = 0.0  # over all resumes
+    contacts: tuple[Contact, ...] = ()  # in the order of the episodes
+
+    def contact(self, id_: str) -> Contact:
+        """The contact with this id, with or without leading zeros.
+
+        Raises:
+          ConfigError: there is none.
+        """
+        for contact in self.contacts:
+            if id_.isdecimal() and int(id_) == contact.episode.index:
+                return contact
+        known = ", ".join(contact.id for contact in self.contacts) or "none: the ego touched nothing"
+        raise ConfigError(f"got {id_!r}; wanted one of the contacts ({known})", field="FAILURE")
+
+
+_RESULTS = TypeAdapter(Results)
+
+
+def write_results(folder: Path, results: Results) -> None:
+    """Replaces results.json in one step.
+
+    Raises:
+      OSError: the folder cannot be written.
+    """
+    temporary = folder / f".{RESULTS}.tmp"
+    temporary.write_bytes(_RESULTS.dump_json(results, indent=2) + b"\n")
+    temporary.replace(folder / RESULTS)
+
+
+def read_results(path: Path) -> Results:
+    """Reads results.json, or the one in a folder.
+
+    Raises:
+      ConfigError: there is none, or it is something else.
+    """
+    file = path / RESULTS if path.is_dir() else path
+    try:
+        return _RESULTS.validate_json(file.read_bytes())
+    except FileNotFoundError as error:
+        raise ConfigError(f"there is no {file}; wanted a folder written by `risk-sac run`", field="RESULTS") from error
+    except ValidationError as error:
+        raise ConfigError(
+            f"{file} was not written by `risk-sac run`: {error.errors()[0]['msg']}", field="RESULTS"
+        ) from error

@@ -1,0 +1,73 @@
+"""A run's settings from YAML and command-line flags, checked as strictly as a REST body."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import ValidationError
+
+from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.errors import ConfigError
+
+T = TypeVar("T", RunSpec, CampaignSpec)
+CAMPAIGN_ONLY = {"family": "families", "method": "methods", "seed": "seeds"}  # a run's field -> a campaign's
+
+
+def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
+    """The run described by a file, overridden by flags.
+
+    Args:
+      file: YAML of a RunSpec, or of a CampaignSpec with a single run once the flags have picked one.
+      flags: fields of RunSpec, those of its budget under their own names; None where a flag was not given.
+
+    Raises:
+      ConfigError: the first wrong field.
+    """
+    given = {name: value for name, value in flags.items() if value is not None}
+    budget = {name: given.pop(name) for name in ("episodes", "evaluation_episodes") if name in given}
+    data = {"method": "risk-sac", "seed": 0} if file is None else _read_yaml(file)
+    if budget:
+        stored = data.get("budget", {})
+        data["budget"] = {**stored, **budget} if isinstance(stored, dict) else stored
+    if data.keys() & {"label", *CAMPAIGN_ONLY.values()}:
+        return _only_run(data | {CAMPAIGN_ONLY[name]: [value] for name, value in given.items()})
+    return _validate(RunSpec, data | given)
+
+
+def _read_yaml(file: Path) -> dict[str, Any]:
+    try:
+        data = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{file} cannot be read: {error.strerror}", field="spec") from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{file} is no YAML: {error}", field="spec") from error
+    if not isinstance(data, dict):
+        raise ConfigError(f"{file} holds a {type(data).__name__}; wanted the fields of a run or campaign", field="spec")
+    return data
+
+
+def _only_run(data: dict[str, Any]) -> RunSpec:
+    runs = _validate(CampaignSpec, data).runs()
+    if len(runs) > 1:
+        raise ConfigError(
+            f"the campaign has {len(runs)} runs; wanted one: pick it with --family, --method and --seed", field="spec"
+        )
+    return runs[0]
+
+
+def _validate(model: type[T], data: dict[str, Any]) -> T:
+    """Through JSON, because strictness would refuse YAML's lists where a tuple is wanted."""
+    try:
+        return model.model_validate_json(json.dumps(data, default=str), strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        got = "" if first["type"] == "missing" else f" (got {first['input']!r})"
+        raise ConfigError(f"{first['msg']}{got}", field=_path(first["loc"])) from error
+
+
+def _path(location: tuple[int | str, ...]) -> str:
+    """("requirements", 0, "scale") -> "requirements[0].scale"."""
+    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    return "".join(parts).removeprefix(".")
