@@ -45,7 +45,8 @@ def main(arguments: list[str] | None = None) -> int:
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(json.dumps(found, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     _summarise(found, console)
-    console.print(f"results: {options.out}; recorded failures: {options.data_dir}/campaigns/{campaign['id']}")
+    console.print(f"results: {options.out}")
+    console.print(f"recorded failures: {options.data_dir}/campaigns/{campaign['id']}", soft_wrap=True)
     return _verdict(found, console)
 
 
@@ -170,8 +171,8 @@ def _collect(url: str, campaign: Json) -> Json:
 
 
 def _summarise(found: Json, console: Console) -> None:
-    table = Table(title="What the search found", box=SIMPLE_HEAD, collapse_padding=True, pad_edge=False)
-    for name in ("method", "episodes", "collisions", "valid", "ECR", "95 %", "ES", "cost", "OFD", "steps/valid"):
+    table = Table(title="What the search found", box=SIMPLE_HEAD, collapse_padding=True, padding=(0, 1), pad_edge=False)
+    for name in ("method", "episodes", "raw", "valid", "ECR", "95 %", "ES", "cost", "OFD", "steps/valid"):
         table.add_column(name, justify="left" if name == "method" else "right")
     for total in found["results"]["totals"]:
         table.add_row(

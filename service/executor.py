@@ -24,6 +24,8 @@ LONGEST_LINE = 1 << 20
 TAIL_BYTES = 2000
 TAIL_LINES = 5
 
+_SIGNAL_NAMES = {item.value: item.name for item in signal.Signals}  # real-time signals have none
+
 
 @dataclass(frozen=True, slots=True)
 class Exited:
@@ -124,7 +126,8 @@ class LocalExecutor:
         problem = self._relay(number, worker.process)
         if problem is not None:
             worker.process.kill()
-        reason = problem or _exit_reason(self._wait(worker.process), worker.log)
+        status = self._wait(worker.process)
+        reason = problem or _exit_reason(status, worker.log)
         with self._lock:
             del self._workers[number]
             if worker.timer is not None:
@@ -175,7 +178,7 @@ def _close(process: subprocess.Popen[bytes]) -> None:
 
 def _exit_reason(status: int, log: Path) -> str | None:
     if status < 0:
-        return f"worker was killed by {signal.Signals(-status).name}"
+        return f"worker was killed by {_SIGNAL_NAMES.get(-status, f'signal {-status}')}"
     if status > 0:
         return f"worker exited with status {status}: {_tail(log)}"
     return None

@@ -9,7 +9,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.problem import check_campaign
 from service.campaigns import State
 from service.errors import StorageError
-from service.events import EpisodeDone, Event, Failed, Finished
+from service.events import EpisodeDone, Event, Failed, Finished, Started
 from service.executor import Executor, Exited
 from service.ledger import Ledger
 from service.records import Campaign, Run
@@ -126,6 +126,8 @@ class Manager:
                 self._ledger.add_episode(active.run.number, message)
             elif isinstance(message, Finished | Failed):
                 active.last = message
+            elif isinstance(message, Started):
+                logger.info("run %s of campaign %s: process %d", active.run.id, active.run.campaign_id, message.pid)
         except StorageError as error:
             self._abandon(active.run.campaign_id, str(error))
 

@@ -51,3 +51,13 @@ def test_wrong_method_is_a_problem_that_names_the_right_ones(base_url):
     assert response.status_code == 405
     assert response.headers["content-type"] == "application/problem+json"
     assert response.headers["allow"] == "GET, POST"
+
+
+@pytest.mark.parametrize("part", ["", "/results", "/episodes", "/failures"])
+def test_answers_about_a_campaign_that_exists_are_as_documented(base_url, part):
+    campaign_id = httpx.post(f"{base_url}/v1/campaigns", json={"families": ["dense"]}).json()["id"]
+    operation = schema[f"/v1/campaigns/{{campaign_id}}{part}"]["GET"]
+    case = operation.Case(path_parameters={"campaign_id": campaign_id})
+    response = case.call(base_url=base_url)
+    assert response.status_code == 200
+    case.validate_response(response)

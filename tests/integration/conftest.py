@@ -66,7 +66,7 @@ class Service:
         self.wait_until(lambda: holds(self.get(campaign_id)))
         return self.get(campaign_id)
 
-    def wait_until(self, holds: Callable[[], bool], timeout_s: float = 60) -> None:
+    def wait_until(self, holds: Callable[[], bool], timeout_s: float = 120) -> None:
         deadline = time.monotonic() + timeout_s
         while not holds():
             assert self.process.poll() is None, "the server died"
