@@ -33,6 +33,7 @@ from risk_sac.trace import Trace
 from risk_sac.types import STEP_S, Bools, Collision, Floats, Frame, Kind, Role, Scene
 
 FEASIBLE_TRIES = 100
+WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
 Observation = NDArray[np.float32]
 
 
@@ -75,6 +76,15 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self.action_size = 2 * len(problem.family.adversaries)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (self.action_size,), np.float32)
         self.observation_space = gym.spaces.Box(-LIMIT, LIMIT, (self.observation_size,), np.float32)
+
+    # The state of an episode, set by `_start`.
+    _adversaries: Adversaries
+    _frame: Frame
+    _measures: Measures
+    _trace: Trace
+    _steps: int
+    _inside_limits: bool
+    _teleported: bool
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -145,12 +155,12 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     @property
     def min_ttc_s(self) -> float:
         """Smallest TTC of the episode so far, over the actors the ego answers for."""
-        return self._min_ttc_s
+        return min(self._trace.least_ttc_s)
 
     @property
     def min_robustness(self) -> float:
         """Smallest soft-min robustness of the episode so far."""
-        return self._min_robustness
+        return min(self._trace.soft_min)
 
     def close(self) -> None:
         """Ends the simulation."""
@@ -170,16 +180,11 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._inside_limits, self._teleported = True, False
         self._touched: set[str] = set()
         self._ever_visible: set[str] = set()
-        self._min_ttc_s, self._min_rss_m, self._peak_braking, self._min_robustness = (
-            TTC_CAP_S,
-            LONGITUDINAL_CAP_M,
-            0.0,
-            ROBUSTNESS_CLIP,
-        )
+        self._min_rss_m, self._peak_braking = LONGITUDINAL_CAP_M, 0.0
         self._started_s = self._frame.time_s
         self._measures = self._measure(self._frame, None)
-        self._check_feasible(scene)
         self._remember(None)
+        self._check_feasible(scene)
         return self._observe(), {"robustness": self._measures.soft_min}
 
     def _check_feasible(self, scene: Scene) -> None:
@@ -201,8 +206,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         robustness = self._monitor.update(signals)
         rho = float(soft_min(robustness, self._reward.softmin_sharpness))
         self._ever_visible.update(id_ for id_ in frame.ids[1:] if id_ not in hidden)
-        self._min_ttc_s = min(self._min_ttc_s, signals["ttc_s"])
-        self._min_robustness = min(self._min_robustness, rho)
         self._peak_braking = max(self._peak_braking, signals["ego_braking_mps2"])
         danger = np.maximum(longitudinal, lateral)
         self._min_rss_m = min(self._min_rss_m, float(danger.min(where=in_charge(view), initial=np.inf)))
@@ -249,11 +252,11 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             other_speed_mps=float(frame.speed_mps[contact.other]),
             relative_speed_mps=contact.relative_speed_mps,
             lateral_offset_m=contact.lateral_offset_m,
-            min_ttc_s=self._min_ttc_s,
+            min_ttc_s=min(self._trace.least_ttc_s[:-WARNING_STEPS], default=TTC_CAP_S),
             min_rss_margin_m=self._min_rss_m,
             visible_for_s=visible_for_s,
             ego_peak_braking_mps2=self._peak_braking,
-            min_robustness=self._min_robustness,
+            min_robustness=min(self._trace.soft_min[:-WARNING_STEPS], default=ROBUSTNESS_CLIP),
             simulator_agrees=agrees(frame, ego, other),
             verdicts=verdicts(contact, frame, history),
         )
@@ -264,6 +267,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._trace.others.append((m.gap_m, m.ttc_s, m.rss_longitudinal_m, m.rss_lateral_m, m.visible))
         self._trace.robustness.append(m.robustness)
         self._trace.soft_min.append(m.soft_min)
+        self._trace.least_ttc_s.append(m.signals["ttc_s"])
         if action is not None:
             self._trace.actions.append(np.array(action, dtype=np.float32))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.types import Floats, Frame
+from risk_sac.types import Bools, Floats, Frame
 
 PER_ACTOR = ("x_m", "y_m", "heading_rad", "speed_mps", "lateral_mps", "accel_mps2")
 PER_OTHER = ("distance_m", "ttc_s", "rss_longitudinal_m", "rss_lateral_m", "visible")
@@ -19,9 +19,10 @@ class Trace:
 
     requirements: tuple[str, ...]
     frames: list[Frame] = field(default_factory=list)
-    others: list[tuple[Floats, ...]] = field(default_factory=list)  # of PER_OTHER, each without the ego
+    others: list[tuple[Floats | Bools, ...]] = field(default_factory=list)  # of PER_OTHER, each without the ego
     robustness: list[Floats] = field(default_factory=list)
     soft_min: list[float] = field(default_factory=list)
+    least_ttc_s: list[float] = field(default_factory=list)  # over the actors the ego answers for
     actions: list[NDArray[np.float32]] = field(default_factory=list)  # one fewer than frames
 
     def series(self) -> dict[str, NDArray[np.generic]]:
@@ -42,6 +43,7 @@ class Trace:
             "requirements": np.array(self.requirements),
             "robustness": np.array(self.robustness),
             "soft_min": np.array(self.soft_min),
+            "least_ttc_s": np.array(self.least_ttc_s),
             "signal": np.array([frame.signal for frame in self.frames], dtype=np.int8),
         }
         columns = [[column[id_] for id_ in frame.ids] for frame in self.frames]

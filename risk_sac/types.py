@@ -104,11 +104,11 @@ class Collision:
     other_speed_mps: float
     relative_speed_mps: float
     lateral_offset_m: float  # other's centre across the ego's axis at contact
-    min_ttc_s: float
+    min_ttc_s: float  # until 1 s before the contact, at which it is 0 for every collision alike
     min_rss_margin_m: float
     visible_for_s: float  # continuously visible to the ego before contact; 0 if never seen
     ego_peak_braking_mps2: float
-    min_robustness: float  # smallest soft-min robustness of the episode
+    min_robustness: float  # soft-min robustness, until 1 s before the contact too
     simulator_agrees: bool  # SUMO's own list names the same pair in the contact frame or the next
     verdicts: Mapping[str, bool] = field(default_factory=dict)  # rule -> passed; valid if all passed
 

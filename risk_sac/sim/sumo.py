@@ -328,7 +328,8 @@ class SumoSimulation:
 
 def _registered(person: str) -> bool:
     lane: str = libsumo.person.getLaneID(person)
-    return lane.rpartition("_")[0] == libsumo.person.getRoadID(person)
+    road: str = libsumo.person.getRoadID(person)
+    return lane.rpartition("_")[0] == road
 
 
 def _compass(heading_rad: float) -> float:
