@@ -1,0 +1,164 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from risk_sac.geometry import relative_view
+from risk_sac.risk.publish import CROSSED_ON_RED_M, GAP_CAP_M, in_charge, publish, red_light_margin
+from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
+from risk_sac.risk.signals import SIGNALS
+from risk_sac.risk.ttc import TTC_CAP_S
+from risk_sac.types import Frame, Kind, Role, Signal
+
+VEHICLE, PEDESTRIAN = Kind.VEHICLE, Kind.PEDESTRIAN
+
+
+def frame_of(
+    *others: tuple[float, float, Kind], speed_mps: float = 10.0, accel_mps2: float = 0.0, stop_line_m: float = math.inf
+) -> Frame:
+    """The ego at the origin, driving along x, its body 4 m long; each other is x, y, kind."""
+    n = len(others) + 1
+    speed = np.array([speed_mps] + [0.0] * (n - 1))
+    return Frame(
+        time_s=0.0,
+        ids=tuple(f"actor_{i}" for i in range(n)),
+        kind=np.array([VEHICLE, *(kind for _, _, kind in others)], dtype=np.int8),
+        role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
+        x_m=np.array([0.0, *(x for x, _, _ in others)]),
+        y_m=np.array([0.0, *(y for _, y, _ in others)]),
+        heading_rad=np.zeros(n),
+        vx_mps=speed,
+        vy_mps=np.zeros(n),
+        speed_mps=speed,
+        lateral_mps=np.zeros(n),
+        accel_mps2=np.array([accel_mps2] + [0.0] * (n - 1)),
+        length_m=np.full(n, 4.0),
+        width_m=np.full(n, 2.0),
+        signal=Signal.NONE if math.isinf(stop_line_m) else Signal.RED,
+        stop_line_m=stop_line_m,
+    )
+
+
+def signals_of(frame: Frame, ttc: list[float], along: list[float], across: list[float]) -> dict[str, float]:
+    view = relative_view(frame)
+    return publish(frame, None, view, np.array(ttc), np.array(along), np.array(across), view.gap)
+
+
+@pytest.mark.parametrize(
+    ("x_m", "y_m", "charged"),
+    [(20, 0, True), (0, 3, True), (-1.9, 3, True), (-2.1, 3, False), (-20, 0, False), (5, -40, True)],
+)
+def test_the_ego_answers_for_whoever_is_not_behind_its_rear_bumper(x_m: float, y_m: float, charged: bool) -> None:
+    assert in_charge(relative_view(frame_of((x_m, y_m, VEHICLE)))).tolist() == [charged]
+
+
+def test_every_published_signal_and_no_other_has_a_value() -> None:
+    assert signals_of(frame_of((20, 0, VEHICLE)), [3.0], [-4.0], [-0.5]).keys() == SIGNALS.keys()
+
+
+def test_nothing_to_measure_takes_the_caps() -> None:
+    assert signals_of(frame_of(), [], [], []) == {
+        "ttc_s": TTC_CAP_S,
+        "rss_longitudinal_m": LONGITUDINAL_CAP_M,
+        "rss_lateral_m": LATERAL_CAP_M,
+        "pedestrian_gap_m": GAP_CAP_M,
+        "vehicle_gap_m": GAP_CAP_M,
+        "red_light_m": GAP_CAP_M,
+        "ego_speed_mps": 10.0,
+        "ego_braking_mps2": 0.0,
+    }
+
+
+def test_the_caps_are_the_ends_of_the_published_ranges() -> None:
+    for name, cap in (
+        ("ttc_s", TTC_CAP_S),
+        ("rss_longitudinal_m", LONGITUDINAL_CAP_M),
+        ("rss_lateral_m", LATERAL_CAP_M),
+        ("pedestrian_gap_m", GAP_CAP_M),
+        ("vehicle_gap_m", GAP_CAP_M),
+        ("red_light_m", GAP_CAP_M),
+    ):
+        assert SIGNALS[name].high == cap
+
+
+def test_the_least_value_among_those_in_charge_is_published() -> None:
+    frame = frame_of((30, 0, VEHICLE), (50, 3, VEHICLE), (-20, 0, VEHICLE))
+    published = signals_of(frame, [4.0, 2.5, 0.5], [-3.0, -7.0, -30.0], [-0.5, -0.2, -2.0])
+    assert published["ttc_s"] == 2.5  # the tailgater's 0.5 s does not count
+    assert published["rss_longitudinal_m"] == -7.0
+    assert published["rss_lateral_m"] == -0.5
+
+
+def test_an_rss_margin_counts_only_where_the_other_one_is_violated_too() -> None:
+    frame = frame_of((30, 3.5, VEHICLE), (40, 0, VEHICLE))
+    published = signals_of(frame, [9.0, 9.0], [-20.0, 12.0], [1.5, -3.0])
+    # The first is aside, the second far enough ahead: neither makes a pair of violations.
+    assert published["rss_longitudinal_m"] == 12.0
+    assert published["rss_lateral_m"] == 1.5
+
+
+def test_gaps_count_in_every_direction_and_by_kind() -> None:
+    frame = frame_of((-9, 0, VEHICLE), (20, 0, VEHICLE), (0, -8, PEDESTRIAN))
+    published = signals_of(frame, [9.0] * 3, [9.0] * 3, [9.0] * 3)
+    assert published["vehicle_gap_m"] == pytest.approx(5.0)
+    assert published["pedestrian_gap_m"] == pytest.approx(6.0)
+
+
+def test_distant_bodies_are_capped() -> None:
+    published = signals_of(frame_of((200, 0, VEHICLE), (0, 200, PEDESTRIAN)), [10.0] * 2, [50.0] * 2, [5.0] * 2)
+    assert published["vehicle_gap_m"] == published["pedestrian_gap_m"] == GAP_CAP_M
+
+
+@pytest.mark.parametrize(("accel_mps2", "braking_mps2"), [(-3.5, 3.5), (2.0, 0.0), (0.0, 0.0)])
+def test_braking_is_a_deceleration_and_never_negative(accel_mps2: float, braking_mps2: float) -> None:
+    assert signals_of(frame_of(accel_mps2=accel_mps2), [], [], [])["ego_braking_mps2"] == braking_mps2
+
+
+def at_light(signal: Signal, stop_line_m: float) -> Frame:
+    return replace(frame_of(), signal=signal, stop_line_m=stop_line_m)
+
+
+@pytest.mark.parametrize(
+    ("signal", "stop_line_m", "margin_m"),
+    [
+        (Signal.RED, 12.0, 12.0),
+        (Signal.RED, 400.0, GAP_CAP_M),
+        (Signal.GREEN, 12.0, GAP_CAP_M),
+        (Signal.YELLOW, 12.0, GAP_CAP_M),
+        (Signal.NONE, math.inf, GAP_CAP_M),
+    ],
+)
+def test_only_a_red_light_has_a_margin(signal: Signal, stop_line_m: float, margin_m: float) -> None:
+    assert red_light_margin(at_light(signal, stop_line_m), None) == margin_m
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        pytest.param(at_light(Signal.RED, 0.4), at_light(Signal.NONE, math.inf), id="no further signal"),
+        pytest.param(at_light(Signal.RED, 0.4), at_light(Signal.GREEN, 310.0), id="the next signal is green"),
+        pytest.param(at_light(Signal.RED, 0.4), at_light(Signal.RED, 310.0), id="the next signal is red"),
+        pytest.param(at_light(Signal.RED, 1.3), at_light(Signal.NONE, math.inf), id="at 13 m/s"),
+    ],
+)
+def test_passing_the_stop_line_on_red_is_negative(before: Frame, after: Frame) -> None:
+    assert red_light_margin(after, before) == CROSSED_ON_RED_M < 0
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        pytest.param(at_light(Signal.GREEN, 0.4), at_light(Signal.NONE, math.inf), id="crossed on green"),
+        pytest.param(at_light(Signal.YELLOW, 0.4), at_light(Signal.NONE, math.inf), id="crossed on yellow"),
+        pytest.param(at_light(Signal.RED, 5.0), at_light(Signal.GREEN, 4.5), id="red turns green while it approaches"),
+        pytest.param(at_light(Signal.RED, 0.2), at_light(Signal.GREEN, 0.2), id="red turns green while it waits"),
+        pytest.param(at_light(Signal.NONE, math.inf), at_light(Signal.GREEN, 90.0), id="a signal comes into view"),
+    ],
+)
+def test_no_red_light_was_run(before: Frame, after: Frame) -> None:
+    assert red_light_margin(after, before) >= 0
+
+
+def test_approaching_a_red_light_counts_down() -> None:
+    assert red_light_margin(at_light(Signal.RED, 3.0), at_light(Signal.RED, 3.9)) == 3.0

@@ -1,0 +1,202 @@
+"""Literals are worked out by hand from the formulas of Shalev-Shwartz et al. 2017, Definitions 1, 2 and 6."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.geometry import RelativeView, relative_view
+from risk_sac.risk.rss import (
+    LATERAL_CAP_M,
+    LONGITUDINAL_CAP_M,
+    RssParameters,
+    lateral,
+    margins,
+    opposite_direction,
+    same_direction,
+)
+from risk_sac.types import Frame, Kind, Role, Signal
+
+# ρ = 1 s, a = 2, b_min = 4, b_max = 8, lateral a = 0.5 and b = 1, μ = 0.1: round enough for mental arithmetic.
+P = RssParameters(
+    response_s=1.0,
+    accel_mps2=2.0,
+    brake_min_mps2=4.0,
+    brake_max_mps2=8.0,
+    lateral_accel_mps2=0.5,
+    lateral_brake_mps2=1.0,
+    fluctuation_m=0.1,
+)
+speed = st.floats(0, 40)
+drift = st.floats(-3, 3)
+
+
+def array(*values: float) -> np.ndarray:
+    return np.array(values, dtype=np.float64)
+
+
+@pytest.mark.parametrize(
+    ("rear_mps", "front_mps", "distance_m"),
+    [
+        (10.0, 8.0, 25.0),  # 10 + 1 + 12²/8 - 8²/16 = 11 + 18 - 4
+        (10.0, 0.0, 29.0),  # the vehicle ahead stands
+        (0.0, 0.0, 1.5),  # 0 + 1 + 2²/8: even from rest, the response time is driven
+        (10.0, 24.0, 0.0),  # 29 - 36 < 0
+        (20.0, 20.0, 56.5),  # 20 + 1 + 22²/8 - 20²/16 = 21 + 60.5 - 25
+    ],
+)
+def test_longitudinal_distance_in_the_same_direction(rear_mps: float, front_mps: float, distance_m: float) -> None:
+    assert same_direction(array(rear_mps), array(front_mps), P).tolist() == pytest.approx([distance_m])
+
+
+@pytest.mark.parametrize(
+    ("ego_mps", "other_mps", "distance_m"),
+    [
+        (10.0, 8.0, 50.5),  # (10 + 12)/2 + 12²/8 + (8 + 10)/2 + 10²/8 = 11 + 18 + 9 + 12.5
+        (0.0, 0.0, 3.0),  # twice 1 + 0.5
+        (10.0, 0.0, 30.5),  # 29 + 1.5
+    ],
+)
+def test_longitudinal_distance_in_opposite_directions(ego_mps: float, other_mps: float, distance_m: float) -> None:
+    assert opposite_direction(array(ego_mps), array(other_mps), P).tolist() == pytest.approx([distance_m])
+
+
+@pytest.mark.parametrize(
+    ("ego_mps", "other_mps", "distance_m"),
+    [
+        (0.0, 0.0, 0.85),  # 0.1 + 2 · (0.25 + 0.5²/2)
+        (1.0, 0.0, 2.85),  # 0.1 + (1.25 + 1.5²/2) + 0.375
+        (0.0, 1.0, 2.85),
+        (1.0, 1.0, 4.85),  # 0.1 + 2 · 2.375
+        (-0.5, -0.5, 0.1),  # both drift apart: (-0.5 + 0)/2 + 0 each, so only the fluctuation is left
+    ],
+)
+def test_lateral_distance(ego_mps: float, other_mps: float, distance_m: float) -> None:
+    assert lateral(array(ego_mps), array(other_mps), P).tolist() == pytest.approx([distance_m])
+
+
+def stopping_gap(rear_mps: float, front_mps: float, p: RssParameters) -> float:
+    """Gap that a simulated worst case uses up: the front brakes at b_max, the rear accelerates for ρ, then brakes."""
+    dt, gap, worst = 1e-3, 0.0, 0.0
+    rear, front, time_s = rear_mps, front_mps, 0.0
+    while rear > 0 or front > 0 or time_s < p.response_s:
+        accel = p.accel_mps2 if time_s < p.response_s else -p.brake_min_mps2
+        next_rear, next_front = max(rear + accel * dt, 0.0), max(front - p.brake_max_mps2 * dt, 0.0)
+        gap += ((rear + next_rear) - (front + next_front)) / 2 * dt
+        worst = max(worst, gap)
+        rear, front, time_s = next_rear, next_front, time_s + dt
+    return worst
+
+
+@pytest.mark.parametrize(("rear_mps", "front_mps"), [(10, 8), (20, 20), (5, 0), (15, 22), (0, 10)])
+def test_the_same_direction_distance_is_what_the_worst_case_uses_up(rear_mps: float, front_mps: float) -> None:
+    # With b_max > b_min the vehicle ahead stops first, so the final gap is the smallest: Lemma 2 of the paper.
+    expected = same_direction(array(rear_mps), array(front_mps), P)[0]
+    if expected > 0:
+        assert stopping_gap(rear_mps, front_mps, P) == pytest.approx(expected, abs=0.05)
+
+
+@given(speed, speed, speed)
+def test_more_speed_of_the_rear_vehicle_never_shrinks_the_distance(a: float, b: float, front: float) -> None:
+    slow, fast = sorted((a, b))
+    assert same_direction(array(slow), array(front), P) <= same_direction(array(fast), array(front), P)
+
+
+@given(speed, speed, speed)
+def test_more_speed_of_the_front_vehicle_never_grows_the_distance(a: float, b: float, rear: float) -> None:
+    slow, fast = sorted((a, b))
+    assert same_direction(array(rear), array(fast), P) <= same_direction(array(rear), array(slow), P)
+
+
+@given(speed, speed)
+def test_opposite_direction_treats_both_alike_and_asks_for_more_than_a_standing_obstacle(a: float, b: float) -> None:
+    forth, back = opposite_direction(array(a), array(b), P)[0], opposite_direction(array(b), array(a), P)[0]
+    assert forth == pytest.approx(back)
+    assert forth >= same_direction(array(a), array(0.0), P)[0]
+
+
+@given(drift, drift, drift)
+def test_faster_lateral_closing_never_shrinks_the_distance(a: float, b: float, other: float) -> None:
+    slow, fast = sorted((a, b))
+    assert lateral(array(slow), array(other), P) <= lateral(array(fast), array(other), P) + 1e-12
+    assert lateral(array(slow), array(other), P) >= P.fluctuation_m
+
+
+@given(speed, speed, st.floats(0.1, 1.5), st.floats(0.1, 1.5))
+def test_a_slower_response_never_shrinks_the_distance(rear: float, front: float, a: float, b: float) -> None:
+    quick, slow = (RssParameters(response_s=r) for r in sorted((a, b)))
+    assert same_direction(array(rear), array(front), quick) <= same_direction(array(rear), array(front), slow) + 1e-12
+
+
+def view_of(ego_mps: float, *others: tuple[float, float, float, float, float]) -> RelativeView:
+    """The ego at the origin, driving along x; each other is x, y, heading, vx, vy."""
+    columns = np.array([(0.0, 0.0, 0.0, ego_mps, 0.0), *others]).T
+    n = len(others) + 1
+    frame = Frame(
+        time_s=0.0,
+        ids=tuple(f"actor_{i}" for i in range(n)),
+        kind=np.full(n, Kind.VEHICLE, dtype=np.int8),
+        role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
+        x_m=columns[0],
+        y_m=columns[1],
+        heading_rad=columns[2],
+        vx_mps=columns[3],
+        vy_mps=columns[4],
+        speed_mps=np.hypot(columns[3], columns[4]),
+        lateral_mps=np.zeros(n),
+        accel_mps2=np.zeros(n),
+        length_m=np.full(n, 4.0),
+        width_m=np.full(n, 2.0),
+        signal=Signal.NONE,
+        stop_line_m=math.inf,
+    )
+    return relative_view(frame)
+
+
+def test_margin_to_a_leader_is_the_gap_minus_the_distance() -> None:
+    longitudinal, _ = margins(view_of(10.0, (34.0, 0, 0, 8, 0)), P)
+    assert longitudinal.tolist() == pytest.approx([5.0])  # 30 m gap, 25 m wanted
+
+
+def test_margin_to_an_oncoming_vehicle_uses_the_opposite_direction_distance() -> None:
+    longitudinal, _ = margins(view_of(10.0, (44.0, 0, math.pi, -8, 0)), P)
+    assert longitudinal.tolist() == pytest.approx([-10.5])  # 40 m gap, 50.5 m wanted
+
+
+def test_margin_to_a_follower_takes_the_follower_as_the_rear_vehicle() -> None:
+    longitudinal, _ = margins(view_of(8.0, (-34.0, 0, 0, 10, 0)), P)
+    assert longitudinal.tolist() == pytest.approx([5.0])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_lateral_margin_is_the_same_on_both_sides(side: int) -> None:
+    _, parallel = margins(view_of(10.0, (0, side * 5.0, 0, 10, 0)), P)
+    _, closing = margins(view_of(10.0, (0, side * 5.0, 0, 10, -side * 1.0)), P)
+    _, leaving = margins(view_of(10.0, (0, side * 5.0, 0, 10, side * 1.0)), P)
+    assert parallel.tolist() == pytest.approx([3.0 - 0.85])
+    assert closing.tolist() == pytest.approx([3.0 - 2.85])
+    # 0.1 + [0.375 + (-0.75 - 0.5²/2)]_+ = 0.1
+    assert leaving.tolist() == pytest.approx([2.9])
+
+
+def test_alongside_there_is_no_longitudinal_distance() -> None:
+    longitudinal, _ = margins(view_of(10.0, (1.0, 3.0, 0, 10, 0)), P)
+    assert longitudinal.tolist() == pytest.approx([-(11 + 18 - 100 / 16)])
+
+
+@given(
+    st.floats(0, 30),
+    st.tuples(*(st.floats(-200, 200), st.floats(-50, 50), st.floats(-4, 4), st.floats(-40, 40), st.floats(-40, 40))),
+)
+def test_margins_stay_within_their_caps(ego_mps: float, other: tuple[float, float, float, float, float]) -> None:
+    longitudinal, sideways = margins(view_of(ego_mps, other), P)
+    assert np.all(np.abs(longitudinal) <= LONGITUDINAL_CAP_M)
+    assert np.all(np.abs(sideways) <= LATERAL_CAP_M)
+
+
+def test_overlapping_bodies_are_in_danger_both_ways() -> None:
+    longitudinal, sideways = margins(view_of(10.0, (1.0, 0.5, 0, 10, 0)), P)
+    assert longitudinal[0] < 0
+    assert sideways[0] < 0

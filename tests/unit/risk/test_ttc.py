@@ -1,0 +1,71 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.geometry import RelativeView, relative_view
+from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
+from risk_sac.types import Frame, Kind, Role, Signal
+
+LENGTH_M, WIDTH_M = 4.6, 1.85
+
+
+def view_of(*others: tuple[float, float, float, float, float], ego_mps: float = 20.0) -> RelativeView:
+    """The ego at the origin, driving along x; each other is x, y, heading, vx, vy."""
+    columns = np.array([(0.0, 0.0, 0.0, ego_mps, 0.0), *others]).T
+    n = len(others) + 1
+    frame = Frame(
+        time_s=0.0,
+        ids=tuple(f"actor_{i}" for i in range(n)),
+        kind=np.full(n, Kind.VEHICLE, dtype=np.int8),
+        role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
+        x_m=columns[0],
+        y_m=columns[1],
+        heading_rad=columns[2],
+        vx_mps=columns[3],
+        vy_mps=columns[4],
+        speed_mps=np.hypot(columns[3], columns[4]),
+        lateral_mps=np.zeros(n),
+        accel_mps2=np.zeros(n),
+        length_m=np.full(n, LENGTH_M),
+        width_m=np.full(n, WIDTH_M),
+        signal=Signal.NONE,
+        stop_line_m=math.inf,
+    )
+    return relative_view(frame)
+
+
+def test_ttc_to_a_leader_is_the_gap_over_the_closing_speed() -> None:
+    assert time_to_collision(view_of((34.6, 0, 0, 15, 0))).tolist() == pytest.approx([6.0])  # 30 m at 5 m/s
+
+
+def test_each_actor_gets_its_own_ttc() -> None:
+    ttc = time_to_collision(view_of((34.6, 0, 0, 15, 0), (64.6, 0, math.pi, -10, 0), (20, 3.3, 0, 10, 0)))
+    assert ttc.tolist() == pytest.approx([6.0, 2.0, TTC_CAP_S])
+
+
+def test_no_course_of_collision_takes_the_cap() -> None:
+    assert time_to_collision(view_of((34.6, 0, 0, 25, 0))).tolist() == [TTC_CAP_S]
+
+
+def test_a_distant_contact_is_capped() -> None:
+    assert time_to_collision(view_of((34.6, 0, 0, 19.9, 0))).tolist() == [TTC_CAP_S]  # 300 s
+
+
+def test_touching_bodies_have_no_time_left() -> None:
+    assert time_to_collision(view_of((4.0, 0, 0, 25, 0))).tolist() == [0.0]
+
+
+def test_a_lone_ego_has_no_ttc() -> None:
+    assert time_to_collision(view_of()).shape == (0,)
+
+
+@given(
+    st.tuples(*(st.floats(-50, 50), st.floats(-50, 50), st.floats(-4, 4), st.floats(-20, 20), st.floats(-20, 20))),
+    st.floats(0, 20),
+)
+def test_ttc_is_finite_and_within_its_range(other: tuple[float, float, float, float, float], ego_mps: float) -> None:
+    ttc = time_to_collision(view_of(other, ego_mps=ego_mps))[0]
+    assert 0.0 <= ttc <= TTC_CAP_S
