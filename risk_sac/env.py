@@ -18,7 +18,7 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.geometry import RelativeView, relative_view
 from risk_sac.observation import LIMIT, Encoder
 from risk_sac.problem import Problem
-from risk_sac.risk.publish import in_charge, publish
+from risk_sac.risk.publish import publish, worst_rss_margin
 from risk_sac.risk.realism import broken_hard_rule, soft_cost
 from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.rss import LONGITUDINAL_CAP_M, margins
@@ -46,7 +46,6 @@ class Measures:
     ttc_s: Floats  # n
     rss_longitudinal_m: Floats  # n
     rss_lateral_m: Floats  # n
-    gap_m: Floats  # n
     signals: dict[str, float]
     robustness: Floats  # M, scaled
     soft_min: float
@@ -121,7 +120,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
           `info` with `cost` (C_soft), `robustness` (soft minimum) and, at a contact, `collision`.
         """
         if self._controlled:
-            self._adversaries.command(np.clip(action, -1.0, 1.0).tolist(), self._sim)
+            self._adversaries.command(action.clip(-1.0, 1.0).tolist(), self._sim)
         before, self._frame = self._frame, self._sim.step()
         previous, self._measures = self._measures, self._measure(self._frame, before)
         self._steps += 1
@@ -191,7 +190,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """C_hard of Eq. 5."""
         measures = self._measures
         overlaps = bool(measures.view.overlap.any() or touching_pairs(self._frame))
-        rule = broken_hard_rule(overlaps, float(measures.gap_m.min()), measures.signals["ttc_s"])
+        rule = broken_hard_rule(overlaps, float(measures.view.gap.min()), measures.signals["ttc_s"])
         if rule is not None:
             raise InfeasibleScene(f"scene of {scene.family!r} breaks {rule}: {dict(scene.values)}", reason=rule)
 
@@ -201,15 +200,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._sim.hide(hidden)
         ttc_s = time_to_collision(view)
         longitudinal, lateral = margins(view, self.problem.rss)
-        gap_m = view.gap
-        signals = publish(frame, before, view, ttc_s, longitudinal, lateral, gap_m)
+        signals = publish(frame, before, view, ttc_s, longitudinal, lateral)
         robustness = self._monitor.update(signals)
         rho = float(soft_min(robustness, self._reward.softmin_sharpness))
         self._ever_visible.update(id_ for id_ in frame.ids[1:] if id_ not in hidden)
         self._peak_braking = max(self._peak_braking, signals["ego_braking_mps2"])
-        danger = np.maximum(longitudinal, lateral)
-        self._min_rss_m = min(self._min_rss_m, float(danger.min(where=in_charge(view), initial=np.inf)))
-        return Measures(view, visible, ttc_s, longitudinal, lateral, gap_m, signals, robustness, rho)
+        self._min_rss_m = min(self._min_rss_m, worst_rss_margin(view, longitudinal, lateral))
+        return Measures(view, visible, ttc_s, longitudinal, lateral, signals, robustness, rho)
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""
@@ -221,8 +218,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             frame.accel_mps2[adversary],
             before.accel_mps2[adversary],
             self._adversaries.accel_limits(frame),
-            now.gap_m[others],
-            previous.gap_m[others],
+            now.view.gap[others],
+            previous.view.gap[others],
             STEP_S,
         )
 
@@ -264,7 +261,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _remember(self, action: Observation | None) -> None:
         m = self._measures
         self._trace.frames.append(self._frame)
-        self._trace.others.append((m.gap_m, m.ttc_s, m.rss_longitudinal_m, m.rss_lateral_m, m.visible))
+        self._trace.others.append((m.view.gap, m.ttc_s, m.rss_longitudinal_m, m.rss_lateral_m, m.visible))
         self._trace.robustness.append(m.robustness)
         self._trace.soft_min.append(m.soft_min)
         self._trace.least_ttc_s.append(m.signals["ttc_s"])
@@ -274,7 +271,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.problem.family.horizon_steps
         m = self._measures
-        return self._encoder.encode(self._frame, m.view, m.gap_m, m.visible, m.robustness, self._unit_scene, time_left)
+        return self._encoder.encode(self._frame, m.view, m.visible, m.robustness, self._unit_scene, time_left)
 
 
 def make_default(family: FamilyName) -> RiskSacEnv:

@@ -5,17 +5,18 @@ x ahead of the ego's centre, y to its left. There the ego is an axis-aligned box
 makes the separating-axis test (Gottschalk et al. 1996) four rows of one array.
 """
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import numpy as np
 
+from risk_sac.jit import compiled
 from risk_sac.types import Bools, Floats, Frame
 
-NO_MOTION = 1e-9  # m/s; keeps the sweep's divisions finite, far below any motion that matters
+NO_MOTION = 1e-9  # m/s or m; keeps the sweeps' divisions finite, far below anything that matters
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeView:
+class RelativeView(NamedTuple):
     """The `n` other actors in the ego's frame; the ego is the box |x| <= ego_half_length, |y| <= ego_half_width."""
 
     x: Floats
@@ -32,52 +33,46 @@ class RelativeView:
     ego_half_width: float
     separation: Floats  # `4 x n`: signed distance of the centres along each separating axis
     reach: Floats  # `4 x n`: sum of both boxes' half extents along that axis
-
-    @property
-    def gap(self) -> Floats:
-        """Distance between the bodies, `n`, 0 when they touch.
-
-        Exact for parallel and perpendicular bodies, else a lower bound: the larger of the distances to
-        each body's bounding box in the other's frame.
-        """
-        clear: Floats = np.maximum(np.abs(self.separation) - self.reach, 0.0)
-        squared = clear * clear
-        gap: Floats = np.sqrt(np.maximum(squared[0] + squared[1], squared[2] + squared[3]))
-        return gap
-
-    @property
-    def overlap(self) -> Bools:
-        """Whether the bodies touch or overlap, `n` (separating-axis theorem, exact)."""
-        touching: Bools = np.logical_and.reduce(np.abs(self.separation) <= self.reach)
-        return touching
+    gap: Floats
+    """Distance between the bodies, 0 when they touch. Exact for parallel and perpendicular bodies, else a lower
+    bound: the larger of the distances to each body's bounding box in the other's frame."""
+    overlap: Bools
+    """Whether the bodies touch or overlap (separating-axis theorem, exact)."""
 
 
 def relative_view(frame: Frame) -> RelativeView:
     """Expresses every other actor of `frame` in the ego's frame."""
-    cos_ego, sin_ego = np.cos(frame.heading_rad[0]), np.sin(frame.heading_rad[0])
-    dx, dy = frame.x_m[1:] - frame.x_m[0], frame.y_m[1:] - frame.y_m[0]
-    heading = frame.heading_rad[1:] - frame.heading_rad[0]
-    cos, sin = np.cos(heading), np.sin(heading)
-    ego_vx, ego_vy = frame.vx_mps[0], frame.vy_mps[0]
-    dvx, dvy = frame.vx_mps[1:] - ego_vx, frame.vy_mps[1:] - ego_vy
-    return box_view(
-        x=dx * cos_ego + dy * sin_ego,
-        y=dy * cos_ego - dx * sin_ego,
-        vx=dvx * cos_ego + dvy * sin_ego,
-        vy=dvy * cos_ego - dvx * sin_ego,
-        cos=cos,
-        sin=sin,
-        half_length=frame.length_m[1:] / 2,
-        half_width=frame.width_m[1:] / 2,
-        ego_vx=float(ego_vx * cos_ego + ego_vy * sin_ego),
-        ego_vy=float(ego_vy * cos_ego - ego_vx * sin_ego),
-        ego_half_length=float(frame.length_m[0]) / 2,
-        ego_half_width=float(frame.width_m[0]) / 2,
+    return _relative_view(
+        frame.x_m, frame.y_m, frame.heading_rad, frame.vx_mps, frame.vy_mps, frame.length_m, frame.width_m
     )
 
 
+@compiled
+def _relative_view(
+    x: Floats, y: Floats, heading: Floats, vx: Floats, vy: Floats, length: Floats, width: Floats
+) -> RelativeView:
+    cos_ego, sin_ego = math.cos(heading[0]), math.sin(heading[0])
+    dx, dy = x[1:] - x[0], y[1:] - y[0]
+    dvx, dvy = vx[1:] - vx[0], vy[1:] - vy[0]
+    turn = heading[1:] - heading[0]
+    return box_view(
+        dx * cos_ego + dy * sin_ego,
+        dy * cos_ego - dx * sin_ego,
+        dvx * cos_ego + dvy * sin_ego,
+        dvy * cos_ego - dvx * sin_ego,
+        np.cos(turn),
+        np.sin(turn),
+        length[1:] / 2,
+        width[1:] / 2,
+        vx[0] * cos_ego + vy[0] * sin_ego,
+        vy[0] * cos_ego - vx[0] * sin_ego,
+        length[0] / 2,
+        width[0] / 2,
+    )
+
+
+@compiled
 def box_view(
-    *,
     x: Floats,
     y: Floats,
     vx: Floats,
@@ -91,18 +86,29 @@ def box_view(
     ego_half_length: float,
     ego_half_width: float,
 ) -> RelativeView:
-    """Adds the separating axes: the ego's x and y, then the other's long and cross axis."""
+    """Adds the separating axes (the ego's x and y, then the other's long and cross axis), gap and overlap."""
     n = len(x)
-    abs_cos, abs_sin = np.abs(cos), np.abs(sin)
     separation, reach = np.empty((4, n)), np.empty((4, n))
-    separation[0] = x
-    separation[1] = y
-    separation[2] = x * cos + y * sin
-    separation[3] = y * cos - x * sin
-    reach[0] = ego_half_length + half_length * abs_cos + half_width * abs_sin
-    reach[1] = ego_half_width + half_length * abs_sin + half_width * abs_cos
-    reach[2] = half_length + ego_half_length * abs_cos + ego_half_width * abs_sin
-    reach[3] = half_width + ego_half_length * abs_sin + ego_half_width * abs_cos
+    gap, overlap = np.empty(n), np.empty(n, dtype=np.bool_)
+    for i in range(n):
+        c, s, a, b = abs(cos[i]), abs(sin[i]), half_length[i], half_width[i]
+        separation[0, i] = x[i]
+        separation[1, i] = y[i]
+        separation[2, i] = x[i] * cos[i] + y[i] * sin[i]
+        separation[3, i] = y[i] * cos[i] - x[i] * sin[i]
+        reach[0, i] = ego_half_length + a * c + b * s
+        reach[1, i] = ego_half_width + a * s + b * c
+        reach[2, i] = a + ego_half_length * c + ego_half_width * s
+        reach[3, i] = b + ego_half_length * s + ego_half_width * c
+        squared = np.zeros(2)
+        touching = True
+        for axis in range(4):
+            clear = abs(separation[axis, i]) - reach[axis, i]
+            if clear > 0.0:
+                touching = False
+                squared[axis // 2] += clear * clear
+        gap[i] = math.sqrt(max(squared[0], squared[1]))
+        overlap[i] = touching
     return RelativeView(
         x,
         y,
@@ -118,38 +124,54 @@ def box_view(
         ego_half_width,
         separation,
         reach,
+        gap,
+        overlap,
     )
 
 
+@compiled
 def time_to_contact(view: RelativeView) -> Floats:
     """Time until the bodies touch if both keep their velocity and heading, `n`, s; inf if they never do.
 
     On each separating axis the overlap lasts from t_in to t_out; bodies touch from the largest t_in on,
     provided it is no later than the smallest t_out.
     """
-    speed = np.empty_like(view.separation)
-    speed[0] = view.vx
-    speed[1] = view.vy
-    speed[2] = view.vx * view.cos + view.vy * view.sin
-    speed[3] = view.vy * view.cos - view.vx * view.sin
-    speed[np.abs(speed) < NO_MOTION] = NO_MOTION
-    centre = -view.separation / speed
-    half = view.reach / np.abs(speed)
-    enter = (centre - half).max(axis=0)
-    leave = (centre + half).min(axis=0)
-    never = (enter > leave) | (leave < 0.0)
-    ttc: Floats = np.maximum(enter, 0.0)
-    ttc[never] = np.inf
+    n = len(view.x)
+    ttc = np.empty(n)
+    for i in range(n):
+        vx, vy, cos, sin = view.vx[i], view.vy[i], view.cos[i], view.sin[i]
+        enter, leave = -np.inf, np.inf
+        for axis in range(4):
+            if axis == 0:
+                speed = vx
+            elif axis == 1:
+                speed = vy
+            elif axis == 2:
+                speed = vx * cos + vy * sin
+            else:
+                speed = vy * cos - vx * sin
+            if abs(speed) < NO_MOTION:
+                speed = NO_MOTION
+            centre, half = -view.separation[axis, i] / speed, view.reach[axis, i] / abs(speed)
+            enter, leave = max(enter, centre - half), min(leave, centre + half)
+        ttc[i] = np.inf if enter > leave or leave < 0.0 else max(enter, 0.0)
     return ttc
 
 
+@compiled
 def corners(view: RelativeView) -> tuple[Floats, Floats]:
     """Corners of the others in the ego's frame, two arrays `4 x n`, counter-clockwise from the front left."""
-    along = np.outer((1.0, -1.0, -1.0, 1.0), view.half_length)
-    across = np.outer((1.0, 1.0, -1.0, -1.0), view.half_width)
-    return view.x + along * view.cos - across * view.sin, view.y + along * view.sin + across * view.cos
+    n = len(view.x)
+    corner_x, corner_y = np.empty((4, n)), np.empty((4, n))
+    for i in range(n):
+        for k, (along, across) in enumerate(((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))):
+            a, b = along * view.half_length[i], across * view.half_width[i]
+            corner_x[k, i] = view.x[i] + a * view.cos[i] - b * view.sin[i]
+            corner_y[k, i] = view.y[i] + a * view.sin[i] + b * view.cos[i]
+    return corner_x, corner_y
 
 
+@compiled
 def line_of_sight(view: RelativeView, occludes: Bools) -> Bools:
     """Whether any of a body's corners or its centre can be seen from the ego's centre, `n`.
 
@@ -158,23 +180,32 @@ def line_of_sight(view: RelativeView, occludes: Bools) -> Bools:
       occludes: `n`; which bodies block the view. A body never hides itself.
     """
     n = len(view.x)
-    walls = np.flatnonzero(occludes)
-    if n == 0 or len(walls) == 0:
-        return np.ones(n, dtype=np.bool_)
     corner_x, corner_y = corners(view)
-    # Targets `5 x n x 1` against walls `w`: the ray from the origin to each target in each wall's own axes.
-    px = np.concatenate((view.x[None], corner_x))[:, :, None]
-    py = np.concatenate((view.y[None], corner_y))[:, :, None]
-    cos, sin = view.cos[walls], view.sin[walls]
-    start_x, start_y = -view.separation[2, walls], -view.separation[3, walls]
-    ray_x, ray_y = px * cos + py * sin, py * cos - px * sin
-    ray_x[np.abs(ray_x) < NO_MOTION] = NO_MOTION
-    ray_y[np.abs(ray_y) < NO_MOTION] = NO_MOTION
-    middle_x, half_x = -start_x / ray_x, view.half_length[walls] / np.abs(ray_x)
-    middle_y, half_y = -start_y / ray_y, view.half_width[walls] / np.abs(ray_y)
-    enter = np.maximum(middle_x - half_x, middle_y - half_y)
-    leave = np.minimum(middle_x + half_x, middle_y + half_y)
-    blocked = (enter < leave) & (enter < 1.0) & (leave > 0.0)
-    blocked[:, walls, np.arange(len(walls))] = False
-    seen: Bools = ~blocked.any(axis=2).all(axis=0)
+    seen = np.zeros(n, dtype=np.bool_)
+    for i in range(n):
+        for k in range(5):
+            px, py = (view.x[i], view.y[i]) if k == 4 else (corner_x[k, i], corner_y[k, i])
+            blocked = False
+            for wall in range(n):
+                if wall != i and occludes[wall] and _crosses(view, wall, px, py):
+                    blocked = True
+                    break
+            if not blocked:
+                seen[i] = True
+                break
     return seen
+
+
+@compiled
+def _crosses(view: RelativeView, wall: int, px: float, py: float) -> bool:
+    """Whether the ray from the ego's centre to (px, py) passes through a body: the slab test in its own axes."""
+    cos, sin = view.cos[wall], view.sin[wall]
+    ray_x, ray_y = px * cos + py * sin, py * cos - px * sin
+    if abs(ray_x) < NO_MOTION:
+        ray_x = NO_MOTION
+    if abs(ray_y) < NO_MOTION:
+        ray_y = NO_MOTION
+    middle_x, half_x = view.separation[2, wall] / ray_x, view.half_length[wall] / abs(ray_x)
+    middle_y, half_y = view.separation[3, wall] / ray_y, view.half_width[wall] / abs(ray_y)
+    enter, leave = max(middle_x - half_x, middle_y - half_y), min(middle_x + half_x, middle_y + half_y)
+    return bool(enter < leave and enter < 1.0 and leave > 0.0)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.geometry import RelativeView
+from risk_sac.jit import compiled
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.scenario.families import Family
 from risk_sac.types import Bools, Floats, Frame
@@ -27,50 +28,79 @@ class Encoder:
         self._adversaries = family.adversaries
         self.size = PER_ADVERSARY * len(family.adversaries) + PER_EGO + scene_size + requirements + 1
         self._ids: tuple[str, ...] = ()
-        self._rows: list[int] = []
 
     def encode(
         self,
         frame: Frame,
         view: RelativeView,
-        gap_m: Floats,
         visible: Bools,
         robustness: Floats,
         unit_scene: Floats,
         time_left: float,
     ) -> NDArray[np.float32]:
         """The observation, `size`, each entry in [-LIMIT, LIMIT]; an adversary that left the net is all zeros."""
-        k = len(self._adversaries)
-        result = np.zeros(self.size)
         if frame.ids is not self._ids:
             self._ids = frame.ids
-            present = [(slot, frame.ids.index(a)) for slot, a in enumerate(self._adversaries) if a in frame.ids]
-            self._slots = np.array([slot for slot, _ in present], dtype=np.intp)
-            self._others = np.array([row - 1 for _, row in present], dtype=np.intp)
-        others = self._others
-        actors = result[: PER_ADVERSARY * k].reshape(PER_ADVERSARY, k)
-        slots = self._slots
-        actors[0, slots] = view.x[others] / X_M
-        actors[1, slots] = view.y[others] / Y_M
-        actors[2, slots] = view.vx[others] / SPEED_MPS
-        actors[3, slots] = view.vy[others] / LATERAL_MPS
-        actors[4, slots] = view.cos[others]
-        actors[5, slots] = view.sin[others]
-        actors[6, slots] = frame.speed_mps[1:][others] / SPEED_MPS
-        actors[7, slots] = frame.accel_mps2[1:][others] / ACCEL_MPS2
-        actors[8, slots] = gap_m[others] / GAP_M
-        actors[9, slots] = visible[others]
-        rest = PER_ADVERSARY * k
-        result[rest : rest + PER_EGO - 4] = (
-            frame.speed_mps[0] / SPEED_MPS,
-            frame.accel_mps2[0] / ACCEL_MPS2,
-            frame.lateral_mps[0] / LATERAL_MPS,
-            min(frame.stop_line_m / X_M, LIMIT),
+            self._rows = np.array([frame.ids.index(a) if a in frame.ids else 0 for a in self._adversaries])
+        result = np.zeros(self.size)
+        _fill(
+            result,
+            self._rows,
+            view,
+            visible,
+            frame.speed_mps,
+            frame.accel_mps2,
+            frame.lateral_mps[0],
+            frame.stop_line_m,
+            int(frame.signal),
+            unit_scene,
+            robustness,
+            time_left,
         )
-        result[rest + PER_EGO - 4 + frame.signal] = 1.0
-        rest += PER_EGO
-        result[rest : rest + len(unit_scene)] = unit_scene
-        rest += len(unit_scene)
-        result[rest : rest + len(robustness)] = robustness / ROBUSTNESS_CLIP
-        result[-1] = time_left
-        return np.clip(result, -LIMIT, LIMIT).astype(np.float32)
+        return result.astype(np.float32)
+
+
+@compiled
+def _fill(
+    result: Floats,
+    rows: NDArray[np.int64],
+    view: RelativeView,
+    visible: Bools,
+    speed_mps: Floats,
+    accel_mps2: Floats,
+    ego_lateral_mps: float,
+    stop_line_m: float,
+    signal: int,
+    unit_scene: Floats,
+    robustness: Floats,
+    time_left: float,
+) -> None:
+    for slot in range(len(rows)):
+        row = rows[slot]
+        if row == 0:  # left the net; 0 is the ego itself
+            continue
+        i, at = row - 1, slot * PER_ADVERSARY
+        result[at] = view.x[i] / X_M
+        result[at + 1] = view.y[i] / Y_M
+        result[at + 2] = view.vx[i] / SPEED_MPS
+        result[at + 3] = view.vy[i] / LATERAL_MPS
+        result[at + 4] = view.cos[i]
+        result[at + 5] = view.sin[i]
+        result[at + 6] = speed_mps[row] / SPEED_MPS
+        result[at + 7] = accel_mps2[row] / ACCEL_MPS2
+        result[at + 8] = view.gap[i] / GAP_M
+        result[at + 9] = visible[i]
+    at = len(rows) * PER_ADVERSARY
+    result[at] = speed_mps[0] / SPEED_MPS
+    result[at + 1] = accel_mps2[0] / ACCEL_MPS2
+    result[at + 2] = ego_lateral_mps / LATERAL_MPS
+    result[at + 3] = stop_line_m / X_M
+    result[at + 4 + signal] = 1.0
+    at += PER_EGO
+    for values in (unit_scene, robustness / ROBUSTNESS_CLIP):
+        for value in values:
+            result[at] = value
+            at += 1
+    result[at] = time_left
+    for k in range(len(result)):
+        result[k] = min(max(result[k], -LIMIT), LIMIT)

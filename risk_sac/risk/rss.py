@@ -4,19 +4,19 @@ Source: Shalev-Shwartz, Shammah, Shashua 2017, "On a Formal Model of Safe and Sc
 Cars", Definitions 1 (same direction), 2 (opposite directions) and 6 (lateral).
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from risk_sac.geometry import RelativeView
+from risk_sac.jit import compiled
 from risk_sac.types import Floats
 
 LONGITUDINAL_CAP_M = 50.0
 LATERAL_CAP_M = 5.0
 
 
-@dataclass(frozen=True, slots=True)
-class RssParameters:
+class RssParameters(NamedTuple):
     """What RSS assumes of both parties. The ego is the one that responds."""
 
     response_s: float = 0.5  # ρ
@@ -28,8 +28,15 @@ class RssParameters:
     fluctuation_m: float = 0.1  # μ, lateral noise that is no manoeuvre
 
 
-def same_direction(rear_mps: Floats, front_mps: Floats, parameters: RssParameters) -> Floats:
-    """d_min = [v_r ρ + a ρ²/2 + (v_r + ρ a)² / (2 b_min) − v_f² / (2 b_max)]_+ , m  (Def. 1)."""
+@compiled
+def same_direction(rear_mps: float, front_mps: float, parameters: RssParameters) -> float:
+    """d_min = [v_r ρ + a ρ²/2 + (v_r + ρ a)² / (2 b_min) − v_f² / (2 b_max)]_+ , m  (Def. 1).
+
+    Args:
+      rear_mps: v_r, speed of the vehicle behind.
+      front_mps: v_f, speed of the one ahead.
+      parameters: see `RssParameters`.
+    """
     p = parameters
     after = rear_mps + p.response_s * p.accel_mps2
     distance = (
@@ -37,10 +44,11 @@ def same_direction(rear_mps: Floats, front_mps: Floats, parameters: RssParameter
         + after * after / (2 * p.brake_min_mps2)
         - front_mps * front_mps / (2 * p.brake_max_mps2)
     )
-    return np.maximum(distance, 0.0)
+    return max(distance, 0.0)
 
 
-def opposite_direction(ego_mps: Floats, other_mps: Floats, parameters: RssParameters) -> Floats:
+@compiled
+def opposite_direction(ego_mps: float, other_mps: float, parameters: RssParameters) -> float:
     """d_min: both respond after ρ and brake with b_min; speeds are magnitudes, m  (Def. 2)."""
     p = parameters
     ego_after = ego_mps + p.response_s * p.accel_mps2
@@ -50,40 +58,45 @@ def opposite_direction(ego_mps: Floats, other_mps: Floats, parameters: RssParame
     ) / (2 * p.brake_min_mps2)
 
 
-def lateral(closing_ego_mps: Floats, closing_other_mps: Floats, parameters: RssParameters) -> Floats:
+@compiled
+def lateral(closing_ego_mps: float, closing_other_mps: float, parameters: RssParameters) -> float:
     """d_min = μ + [Σ_i (v_i + v_i,ρ) ρ/2 + v_i,ρ² / (2 b_lat)]_+ , m  (Def. 6).
 
     Args:
-      closing_ego_mps: `n`, the ego's lateral speed towards the other; negative when it moves away.
-      closing_other_mps: `n`, the other's towards the ego.
+      closing_ego_mps: the ego's lateral speed towards the other; negative when it moves away.
+      closing_other_mps: the other's towards the ego.
       parameters: see `RssParameters`.
     """
     p = parameters
-    total = np.zeros_like(closing_other_mps)
+    total = 0.0
     for closing in (closing_ego_mps, closing_other_mps):
         after = closing + p.response_s * p.lateral_accel_mps2
-        total = total + (closing + after) * (p.response_s / 2) + after * np.abs(after) / (2 * p.lateral_brake_mps2)
-    return p.fluctuation_m + np.maximum(total, 0.0)
+        total += (closing + after) * (p.response_s / 2) + after * abs(after) / (2 * p.lateral_brake_mps2)
+    return p.fluctuation_m + max(total, 0.0)
 
 
+@compiled
 def margins(view: RelativeView, parameters: RssParameters) -> tuple[Floats, Floats]:
     """Longitudinal and lateral RSS margin to each other actor, two arrays `n`, m.
 
     A margin is the distance between the bodies along one of the ego's axes minus the RSS distance; the
     situation is dangerous where both are negative. An actor alongside has no longitudinal distance.
     """
-    along, across = view.vx + view.ego_vx, view.vy + view.ego_vy  # the other's velocity in the ego's axes
-    ahead = view.x >= 0.0
-    oncoming = (along < 0.0) & ahead
-    speed = np.maximum(along, 0.0)
-    ego = np.full_like(speed, max(view.ego_vx, 0.0))
-    following = same_direction(np.where(ahead, ego, speed), np.where(ahead, speed, ego), parameters)
-    facing = opposite_direction(ego, np.abs(along), parameters)
-    clear = np.maximum(np.abs(view.separation[:2]) - view.reach[:2], 0.0)
-    side = np.sign(view.y)
-    longitudinal = clear[0] - np.where(oncoming, facing, following)
-    sideways = clear[1] - lateral(side * view.ego_vy, -side * across, parameters)
-    return (
-        longitudinal.clip(-LONGITUDINAL_CAP_M, LONGITUDINAL_CAP_M),
-        sideways.clip(-LATERAL_CAP_M, LATERAL_CAP_M),
-    )
+    n = len(view.x)
+    longitudinal, sideways = np.empty(n), np.empty(n)
+    ego = max(view.ego_vx, 0.0)
+    for i in range(n):
+        along, across = view.vx[i] + view.ego_vx, view.vy[i] + view.ego_vy  # the other's velocity in the ego's axes
+        if view.x[i] < 0.0:
+            distance = same_direction(max(along, 0.0), ego, parameters)
+        elif along < 0.0:
+            distance = opposite_direction(ego, -along, parameters)
+        else:
+            distance = same_direction(ego, along, parameters)
+        clear = max(abs(view.x[i]) - view.reach[0, i], 0.0)
+        longitudinal[i] = min(max(clear - distance, -LONGITUDINAL_CAP_M), LONGITUDINAL_CAP_M)
+        side = np.sign(view.y[i])
+        distance = lateral(side * view.ego_vy, -side * across, parameters)
+        clear = max(abs(view.y[i]) - view.reach[1, i], 0.0)
+        sideways[i] = min(max(clear - distance, -LATERAL_CAP_M), LATERAL_CAP_M)
+    return longitudinal, sideways

@@ -1,5 +1,7 @@
 """Time to collision under constant velocity, in the plane."""
 
+import numpy as np
+
 from risk_sac.geometry import RelativeView, time_to_contact
 from risk_sac.types import Floats
 
@@ -12,4 +14,4 @@ def time_to_collision(view: RelativeView) -> Floats:
     Bodies are swept as oriented boxes, so crossing and oncoming conflicts count as much as following;
     for a leader in the same lane it equals gap / closing speed (Hayward 1972).
     """
-    return time_to_contact(view).clip(max=TTC_CAP_S)
+    return np.minimum(time_to_contact(view), TTC_CAP_S)

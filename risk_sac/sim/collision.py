@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from risk_sac.geometry import RelativeView, box_view, corners
-from risk_sac.types import Frame, Kind
+from risk_sac.jit import compiled
+from risk_sac.types import Floats, Frame, Kind
 
 BISECTIONS = 10  # of 0.1 s: locates the contact to 0.1 ms
 ZONE_MARGIN_M = 0.05  # a contact this close to an edge lies on it
@@ -47,9 +48,9 @@ def find_contact(before: Frame | None, frame: Frame, view: RelativeView) -> Cont
       frame: all actors now.
       view: `relative_view(frame)`.
     """
-    touching = np.flatnonzero(view.overlap)
-    if len(touching) == 0:
+    if not view.overlap.any():
         return None
+    touching = np.flatnonzero(view.overlap)
     if before is None or before.ids != frame.ids:
         return _describe(frame, int(touching[0]) + 1, frame, 1.0)
     share, other = min((_first_touch(before, frame, int(i) + 1), int(i) + 1) for i in touching)
@@ -58,11 +59,21 @@ def find_contact(before: Frame | None, frame: Frame, view: RelativeView) -> Cont
 
 def touching_pairs(frame: Frame) -> list[tuple[int, int]]:
     """Index pairs of actors other than the ego whose bodies overlap; distance filter, then exact test."""
-    radius = np.hypot(frame.length_m, frame.width_m) / 2
-    dx, dy = np.subtract.outer(frame.x_m, frame.x_m), np.subtract.outer(frame.y_m, frame.y_m)
-    near = dx * dx + dy * dy <= np.add.outer(radius, radius) ** 2
-    pairs = np.argwhere(np.triu(near, 1))
-    return [(int(i), int(j)) for i, j in pairs if i > 0 and _pair_view(frame, frame, int(i), int(j), 1.0).overlap[0]]
+    near = _near_pairs(frame.x_m, frame.y_m, frame.length_m, frame.width_m)
+    return [(i, j) for i, j in near if _pair_view(frame, frame, i, j, 1.0).overlap[0]]
+
+
+@compiled
+def _near_pairs(x: Floats, y: Floats, length: Floats, width: Floats) -> list[tuple[int, int]]:
+    """Pairs without the ego whose enclosing circles overlap."""
+    pairs = [(0, 0) for _ in range(0)]  # an empty list whose type the compiler can tell
+    radius = np.sqrt(length * length + width * width) / 2
+    for i in range(1, len(x)):
+        for j in range(i + 1, len(x)):
+            dx, dy, reach = x[i] - x[j], y[i] - y[j], radius[i] + radius[j]
+            if dx * dx + dy * dy <= reach * reach:
+                pairs.append((i, j))
+    return pairs
 
 
 def _first_touch(before: Frame, frame: Frame, other: int) -> float:
@@ -94,18 +105,18 @@ def _pair_view(before: Frame, frame: Frame, one: int, other: int, share: float) 
     vx, vy = float(frame.vx_mps[one]), float(frame.vy_mps[one])
     dvx, dvy = frame.vx_mps[other] - vx, frame.vy_mps[other] - vy
     return box_view(
-        x=np.array([(x1 - x0) * cos0 + (y1 - y0) * sin0]),
-        y=np.array([(y1 - y0) * cos0 - (x1 - x0) * sin0]),
-        vx=np.array([dvx * cos0 + dvy * sin0]),
-        vy=np.array([dvy * cos0 - dvx * sin0]),
-        cos=np.array([math.cos(h1 - h0)]),
-        sin=np.array([math.sin(h1 - h0)]),
-        half_length=frame.length_m[other : other + 1] / 2,
-        half_width=frame.width_m[other : other + 1] / 2,
-        ego_vx=vx * cos0 + vy * sin0,
-        ego_vy=vy * cos0 - vx * sin0,
-        ego_half_length=float(frame.length_m[one]) / 2,
-        ego_half_width=float(frame.width_m[one]) / 2,
+        np.array([(x1 - x0) * cos0 + (y1 - y0) * sin0]),
+        np.array([(y1 - y0) * cos0 - (x1 - x0) * sin0]),
+        np.array([dvx * cos0 + dvy * sin0]),
+        np.array([dvy * cos0 - dvx * sin0]),
+        np.array([math.cos(h1 - h0)]),
+        np.array([math.sin(h1 - h0)]),
+        frame.length_m[other : other + 1] / 2,
+        frame.width_m[other : other + 1] / 2,
+        vx * cos0 + vy * sin0,
+        vy * cos0 - vx * sin0,
+        float(frame.length_m[one]) / 2,
+        float(frame.width_m[one]) / 2,
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from risk_sac.config import SensorConfig
 from risk_sac.geometry import RelativeView, line_of_sight
+from risk_sac.jit import compiled
 from risk_sac.types import Bools, Frame, Kind
 
 
@@ -20,12 +21,17 @@ def visible(view: RelativeView, vehicle: Bools, sensor: SensorConfig | None, vis
     """
     if sensor is None:
         return np.ones(len(view.x), dtype=np.bool_)
-    reach = min(sensor.range_m, visibility_m)
-    seen: Bools = view.x * view.x + view.y * view.y <= reach * reach
-    if sensor.field_of_view_rad < math.tau:
-        seen &= np.abs(np.arctan2(view.y, view.x)) <= sensor.field_of_view_rad / 2
-    if sensor.occlusion:
-        seen &= line_of_sight(view, vehicle)
+    reach_m = min(sensor.range_m, visibility_m)
+    return _visible(view, vehicle, reach_m, sensor.field_of_view_rad / 2, sensor.occlusion)
+
+
+@compiled
+def _visible(view: RelativeView, vehicle: Bools, reach_m: float, half_view_rad: float, occlusion: bool) -> Bools:
+    seen = line_of_sight(view, vehicle) if occlusion else np.ones(len(view.x), dtype=np.bool_)
+    for i in range(len(seen)):
+        x, y = view.x[i], view.y[i]
+        if x * x + y * y > reach_m * reach_m or abs(math.atan2(y, x)) > half_view_rad:
+            seen[i] = False
     return seen
 
 
