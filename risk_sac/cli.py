@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
@@ -161,7 +162,11 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
 
 
 def _contacts(results: Results) -> Table:
-    table = Table("id", "outcome", "other", "ego m/s", "other m/s", "where", "min TTC s", "visible s", "failed rules")
+    """Fits 80 columns; only the failed rules wrap."""
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("id", "outcome", "other", "ego\nm/s", "other\nm/s", "ego's zone\non other's", "TTC\ns", "seen\ns"):
+        table.add_column(name, no_wrap=True)
+    table.add_column("failed rules")
     for contact in results.contacts:
         collision = contact.episode.collision
         if collision is None:
@@ -172,7 +177,7 @@ def _contacts(results: Results) -> Table:
             collision.other_id,
             f"{collision.ego_speed_mps:.1f}",
             f"{collision.other_speed_mps:.1f}",
-            f"{collision.ego_zone} on {collision.other_zone}",
+            f"{collision.ego_zone} {collision.other_zone}",
             f"{collision.min_ttc_s:.2f}",
             f"{collision.visible_for_s:.1f}",
             contact.episode.reason,
