@@ -202,7 +202,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         longitudinal, lateral = margins(view, self.problem.rss)
         signals = publish(frame, before, view, ttc_s, longitudinal, lateral)
         robustness = self._monitor.update(signals)
-        rho = float(soft_min(robustness, self._reward.softmin_sharpness))
+        rho = soft_min(robustness, self._reward.softmin_sharpness)
         self._ever_visible.update(id_ for id_ in frame.ids[1:] if id_ not in hidden)
         self._peak_braking = max(self._peak_braking, signals["ego_braking_mps2"])
         self._min_rss_m = min(self._min_rss_m, worst_rss_margin(view, longitudinal, lateral))

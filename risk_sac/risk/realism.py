@@ -5,14 +5,12 @@ C_real(s, a) = C_hard(s, a) + C_soft(s, a)                                      
 Choice: C_hard acts on the whole episode. A scene that breaks one of its rules is rejected before the
 first step, so what remains during an episode is C_soft, in [0, 1].
 
-Written in plain floats: for the handful of adversaries of a scene that is faster than numpy.
-
 Source: RISK-SAC, Sec. III-B.
 """
 
-from collections.abc import Sequence
 from typing import Literal
 
+from risk_sac.jit import compiled
 from risk_sac.types import Floats
 
 JERK_SCALE_MPS3 = 20.0  # at which the jerk term saturates: full braking from rest to 9 m/s² in about 0.5 s
@@ -27,11 +25,13 @@ MIN_INITIAL_GAP_M = 0.5  # bodies placed closer than traffic ever stands
 HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc"]
 
 
+@compiled
 def jerk_term(accel_mps2: float, previous_accel_mps2: float, step_s: float) -> float:
     """Abrupt control of one adversary, min(|Δa| / (dt · scale), 1)."""
     return min(abs(accel_mps2 - previous_accel_mps2) / (step_s * JERK_SCALE_MPS3), 1.0)
 
 
+@compiled
 def acceleration_term(accel_mps2: float, limit_mps2: float) -> float:
     """Excess acceleration of one adversary, max(|a| - comfort, 0) / (limit - comfort), at most 1.
 
@@ -43,6 +43,7 @@ def acceleration_term(accel_mps2: float, limit_mps2: float) -> float:
     return min(max(abs(accel_mps2) - comfort, 0.0) / (limit_mps2 - comfort), 1.0)
 
 
+@compiled
 def closeness_term(gap_m: float, previous_gap_m: float, step_s: float) -> float:
     """Sudden extreme proximity of one adversary to the ego, nearness · closing speed / scale.
 
@@ -58,12 +59,13 @@ def closeness_term(gap_m: float, previous_gap_m: float, step_s: float) -> float:
     return min(nearness, 1.0) * min(closing_mps / CLOSING_SCALE_MPS, 1.0)
 
 
+@compiled
 def soft_cost(
-    accel_mps2: Floats | Sequence[float],
-    previous_accel_mps2: Floats | Sequence[float],
-    limit_mps2: Floats | Sequence[float],
-    gap_m: Floats | Sequence[float],
-    previous_gap_m: Floats | Sequence[float],
+    accel_mps2: Floats,
+    previous_accel_mps2: Floats,
+    limit_mps2: Floats,
+    gap_m: Floats,
+    previous_gap_m: Floats,
     step_s: float,
 ) -> float:
     """Soft realism cost of one step, C_soft(s, a) of (5).
@@ -85,12 +87,10 @@ def soft_cost(
       In [0, 1]; 0 without adversaries.
     """
     jerk = excess = closeness = 0.0
-    for accel, previous, limit, gap, previous_gap in zip(
-        *map(_as_list, (accel_mps2, previous_accel_mps2, limit_mps2, gap_m, previous_gap_m)), strict=True
-    ):
-        jerk = max(jerk, jerk_term(accel, previous, step_s))
-        excess = max(excess, acceleration_term(accel, limit))
-        closeness = max(closeness, closeness_term(gap, previous_gap, step_s))
+    for k in range(len(accel_mps2)):
+        jerk = max(jerk, jerk_term(accel_mps2[k], previous_accel_mps2[k], step_s))
+        excess = max(excess, acceleration_term(accel_mps2[k], limit_mps2[k]))
+        closeness = max(closeness, closeness_term(gap_m[k], previous_gap_m[k], step_s))
     return (jerk + excess + closeness) / 3.0
 
 
@@ -109,8 +109,3 @@ def broken_hard_rule(overlaps: bool, gap_m: float, ttc_s: float) -> HardRule | N
     if ttc_s < MIN_INITIAL_TTC_S:
         return "initial_ttc"
     return None
-
-
-def _as_list(values: Floats | Sequence[float]) -> Sequence[float]:
-    # numpy's own scalars are several times slower than floats in the loop above
-    return values if isinstance(values, list | tuple) else values.tolist()  # type: ignore[union-attr]

@@ -10,6 +10,7 @@ Source: RISK-SAC, Sec. III-C; Nickovic, Yamaguchi, "RTAMT: online robustness mon
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from operator import sub
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ import rtamt
 
 from risk_sac.config import Requirement
 from risk_sac.errors import FormulaError, NotFinite
+from risk_sac.jit import compiled
 from risk_sac.risk.formula import Node, parse, signals_of
 from risk_sac.types import Floats
 
@@ -25,24 +27,26 @@ ROBUSTNESS_CLIP = 3.0  # in scales; a margin beyond it is as good as any, and rt
 Instruction = tuple[Callable[..., float], int, int, int]  # operator, its operands' slots (-1: none), its own slot
 
 
-def soft_min(robustness: Floats, beta: float) -> Floats:
+@compiled
+def soft_min(robustness: Floats, beta: float) -> float:
     """Soft minimum of the requirements' robustness, ρ(Φ, s).
 
     ρ(Φ, s) = -(1/β) log Σ_i exp(-β ρ_i)                                             (7)
 
     Args:
-      robustness: `... x M`, M ≥ 1, scaled; below 0 means violated.
+      robustness: `M`, M ≥ 1, scaled; below 0 means violated.
       beta: sharpness β > 0; larger is closer to the true minimum.
 
     Returns:
-      `...`, in [min_i ρ_i - log(M)/β, min_i ρ_i].
+      A value in [min_i ρ_i - log(M)/β, min_i ρ_i].
 
     Source: RISK-SAC, Sec. III-C.
     """
-    least = robustness.min(axis=-1, keepdims=True)  # ... x 1; taken out so that exp cannot overflow
-    summed = np.exp(beta * (least - robustness)).sum(axis=-1)  # ...; at least 1
-    result: Floats = least[..., 0] - np.log(summed) / beta
-    return result
+    least = robustness.min()  # taken out so that exp cannot overflow
+    summed = 0.0
+    for value in robustness:
+        summed += math.exp(beta * (least - value))
+    return float(least - math.log(summed) / beta)
 
 
 class Monitor:
@@ -120,7 +124,13 @@ class Monitor:
             operator = operators[node.name]
             self._operators.append(operator)
             left, right = operands if len(operands) == 2 else (operands[0], -1)
-            self._program.append((operator.update, left, right, slot))
+            comparison = getattr(operator, "comparison_op", None)
+            if comparison is None:
+                self._program.append((operator.update, left, right, slot))
+            elif comparison.name in ("LEQ", "LESS"):  # stateless; rtamt compares enums at every update
+                self._program.append((sub, right, left, slot))
+            else:
+                self._program.append((sub, left, right, slot))
         return slot
 
 

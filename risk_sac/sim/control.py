@@ -16,16 +16,18 @@ from risk_sac.scenario.families import Family
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.sumo import Room, SumoSimulation, VehicleCommand, Walker
-from risk_sac.types import STEP_S, Frame
+from risk_sac.types import STEP_S, Floats, Frame
 
 
 def _taper(distance: float, rate: float) -> float:
-    """Largest value that can still be brought to 0 at `rate` per second within the integral `distance`.
+    """Largest value that falls to 0 by at most `rate` per second while its sum over steps stays within `distance`.
 
-    Solves value²/(2 rate) + value·dt/2 = distance, the discrete stopping distance.
+    With decrements of c = rate·dt and D = distance/dt, k full decrements fit, k(k+1)/2·c <= D, and the rest is
+    spread over k + 1 steps. The continuous √(2·rate·distance) would overshoot by up to half a decrement.
     """
-    half = rate * STEP_S / 2
-    return math.sqrt(half * half + 2 * rate * max(distance, 0.0)) - half
+    change, total = rate * STEP_S, max(distance, 0.0) / STEP_S
+    full = math.floor((math.sqrt(1.0 + 8.0 * total / change) - 1.0) / 2.0)
+    return full * change / 2.0 + total / (full + 1)
 
 
 def _clip(value: float, low: float, high: float) -> float:
@@ -137,10 +139,11 @@ class Adversaries:
             self._driven = [(frame.ids.index(id_), self._vehicles[id_]) for id_ in present if id_ in self._vehicles]
             vehicle_limit = max(self._limits.accel_mps2, self._limits.brake_mps2)
             walker_limit = max(self._limits.walk_accel_mps2, self._limits.walk_brake_mps2)
-            self._accel_limits = [vehicle_limit if id_ in self._vehicles else walker_limit for id_ in present]
+            limits = [vehicle_limit if id_ in self._vehicles else walker_limit for id_ in present]
+            self._accel_limits = np.array(limits)
         return self._rows
 
-    def accel_limits(self, frame: Frame) -> list[float]:
+    def accel_limits(self, frame: Frame) -> Floats:
         """Greatest absolute acceleration of each actor in `rows`, m/s²."""
         self.rows(frame)
         return self._accel_limits
@@ -148,6 +151,7 @@ class Adversaries:
     def keep_limits(self, frame: Frame) -> bool:
         """Whether every adversary vehicle drove as commanded, and so inside its limits.
 
+        Less lateral motion than commanded passes: SUMO pauses it for some steps where a vehicle enters a junction.
         Pedestrians move by our own dynamics and cannot deviate. The controls go on from what was driven.
         """
         self.rows(frame)

@@ -27,6 +27,7 @@ logger = logging.getLogger(__name__)
 
 NETS = files("sumo_nets")
 PEDESTRIAN_SIZE_M = 0.5
+EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 GRAVITY_MPS2 = 9.81
 EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
@@ -78,7 +79,7 @@ class SumoSimulation:
         self._ego = ego
         self._started = False
         self._walkers: dict[str, Walker] = {}
-        self._lanes: dict[str, tuple[float, float, float]] = {}
+        self._lanes: dict[tuple[tuple[str, ...], str], tuple[float, float, float]] = {}
 
     def reset(self, layout: Layout, seed: int, *, controlled: bool = True) -> Frame:
         """Sets up an episode and returns its first frame.
@@ -110,6 +111,7 @@ class SumoSimulation:
                 libsumo.vehicle.setSpeedMode(start.id, 0)
                 libsumo.vehicle.setLaneChangeMode(start.id, 0)
         self._previous: dict[str, tuple[float, float]] = {}
+        self._routes = {start.id: start.route for start in (layout.ego, *layout.vehicles)}
         self._lanes.clear()  # another net may use the same names
         self._describe_actors()
         return self._read()
@@ -166,6 +168,7 @@ class SumoSimulation:
         self._role = np.array([self._roles[id_] for id_ in self._ids], dtype=np.int8)
         get = libsumo.vehicle
         self._length = np.array([get.getLength(v) for v in self._vehicles] + [PEDESTRIAN_SIZE_M] * walking)
+        self._half_lengths = [get.getLength(v) / 2 for v in self._vehicles]
         self._width = np.array([get.getWidth(v) for v in self._vehicles] + [PEDESTRIAN_SIZE_M] * walking)
 
     def apply(self, vehicles: Mapping[str, VehicleCommand], walkers: Mapping[str, Walker]) -> None:
@@ -243,26 +246,26 @@ class SumoSimulation:
         return None
 
     def room(self, vehicle: str) -> Room | None:
-        """How far `vehicle` may move sideways before it leaves the drivable lanes; None once it left the net."""
+        """How far `vehicle` may move sideways; None once it left the net.
+
+        The lanes that its route goes on from end at a wall: SUMO halts a vehicle dead at the end of any other.
+        """
         if vehicle not in self._vehicles:
             return None
         get = libsumo.vehicle
-        right_lanes, left_lanes, lane_width = self._lane(get.getLaneID(vehicle))
+        right_lanes, left_lanes, lane_width = self._lane(self._routes[vehicle], get.getLaneID(vehicle))
         offset = get.getLateralLanePosition(vehicle)
-        spare = (lane_width - get.getWidth(vehicle)) / 2
+        spare = (lane_width - get.getWidth(vehicle)) / 2 - EDGE_M
         return Room(left_m=left_lanes + spare - offset, right_m=right_lanes + spare + offset)
 
-    def _lane(self, lane: str) -> tuple[float, float, float]:
-        """Width of the drivable lanes right and left of `lane`, and its own."""
-        if lane not in self._lanes:
+    def _lane(self, route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
+        """Width of the lanes right and left of `lane` that lead on along `route`, and its own."""
+        if (route, lane) not in self._lanes:
             edge, _, index = lane.rpartition("_")
-            widths = [
-                libsumo.lane.getWidth(f"{edge}_{i}") * (libsumo.lane.getAllowed(f"{edge}_{i}") != ("pedestrian",))
-                for i in range(libsumo.edge.getLaneNumber(edge))
-            ]
+            widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
             own = int(index)
-            self._lanes[lane] = (sum(widths[:own]), sum(widths[own + 1 :]), widths[own])
-        return self._lanes[lane]
+            self._lanes[route, lane] = (sum(widths[:own]), sum(widths[own + 1 :]), libsumo.lane.getWidth(lane))
+        return self._lanes[route, lane]
 
     def close(self) -> None:
         """Ends the simulation; `reset` may be called again."""
@@ -277,7 +280,7 @@ class SumoSimulation:
         get_accel = libsumo.vehicle.getAcceleration
         rows = []
         previous = self._previous
-        for id_, length in zip(self._vehicles, self._length, strict=False):
+        for id_, half in zip(self._vehicles, self._half_lengths, strict=True):
             x, y = get_position(id_)
             heading = math.radians(90.0 - get_angle(id_))
             cos, sin = math.cos(heading), math.sin(heading)
@@ -288,7 +291,6 @@ class SumoSimulation:
             else:
                 vx, vy = speed * cos, speed * sin
             previous[id_] = (x, y)
-            half = length / 2
             rows.append((x - half * cos, y - half * sin, heading, vx, vy, speed, get_lateral(id_), get_accel(id_)))
         for w in self._walkers.values():
             vx, vy = w.speed_mps * math.cos(w.heading_rad), w.speed_mps * math.sin(w.heading_rad)
@@ -324,6 +326,19 @@ class SumoSimulation:
             return Signal.NONE, math.inf
         _, _, distance_m, state = ahead[0]
         return COLOURS.get(state.lower(), Signal.NONE), distance_m
+
+
+def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
+    """Width of a lane, m; 0 if vehicles may not use it or it does not lead to the route's next edge."""
+    if libsumo.lane.getAllowed(lane) == ("pedestrian",):
+        return 0.0
+    edge = lane.rpartition("_")[0]
+    if edge in route[:-1]:
+        following = route[route.index(edge) + 1]
+        if not any(link[0].rpartition("_")[0] == following for link in libsumo.lane.getLinks(lane)):
+            return 0.0
+    width: float = libsumo.lane.getWidth(lane)
+    return width
 
 
 def _registered(person: str) -> bool:

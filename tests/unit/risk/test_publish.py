@@ -42,7 +42,7 @@ def frame_of(
 
 def signals_of(frame: Frame, ttc: list[float], along: list[float], across: list[float]) -> dict[str, float]:
     view = relative_view(frame)
-    return publish(frame, None, view, np.array(ttc), np.array(along), np.array(across), view.gap)
+    return publish(frame, None, view, np.array(ttc), np.array(along), np.array(across))
 
 
 @pytest.mark.parametrize(

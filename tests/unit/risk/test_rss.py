@@ -33,10 +33,6 @@ speed = st.floats(0, 40)
 drift = st.floats(-3, 3)
 
 
-def array(*values: float) -> np.ndarray:
-    return np.array(values, dtype=np.float64)
-
-
 @pytest.mark.parametrize(
     ("rear_mps", "front_mps", "distance_m"),
     [
@@ -48,7 +44,7 @@ def array(*values: float) -> np.ndarray:
     ],
 )
 def test_longitudinal_distance_in_the_same_direction(rear_mps: float, front_mps: float, distance_m: float) -> None:
-    assert same_direction(array(rear_mps), array(front_mps), P).tolist() == pytest.approx([distance_m])
+    assert same_direction(rear_mps, front_mps, P) == pytest.approx(distance_m)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +56,7 @@ def test_longitudinal_distance_in_the_same_direction(rear_mps: float, front_mps:
     ],
 )
 def test_longitudinal_distance_in_opposite_directions(ego_mps: float, other_mps: float, distance_m: float) -> None:
-    assert opposite_direction(array(ego_mps), array(other_mps), P).tolist() == pytest.approx([distance_m])
+    assert opposite_direction(ego_mps, other_mps, P) == pytest.approx(distance_m)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +70,7 @@ def test_longitudinal_distance_in_opposite_directions(ego_mps: float, other_mps:
     ],
 )
 def test_lateral_distance(ego_mps: float, other_mps: float, distance_m: float) -> None:
-    assert lateral(array(ego_mps), array(other_mps), P).tolist() == pytest.approx([distance_m])
+    assert lateral(ego_mps, other_mps, P) == pytest.approx(distance_m)
 
 
 def stopping_gap(rear_mps: float, front_mps: float, p: RssParameters) -> float:
@@ -90,10 +86,10 @@ def stopping_gap(rear_mps: float, front_mps: float, p: RssParameters) -> float:
     return worst
 
 
-@pytest.mark.parametrize(("rear_mps", "front_mps"), [(10, 8), (20, 20), (5, 0), (15, 22), (0, 10)])
+@pytest.mark.parametrize(("rear_mps", "front_mps"), [(10.0, 8.0), (20.0, 20.0), (5.0, 0.0), (15.0, 22.0), (0.0, 10.0)])
 def test_the_same_direction_distance_is_what_the_worst_case_uses_up(rear_mps: float, front_mps: float) -> None:
     # With b_max > b_min the vehicle ahead stops first, so the final gap is the smallest: Lemma 2 of the paper.
-    expected = same_direction(array(rear_mps), array(front_mps), P)[0]
+    expected = same_direction(rear_mps, front_mps, P)
     if expected > 0:
         assert stopping_gap(rear_mps, front_mps, P) == pytest.approx(expected, abs=0.05)
 
@@ -101,33 +97,33 @@ def test_the_same_direction_distance_is_what_the_worst_case_uses_up(rear_mps: fl
 @given(speed, speed, speed)
 def test_more_speed_of_the_rear_vehicle_never_shrinks_the_distance(a: float, b: float, front: float) -> None:
     slow, fast = sorted((a, b))
-    assert same_direction(array(slow), array(front), P) <= same_direction(array(fast), array(front), P)
+    assert same_direction(slow, front, P) <= same_direction(fast, front, P)
 
 
 @given(speed, speed, speed)
 def test_more_speed_of_the_front_vehicle_never_grows_the_distance(a: float, b: float, rear: float) -> None:
     slow, fast = sorted((a, b))
-    assert same_direction(array(rear), array(fast), P) <= same_direction(array(rear), array(slow), P)
+    assert same_direction(rear, fast, P) <= same_direction(rear, slow, P)
 
 
 @given(speed, speed)
 def test_opposite_direction_treats_both_alike_and_asks_for_more_than_a_standing_obstacle(a: float, b: float) -> None:
-    forth, back = opposite_direction(array(a), array(b), P)[0], opposite_direction(array(b), array(a), P)[0]
+    forth, back = opposite_direction(a, b, P), opposite_direction(b, a, P)
     assert forth == pytest.approx(back)
-    assert forth >= same_direction(array(a), array(0.0), P)[0]
+    assert forth >= same_direction(a, 0.0, P)
 
 
 @given(drift, drift, drift)
 def test_faster_lateral_closing_never_shrinks_the_distance(a: float, b: float, other: float) -> None:
     slow, fast = sorted((a, b))
-    assert lateral(array(slow), array(other), P) <= lateral(array(fast), array(other), P) + 1e-12
-    assert lateral(array(slow), array(other), P) >= P.fluctuation_m
+    assert lateral(slow, other, P) <= lateral(fast, other, P) + 1e-12
+    assert lateral(slow, other, P) >= P.fluctuation_m
 
 
 @given(speed, speed, st.floats(0.1, 1.5), st.floats(0.1, 1.5))
 def test_a_slower_response_never_shrinks_the_distance(rear: float, front: float, a: float, b: float) -> None:
     quick, slow = (RssParameters(response_s=r) for r in sorted((a, b)))
-    assert same_direction(array(rear), array(front), quick) <= same_direction(array(rear), array(front), slow) + 1e-12
+    assert same_direction(rear, front, quick) <= same_direction(rear, front, slow) + 1e-12
 
 
 def view_of(ego_mps: float, *others: tuple[float, float, float, float, float]) -> RelativeView:
