@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.geometry import RelativeView, line_of_sight, relative_view, time_to_contact
@@ -116,6 +116,7 @@ def test_gap_of_aligned_bodies_is_the_hand_computed_distance() -> None:
     assert view.gap.tolist() == pytest.approx([6.0, 3.0, 5.0, 5.0])  # ahead, alongside, 3-4-5 diagonal, turned
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.integers(0, 3), st.floats(-15, 15), st.floats(-15, 15), st.floats(-4, 4))
 def test_gap_is_exact_between_parallel_and_perpendicular_bodies(turns: int, x: float, y: float, ego: float) -> None:
     frame = frame_of([(0, 0, ego, 4.6, 1.85), (x, y, ego + turns * math.pi / 2, 6.0, 2.5)])
@@ -205,6 +206,7 @@ def test_time_to_contact_agrees_with_stepping_the_bodies_forward() -> None:
     assert hits > 50
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.floats(0.1, 100), st.floats(0, 30), st.floats(0, 30))
 def test_time_to_a_leader_is_gap_over_closing_speed(gap_m: float, ego: float, leader: float) -> None:
     ttc = time_to_contact(view_of([(0, 0, 0, 4.6, 1.85, ego, 0), (gap_m + 4.6, 0, 0, 4.6, 1.85, leader, 0)]))[0]
@@ -268,6 +270,7 @@ def test_nothing_hides_behind_what_does_not_occlude() -> None:
     assert line_of_sight(view, np.array([False, False])).tolist() == [True, True]
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.floats(-50, 50), st.floats(-50, 50), st.floats(-4, 4))
 def test_a_body_never_hides_itself(x: float, y: float, heading: float) -> None:
     view = view_of([(0, 0, 0.4, 4.6, 1.85), (x, y, heading, 4.6, 1.85)])

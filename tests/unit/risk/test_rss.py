@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.geometry import RelativeView, relative_view
@@ -94,18 +94,21 @@ def test_the_same_direction_distance_is_what_the_worst_case_uses_up(rear_mps: fl
         assert stopping_gap(rear_mps, front_mps, P) == pytest.approx(expected, abs=0.05)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(speed, speed, speed)
 def test_more_speed_of_the_rear_vehicle_never_shrinks_the_distance(a: float, b: float, front: float) -> None:
     slow, fast = sorted((a, b))
     assert same_direction(slow, front, P) <= same_direction(fast, front, P)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(speed, speed, speed)
 def test_more_speed_of_the_front_vehicle_never_grows_the_distance(a: float, b: float, rear: float) -> None:
     slow, fast = sorted((a, b))
     assert same_direction(rear, fast, P) <= same_direction(rear, slow, P)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(speed, speed)
 def test_opposite_direction_treats_both_alike_and_asks_for_more_than_a_standing_obstacle(a: float, b: float) -> None:
     forth, back = opposite_direction(a, b, P), opposite_direction(b, a, P)
@@ -113,6 +116,7 @@ def test_opposite_direction_treats_both_alike_and_asks_for_more_than_a_standing_
     assert forth >= same_direction(a, 0.0, P)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(drift, drift, drift)
 def test_faster_lateral_closing_never_shrinks_the_distance(a: float, b: float, other: float) -> None:
     slow, fast = sorted((a, b))
@@ -120,6 +124,7 @@ def test_faster_lateral_closing_never_shrinks_the_distance(a: float, b: float, o
     assert lateral(slow, other, P) >= P.fluctuation_m
 
 
+@settings(deadline=None)  # the first call compiles
 @given(speed, speed, st.floats(0.1, 1.5), st.floats(0.1, 1.5))
 def test_a_slower_response_never_shrinks_the_distance(rear: float, front: float, a: float, b: float) -> None:
     quick, slow = (RssParameters(response_s=r) for r in sorted((a, b)))
@@ -182,6 +187,7 @@ def test_alongside_there_is_no_longitudinal_distance() -> None:
     assert longitudinal.tolist() == pytest.approx([-(11 + 18 - 100 / 16)])
 
 
+@settings(deadline=None)  # the first call compiles
 @given(
     st.floats(0, 30),
     st.tuples(*(st.floats(-200, 200), st.floats(-50, 50), st.floats(-4, 4), st.floats(-40, 40), st.floats(-40, 40))),
