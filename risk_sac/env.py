@@ -6,7 +6,6 @@ realism cost and the robustness come in `info`, because λ and the shaping belon
 Source: RISK-SAC, Alg. 1, l. 5 and 8.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -15,13 +14,13 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.errors import InfeasibleScene, SimulationError
-from risk_sac.geometry import RelativeView, relative_view
+from risk_sac.geometry import relative_view
 from risk_sac.observation import LIMIT, Encoder
 from risk_sac.problem import Problem
 from risk_sac.risk.publish import publish, worst_rss_margin
 from risk_sac.risk.realism import broken_hard_rule, soft_cost
 from risk_sac.risk.reward import risk_reward
-from risk_sac.risk.rss import LONGITUDINAL_CAP_M, margins
+from risk_sac.risk.rss import margins
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
 from risk_sac.scenario.limits import limits_from_odd
@@ -29,26 +28,12 @@ from risk_sac.sim.collision import Contact, History, agrees, find_contact, touch
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Perception
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.trace import Trace
-from risk_sac.types import STEP_S, Bools, Collision, Floats, Frame, Kind, Role, Scene
+from risk_sac.trace import Measures, Trace
+from risk_sac.types import STEP_S, Collision, Frame, Kind, Role, Scene
 
 FEASIBLE_TRIES = 100
 WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
 Observation = NDArray[np.float32]
-
-
-@dataclass(frozen=True, slots=True)
-class Measures:
-    """What one frame says about risk."""
-
-    view: RelativeView
-    visible: Bools  # n
-    ttc_s: Floats  # n
-    rss_longitudinal_m: Floats  # n
-    rss_lateral_m: Floats  # n
-    signals: dict[str, float]
-    robustness: Floats  # M, scaled
-    soft_min: float
 
 
 class RiskSacEnv(gym.Env[Observation, Observation]):
@@ -127,7 +112,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._inside_limits &= not self._controlled or self._adversaries.keep_limits(self._frame)
         self._teleported |= bool(self._frame.teleported)
         contact = find_contact(before, self._frame, self._measures.view)
-        self._remember(action)
+        self._trace.append(self._frame, self._measures, action)
         collision = None if contact is None else self._judge(contact)
         self._touched.update(self._frame.ids[i] for pair in touching_pairs(self._frame) for i in pair)
         cost = self._cost(before, self._frame, previous, self._measures)
@@ -154,12 +139,12 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     @property
     def min_ttc_s(self) -> float:
         """Smallest TTC of the episode so far, over the actors the ego answers for."""
-        return min(self._trace.least_ttc_s)
+        return min(m.signals["ttc_s"] for m in self._trace.measures)
 
     @property
     def min_robustness(self) -> float:
         """Smallest soft-min robustness of the episode so far."""
-        return min(self._trace.soft_min)
+        return min(m.soft_min for m in self._trace.measures)
 
     def close(self) -> None:
         """Ends the simulation."""
@@ -178,19 +163,17 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._steps = 0
         self._inside_limits, self._teleported = True, False
         self._touched: set[str] = set()
-        self._ever_visible: set[str] = set()
-        self._min_rss_m, self._peak_braking = LONGITUDINAL_CAP_M, 0.0
         self._started_s = self._frame.time_s
         self._measures = self._measure(self._frame, None)
-        self._remember(None)
+        self._trace.append(self._frame, self._measures, None)
         self._check_feasible(scene)
         return self._observe(), {"robustness": self._measures.soft_min}
 
     def _check_feasible(self, scene: Scene) -> None:
         """C_hard of Eq. 5."""
         measures = self._measures
-        overlaps = bool(measures.view.overlap.any() or touching_pairs(self._frame))
-        rule = broken_hard_rule(overlaps, float(measures.view.gap.min()), measures.signals["ttc_s"])
+        self._spawn_overlap = bool(measures.view.overlap.any() or touching_pairs(self._frame))
+        rule = broken_hard_rule(self._spawn_overlap, float(measures.view.gap.min()), measures.signals["ttc_s"])
         if rule is not None:
             raise InfeasibleScene(f"scene of {scene.family!r} breaks {rule}: {dict(scene.values)}", reason=rule)
 
@@ -203,9 +186,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         signals = publish(frame, before, view, ttc_s, longitudinal, lateral)
         robustness = self._monitor.update(signals)
         rho = soft_min(robustness, self._reward.softmin_sharpness)
-        self._ever_visible.update(id_ for id_ in frame.ids[1:] if id_ not in hidden)
-        self._peak_braking = max(self._peak_braking, signals["ego_braking_mps2"])
-        self._min_rss_m = min(self._min_rss_m, worst_rss_margin(view, longitudinal, lateral))
         return Measures(view, visible, ttc_s, longitudinal, lateral, signals, robustness, rho)
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
@@ -224,17 +204,18 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         )
 
     def _judge(self, contact: Contact) -> Collision:
-        frame = self._frame
+        frame, measures = self._frame, self._trace.measures
+        warning = measures[:-WARNING_STEPS]
         other, ego = frame.ids[contact.other], frame.ids[0]
         visible_for_s = self._perception.visible_for(other, frame.time_s)
         history = History(
             started_s=self._started_s,
             teleported=self._teleported,
-            spawn_overlap=False,  # C_hard rejected such scenes before the first step
+            spawn_overlap=self._spawn_overlap,
             inside_limits=self._inside_limits,
             touched_before=other in self._touched,
             visible_for_s=visible_for_s,
-            ever_visible=other in self._ever_visible,
+            ever_visible=self._perception.ever_seen(other),
         )
         return Collision(
             time_s=contact.time_s - self._started_s,
@@ -249,24 +230,14 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             other_speed_mps=float(frame.speed_mps[contact.other]),
             relative_speed_mps=contact.relative_speed_mps,
             lateral_offset_m=contact.lateral_offset_m,
-            min_ttc_s=min(self._trace.least_ttc_s[:-WARNING_STEPS], default=TTC_CAP_S),
-            min_rss_margin_m=self._min_rss_m,
+            min_ttc_s=min((m.signals["ttc_s"] for m in warning), default=TTC_CAP_S),
+            min_rss_margin_m=min(worst_rss_margin(m.view, m.rss_longitudinal_m, m.rss_lateral_m) for m in measures),
             visible_for_s=visible_for_s,
-            ego_peak_braking_mps2=self._peak_braking,
-            min_robustness=min(self._trace.soft_min[:-WARNING_STEPS], default=ROBUSTNESS_CLIP),
+            ego_peak_braking_mps2=max(m.signals["ego_braking_mps2"] for m in measures),
+            min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
             simulator_agrees=agrees(frame, ego, other),
             verdicts=verdicts(contact, frame, history),
         )
-
-    def _remember(self, action: Observation | None) -> None:
-        m = self._measures
-        self._trace.frames.append(self._frame)
-        self._trace.others.append((m.view.gap, m.ttc_s, m.rss_longitudinal_m, m.rss_lateral_m, m.visible))
-        self._trace.robustness.append(m.robustness)
-        self._trace.soft_min.append(m.soft_min)
-        self._trace.least_ttc_s.append(m.signals["ttc_s"])
-        if action is not None:
-            self._trace.actions.append(np.array(action, dtype=np.float32))
 
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.problem.family.horizon_steps

@@ -7,10 +7,30 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.geometry import RelativeView
 from risk_sac.types import Bools, Floats, Frame
 
 PER_ACTOR = ("x_m", "y_m", "heading_rad", "speed_mps", "lateral_mps", "accel_mps2")
 PER_OTHER = ("distance_m", "ttc_s", "rss_longitudinal_m", "rss_lateral_m", "visible")
+
+
+@dataclass(frozen=True, slots=True)
+class Measures:
+    """What one frame says about risk; arrays hold the `n` actors other than the ego."""
+
+    view: RelativeView
+    visible: Bools
+    ttc_s: Floats
+    rss_longitudinal_m: Floats
+    rss_lateral_m: Floats
+    signals: dict[str, float]
+    robustness: Floats  # M, scaled
+    soft_min: float
+
+    @property
+    def distance_m(self) -> Floats:
+        """Gap between each body and the ego's."""
+        return self.view.gap
 
 
 @dataclass(slots=True)
@@ -19,11 +39,15 @@ class Trace:
 
     requirements: tuple[str, ...]
     frames: list[Frame] = field(default_factory=list)
-    others: list[tuple[Floats | Bools, ...]] = field(default_factory=list)  # of PER_OTHER, each without the ego
-    robustness: list[Floats] = field(default_factory=list)
-    soft_min: list[float] = field(default_factory=list)
-    least_ttc_s: list[float] = field(default_factory=list)  # over the actors the ego answers for
+    measures: list[Measures] = field(default_factory=list)
     actions: list[NDArray[np.float32]] = field(default_factory=list)  # one fewer than frames
+
+    def append(self, frame: Frame, measures: Measures, action: NDArray[np.float32] | None) -> None:
+        """Records a frame and the action that led to it, None for the first."""
+        self.frames.append(frame)
+        self.measures.append(measures)
+        if action is not None:
+            self.actions.append(np.array(action, dtype=np.float32))
 
     def series(self) -> dict[str, NDArray[np.generic]]:
         """Arrays by name: `T` frames, `n` actors of the first frame, NaN where one has left.
@@ -41,9 +65,9 @@ class Trace:
             "length_m": first.length_m,
             "width_m": first.width_m,
             "requirements": np.array(self.requirements),
-            "robustness": np.array(self.robustness),
-            "soft_min": np.array(self.soft_min),
-            "least_ttc_s": np.array(self.least_ttc_s),
+            "robustness": np.array([m.robustness for m in self.measures]),
+            "soft_min": np.array([m.soft_min for m in self.measures]),
+            "least_ttc_s": np.array([m.signals["ttc_s"] for m in self.measures]),
             "signal": np.array([frame.signal for frame in self.frames], dtype=np.int8),
         }
         columns = [[column[id_] for id_ in frame.ids] for frame in self.frames]
@@ -52,10 +76,10 @@ class Trace:
             for t, frame in enumerate(self.frames):
                 values[t, columns[t]] = getattr(frame, name)
             result[name] = values
-        for k, name in enumerate(PER_OTHER):
+        for name in PER_OTHER:
             values = np.full((steps, n), np.nan)
-            for t, arrays in enumerate(self.others):
-                values[t, columns[t][1:]] = arrays[k]
+            for t, measures in enumerate(self.measures):
+                values[t, columns[t][1:]] = getattr(measures, name)
             result[name] = values
         size = len(self.actions[0]) if self.actions else 0
         result["actions"] = np.vstack((np.full((1, size), np.nan, dtype=np.float32), *self.actions))
@@ -79,5 +103,5 @@ def write_series(path: Path, series: dict[str, NDArray[np.generic]]) -> None:
 
 def read_series(path: Path) -> dict[str, NDArray[np.generic]]:
     """Reads what `write_series` wrote."""
-    with np.load(path, allow_pickle=False) as archive:
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}

@@ -42,10 +42,12 @@ class Perception:
         self._sensor = sensor
         self._visibility_m = visibility_m
         self._seen_since: dict[str, float] = {}
+        self._ever_seen: set[str] = set()
 
     def reset(self) -> None:
         """Forgets the previous episode."""
         self._seen_since.clear()
+        self._ever_seen.clear()
 
     def update(self, frame: Frame, view: RelativeView) -> tuple[Bools, frozenset[str]]:
         """Looks at a frame.
@@ -59,7 +61,9 @@ class Perception:
         hidden = []
         for id_, flag in zip(others, seen.tolist(), strict=True):
             if flag:
-                since.setdefault(id_, frame.time_s)
+                if id_ not in since:
+                    since[id_] = frame.time_s
+                    self._ever_seen.add(id_)
             else:
                 since.pop(id_, None)
                 hidden.append(id_)
@@ -69,3 +73,7 @@ class Perception:
         """How long `id_` has been visible without a break, s; 0 if it is hidden."""
         since = self._seen_since.get(id_)
         return 0.0 if since is None else time_s - since
+
+    def ever_seen(self, id_: str) -> bool:
+        """Whether `id_` has been visible at any time in this episode."""
+        return id_ in self._ever_seen
