@@ -1,0 +1,52 @@
+# Everything runs in .venv, which the first target that needs it makes. Needs Python 3.11 or 3.12 and make.
+.DEFAULT_GOAL := help
+.PHONY: help install demo test serve bench lint openapi nets clean
+
+BIN := .venv/bin
+PYTHON := $(BIN)/python
+STAMP := .venv/.installed
+# One thread per process: runs are parallel, not the small matrices within one.
+export OMP_NUM_THREADS := 1
+# Tried by running it: a pyenv shim may exist without its version.
+FIND_PYTHON := for p in python3.11 python3.12 python3; do \
+	"$$p" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null && echo "$$p" && break; done
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' Makefile | expand -t 10
+
+install: $(STAMP) ## make .venv with the pinned versions
+
+$(STAMP): pyproject.toml constraints.txt
+	@python=$$($(FIND_PYTHON)); \
+	if [ -z "$$python" ]; then echo "make: found neither python3.11 nor python3.12; install one of them" >&2; exit 1; fi; \
+	test -x $(PYTHON) || "$$python" -m venv .venv
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	@touch $@
+
+demo: $(STAMP) ## start the service, run a campaign over REST, write results/demo.json
+	$(PYTHON) -m service.demo
+
+test: lint ## check the code and run the whole suite
+	$(PYTHON) -m pytest -n 2
+
+serve: $(STAMP) ## run the service on http://127.0.0.1:8000
+	RISK_SAC_HOST=127.0.0.1 RISK_SAC_PORT=8000 $(PYTHON) -m service
+
+bench: $(STAMP) ## measure speed as ratios
+	$(PYTHON) -m pytest -m bench -s tests/benchmarks/bench_*.py
+
+lint: $(STAMP) ## style, types and import rules
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+openapi: $(STAMP) ## write openapi.yaml
+	$(PYTHON) -m service.openapi
+
+nets: $(STAMP) ## rebuild sumo_nets/*/*.net.xml
+	PATH="$(CURDIR)/$(BIN):$$PATH" sumo_nets/build.sh
+
+clean: ## remove .venv, caches and builds; data/ and results/ stay
+	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
