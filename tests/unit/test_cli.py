@@ -1,0 +1,187 @@
+import json
+import os
+import signal
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from risk_sac import cli
+from risk_sac.config import Budget, RunSpec
+from risk_sac.errors import ConfigError
+from risk_sac.local_run import run
+from risk_sac.results import read_results, write_results
+from risk_sac.types import RunMetrics
+
+SPEC = RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=3))
+
+
+def ignore(done: int, metrics: RunMetrics | None) -> None:
+    pass
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished run with at least one contact."""
+    for seed in range(11, 31):
+        folder = tmp_path_factory.mktemp("run")
+        spec = SPEC.model_copy(update={"seed": seed, "budget": Budget(episodes=8)})
+        if run(spec, folder, ignore).contacts:
+            return folder
+    raise AssertionError("no contact in 160 random episodes; wanted one to list and draw")
+
+
+def test_results_hold_spec_metrics_versions_and_contacts(folder: Path) -> None:
+    stored = json.loads((folder / "results.json").read_text())
+    assert stored["finished"] is True
+    assert stored["spec"]["method"] == "random"
+    assert stored["metrics"]["ecr_low"] <= stored["metrics"]["ecr"] <= stored["metrics"]["ecr_high"]
+    assert len(stored["digest"]) == 64
+    assert stored["wall_s"] > 0
+    assert "libsumo" in stored["versions"]
+    contact = stored["contacts"][0]
+    assert contact["id"] == f"{contact['episode']['index']:06d}"
+    assert contact["episode"]["collision"]["verdicts"]
+    assert (folder / contact["series"]).exists()
+
+
+def test_episodes_are_one_line_each(folder: Path) -> None:
+    lines = (folder / "episodes.jsonl").read_text().splitlines()
+    assert [json.loads(line)["index"] for line in lines] == list(range(8))
+
+
+def test_show_lists_the_contacts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["show", str(folder)]) == 0
+    printed = capsys.readouterr().out
+    assert all(contact.id in printed for contact in read_results(folder).contacts)
+
+
+@pytest.mark.parametrize("strip", [False, True])
+def test_show_draws_by_id_with_or_without_leading_zeros(folder: Path, tmp_path: Path, strip: bool) -> None:
+    id_ = read_results(folder).contacts[0].id
+    picture = tmp_path / "contact.png"
+    wanted = str(int(id_)) if strip else id_
+    assert cli.main(["show", str(folder / "results.json"), wanted, "--out", str(picture)]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_show_without_out_draws_beside_the_time_series(folder: Path) -> None:
+    contact = read_results(folder).contacts[0]
+    assert cli.main(["show", str(folder), contact.id]) == 0
+    assert (folder / contact.series).with_suffix(".png").exists()
+
+
+@pytest.mark.parametrize("unknown", ["999", "x", "-1", "²"])
+def test_show_names_the_known_contacts(folder: Path, unknown: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["show", str(folder), "--", unknown]) == 2
+    complaint = capsys.readouterr().err
+    assert complaint.startswith("FAILURE: ")
+    assert read_results(folder).contacts[0].id in complaint
+
+
+def test_show_refuses_a_folder_without_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["show", str(tmp_path)]) == 2
+    assert capsys.readouterr().err.startswith("RESULTS: there is no ")
+
+
+def test_show_refuses_what_run_did_not_write(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "results.json").write_text("[1]")
+    assert cli.main(["show", str(tmp_path)]) == 2
+    assert "was not written by" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--family", "high"], "family: "),
+        (["--family", "low", "--method", "magic"], "method: "),
+        (["--family", "low", "--episodes", "-3"], "budget.episodes: "),
+        (["--family", "low", "--seed", "-1"], "seed: "),
+        ([], "family: "),
+        (["--spec", "nowhere.yaml"], "spec: "),
+    ],
+)
+def test_wrong_settings_name_the_field_and_leave_no_folder(
+    arguments: list[str], complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["run", *arguments, "--out", str(tmp_path / "out")]) == 2
+    printed = capsys.readouterr().err
+    assert printed.startswith(complaint)
+    assert "Traceback" not in printed
+    assert not (tmp_path / "out").exists()
+
+
+def test_bad_formula_is_refused_before_the_folder_is_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "spec.yaml"
+    file.write_text("family: low\nmethod: random\nseed: 0\nrequirements: [{name: a, formula: 'ttc_s >', scale: 1}]\n")
+    assert cli.main(["run", "--spec", str(file), "--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.startswith("requirements[0].formula: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_folder_of_another_run_is_refused_and_kept(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (folder / "results.json").read_bytes()
+    assert cli.main(["run", "--family", "low", "--method", "sac", "--episodes", "8", "--out", str(folder)]) == 2
+    assert "holds a run with another method, seed" in capsys.readouterr().err
+    assert (folder / "results.json").read_bytes() == before
+
+
+def test_checkpoint_without_results_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "checkpoint").write_bytes(b"of somebody else")
+    with pytest.raises(ConfigError, match="holds a checkpoint but no results"):
+        run(SPEC, tmp_path, ignore)
+
+
+def test_unwritable_folder_is_an_error_without_traceback(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    assert cli.main(["run", "--family", "low", "--method", "random", "--out", str(tmp_path / "file" / "out")]) == 1
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_interrupt_ends_the_run_after_its_episode_and_it_goes_on(tmp_path: Path) -> None:
+    whole = run(SPEC, tmp_path / "whole", ignore)
+
+    def interrupt(done: int, metrics: RunMetrics | None) -> None:
+        if done == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    stopped = run(SPEC, tmp_path / "parts", interrupt)
+    assert (stopped.finished, stopped.metrics and stopped.metrics.episodes) == (False, 2)
+    resumed = run(SPEC, tmp_path / "parts", ignore)
+    assert replace(resumed, wall_s=0.0) == replace(whole, wall_s=0.0)
+    assert resumed.wall_s > stopped.wall_s
+    parts, at_once = ((tmp_path / name / "episodes.jsonl").read_bytes() for name in ("parts", "whole"))
+    assert parts == at_once
+
+
+def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path: Path) -> None:
+    whole = run(SPEC, tmp_path, ignore)
+    (tmp_path / "checkpoint").unlink()  # as if killed before the first one
+    write_results(tmp_path, replace(whole, metrics=None, digest=None, finished=False, contacts=(), wall_s=0.0))
+    assert run(SPEC, tmp_path, ignore).digest == whole.digest
+    assert len((tmp_path / "episodes.jsonl").read_text().splitlines()) == 3
+
+
+def test_signal_handlers_are_put_back(tmp_path: Path) -> None:
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    run(SPEC, tmp_path, ignore)
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+def test_serve_becomes_the_service_with_its_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[tuple[str, list[str], dict[str, str]]] = []
+    monkeypatch.setattr(os, "execve", lambda *call: calls.append(call))
+    monkeypatch.setenv("RISK_SAC_GRACE_S", "5")
+    cli.main(["serve", "--host", "0.0.0.0", "--port", "8001"])
+    ((program, arguments, environment),) = calls
+    assert (program, arguments) == (sys.executable, [sys.executable, "-m", "service"])
+    assert (environment["RISK_SAC_HOST"], environment["RISK_SAC_PORT"]) == ("0.0.0.0", "8001")
+    assert environment["RISK_SAC_GRACE_S"] == "5"
+    assert "RISK_SAC_DATA_DIR" not in environment
+
+
+def test_unknown_command_is_misuse(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        cli.main(["launch"])
+    assert "invalid choice" in capsys.readouterr().err

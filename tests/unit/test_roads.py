@@ -1,0 +1,32 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import sumo_nets
+from risk_sac.roads import read_surfaces
+
+NETS = Path(sumo_nets.__path__[0])
+
+
+def test_lane_is_a_ribbon_of_its_width_around_its_centre_line(tmp_path: Path) -> None:
+    net = tmp_path / "bend.net.xml"
+    net.write_text(
+        '<net><edge id="e"><lane id="e_0" width="2.00" shape="0,0 10,0"/></edge>'
+        '<edge id=":j_0" function="internal"><lane id=":j_0_0" shape="10,0 20,0"/></edge></net>'
+    )
+    (lane,) = read_surfaces(net)
+    assert lane.use == "lane"
+    np.testing.assert_allclose(lane.outline, [(0, 1), (10, 1), (10, -1), (0, -1)])
+
+
+@pytest.mark.parametrize(("family", "lanes", "crossings"), [("low", 3, 0), ("mixed", 12, 2), ("dense", 16, 4)])
+def test_nets_have_the_lanes_and_crossings_of_their_family(family: str, lanes: int, crossings: int) -> None:
+    uses = [surface.use for surface in read_surfaces(NETS / family / f"{family}.net.xml")]
+    assert (uses.count("lane"), uses.count("crossing")) == (lanes, crossings)
+
+
+def test_heights_in_a_net_are_dropped(tmp_path: Path) -> None:
+    net = tmp_path / "hill.net.xml"
+    net.write_text('<net><edge id="e"><lane id="e_0" width="2" shape="0,0,5 0,10,6"/></edge></net>')
+    np.testing.assert_allclose(read_surfaces(net)[0].outline, [(-1, 0), (-1, 10), (1, 10), (1, 0)])

@@ -1,0 +1,86 @@
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError
+from risk_sac.spec_file import read_spec
+
+FLAGS: dict[str, Any] = dict.fromkeys(("family", "method", "seed", "episodes", "evaluation_episodes"))
+
+
+def yaml_file(folder: Path, text: str) -> Path:
+    file = folder / "spec.yaml"
+    file.write_text(text)
+    return file
+
+
+def test_flags_alone_make_a_run_with_the_defaults() -> None:
+    spec = read_spec(None, FLAGS | {"family": "low", "episodes": 7})
+    assert spec == RunSpec.model_validate({"family": "low", "method": "risk-sac", "seed": 0, "budget": {"episodes": 7}})
+
+
+def test_run_file_keeps_its_fields_and_flags_override_them(tmp_path: Path) -> None:
+    file = yaml_file(
+        tmp_path,
+        "family: mixed\nmethod: sac\nseed: 4\nbudget: {episodes: 9, evaluation_episodes: 2}\n"
+        "ego: {profile: perfect}\nrequirements: [{name: slow, formula: ego_speed_mps < 5, scale: 1.0}]\n",
+    )
+    spec = read_spec(file, FLAGS | {"seed": 5, "episodes": 3})
+    assert (spec.family, spec.method, spec.seed) == ("mixed", "sac", 5)
+    assert (spec.budget.episodes, spec.budget.evaluation_episodes) == (3, 2)
+    assert spec.ego.sensor is None
+    assert spec.requirements[0].name == "slow"
+
+
+def test_campaign_with_one_run_is_that_run(tmp_path: Path) -> None:
+    file = yaml_file(tmp_path, "families: [dense]\nmethods: [random]\nseeds: [3]\n")
+    assert read_spec(file, FLAGS) == RunSpec(family="dense", method="random", seed=3)
+
+
+def test_flags_pick_one_run_of_a_campaign(tmp_path: Path) -> None:
+    file = yaml_file(tmp_path, "label: all\nfamilies: [low, mixed]\nmethods: [random, sac]\nseeds: [1, 2]\n")
+    with pytest.raises(ConfigError, match="has 8 runs; wanted one") as raised:
+        read_spec(file, FLAGS)
+    assert raised.value.field == "spec"
+    picked = read_spec(file, FLAGS | {"family": "mixed", "method": "sac", "seed": 2})
+    assert (picked.family, picked.method, picked.seed) == ("mixed", "sac", 2)
+
+
+@pytest.mark.parametrize(
+    ("text", "field", "message"),
+    [
+        ("method: sac\nseed: 0", "family", "required"),
+        ("family: high\nmethod: sac\nseed: 0", "family", "got 'high'"),
+        ("family: low\nmethod: sac\nseed: '3'", "seed", "got '3'"),
+        ("family: low\nmethod: sac\nseed: 0\nbudget: {episodes: .nan}", "budget.episodes", "nan"),
+        ("family: low\nmethod: sac\nseed: 0\nbudgets: {}", "budgets", "not permitted"),
+        ("family: low\nmethod: sac\nseed: 0\nbudget: 3", "budget", "got 3"),
+        (
+            "family: low\nmethod: sac\nseed: 0\nrequirements: [{name: a, formula: x, scale: -1}]",
+            "requirements[0].scale",
+            "greater than 0",
+        ),
+        ("families: [low, low]", "", "wanted each value once"),
+        ("[1, 2]", "spec", "holds a list"),
+        ("family: [", "spec", "is no YAML"),
+        ("family: 2020-01-01\nmethod: sac\nseed: 0", "family", "2020"),
+    ],
+)
+def test_wrong_file_names_the_field(tmp_path: Path, text: str, field: str, message: str) -> None:
+    with pytest.raises(ConfigError) as raised:
+        read_spec(yaml_file(tmp_path, text), FLAGS)
+    assert raised.value.field == field
+    assert message in str(raised.value)
+
+
+def test_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"nowhere\.yaml cannot be read"):
+        read_spec(tmp_path / "nowhere.yaml", FLAGS)
+
+
+def test_wrong_flag_names_the_field() -> None:
+    with pytest.raises(ConfigError, match="greater than or equal to 1") as raised:
+        read_spec(None, FLAGS | {"family": "low", "episodes": -2})
+    assert raised.value.field == "budget.episodes"
