@@ -1,0 +1,1 @@
+"""Road nets of the scenario families, as package data."""
