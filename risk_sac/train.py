@@ -74,6 +74,7 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
     """
     started = time.monotonic()
     torch.set_num_threads(1)
+    folder.mkdir(parents=True, exist_ok=True)
     run = Run(spec, folder)
     try:
         run.resume()
