@@ -1,0 +1,268 @@
+"""The ego brakes for what it sees, and only for that.
+
+Each claim compares three runs of one scene: without the actor, with it hidden from the ego's models, and with it in
+view. Swerving is a reaction too, so "no reaction" means the same trajectory to the last bit.
+"""
+
+import math
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.env import RiskSacEnv
+from risk_sac.geometry import relative_view
+from risk_sac.problem import Problem
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.layout import Layout, PedestrianStart, VehicleStart
+from risk_sac.sim.sumo import SumoSimulation, VehicleCommand
+from risk_sac.types import Floats, Frame, Role
+
+LANE_Y_M = -1.65  # the ego's lane on the mixed road
+GREEN_S, NEVER = 0.0, 10_000
+MIXED = FAMILIES["mixed"].layout(FAMILIES["mixed"].space.from_unit(np.full(10, 0.5)).values)
+DENSE_SPACE = FAMILIES["dense"].space
+
+
+@pytest.fixture
+def sim() -> Iterator[SumoSimulation]:
+    with closing(SumoSimulation(EgoConfig())) as simulation:
+        yield simulation
+
+
+def car(
+    id_: str, role: Role, position_m: float, speed_mps: float, edges: tuple[str, ...] = ("e1", "e2")
+) -> VehicleStart:
+    return VehicleStart(id=id_, role=role, route=edges, lane=2, position_m=position_m, speed_mps=speed_mps)
+
+
+def on_the_mixed_road(ego: VehicleStart, *vehicles: VehicleStart, walker: tuple[float, float] | None = None) -> Layout:
+    """The ego, and at most a few others; a pedestrian stands where told."""
+    standing = () if walker is None else (walker,)
+    return replace(
+        MIXED,
+        ego=ego,
+        vehicles=vehicles,
+        pedestrians=tuple(
+            PedestrianStart(id="actor", role=Role.ADVERSARY, x_m=x, y_m=y, heading_rad=math.pi / 2, speed_mps=0.0)
+            for x, y in standing
+        ),
+        signal_offset_s=GREEN_S,
+    )
+
+
+def drive(sim: SumoSimulation, layout: Layout, *, seen_from: int = 0, steps: int = 110) -> list[Frame]:
+    """Frames of a run in which `actor` is hidden before step `seen_from`; adversary vehicles keep their speed."""
+    frames = [sim.reset(layout, 1)]
+    kept = {v.id: VehicleCommand(v.speed_mps, 0.0) for v in layout.vehicles if v.role is Role.ADVERSARY}
+    for step in range(steps):
+        sim.hide(frozenset() if step >= seen_from else frozenset({"actor"}))
+        sim.apply(kept, {})
+        frames.append(sim.step())
+    return frames
+
+
+def path(frames: list[Frame]) -> Floats:
+    """The ego's x, y, heading and speed in every frame."""
+    return np.array([(f.x_m[0], f.y_m[0], f.heading_rad[0], f.speed_mps[0]) for f in frames])
+
+
+def least_gap(frames: list[Frame]) -> float:
+    return min(float(relative_view(f).gap[f.ids.index("actor") - 1]) for f in frames)
+
+
+def peak_braking(frames: list[Frame]) -> float:
+    return max(-float(f.accel_mps2[0]) for f in frames)
+
+
+def dense(*vehicles: VehicleStart) -> Layout:
+    """The ego goes straight on at the intersection from the south, on green."""
+    middle = FAMILIES["dense"].layout(DENSE_SPACE.from_unit(np.full(DENSE_SPACE.dimension, 0.5)).values)
+    ego = replace(middle.ego, position_m=middle.ego.position_m - 10.0, speed_mps=12.0)
+    return replace(middle, ego=ego, vehicles=vehicles, pedestrians=(), signal_offset_s=GREEN_S)
+
+
+ZEBRA_EGO, SIGNAL_EGO = car("ego", Role.EGO, 220.0, 12.0), car("ego", Role.EGO, 320.0, 12.0, ("e2", "e3"))
+MIDBLOCK_EGO = car("ego", Role.EGO, 100.0, 12.0)
+PARKED = car("actor", Role.ADVERSARY, 190.0, 0.0)
+PEDESTRIANS = {
+    "pedestrian on the roadway": (
+        on_the_mixed_road(MIDBLOCK_EGO, walker=(190.0, LANE_Y_M)),
+        on_the_mixed_road(MIDBLOCK_EGO),
+    ),
+    "pedestrian on the zebra": (
+        on_the_mixed_road(ZEBRA_EGO, walker=(300.0, LANE_Y_M)),
+        on_the_mixed_road(ZEBRA_EGO),
+    ),
+    "pedestrian on the signalised crossing": (
+        on_the_mixed_road(SIGNAL_EGO, walker=(700.0, LANE_Y_M)),
+        on_the_mixed_road(SIGNAL_EGO),
+    ),
+}
+each_pedestrian = pytest.mark.parametrize(("present", "absent"), PEDESTRIANS.values(), ids=PEDESTRIANS)
+
+
+@each_pedestrian
+def test_a_visible_pedestrian_is_not_hit(sim: SumoSimulation, present: Layout, absent: Layout) -> None:
+    frames = drive(sim, present)
+    assert least_gap(frames) > 0.2
+    assert not np.array_equal(path(frames), path(drive(sim, absent)))
+
+
+@each_pedestrian
+def test_a_hidden_pedestrian_changes_nothing_and_is_driven_through(
+    sim: SumoSimulation, present: Layout, absent: Layout
+) -> None:
+    frames = drive(sim, present, seen_from=NEVER)
+    assert np.array_equal(path(frames), path(drive(sim, absent)))
+    assert least_gap(frames) == 0.0
+
+
+@each_pedestrian
+@pytest.mark.parametrize("seen_from", [15, 30])
+def test_the_ego_reacts_from_the_moment_a_pedestrian_comes_into_view(
+    sim: SumoSimulation, present: Layout, absent: Layout, seen_from: int
+) -> None:
+    late, never = path(drive(sim, present, seen_from=seen_from)), path(drive(sim, absent))
+    first = int(np.flatnonzero(np.any(late != never, axis=1))[0])
+    assert first > seen_from  # nothing before it, bit for bit
+    assert least_gap(drive(sim, present, seen_from=seen_from)) > 0.0  # still far enough to stop or to pass
+
+
+def test_a_hidden_pedestrian_does_not_hide_the_vehicle_beside_it(sim: SumoSimulation) -> None:
+    other = replace(PARKED, id="parked", position_m=PARKED.position_m + 5)
+    layout = on_the_mixed_road(MIDBLOCK_EGO, other, walker=(150.0, LANE_Y_M))
+    frames = drive(sim, layout, seen_from=NEVER)
+    gap = min(float(relative_view(f).gap[f.ids.index("parked") - 1]) for f in frames)
+    assert least_gap(frames) == 0.0
+    assert gap > 0.0
+
+
+def test_a_pedestrian_off_the_road_does_not_stop_the_ego(sim: SumoSimulation) -> None:
+    frames = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, walker=(190.0, -8.0)))
+    assert np.array_equal(path(frames), path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO))))
+
+
+MODELS = pytest.mark.parametrize("model", ["IDM", "ACC"])  # without dawdling, whose noise another vehicle would shift
+
+
+@MODELS
+def test_a_visible_vehicle_ahead_is_not_hit(model: str) -> None:
+    with closing(SumoSimulation(EgoConfig(car_following=model))) as sim:
+        frames = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, PARKED))
+        assert least_gap(frames) > 0.2
+        assert not np.array_equal(path(frames), path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO))))
+
+
+@MODELS
+def test_a_hidden_vehicle_ahead_does_not_slow_the_ego(model: str) -> None:
+    # SUMO can hide a vehicle from car following and at junctions, not from lane changing: only the speed is untouched.
+    with closing(SumoSimulation(EgoConfig(car_following=model))) as sim:
+        frames = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, PARKED), seen_from=NEVER)
+        alone = drive(sim, on_the_mixed_road(MIDBLOCK_EGO))
+        assert np.array_equal(path(frames)[:, 3], path(alone)[:, 3])
+        assert least_gap(frames) == 0.0
+
+
+@MODELS
+def test_the_ego_brakes_from_the_moment_a_vehicle_ahead_comes_into_view(model: str) -> None:
+    with closing(SumoSimulation(EgoConfig(car_following=model))) as sim:
+        late = path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO, PARKED), seen_from=25))
+        alone = path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO)))
+    differs = np.flatnonzero(np.any(late != alone, axis=1))
+    assert differs[0] > 25
+
+
+def red_light_runner() -> VehicleStart:
+    """Comes from the west, and arrives in the middle of the intersection together with the ego."""
+    return VehicleStart(
+        id="actor",
+        role=Role.ADVERSARY,
+        route=("from_west", "to_east"),
+        lane=2,
+        position_m=dense().ego.position_m + 16.0,
+        speed_mps=11.0,
+    )
+
+
+def test_a_visible_vehicle_at_the_junction_is_braked_for(sim: SumoSimulation) -> None:
+    seen, alone = drive(sim, dense(red_light_runner()), steps=90), drive(sim, dense(), steps=90)
+    assert peak_braking(seen) > peak_braking(alone) + 3.0
+    assert least_gap(seen) > 0.5
+
+
+def test_a_hidden_vehicle_at_the_junction_changes_nothing(sim: SumoSimulation) -> None:
+    hidden = drive(sim, dense(red_light_runner()), seen_from=NEVER, steps=90)
+    assert np.array_equal(path(hidden), path(drive(sim, dense(), steps=90)))
+    assert least_gap(hidden) == 0.0
+
+
+def behind_a_braking_leader(config: EgoConfig) -> list[Frame]:
+    """The leader, 20 m ahead at 14 m/s, brakes with 8 m/s² after a second."""
+    low = FAMILIES["low"].layout(FAMILIES["low"].space.from_unit(np.full(9, 0.5)).values)
+    ego = replace(low.ego, speed_mps=14.0)
+    lead = replace(low.vehicles[0], position_m=ego.position_m + 24.6, speed_mps=14.0, id="actor")
+    with closing(SumoSimulation(config)) as sim:
+        frames, speed = [sim.reset(replace(low, ego=ego, vehicles=(lead,), friction=1.0), 1)], 14.0
+        for step in range(100):
+            speed = max(speed - 0.8, 0.0) if step >= 10 else speed
+            sim.apply({"actor": VehicleCommand(speed, 0.0)}, {})
+            frames.append(sim.step())
+    return frames
+
+
+def test_peak_braking_rises_with_the_reaction_time() -> None:
+    peaks = [peak_braking(behind_a_braking_leader(EgoConfig(reaction_time_s=t))) for t in (0.1, 0.5, 1.0, 1.5)]
+    assert peaks == sorted(peaks)
+    assert peaks[0] < 5.0
+    assert peaks[-1] > peaks[0] + 2.0
+
+
+@pytest.mark.parametrize("model", ["Krauss", "IDM", "EIDM", "ACC", "CACC"])
+def test_every_car_following_model_drives_and_reacts(model: str) -> None:
+    frames = behind_a_braking_leader(EgoConfig(car_following=model))
+    speeds = path(frames)[:, 3]
+    assert speeds[:10].min() > 10.0
+    assert peak_braking(frames) > 2.5
+    assert speeds[-1] < 8.0 or path(frames)[-1, 1] != path(frames)[0, 1]  # nearly stopped, or gone round it
+
+
+def first_braking_step(profile: str) -> tuple[int, bool]:
+    """When the ego first brakes for a pedestrian behind a standing vehicle, and whether it saw it all the time."""
+    spec = RunSpec(family="mixed", method="risk-sac", seed=0, ego=EgoConfig(profile=profile))
+    problem = Problem.from_spec(spec)
+    middle = dict(problem.space.from_unit(np.full(problem.space.dimension, 0.5)).values)
+    changed = {
+        "crossing": 1.0,
+        "ego_speed_mps": 12.0,
+        "ego_distance_m": 60.0,
+        "occluder_distance_m": 1.0,
+        "occluder_speed_mps": 0.0,
+        "pedestrian_offset_m": 0.0,
+        "pedestrian_setback_m": 0.3,
+        "pedestrian_speed_mps": 1.5,
+        "signal_offset_s": 0.0,
+    }
+    scene = replace(problem.space.from_unit(np.full(problem.space.dimension, 0.5)), values=middle | changed)
+    with closing(RiskSacEnv(problem, spec.learner.reward)) as env:
+        env.reset(seed=0, options={"scene": scene})
+        for _ in range(80):
+            _, _, terminated, _, _ = env.step(np.array([-1.0, 0.0, 0.0, 0.0], dtype=np.float32))
+            if terminated:
+                break
+        series = env.trace.series()
+    pedestrian = series["ids"].tolist().index("pedestrian")
+    visible = series["visible"][:, pedestrian] > 0
+    braking = np.flatnonzero(series["accel_mps2"][:, 0] < -2.0)
+    return (int(braking[0]) if len(braking) else len(series["time_s"])), bool(visible.all())
+
+
+def test_the_perfect_profile_sees_everything_and_brakes_earlier() -> None:
+    perfect, saw_all = first_braking_step("perfect")
+    default, saw_too = first_braking_step("default")
+    assert saw_all
+    assert not saw_too
+    assert perfect < default
