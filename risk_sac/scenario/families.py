@@ -65,7 +65,7 @@ def _odd(*, lanes: float, limit_mps: float, signals: bool, pedestrians: bool) ->
             ego_speed_mps=Interval(low=0, high=limit_mps),
             vehicle_speed_mps=Interval(low=0, high=limit_mps * 1.2),
             vehicle_accel_mps2=Interval(low=-8, high=3.5),
-            pedestrian_speed_mps=Interval(low=0, high=4),
+            pedestrian_speed_mps=Interval(low=0, high=3),
             pedestrian_accel_mps2=Interval(low=-4, high=3),
         ),
     )

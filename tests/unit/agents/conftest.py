@@ -3,13 +3,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 import torch
-from hypothesis import settings
 
 from risk_sac.agents.replay import Transition
-
-# The first call into torch pays for its lazy imports, whichever example that is.
-settings.register_profile("agents", deadline=None)
-settings.load_profile("agents")
 
 
 @pytest.fixture(autouse=True)
