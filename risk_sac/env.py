@@ -207,7 +207,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         frame, measures = self._frame, self._trace.measures
         warning = measures[:-WARNING_STEPS]
         other, ego = frame.ids[contact.other], frame.ids[0]
-        visible_for_s = self._perception.visible_for(other, frame.time_s)
+        visible_for_s = self._perception.known_for(other, frame.time_s)
         history = History(
             started_s=self._started_s,
             teleported=self._teleported,

@@ -106,7 +106,7 @@ class Collision:
     lateral_offset_m: float  # other's centre across the ego's axis at contact
     min_ttc_s: float  # until 1 s before the contact, at which it is 0 for every collision alike
     min_rss_margin_m: float
-    visible_for_s: float  # continuously visible to the ego before contact; 0 if never seen
+    visible_for_s: float  # known to the ego without a break before contact, sensor memory included; 0 if unseen
     ego_peak_braking_mps2: float
     min_robustness: float  # soft-min robustness, until 1 s before the contact too
     simulator_agrees: bool  # SUMO's own list names the same pair in the contact frame or the next

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from risk_sac.config.base import Positive, Settings
+from risk_sac.config.base import NonNegative, Positive, Settings
 
 CarFollowing = Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"]
 
@@ -19,6 +19,8 @@ class SensorConfig(Settings):
     """Opening angle centred on the ego's heading, rad."""
     occlusion: bool = True
     """Whether vehicles hide what stands behind them."""
+    memory_s: NonNegative = 0.5
+    """How long an actor that went out of sight is still known, s; a tracker coasts over short occlusions."""
 
 
 class EgoConfig(Settings):

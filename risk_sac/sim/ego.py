@@ -35,45 +35,52 @@ def _visible(view: RelativeView, vehicle: Bools, reach_m: float, half_view_rad: 
     return seen
 
 
+TIME_TOLERANCE_S = 1e-6  # SUMO counts milliseconds, we add floats
+
+
 class Perception:
-    """Who is hidden now, and since when each visible actor has been visible without a break."""
+    """Whom the ego knows of, and since when without a break.
+
+    An actor is known while it is in sight and for the sensor's memory afterwards.
+    """
 
     def __init__(self, sensor: SensorConfig | None, visibility_m: float) -> None:
         self._sensor = sensor
         self._visibility_m = visibility_m
-        self._seen_since: dict[str, float] = {}
-        self._ever_seen: set[str] = set()
+        self._memory_s = 0.0 if sensor is None else sensor.memory_s
+        self._known_since: dict[str, float] = {}
+        self._last_seen: dict[str, float] = {}
 
     def reset(self) -> None:
         """Forgets the previous episode."""
-        self._seen_since.clear()
-        self._ever_seen.clear()
+        self._known_since.clear()
+        self._last_seen.clear()
 
     def update(self, frame: Frame, view: RelativeView) -> tuple[Bools, frozenset[str]]:
         """Looks at a frame.
 
         Returns:
-          `n - 1` flags of the other actors, and the ids that must be hidden from the ego's models.
+          `n - 1` flags of the other actors in sight, and the ids that must be hidden from the ego's models.
         """
-        others = frame.ids[1:]
         seen = visible(view, frame.kind[1:] == Kind.VEHICLE, self._sensor, self._visibility_m)
-        since = self._seen_since
+        now, forgotten = frame.time_s, frame.time_s - self._memory_s - TIME_TOLERANCE_S
+        known_since, last_seen = self._known_since, self._last_seen
         hidden = []
-        for id_, flag in zip(others, seen.tolist(), strict=True):
-            if flag:
-                if id_ not in since:
-                    since[id_] = frame.time_s
-                    self._ever_seen.add(id_)
-            else:
-                since.pop(id_, None)
+        for id_, in_sight in zip(frame.ids[1:], seen.tolist(), strict=True):
+            if in_sight:
+                last_seen[id_] = now
+                if id_ not in known_since:
+                    known_since[id_] = now
+            elif last_seen.get(id_, -math.inf) < forgotten:
+                known_since.pop(id_, None)
                 hidden.append(id_)
         return seen, frozenset(hidden)
 
-    def visible_for(self, id_: str, time_s: float) -> float:
-        """How long `id_` has been visible without a break, s; 0 if it is hidden."""
-        since = self._seen_since.get(id_)
+    def known_for(self, id_: str, time_s: float) -> float:
+        """How long the ego has known of `id_` without a break, s; 0 if it does not."""
+        since = self._known_since.get(id_)
         return 0.0 if since is None else time_s - since
 
     def ever_seen(self, id_: str) -> bool:
-        """Whether `id_` has been visible at any time in this episode."""
-        return id_ in self._ever_seen
+        """Whether `id_` has been in sight at any time in this episode."""
+        return id_ in self._last_seen
