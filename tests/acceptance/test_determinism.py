@@ -1,0 +1,127 @@
+"""Same spec, same seed, same results; and a run stopped half-way ends as one that never was."""
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from risk_sac.config import Budget, LearnerConfig, ReplayConfig, RunSpec, SacConfig, SceneOptimizerConfig
+from risk_sac.records import records_to_json
+from risk_sac.train import RunSummary, train
+from risk_sac.types import EpisodeRecord, RunMetrics
+
+EPISODES, EVALUATION = 6, 1
+# Small enough for seconds, and still learning, modelling and replaying by priority before the run is over.
+LEARNER = LearnerConfig(
+    sac=SacConfig(hidden_sizes=(32, 32), batch_size=32, warmup_steps=150),
+    replay=ReplayConfig(capacity=1000),
+    scenes=SceneOptimizerConfig(initial_scenes=2, refit_every=1, candidates=32, exploration=0.0),
+    checkpoint_every=1,
+)
+
+
+def spec(seed: int = 0, method: str = "risk-sac") -> RunSpec:
+    budget = Budget(episodes=EPISODES, evaluation_episodes=EVALUATION)
+    return RunSpec(family="mixed", method=method, seed=seed, budget=budget, learner=LEARNER)
+
+
+@dataclass
+class Listener:
+    """Keeps every record, and ends the run after so many episodes of this process."""
+
+    limit: int = 10**9
+    records: list[EpisodeRecord] = field(default_factory=list)
+    series: list[str | None] = field(default_factory=list)
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
+        self.records.append(record)
+        self.series.append(series)
+
+    def should_stop(self) -> bool:
+        return len(self.records) >= self.limit
+
+
+def run(folder: Path, *, seed: int = 0, limit: int = 10**9, method: str = "risk-sac") -> tuple[RunSummary, Listener]:
+    listener = Listener(limit)
+    return train(spec(seed, method), folder, listener), listener
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunSummary, Listener]:
+    return run(tmp_path_factory.mktemp("uninterrupted"))
+
+
+def test_the_run_has_learnt_something_to_be_deterministic_about(uninterrupted: tuple[RunSummary, Listener]) -> None:
+    summary, listener = uninterrupted
+    assert summary.finished
+    assert [r.phase for r in listener.records] == ["train"] * EPISODES + ["evaluate"] * EVALUATION
+    assert listener.records[-1].environment_steps > 2 * LEARNER.sac.warmup_steps
+    assert len({r.temperature for r in listener.records}) > 1
+    assert len({r.dual_variable for r in listener.records}) > 1
+
+
+def test_the_same_spec_twice_gives_the_same_results(uninterrupted: tuple[RunSummary, Listener], tmp_path: Path) -> None:
+    first, one = uninterrupted
+    second, other = run(tmp_path)
+    assert records_to_json(one.records) == records_to_json(other.records)
+    assert first.digest == second.digest
+    assert first.metrics == second.metrics
+    assert first.evaluation == second.evaluation
+
+
+ELSEWHERE = """
+import sys
+from pathlib import Path
+from risk_sac.config import RunSpec
+from risk_sac.train import train
+
+class Deaf:
+    def episode(self, record, metrics, series): ...
+    def should_stop(self): return False
+
+print(train(RunSpec.model_validate_json(sys.argv[1]), Path(sys.argv[2]), Deaf()).digest)
+"""
+
+
+def test_another_process_gives_the_same_results(uninterrupted: tuple[RunSummary, Listener], tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", ELSEWHERE, spec().model_dump_json(), str(tmp_path)],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+        env=os.environ | {"PYTHONHASHSEED": "1234"},
+    )
+    assert done.stdout.split()[-1] == uninterrupted[0].digest
+
+
+@pytest.mark.parametrize("stop_after", [1, 4, EPISODES])
+def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
+    uninterrupted: tuple[RunSummary, Listener], tmp_path: Path, stop_after: int
+) -> None:
+    expected, whole = uninterrupted
+    stopped, before = run(tmp_path, limit=stop_after)
+    assert not stopped.finished
+    assert len(before.records) == stop_after
+    resumed, after = run(tmp_path)
+    assert resumed.finished
+    assert records_to_json(before.records + after.records) == records_to_json(whole.records)
+    assert resumed.digest == expected.digest
+    assert resumed.metrics == expected.metrics
+    assert resumed.evaluation == expected.evaluation
+
+
+def test_a_finished_run_has_nothing_left_to_do(tmp_path: Path) -> None:
+    first, _ = run(tmp_path, method="random")
+    again, listener = run(tmp_path, method="random")
+    assert listener.records == []
+    assert again.digest == first.digest
+
+
+def test_another_seed_gives_other_results(uninterrupted: tuple[RunSummary, Listener], tmp_path: Path) -> None:
+    expected, _ = uninterrupted
+    summary, _ = run(tmp_path, seed=1)
+    assert summary.digest != expected.digest
