@@ -6,6 +6,7 @@ realism cost and the robustness come in `info`, because λ and the shaping belon
 Source: RISK-SAC, Alg. 1, l. 5 and 8.
 """
 
+import logging
 from typing import Any
 
 import gymnasium as gym
@@ -17,12 +18,11 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.geometry import relative_view
 from risk_sac.observation import LIMIT, Encoder
 from risk_sac.problem import Problem
-from risk_sac.risk.publish import publish, worst_rss_margin
+from risk_sac.risk.publish import assess, publish, worst_rss_margin
 from risk_sac.risk.realism import broken_hard_rule, soft_cost
 from risk_sac.risk.reward import risk_reward
-from risk_sac.risk.rss import margins
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
-from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
+from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, History, agrees, find_contact, touching_pairs, verdicts
 from risk_sac.sim.control import Adversaries
@@ -30,6 +30,8 @@ from risk_sac.sim.ego import Perception
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.trace import Measures, Trace
 from risk_sac.types import STEP_S, Collision, Frame, Kind, Role, Scene
+
+logger = logging.getLogger(__name__)
 
 FEASIBLE_TRIES = 100
 WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
@@ -181,9 +183,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         view = relative_view(frame)
         visible, hidden = self._perception.update(frame, view)
         self._sim.hide(hidden)
-        ttc_s = time_to_collision(view)
-        longitudinal, lateral = margins(view, self.problem.rss)
-        signals = publish(frame, before, view, ttc_s, longitudinal, lateral)
+        ttc_s, longitudinal, lateral, least = assess(view, frame.kind, self.problem.rss)
+        signals = publish(frame, before, least)
         robustness = self._monitor.update(signals)
         rho = soft_min(robustness, self._reward.softmin_sharpness)
         return Measures(view, visible, ttc_s, longitudinal, lateral, signals, robustness, rho)
@@ -206,7 +207,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _judge(self, contact: Contact) -> Collision:
         frame, measures = self._frame, self._trace.measures
         warning = measures[:-WARNING_STEPS]
-        other, ego = frame.ids[contact.other], frame.ids[0]
+        other = frame.ids[contact.other]
+        simulator_agrees = agrees(frame, frame.ids[0], other)
+        if not simulator_agrees:  # its test takes lane-aligned rectangles and persons on mapped lanes only
+            logger.info("SUMO lists no collision with %r at %.1f s", other, frame.time_s)
         visible_for_s = self._perception.known_for(other, frame.time_s)
         history = History(
             started_s=self._started_s,
@@ -235,7 +239,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             visible_for_s=visible_for_s,
             ego_peak_braking_mps2=max(m.signals["ego_braking_mps2"] for m in measures),
             min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
-            simulator_agrees=agrees(frame, ego, other),
+            simulator_agrees=simulator_agrees,
             verdicts=verdicts(contact, frame, history),
         )
 

@@ -1,12 +1,14 @@
 """From a frame to the published signals."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.geometry import RelativeView
 from risk_sac.jit import compiled
-from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
-from risk_sac.risk.ttc import TTC_CAP_S
+from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M, RssParameters, margins
+from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
 from risk_sac.types import Bools, Floats, Frame, Kind, Signal
 
 GAP_CAP_M = 50.0
@@ -35,50 +37,42 @@ def worst_rss_margin(view: RelativeView, rss_longitudinal_m: Floats, rss_lateral
     return worst
 
 
-def publish(
-    frame: Frame,
-    before: Frame | None,
-    view: RelativeView,
-    ttc_s: Floats,
-    rss_longitudinal_m: Floats,
-    rss_lateral_m: Floats,
-) -> dict[str, float]:
-    """The value of every signal in `risk_sac.risk.signals.SIGNALS`.
+class LeastMargins(NamedTuple):
+    """The smallest of each measure over the actors it concerns; its cap where there is none."""
 
-    Args:
-      frame: all actors now; index 0 is the ego.
-      before: the previous frame, None at the start.
-      view: the `n` others in the ego's frame.
-      ttc_s: `n`.
-      rss_longitudinal_m: `n`.
-      rss_lateral_m: `n`.
-    """
-    ttc, longitudinal, lateral, pedestrian, vehicle = _least(view, ttc_s, rss_longitudinal_m, rss_lateral_m, frame.kind)
-    return {
-        "ttc_s": ttc,
-        "rss_longitudinal_m": longitudinal,
-        "rss_lateral_m": lateral,
-        "pedestrian_gap_m": pedestrian,
-        "vehicle_gap_m": vehicle,
-        "red_light_m": red_light_margin(frame, before),
-        "ego_speed_mps": frame.ego_speed_mps,
-        "ego_braking_mps2": max(0.0, -float(frame.accel_mps2[0])),
-    }
-
-
-def red_light_margin(frame: Frame, before: Frame | None) -> float:
-    """Distance to the stop line while the signal is red, m; `CROSSED_ON_RED_M` in the step that crosses it."""
-    if before is not None and before.signal is Signal.RED and before.stop_line_m < frame.stop_line_m - 1.0:
-        return CROSSED_ON_RED_M  # the signal ahead is suddenly a farther one, or none: the ego has passed it
-    if frame.signal is Signal.RED:
-        return min(frame.stop_line_m, GAP_CAP_M)
-    return GAP_CAP_M
+    ttc_s: float
+    rss_longitudinal_m: float
+    rss_lateral_m: float
+    pedestrian_gap_m: float
+    vehicle_gap_m: float
 
 
 @compiled
-def _least(
-    view: RelativeView, ttc_s: Floats, rss_longitudinal_m: Floats, rss_lateral_m: Floats, kind: NDArray[np.int8]
-) -> tuple[float, float, float, float, float]:
+def assess(
+    view: RelativeView, kind: NDArray[np.int8], parameters: RssParameters
+) -> tuple[Floats, Floats, Floats, LeastMargins]:
+    """TTC and both RSS margins of each of the `n` others, and the least of all; one compiled call a step.
+
+    Args:
+      view: the others in the ego's frame.
+      kind: `n + 1`, with the ego in front.
+      parameters: of RSS.
+    """
+    ttc_s = time_to_collision(view)
+    rss_longitudinal_m, rss_lateral_m = margins(view, parameters)
+    return (
+        ttc_s,
+        rss_longitudinal_m,
+        rss_lateral_m,
+        least_margins(view, kind, ttc_s, rss_longitudinal_m, rss_lateral_m),
+    )
+
+
+@compiled
+def least_margins(
+    view: RelativeView, kind: NDArray[np.int8], ttc_s: Floats, rss_longitudinal_m: Floats, rss_lateral_m: Floats
+) -> LeastMargins:
+    """See `LeastMargins`; TTC and RSS over those the ego answers for, gaps over all."""
     ttc, longitudinal, lateral = TTC_CAP_S, LONGITUDINAL_CAP_M, LATERAL_CAP_M
     pedestrian = vehicle = GAP_CAP_M
     charge = in_charge(view)
@@ -93,4 +87,29 @@ def _least(
             pedestrian = min(pedestrian, view.gap[i])
         else:
             vehicle = min(vehicle, view.gap[i])
-    return ttc, longitudinal, lateral, pedestrian, vehicle
+    return LeastMargins(ttc, longitudinal, lateral, pedestrian, vehicle)
+
+
+def publish(frame: Frame, before: Frame | None, least: LeastMargins) -> dict[str, float]:
+    """The value of every signal in `risk_sac.risk.signals.SIGNALS`.
+
+    Args:
+      frame: all actors now; index 0 is the ego.
+      before: the previous frame, None at the start.
+      least: of `frame`.
+    """
+    return {
+        **least._asdict(),
+        "red_light_m": red_light_margin(frame, before),
+        "ego_speed_mps": frame.ego_speed_mps,
+        "ego_braking_mps2": max(0.0, -float(frame.accel_mps2[0])),
+    }
+
+
+def red_light_margin(frame: Frame, before: Frame | None) -> float:
+    """Distance to the stop line while the signal is red, m; `CROSSED_ON_RED_M` in the step that crosses it."""
+    if before is not None and before.signal is Signal.RED and before.stop_line_m < frame.stop_line_m - 1.0:
+        return CROSSED_ON_RED_M  # the signal ahead is suddenly a farther one, or none: the ego has passed it
+    if frame.signal is Signal.RED:
+        return min(frame.stop_line_m, GAP_CAP_M)
+    return GAP_CAP_M

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from risk_sac.geometry import relative_view
-from risk_sac.risk.publish import CROSSED_ON_RED_M, GAP_CAP_M, in_charge, publish, red_light_margin
+from risk_sac.risk.publish import CROSSED_ON_RED_M, GAP_CAP_M, in_charge, least_margins, publish, red_light_margin
 from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.risk.ttc import TTC_CAP_S
@@ -42,7 +42,7 @@ def frame_of(
 
 def signals_of(frame: Frame, ttc: list[float], along: list[float], across: list[float]) -> dict[str, float]:
     view = relative_view(frame)
-    return publish(frame, None, view, np.array(ttc), np.array(along), np.array(across))
+    return publish(frame, None, least_margins(view, frame.kind, np.array(ttc), np.array(along), np.array(across)))
 
 
 @pytest.mark.parametrize(
