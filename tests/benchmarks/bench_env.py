@@ -1,0 +1,191 @@
+"""What the closed loop costs beside the simulator, and whether it can run for a long time."""
+
+import gc
+import re
+import statistics
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+
+import libsumo
+import numpy as np
+import pytest
+
+from risk_sac.env import RiskSacEnv, make_default
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.sim import sumo
+
+STEP_RATIO = 3.0
+RESET_MS = 15.0
+EPISODES, ROUNDS = 8, 5
+SOAK_EPISODES, WARM_UP_EPISODES, GROWTH_MIB = 2000, 100, 50.0
+
+Call = tuple[Callable[..., object], tuple[object, ...], dict[str, object]]
+
+
+class Recorder:
+    """Stands before libsumo and writes down every call on its way through."""
+
+    def __init__(self, target: object, calls: list[Call]) -> None:
+        self._target, self._calls = target, calls
+
+    def __getattr__(self, name: str) -> object:
+        value = getattr(self._target, name)
+        if isinstance(value, type):
+            # A domain (libsumo.vehicle), or one of the exceptions.
+            return value if issubclass(value, BaseException) else Recorder(value, self._calls)
+        if not callable(value):
+            return Recorder(value, self._calls)
+
+        def recorded(*args: object, **kwargs: object) -> object:
+            self._calls.append((value, args, kwargs))
+            return value(*args, **kwargs)
+
+        return recorded
+
+
+@contextmanager
+def recording(calls: list[Call]) -> Iterator[None]:
+    genuine = sumo.libsumo
+    sumo.libsumo = Recorder(genuine, calls)  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        sumo.libsumo = genuine
+
+
+def actions_of(env: RiskSacEnv, seed: int, steps: int) -> list[np.ndarray]:
+    """Actions that keep to a manoeuvre, as a policy's do."""
+    generator, action, result = np.random.default_rng(seed), np.zeros(env.action_size), []
+    for _ in range(steps):
+        action = np.clip(0.95 * action + 0.3 * generator.standard_normal(env.action_size), -1, 1)
+        result.append(action.astype(np.float32))
+    return result
+
+
+def record(env: RiskSacEnv, seed: int, actions: list[np.ndarray]) -> tuple[list[Call], list[list[Call]]]:
+    """The libsumo calls of one episode: those that set it up, and those of each step."""
+    calls: list[Call] = []
+    with recording(calls):
+        env.reset(seed=seed)
+        loads = [i for i, (function, _, _) in enumerate(calls) if function is libsumo.load]
+        setup = calls[loads[-1] :]  # what came before cleared up the previous episode, or rejected scenes
+        steps = []
+        for action in actions:
+            calls.clear()
+            _, _, terminated, truncated, _ = env.step(action)
+            steps.append(list(calls))
+            if terminated or truncated:
+                break
+    return setup, steps
+
+
+def cpu_of_env(env: RiskSacEnv, seed: int, actions: list[np.ndarray], steps: int) -> float:
+    env.reset(seed=seed)
+    started = time.process_time()
+    for action in actions[:steps]:
+        env.step(action)
+    return time.process_time() - started
+
+
+def cpu_of_calls(setup: list[Call], steps: list[list[Call]]) -> float:
+    """The same episode from a flat list of calls."""
+    for person in libsumo.person.getIDList():
+        libsumo.person.remove(person)
+    libsumo.simulationStep()
+    for function, args, kwargs in setup:
+        function(*args, **kwargs)
+    flat = [call for step in steps for call in step]
+    started = time.process_time()
+    for function, args, kwargs in flat:
+        function(*args, **kwargs)
+    return time.process_time() - started
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_step_costs_at_most_three_times_its_libsumo_calls(family: str) -> None:
+    horizon = FAMILIES[family].horizon_steps
+    with closing(make_default(family)) as env:
+        env.reset(seed=0)  # starts the simulator, so that every episode below begins with a load
+        env.step(np.zeros(env.action_size, dtype=np.float32))  # compiles
+        recorded = []
+        for seed in range(EPISODES):
+            actions = actions_of(env, seed, horizon)
+            recorded.append((seed, actions, *record(env, seed, actions)))
+        total = sum(len(steps) for *_, steps in recorded)
+        calls = sum(len(step) for *_, steps in recorded for step in steps)
+        ours, bare = [], []
+        gc.collect()
+        gc.disable()
+        try:
+            for _ in range(ROUNDS):
+                ours.append(sum(cpu_of_env(env, seed, actions, len(steps)) for seed, actions, _, steps in recorded))
+                bare.append(sum(cpu_of_calls(setup, steps) for *_, setup, steps in recorded))
+        finally:
+            gc.enable()
+    ratios = [a / b for a, b in zip(ours, bare, strict=True)]
+    ratio = statistics.median(ratios)
+    print(
+        f"\n{family}: env.step {min(ours) / total * 1e6:.0f} µs, its {calls / total:.0f} libsumo calls "
+        f"{min(bare) / total * 1e6:.0f} µs; ratio {ratio:.2f} ({min(ratios):.2f} to {max(ratios):.2f})"
+    )
+    assert ratio <= STEP_RATIO
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_reset_takes_at_most_fifteen_milliseconds(family: str) -> None:
+    times = []
+    with closing(make_default(family)) as env:
+        env.reset(seed=0)
+        for seed in range(100):
+            for action in actions_of(env, seed, 3):
+                env.step(action)
+            started = time.perf_counter()
+            env.reset(seed=seed)
+            times.append((time.perf_counter() - started) * 1e3)
+    worst = sorted(times)[94]
+    print(f"\n{family}: reset {statistics.median(times):.1f} ms, 95 % within {worst:.1f} ms")
+    assert statistics.median(times) <= RESET_MS
+
+
+SOAK = textwrap.dedent(
+    """
+    import sys
+    import numpy as np
+    import psutil
+    from risk_sac.env import make_default
+
+    family, episodes, warm_up = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
+    env, process, generator = make_default(family), psutil.Process(), np.random.default_rng(1)
+    for episode in range(episodes):
+        env.reset(seed=episode)
+        action, done = np.zeros(env.action_size), False
+        while not done:
+            action = np.clip(0.95 * action + 0.3 * generator.standard_normal(env.action_size), -1, 1)
+            _, _, terminated, truncated, _ = env.step(action.astype(np.float32))
+            done = terminated or truncated
+        if episode + 1 == warm_up:
+            before = process.memory_info().rss
+    print("grew", (process.memory_info().rss - before) / 2**20, "MiB from", before / 2**20)
+    """
+)
+
+
+@pytest.mark.bench
+@pytest.mark.timeout(1800)
+def test_two_thousand_episodes_neither_crash_nor_leak() -> None:
+    arguments = ["mixed", str(SOAK_EPISODES), str(WARM_UP_EPISODES)]
+    started = time.perf_counter()
+    done = subprocess.run([sys.executable, "-c", SOAK, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    grew, before = map(float, re.findall(r"-?\d+\.\d+", done.stdout))
+    print(
+        f"\n{SOAK_EPISODES} mixed episodes in {time.perf_counter() - started:.0f} s: "
+        f"resident memory grew {grew:.1f} MiB from {before:.0f} MiB"
+    )
+    assert grew < GROWTH_MIB
