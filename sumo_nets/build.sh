@@ -11,5 +11,6 @@ for family in low mixed dense; do
         --walkingareas true --tls.default-type static --tls.green.time 25 --tls.yellow.time 3 \
         --output.original-names false --junctions.scurve-stretch 1 --write-license false
     # The header carries a date and the machine's paths; drop it, so that a rebuild gives the same file.
-    sed -i '/^<!--/,/-->$/d' "$family/$family.net.xml"
+    sed '/^<!--/,/-->$/d' "$family/$family.net.xml" >"$family/$family.net.xml.tmp"
+    mv "$family/$family.net.xml.tmp" "$family/$family.net.xml"
 done
