@@ -56,7 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
     show = commands.add_parser("show", help="list a run's contacts, or draw one")
     show.set_defaults(command=_show)
-    show.add_argument("results", type=Path, metavar="RESULTS", help="results.json or its folder")
+    show.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
     show.add_argument("failure", nargs="?", metavar="FAILURE", help="id of a contact; without it they are listed")
     show.add_argument("--out", type=Path, metavar="FILE.png", help="(default: failures/FAILURE.png beside RESULTS)")
     serve = commands.add_parser("serve", help="run the service in the foreground")

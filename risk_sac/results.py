@@ -1,4 +1,4 @@
-"""What `risk-sac run` leaves in its folder, and how it is read back.
+"""What a run leaves in its folder, under `risk-sac run` and in the service alike, and how it is read back.
 
 results.json    the spec, the metrics and every contact; rewritten at each checkpoint and at the end
 episodes.jsonl  one `EpisodeRecord` per line
@@ -6,6 +6,7 @@ failures/       the time series of every contact, see `risk_sac.trace`
 checkpoint      from which the run goes on
 """
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,12 @@ from risk_sac.types import EpisodeRecord, RunMetrics
 
 RESULTS = "results.json"
 EPISODES = "episodes.jsonl"
+FAILURES = "failures"
+
+
+def series_name(index: int) -> str:
+    """File in `failures/` that holds the time series of an episode."""
+    return f"{index:06d}.npz"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,8 +38,8 @@ class Contact:
     @classmethod
     def of(cls, episode: EpisodeRecord) -> "Contact":
         """The contact of an episode, its file named as the run names it."""
-        id_ = f"{episode.index:06d}"
-        return cls(id=id_, series=f"failures/{id_}.npz", episode=episode)
+        name = series_name(episode.index)
+        return cls(id=name.removesuffix(".npz"), series=f"{FAILURES}/{name}", episode=episode)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +79,10 @@ def write_results(folder: Path, results: Results) -> None:
       OSError: the folder cannot be written.
     """
     temporary = folder / f".{RESULTS}.tmp"
-    temporary.write_bytes(_RESULTS.dump_json(results, indent=2) + b"\n")
+    with temporary.open("wb") as file:
+        file.write(_RESULTS.dump_json(results, indent=2) + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
     temporary.replace(folder / RESULTS)
 
 
@@ -86,8 +96,6 @@ def read_results(path: Path) -> Results:
     try:
         return _RESULTS.validate_json(file.read_bytes())
     except FileNotFoundError as error:
-        raise ConfigError(f"there is no {file}; wanted a folder written by `risk-sac run`", field="RESULTS") from error
+        raise ConfigError(f"there is no {file}; wanted the folder of a run", field="RESULTS") from error
     except ValidationError as error:
-        raise ConfigError(
-            f"{file} was not written by `risk-sac run`: {error.errors()[0]['msg']}", field="RESULTS"
-        ) from error
+        raise ConfigError(f"{file} was not written by a run: {error.errors()[0]['msg']}", field="RESULTS") from error

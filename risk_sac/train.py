@@ -25,6 +25,7 @@ from risk_sac.errors import InfeasibleScene
 from risk_sac.metrics import MetricsAccumulator, results_digest
 from risk_sac.problem import Problem
 from risk_sac.records import records_from_json, records_to_json
+from risk_sac.results import FAILURES, series_name
 from risk_sac.risk.reward import penalised_reward, shaped_reward
 from risk_sac.scene_optimizer import BotorchOptimizer, SceneOptimizer, SobolOptimizer
 from risk_sac.trace import write_series
@@ -33,7 +34,6 @@ from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
-FAILURES = "failures"
 PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
 
 
@@ -209,7 +209,7 @@ class Run:
     def _keep_series(self, record: EpisodeRecord) -> str | None:
         if record.collision is None:
             return None
-        name = f"{record.index:06d}.npz"
+        name = series_name(record.index)
         write_series(self._folder / FAILURES / name, self._env.trace.series())
         return name
 

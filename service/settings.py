@@ -37,5 +37,5 @@ class ServiceSettings(BaseSettings):
         return self.data_dir / "risk-sac.db"
 
     def run_folder(self, campaign_id: str, run_id: str) -> Path:
-        """Where one run keeps its checkpoint, its recorded failures and its log."""
+        """Where one run keeps its results, its recorded failures, its checkpoint and its log."""
         return self.data_dir / "campaigns" / campaign_id / run_id

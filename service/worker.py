@@ -78,9 +78,12 @@ def main() -> int:
 
 
 def _execute(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished:
-    from risk_sac.train import train  # here, so that a signal during the slow import is not lost
+    from risk_sac.recorder import Recorder  # here, so that a signal during the slow import is not lost
+    from risk_sac.train import train
 
-    summary = train(spec, folder, reporter)
+    with Recorder(spec, folder, reporter) as recorder:
+        summary = train(spec, folder, recorder)
+        recorder.finish(summary)
     versions: Mapping[str, str] = summary.versions
     return Finished(
         finished=summary.finished,

@@ -1,5 +1,6 @@
 """Records as response bodies."""
 
+from risk_sac.results import FAILURES
 from risk_sac.types import Outcome
 from service import records
 from service.errors import StorageError
@@ -45,7 +46,7 @@ def failure_body(campaign_id: str, episode: records.Episode, settings: ServiceSe
     try:
         if episode.series is None:
             raise StorageError("no time series was recorded")
-        folder = settings.run_folder(campaign_id, episode.run_id) / "failures"
+        folder = settings.run_folder(campaign_id, episode.run_id) / FAILURES
         body |= {"series": load_series(folder / episode.series), "series_problem": None}
     except StorageError as error:
         body |= {"series": None, "series_problem": str(error)}

@@ -1,6 +1,10 @@
 """The whole way with the real worker: REST, libsumo, RISK-SAC, results."""
 
+import json
 import signal
+
+from risk_sac import cli
+from risk_sac.results import read_results
 
 SPEC = {
     "families": ["low"],
@@ -9,6 +13,10 @@ SPEC = {
     "budget": {"episodes": 5, "evaluation_episodes": 1},
     "learner": {"checkpoint_every": 2, "sac": {"warmup_steps": 200, "hidden_sizes": [16], "batch_size": 16}},
 }
+
+
+def run_folder(service, campaign_id, run_id):
+    return service.data_dir / "campaigns" / campaign_id / run_id
 
 
 def test_a_campaign_finds_the_same_with_and_without_a_crash_of_the_server(serve):
@@ -29,8 +37,15 @@ def test_a_campaign_finds_the_same_with_and_without_a_crash_of_the_server(serve)
     assert service.episodes(shaken, run["id"]) == list(range(6))
     assert service.get(shaken, "/results")["runs"][0]["digest"] == run["digest"]
 
+    at_once, resumed = (read_results(run_folder(service, id_, run["id"])) for id_ in (calm["id"], shaken))
+    assert (resumed.finished, resumed.digest) == (True, run["digest"])
+    assert (resumed.metrics, resumed.evaluation) == (at_once.metrics, at_once.evaluation)
+    assert resumed.contacts == at_once.contacts
+    lines = (run_folder(service, shaken, run["id"]) / "episodes.jsonl").read_text().splitlines()
+    assert [json.loads(line)["index"] for line in lines] == list(range(6))
 
-def test_every_contact_can_be_read_with_its_full_time_series(serve):
+
+def test_every_contact_can_be_read_with_its_full_time_series_and_drawn(serve, tmp_path):
     service = serve("service.worker", grace_s=30)
     campaign_id = service.post(families=["mixed"], methods=["random"], budget={"episodes": 60})
     campaign = service.wait(campaign_id)
@@ -48,3 +63,9 @@ def test_every_contact_can_be_read_with_its_full_time_series(serve):
         for name in ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2", "visible", "distance_m", "ttc_s"):
             assert [len(row) for row in series[name]] == [actors] * steps, name
         assert [len(row) for row in series["robustness"]] == [len(series["requirements"])] * steps
+
+    folder = run_folder(service, campaign_id, campaign["runs"][0]["id"])
+    assert [contact.episode.index for contact in read_results(folder).contacts] == [each["index"] for each in contacts]
+    picture = tmp_path / "contact.png"
+    assert cli.main(["show", str(folder), str(contacts[0]["index"]), "--out", str(picture)]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,116 @@
+"""Writes a run down as it goes; what its folder then holds is told in `risk_sac.results`."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Self
+
+from pydantic import TypeAdapter
+
+from risk_sac import checkpoint
+from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError
+from risk_sac.records import records_from_json
+from risk_sac.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
+from risk_sac.train import CHECKPOINT, Observer, RunSummary
+from risk_sac.types import EpisodeRecord, RunMetrics
+
+_LINE = TypeAdapter(EpisodeRecord)
+
+
+class Recorder:
+    """The observer that writes a run down and hands on to another one what it is told.
+
+    Attributes:
+      done: episodes that the checkpoint holds; the run goes on with the next.
+      results: what results.json says.
+    """
+
+    def __init__(self, spec: RunSpec, folder: Path, observer: Observer) -> None:
+        """Takes up the run in `folder`, or claims the folder for it.
+
+        Raises:
+          ConfigError: the folder holds another run.
+          CheckpointError: its checkpoint is damaged.
+          OSError: it cannot be written.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        self._folder = folder
+        self._observer = observer
+        self.should_stop = observer.should_stop
+        self.results = _results_so_far(spec, folder)
+        records = _checkpointed(spec, folder)
+        self.done = len(records)
+        self._contacts = [Contact.of(record) for record in records if record.collision is not None]
+        self._episodes = _restart_episodes(folder, records)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._episodes.close()
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
+        """Writes an episode down."""
+        self._episodes.write(_LINE.dump_json(record) + b"\n")
+        self._episodes.flush()
+        if series is not None:
+            self._contacts.append(Contact.of(record))
+        if (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and record.phase == "train":
+            self._write(replace(self.results, metrics=metrics, contacts=tuple(self._contacts)))
+        self._observer.episode(record, metrics, series)
+
+    def finish(self, summary: RunSummary) -> Results:
+        """Writes down what the run came to."""
+        self._write(
+            replace(
+                self.results,
+                finished=summary.finished,
+                metrics=summary.metrics,
+                evaluation=summary.evaluation,
+                digest=summary.digest,
+                versions=summary.versions,
+                wall_s=self.results.wall_s + summary.wall_s,
+                contacts=tuple(self._contacts),
+            )
+        )
+        return self.results
+
+    def _write(self, results: Results) -> None:
+        write_results(self._folder, results)
+        self.results = results
+
+
+def _results_so_far(spec: RunSpec, folder: Path) -> Results:
+    """What earlier invocations left, or an empty start that claims the folder for `spec`."""
+    if (folder / RESULTS).exists():
+        results = read_results(folder)
+        if results.spec_digest != spec.digest:
+            differing = [name for name in RunSpec.model_fields if getattr(results.spec, name) != getattr(spec, name)]
+            raise ConfigError(
+                f"{folder} holds a run with another {', '.join(differing)}; wanted an empty folder, or the same "
+                "settings to go on with that run",
+                field="out",
+            )
+        return replace(results, finished=False, digest=None)
+    if (folder / CHECKPOINT).exists():
+        raise ConfigError(f"{folder} holds a checkpoint but no {RESULTS}; wanted an empty folder", field="out")
+    results = Results(spec=spec, spec_digest=spec.digest, finished=False)
+    write_results(folder, results)
+    return results
+
+
+def _checkpointed(spec: RunSpec, folder: Path) -> list[EpisodeRecord]:
+    if not (folder / CHECKPOINT).exists():
+        return []
+    return records_from_json(checkpoint.load(folder / CHECKPOINT, spec.digest)["records"])
+
+
+def _restart_episodes(folder: Path, records: list[EpisodeRecord]) -> BinaryIO:
+    """Cuts the file of episodes back to those of the checkpoint; the run repeats the rest."""
+    file = (folder / EPISODES).open("wb")
+    file.write(b"".join(_LINE.dump_json(record) + b"\n" for record in records))
+    file.flush()
+    return file
