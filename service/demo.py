@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import json
 import os
+import shlex
 import socket
 import subprocess
 import sys
@@ -18,6 +19,9 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
+
+from risk_sac.results import FAILURES, series_name
+from service.settings import ServiceSettings
 
 START_S = 60.0
 STOP_S = 60.0
@@ -47,6 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
     _summarise(found, console)
     console.print(f"results: {options.out}")
     console.print(f"recorded failures: {options.data_dir}/campaigns/{campaign['id']}", soft_wrap=True)
+    _invite(found, options.data_dir, console)
     return _verdict(found, console)
 
 
@@ -54,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m service.demo", description=__doc__)
     parser.add_argument("--family", default="mixed", help="scenario family")
     parser.add_argument("--methods", nargs="+", default=["risk-sac", "random"], help="search methods, side by side")
-    parser.add_argument("--episodes", type=int, default=150, help="search episodes of each run")
+    parser.add_argument("--episodes", type=int, default=200, help="search episodes of each run")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="one run per method and seed")
     parser.add_argument("--out", type=Path, default=Path("results/demo.json"), help="where the results go")
     parser.add_argument(
@@ -166,13 +171,25 @@ def _collect(url: str, campaign: Json) -> Json:
     return {
         "campaign": campaign,
         "results": _call(f"{base}/results"),
-        "failures": _call(f"{base}/failures?limit=500")["items"],
+        "failures": [
+            failure | {"series": _series(campaign, failure)} for failure in _call(f"{base}/failures?limit=500")["items"]
+        ],
     }
 
 
+def _series(campaign: Json, failure: Json) -> str:
+    """Where the time series of a failure lies in the data folder."""
+    folder = _run_folder(Path(), campaign, failure["run_id"])
+    return (folder / FAILURES / series_name(failure["index"])).as_posix()
+
+
+def _run_folder(data_dir: Path, campaign: Json, run_id: str) -> Path:
+    return ServiceSettings(data_dir=data_dir).run_folder(campaign["id"], run_id)
+
+
 def _summarise(found: Json, console: Console) -> None:
-    table = Table(title="What the search found", box=SIMPLE_HEAD, collapse_padding=True, padding=(0, 1), pad_edge=False)
-    for name in ("method", "episodes", "raw", "valid", "ECR", "95 %", "ES", "cost", "OFD", "steps/valid"):
+    table = Table(title="What the search found", box=SIMPLE_HEAD, padding=0)  # 80 columns hold the longest method
+    for name in ("method", "episodes", "raw", "valid", "ECR", "95 %", "ES", "cost", "OFD", "steps\n/valid"):
         table.add_column(name, justify="left" if name == "method" else "right")
     for total in found["results"]["totals"]:
         table.add_row(
@@ -188,6 +205,19 @@ def _summarise(found: Json, console: Console) -> None:
             _number(total["steps_per_failure"], 0),
         )
     console.print(table)
+
+
+def _invite(found: Json, data_dir: Path, console: Console) -> None:
+    """The command that draws the first failure of the first method that found one."""
+    campaign, failures = found["campaign"], found["failures"]
+    first = next((each for run in campaign["runs"] for each in failures if each["run_id"] == run["id"]), None)
+    if first is None:
+        return
+    program, here = Path(sys.executable).with_name("risk-sac"), Path.cwd()
+    program = program.relative_to(here) if program.is_relative_to(here) else program
+    folder = _run_folder(data_dir, campaign, first["run_id"])
+    command = [program, "show", folder, Path(series_name(first["index"])).stem, "--out", "failure.png"]
+    console.print(f"draw one: {shlex.join(map(str, command))}", soft_wrap=True, markup=False, highlight=False)
 
 
 def _verdict(found: Json, console: Console) -> int:

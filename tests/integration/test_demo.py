@@ -1,3 +1,10 @@
+import json
+import shlex
+from pathlib import Path
+
+from risk_sac import cli
+from risk_sac.config import METHODS
+from service import demo
 from service.demo import main
 
 
@@ -7,3 +14,38 @@ def test_a_demo_that_cannot_be_posted_says_so_and_leaves_no_service(tmp_path, ca
     assert "families[0]: Input should be 'low', 'mixed' or 'dense'" in capsys.readouterr().out.replace("\n", "")
     assert not (tmp_path / "demo.json").exists()
     assert "Finished server process" in (tmp_path / "data" / "service.log").read_text()
+
+
+def test_the_command_it_ends_with_draws_a_failure(tmp_path, capsys, monkeypatch):
+    data_dir = tmp_path / "my data"
+    arguments = ["--family", "low", "--methods", "random", "--episodes", "60", "--seeds", "0", "1"]
+    assert main([*arguments, "--out", str(tmp_path / "demo.json"), "--data-dir", str(data_dir)]) == 0
+    found = json.loads((tmp_path / "demo.json").read_text())
+    assert all((data_dir / failure["series"]).is_file() for failure in found["failures"])
+    printed = capsys.readouterr().out
+    (line,) = (line for line in printed.splitlines() if line.startswith("draw one: "))
+    program, *command = shlex.split(line.removeprefix("draw one: "))
+    assert Path(program).is_file()
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(command) == 0
+    assert (tmp_path / "failure.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_without_a_failure_it_offers_none_to_draw(capsys):
+    demo._invite({"campaign": {"id": "c", "runs": [{"id": "low-random-0"}]}, "failures": []}, Path(), demo.Console())
+    assert capsys.readouterr().out == ""
+
+
+def test_summary_of_every_method_fits_80_columns(capsys):
+    total = {
+        "episodes": 10_000,
+        "raw_collisions": 999,
+        "failures": 999,
+        **dict.fromkeys(("ecr", "ecr_low", "ecr_high", "efficiency", "cost_rate", "dispersion"), 0.5),
+        "steps_per_failure": 12_345.0,
+    }
+    totals = [total | {"method": method} for method in METHODS]
+    demo._summarise({"results": {"totals": totals}}, demo.Console(width=80))
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    assert all(method in printed for method in METHODS)
