@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.errors import InfeasibleScene, SimulationError
-from risk_sac.geometry import relative_view
+from risk_sac.geometry import overlapping_pairs
 from risk_sac.observation import LIMIT, Encoder
 from risk_sac.problem import Problem
 from risk_sac.risk.publish import assess, publish, worst_rss_margin
@@ -24,9 +24,9 @@ from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.scenario.limits import limits_from_odd
-from risk_sac.sim.collision import Contact, History, agrees, find_contact, touching_pairs, verdicts
+from risk_sac.sim.collision import Contact, History, agrees, find_contact, verdicts
 from risk_sac.sim.control import Adversaries
-from risk_sac.sim.ego import Perception
+from risk_sac.sim.ego import Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.trace import Measures, Trace
 from risk_sac.types import STEP_S, Collision, Frame, Kind, Role, Scene
@@ -55,7 +55,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._reward = reward
         self._controlled = controlled
         self._sim = SumoSimulation(problem.ego)
-        self._perception = Perception(problem.ego.sensor, problem.visibility_m)
+        sensor = problem.ego.sensor
+        self._sight = sight(sensor, problem.visibility_m)
+        self._perception = Perception(sensor.memory_s if sensor else 0.0)
         self._monitor = Monitor(problem.requirements, STEP_S, problem.family.horizon_steps)
         self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
         self.observation_size = self._encoder.size
@@ -113,10 +115,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._steps += 1
         self._inside_limits &= not self._controlled or self._adversaries.keep_limits(self._frame)
         self._teleported |= bool(self._frame.teleported)
-        contact = find_contact(before, self._frame, self._measures.view)
+        contact = find_contact(before, self._frame, self._measures.assessment.view)
         self._trace.append(self._frame, self._measures, action)
         collision = None if contact is None else self._judge(contact)
-        self._touched.update(self._frame.ids[i] for pair in touching_pairs(self._frame) for i in pair)
+        self._touched |= self._in_contact()
         cost = self._cost(before, self._frame, previous, self._measures)
         valid = collision is not None and collision.valid
         reward = risk_reward(
@@ -174,20 +176,25 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _check_feasible(self, scene: Scene) -> None:
         """C_hard of Eq. 5."""
         measures = self._measures
-        self._spawn_overlap = bool(measures.view.overlap.any() or touching_pairs(self._frame))
-        rule = broken_hard_rule(self._spawn_overlap, float(measures.view.gap.min()), measures.signals["ttc_s"])
+        self._spawn_overlap = bool(measures.assessment.view.overlap.any() or self._in_contact())
+        rule = broken_hard_rule(
+            self._spawn_overlap, float(measures.assessment.view.gap.min()), measures.signals["ttc_s"]
+        )
         if rule is not None:
             raise InfeasibleScene(f"scene of {scene.family!r} breaks {rule}: {dict(scene.values)}", reason=rule)
 
+    def _in_contact(self) -> set[str]:
+        """Who touches somebody other than the ego."""
+        f = self._frame
+        pairs = overlapping_pairs(f.x_m, f.y_m, f.heading_rad, f.length_m, f.width_m)
+        return {f.ids[i] for pair in pairs if pair[0] > 0 for i in pair}
+
     def _measure(self, frame: Frame, before: Frame | None) -> Measures:
-        view = relative_view(frame)
-        visible, hidden = self._perception.update(frame, view)
-        self._sim.hide(hidden)
-        ttc_s, longitudinal, lateral, least = assess(view, frame.kind, self.problem.rss)
-        signals = publish(frame, before, least)
+        assessment = assess(frame, self.problem.rss, self._sight)
+        self._sim.hide(self._perception.update(frame, assessment.seen))
+        signals = publish(frame, before, assessment.least)
         robustness = self._monitor.update(signals)
-        rho = soft_min(robustness, self._reward.softmin_sharpness)
-        return Measures(view, visible, ttc_s, longitudinal, lateral, signals, robustness, rho)
+        return Measures(assessment, signals, robustness, soft_min(robustness, self._reward.softmin_sharpness))
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""
@@ -199,8 +206,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             frame.accel_mps2[adversary],
             before.accel_mps2[adversary],
             self._adversaries.accel_limits(frame),
-            now.view.gap[others],
-            previous.view.gap[others],
+            now.assessment.view.gap[others],
+            previous.assessment.view.gap[others],
             STEP_S,
         )
 
@@ -235,7 +242,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             relative_speed_mps=contact.relative_speed_mps,
             lateral_offset_m=contact.lateral_offset_m,
             min_ttc_s=min((m.signals["ttc_s"] for m in warning), default=TTC_CAP_S),
-            min_rss_margin_m=min(worst_rss_margin(m.view, m.rss_longitudinal_m, m.rss_lateral_m) for m in measures),
+            min_rss_margin_m=min(worst_rss_margin(m.assessment) for m in measures),
             visible_for_s=visible_for_s,
             ego_peak_braking_mps2=max(m.signals["ego_braking_mps2"] for m in measures),
             min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
@@ -246,7 +253,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.problem.family.horizon_steps
         m = self._measures
-        return self._encoder.encode(self._frame, m.view, m.visible, m.robustness, self._unit_scene, time_left)
+        return self._encoder.encode(
+            self._frame, m.assessment.view, m.assessment.seen, m.robustness, self._unit_scene, time_left
+        )
 
 
 def make_default(family: FamilyName) -> RiskSacEnv:

@@ -42,15 +42,16 @@ class RelativeView(NamedTuple):
 
 def relative_view(frame: Frame) -> RelativeView:
     """Expresses every other actor of `frame` in the ego's frame."""
-    return _relative_view(
+    return frame_view(
         frame.x_m, frame.y_m, frame.heading_rad, frame.vx_mps, frame.vy_mps, frame.length_m, frame.width_m
     )
 
 
 @compiled
-def _relative_view(
+def frame_view(
     x: Floats, y: Floats, heading: Floats, vx: Floats, vy: Floats, length: Floats, width: Floats
 ) -> RelativeView:
+    """`relative_view` of the arrays of a frame, `n + 1` each with the ego in front."""
     cos_ego, sin_ego = math.cos(heading[0]), math.sin(heading[0])
     dx, dy = x[1:] - x[0], y[1:] - y[0]
     dvx, dvy = vx[1:] - vx[0], vy[1:] - vy[0]
@@ -196,6 +197,25 @@ def line_of_sight(view: RelativeView, occludes: Bools) -> Bools:
     return seen
 
 
+class Sight(NamedTuple):
+    """What a sensor at the ego's centre can see at best."""
+
+    reach_m: float
+    half_view_rad: float  # to either side of the ego's heading
+    occlusion: bool  # whether vehicles hide what stands behind them
+
+
+@compiled
+def in_sight(view: RelativeView, occludes: Bools, sight: Sight) -> Bools:
+    """Which of the `n` others are within reach, inside the field of view and not hidden; see `line_of_sight`."""
+    seen = line_of_sight(view, occludes) if sight.occlusion else np.ones(len(view.x), dtype=np.bool_)
+    for i in range(len(seen)):
+        x, y = view.x[i], view.y[i]
+        if x * x + y * y > sight.reach_m * sight.reach_m or abs(math.atan2(y, x)) > sight.half_view_rad:
+            seen[i] = False
+    return seen
+
+
 @compiled
 def _crosses(view: RelativeView, wall: int, px: float, py: float) -> bool:
     """Whether the ray from the ego's centre to (px, py) passes through a body: the slab test in its own axes."""
@@ -209,3 +229,27 @@ def _crosses(view: RelativeView, wall: int, px: float, py: float) -> bool:
     middle_y, half_y = view.separation[3, wall] / ray_y, view.half_width[wall] / abs(ray_y)
     enter, leave = max(middle_x - half_x, middle_y - half_y), min(middle_x + half_x, middle_y + half_y)
     return bool(enter < leave and enter < 1.0 and leave > 0.0)
+
+
+@compiled
+def overlapping_pairs(x: Floats, y: Floats, heading: Floats, length: Floats, width: Floats) -> list[tuple[int, int]]:
+    """Pairs i < j of `n` boxes that touch or overlap, in any frame of reference."""
+    pairs = [(0, 0) for _ in range(0)]  # an empty list whose type the compiler can tell
+    for i in range(len(x)):
+        cos, sin = math.cos(heading[i]), math.sin(heading[i])
+        for j in range(i + 1, len(x)):
+            dx, dy = x[j] - x[i], y[j] - y[i]
+            reach = (length[i] + width[i] + length[j] + width[j]) / 2
+            if dx * dx + dy * dy > reach * reach:  # circles around both boxes: most pairs are far apart
+                continue
+            c, s = abs(math.cos(heading[j] - heading[i])), abs(math.sin(heading[j] - heading[i]))
+            cos_j, sin_j = math.cos(heading[j]), math.sin(heading[j])
+            a, b, p, q = length[i] / 2, width[i] / 2, length[j] / 2, width[j] / 2
+            if (
+                abs(dx * cos + dy * sin) <= a + p * c + q * s
+                and abs(dy * cos - dx * sin) <= b + p * s + q * c
+                and abs(dx * cos_j + dy * sin_j) <= p + a * c + b * s
+                and abs(dy * cos_j - dx * sin_j) <= q + a * s + b * c
+            ):
+                pairs.append((i, j))
+    return pairs

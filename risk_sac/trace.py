@@ -1,36 +1,34 @@
 """The full time series of one episode, kept while it runs and written only if the ego touched something."""
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.geometry import RelativeView
+from risk_sac.risk.publish import Assessment
 from risk_sac.types import Bools, Floats, Frame
 
 PER_ACTOR = ("x_m", "y_m", "heading_rad", "speed_mps", "lateral_mps", "accel_mps2")
-PER_OTHER = ("distance_m", "ttc_s", "rss_longitudinal_m", "rss_lateral_m", "visible")
+PER_OTHER: dict[str, Callable[[Assessment], Floats | Bools]] = {
+    "distance_m": lambda assessment: assessment.view.gap,
+    "ttc_s": lambda assessment: assessment.ttc_s,
+    "rss_longitudinal_m": lambda assessment: assessment.rss_longitudinal_m,
+    "rss_lateral_m": lambda assessment: assessment.rss_lateral_m,
+    "visible": lambda assessment: assessment.seen,
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Measures:
-    """What one frame says about risk; arrays hold the `n` actors other than the ego."""
+    """What one frame says about risk, and what the requirements say to it."""
 
-    view: RelativeView
-    visible: Bools
-    ttc_s: Floats
-    rss_longitudinal_m: Floats
-    rss_lateral_m: Floats
+    assessment: Assessment
     signals: dict[str, float]
     robustness: Floats  # M, scaled
     soft_min: float
-
-    @property
-    def distance_m(self) -> Floats:
-        """Gap between each body and the ego's."""
-        return self.view.gap
 
 
 @dataclass(slots=True)
@@ -76,10 +74,10 @@ class Trace:
             for t, frame in enumerate(self.frames):
                 values[t, columns[t]] = getattr(frame, name)
             result[name] = values
-        for name in PER_OTHER:
+        for name, of in PER_OTHER.items():
             values = np.full((steps, n), np.nan)
             for t, measures in enumerate(self.measures):
-                values[t, columns[t][1:]] = getattr(measures, name)
+                values[t, columns[t][1:]] = of(measures.assessment)
             result[name] = values
         size = len(self.actions[0]) if self.actions else 0
         result["actions"] = np.vstack((np.full((1, size), np.nan, dtype=np.float32), *self.actions))

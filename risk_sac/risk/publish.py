@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.geometry import RelativeView
+from risk_sac.geometry import RelativeView, Sight, frame_view, in_sight
 from risk_sac.jit import compiled
 from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M, RssParameters, margins
 from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
@@ -13,7 +13,7 @@ from risk_sac.types import Bools, Floats, Frame, Kind, Signal
 
 GAP_CAP_M = 50.0
 CROSSED_ON_RED_M = -1.0
-PEDESTRIAN = int(Kind.PEDESTRIAN)  # compiled code knows no enums of int8
+VEHICLE, PEDESTRIAN = int(Kind.VEHICLE), int(Kind.PEDESTRIAN)  # compiled code knows no enums of int8
 
 
 @compiled
@@ -26,17 +26,6 @@ def in_charge(view: RelativeView) -> Bools:
     return view.x > -view.ego_half_length
 
 
-@compiled
-def worst_rss_margin(view: RelativeView, rss_longitudinal_m: Floats, rss_lateral_m: Floats) -> float:
-    """Smallest RSS margin: of each actor the ego answers for, the larger of the two, since it takes both, m."""
-    worst = LONGITUDINAL_CAP_M
-    charge = in_charge(view)
-    for i in range(len(charge)):
-        if charge[i]:
-            worst = min(worst, max(rss_longitudinal_m[i], rss_lateral_m[i]))
-    return worst
-
-
 class LeastMargins(NamedTuple):
     """The smallest of each measure over the actors it concerns; its cap where there is none."""
 
@@ -47,20 +36,52 @@ class LeastMargins(NamedTuple):
     vehicle_gap_m: float
 
 
-@compiled
-def assess(
-    view: RelativeView, kind: NDArray[np.int8], parameters: RssParameters
-) -> tuple[Floats, Floats, Floats, LeastMargins]:
-    """TTC and both RSS margins of each of the `n` others, and the least of all; one compiled call a step.
+class Assessment(NamedTuple):
+    """What one frame says about risk; arrays hold the `n` actors other than the ego."""
 
-    Args:
-      view: the others in the ego's frame.
-      kind: `n + 1`, with the ego in front.
-      parameters: of RSS.
-    """
+    view: RelativeView
+    seen: Bools  # in the ego's sight
+    ttc_s: Floats
+    rss_longitudinal_m: Floats
+    rss_lateral_m: Floats
+    least: LeastMargins
+
+
+def assess(frame: Frame, rss: RssParameters, sight: Sight) -> Assessment:
+    """All measures of a frame, in one compiled call."""
+    return _assess(
+        frame.x_m,
+        frame.y_m,
+        frame.heading_rad,
+        frame.vx_mps,
+        frame.vy_mps,
+        frame.length_m,
+        frame.width_m,
+        frame.kind,
+        rss,
+        sight,
+    )
+
+
+@compiled
+def _assess(
+    x: Floats,
+    y: Floats,
+    heading: Floats,
+    vx: Floats,
+    vy: Floats,
+    length: Floats,
+    width: Floats,
+    kind: NDArray[np.int8],
+    rss: RssParameters,
+    sight: Sight,
+) -> Assessment:
+    view = frame_view(x, y, heading, vx, vy, length, width)
     ttc_s = time_to_collision(view)
-    rss_longitudinal_m, rss_lateral_m = margins(view, parameters)
-    return (
+    rss_longitudinal_m, rss_lateral_m = margins(view, rss)
+    return Assessment(
+        view,
+        in_sight(view, kind[1:] == VEHICLE, sight),
         ttc_s,
         rss_longitudinal_m,
         rss_lateral_m,
@@ -90,6 +111,12 @@ def least_margins(
     return LeastMargins(ttc, longitudinal, lateral, pedestrian, vehicle)
 
 
+def worst_rss_margin(assessment: Assessment) -> float:
+    """Smallest RSS margin: of each actor the ego answers for, the larger of the two, since it takes both, m."""
+    margin = np.maximum(assessment.rss_longitudinal_m, assessment.rss_lateral_m)
+    return float(margin.min(where=in_charge(assessment.view), initial=LONGITUDINAL_CAP_M))
+
+
 def publish(frame: Frame, before: Frame | None, least: LeastMargins) -> dict[str, float]:
     """The value of every signal in `risk_sac.risk.signals.SIGNALS`.
 
@@ -99,7 +126,11 @@ def publish(frame: Frame, before: Frame | None, least: LeastMargins) -> dict[str
       least: of `frame`.
     """
     return {
-        **least._asdict(),
+        "ttc_s": least.ttc_s,
+        "rss_longitudinal_m": least.rss_longitudinal_m,
+        "rss_lateral_m": least.rss_lateral_m,
+        "pedestrian_gap_m": least.pedestrian_gap_m,
+        "vehicle_gap_m": least.vehicle_gap_m,
         "red_light_m": red_light_margin(frame, before),
         "ego_speed_mps": frame.ego_speed_mps,
         "ego_braking_mps2": max(0.0, -float(frame.accel_mps2[0])),

@@ -67,7 +67,7 @@ class Monitor:
           FormulaError: naming the requirement, the position and the reason.
         """
         self.names = tuple(requirement.name for requirement in requirements)
-        self._per_scale = [1.0 / requirement.scale for requirement in requirements]
+        self._per_scale = np.array([1.0 / requirement.scale for requirement in requirements])
         self._slots: dict[str, int] = {}  # text of a sub-formula -> where its value lies
         self._values: list[float] = []
         self._operators: list[Any] = []
@@ -96,19 +96,15 @@ class Monitor:
           starts in the past is still empty, `historically` holds and `once` and `since` do not.
         """
         values = self._values
+        total = 0.0
         for name, slot in self._inputs:
-            value = signals[name]
-            if not math.isfinite(value):
-                raise NotFinite(f"signal {name!r} is {value}; wanted a finite number")
-            values[slot] = value
+            values[slot] = signals[name]
+            total += values[slot]
+        if not math.isfinite(total):  # one check for all: the signals are far too small to overflow together
+            raise NotFinite(f"the signals are {dict(signals)}; wanted finite numbers")
         for operator, left, right, slot in self._program:
             values[slot] = operator(values[left]) if right < 0 else operator(values[left], values[right])
-        return np.array(
-            [
-                min(max(values[slot] * per_scale, -ROBUSTNESS_CLIP), ROBUSTNESS_CLIP)
-                for slot, per_scale in zip(self._outputs, self._per_scale, strict=True)
-            ]
-        )
+        return _scaled(np.array([values[slot] for slot in self._outputs], dtype=np.float64), self._per_scale)
 
     def _compile(self, node: Any, operators: Mapping[str, Any]) -> int:
         """Append what computes rtamt's `node` to the program; the slot of its value.
@@ -132,6 +128,13 @@ class Monitor:
             else:
                 self._program.append((sub, left, right, slot))
         return slot
+
+
+@compiled
+def _scaled(robustness: Floats, per_scale: Floats) -> Floats:
+    for i in range(len(robustness)):
+        robustness[i] = min(max(robustness[i] * per_scale[i], -ROBUSTNESS_CLIP), ROBUSTNESS_CLIP)
+    return robustness
 
 
 def check_requirements(requirements: Sequence[Requirement], step_s: float, horizon_steps: int) -> None:

@@ -148,11 +148,11 @@ def _mixed(xi: Mapping[str, float]) -> Layout:
                     id=f"oncoming_{i}",
                     role=Role.BACKGROUND,
                     route=(oncoming_edge, oncoming_after),
-                    lane=1 + i,
+                    lane=1 + i % 2,
                     position_m=oncoming_length - 60.0 - 30.0 * i,
                     speed_mps=10.0,
                 )
-                for i in range(2)
+                for i in range(4)
             ),
         ),
         pedestrians=(

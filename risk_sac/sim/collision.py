@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from risk_sac.geometry import RelativeView, box_view, corners
-from risk_sac.jit import compiled
-from risk_sac.types import Floats, Frame, Kind
+from risk_sac.types import Frame, Kind
 
 BISECTIONS = 10  # of 0.1 s: locates the contact to 0.1 ms
 ZONE_MARGIN_M = 0.05  # a contact this close to an edge lies on it
@@ -55,25 +54,6 @@ def find_contact(before: Frame | None, frame: Frame, view: RelativeView) -> Cont
         return _describe(frame, int(touching[0]) + 1, frame, 1.0)
     share, other = min((_first_touch(before, frame, int(i) + 1), int(i) + 1) for i in touching)
     return _describe(before, other, frame, share)
-
-
-def touching_pairs(frame: Frame) -> list[tuple[int, int]]:
-    """Index pairs of actors other than the ego whose bodies overlap; distance filter, then exact test."""
-    near = _near_pairs(frame.x_m, frame.y_m, frame.length_m, frame.width_m)
-    return [(i, j) for i, j in near if _pair_view(frame, frame, i, j, 1.0).overlap[0]]
-
-
-@compiled
-def _near_pairs(x: Floats, y: Floats, length: Floats, width: Floats) -> list[tuple[int, int]]:
-    """Pairs without the ego whose enclosing circles overlap."""
-    pairs = [(0, 0) for _ in range(0)]  # an empty list whose type the compiler can tell
-    radius = np.sqrt(length * length + width * width) / 2
-    for i in range(1, len(x)):
-        for j in range(i + 1, len(x)):
-            dx, dy, reach = x[i] - x[j], y[i] - y[j], radius[i] + radius[j]
-            if dx * dx + dy * dy <= reach * reach:
-                pairs.append((i, j))
-    return pairs
 
 
 def _first_touch(before: Frame, frame: Frame, other: int) -> float:

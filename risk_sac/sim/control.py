@@ -25,8 +25,10 @@ def _taper(distance: float, rate: float) -> float:
     With decrements of c = rate·dt and D = distance/dt, k full decrements fit, k(k+1)/2·c <= D, and the rest is
     spread over k + 1 steps. The continuous √(2·rate·distance) would overshoot by up to half a decrement.
     """
-    change, total = rate * STEP_S, max(distance, 0.0) / STEP_S
-    full = math.floor((math.sqrt(1.0 + 8.0 * total / change) - 1.0) / 2.0)
+    if distance <= 0.0:
+        return 0.0
+    change, total = rate * STEP_S, distance / STEP_S
+    full = int((math.sqrt(1.0 + 8.0 * total / change) - 1.0) / 2.0)
     return full * change / 2.0 + total / (full + 1)
 
 

@@ -181,7 +181,10 @@ class SumoSimulation:
         self._walkers.update(walkers)
 
     def hide(self, hidden: frozenset[str]) -> None:
-        """Makes the ego's models blind to these actors, and only to these."""
+        """Makes the ego blind to these actors, and only to these.
+
+        Its car-following and junction models, that is: SUMO's lane-change model has no list of vehicles to ignore.
+        """
         if hidden == self._hidden:
             return
         vehicles = " ".join(sorted(id_ for id_ in hidden if id_ not in self._walkers))
@@ -278,7 +281,7 @@ class SumoSimulation:
         get_position, get_angle = libsumo.vehicle.getPosition, libsumo.vehicle.getAngle
         get_speed, get_lateral = libsumo.vehicle.getSpeed, libsumo.vehicle.getLateralSpeed
         get_accel = libsumo.vehicle.getAcceleration
-        rows = []
+        rows: list[float] = []  # flat: numpy converts nested sequences at half the speed
         previous = self._previous
         for id_, half in zip(self._vehicles, self._half_lengths, strict=True):
             x, y = get_position(id_)
@@ -291,11 +294,11 @@ class SumoSimulation:
             else:
                 vx, vy = speed * cos, speed * sin
             previous[id_] = (x, y)
-            rows.append((x - half * cos, y - half * sin, heading, vx, vy, speed, get_lateral(id_), get_accel(id_)))
+            rows += (x - half * cos, y - half * sin, heading, vx, vy, speed, get_lateral(id_), get_accel(id_))
         for w in self._walkers.values():
             vx, vy = w.speed_mps * math.cos(w.heading_rad), w.speed_mps * math.sin(w.heading_rad)
-            rows.append((w.x_m, w.y_m, w.heading_rad, vx, vy, w.speed_mps, 0.0, w.accel_mps2))
-        x_m, y_m, heading_rad, vx_mps, vy_mps, speed_mps, lateral_mps, accel_mps2 = np.array(rows).T
+            rows += (w.x_m, w.y_m, w.heading_rad, vx, vy, w.speed_mps, 0.0, w.accel_mps2)
+        x_m, y_m, heading_rad, vx_mps, vy_mps, speed_mps, lateral_mps, accel_mps2 = np.array(rows).reshape(-1, 8).T
         signal, stop_line_m = self._next_signal()
         return Frame(
             time_s=libsumo.simulation.getTime(),
@@ -314,7 +317,9 @@ class SumoSimulation:
             width_m=self._width,
             signal=signal,
             stop_line_m=stop_line_m,
-            simulator_collisions=tuple((c.collider, c.victim) for c in libsumo.simulation.getCollisions()),
+            simulator_collisions=tuple(
+                (_actor(c.collider), _actor(c.victim)) for c in libsumo.simulation.getCollisions()
+            ),
             teleported=libsumo.simulation.getStartingTeleportIDList(),
         )
 
@@ -339,6 +344,11 @@ def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
             return 0.0
     width: float = libsumo.lane.getWidth(lane)
     return width
+
+
+def _actor(sumo_id: str) -> str:
+    """The actor that a vehicle, or a person `pedestrian#3` that stands in for one, belongs to."""
+    return sumo_id.partition("#")[0]
 
 
 def _registered(person: str) -> bool:

@@ -8,7 +8,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from risk_sac.geometry import RelativeView, line_of_sight, relative_view, time_to_contact
+from risk_sac.geometry import RelativeView, line_of_sight, overlapping_pairs, relative_view, time_to_contact
 from risk_sac.types import Bools, Floats, Frame, Kind, Role, Signal
 
 TOUCHING_M = 1e-9
@@ -88,6 +88,19 @@ def test_overlap_agrees_with_shapely_on_10000_random_pose_pairs() -> None:
     assert 0.2 < theirs.mean() < 0.8  # both answers are well covered
     assert np.array_equal(ours[~touching], theirs[~touching])
     assert touching.sum() <= 5
+
+
+def test_overlapping_pairs_are_the_pairs_that_shapely_sees_intersect() -> None:
+    generator = np.random.default_rng(2)
+    found = 0
+    for _ in range(300):
+        frame = random_frame(generator, 8, 12.0)  # eight others and the ego
+        bodies = boxes(frame)
+        pairs = overlapping_pairs(frame.x_m, frame.y_m, frame.heading_rad, frame.length_m, frame.width_m)
+        expected = [(i, j) for i in range(9) for j in range(i + 1, 9) if shapely.intersects(bodies[i], bodies[j])]
+        assert pairs == expected
+        found += len(pairs)
+    assert found > 500
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.3, math.pi / 2, -2.5])

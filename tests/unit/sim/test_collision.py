@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from risk_sac.geometry import relative_view
-from risk_sac.sim.collision import Contact, History, agrees, find_contact, touching_pairs, verdicts
+from risk_sac.sim.collision import Contact, History, agrees, find_contact, verdicts
 from risk_sac.types import STEP_S, Frame, Kind, Role, Signal
 
 LENGTH_M, WIDTH_M = 4.6, 1.85
@@ -260,18 +260,6 @@ def test_headings_that_pass_south_are_interpolated_the_short_way() -> None:
     assert contact is not None
     assert contact.time_s == pytest.approx(5.0, abs=0.005)
     assert contact.ego_zone == "front"
-
-
-def test_only_contacts_among_the_others_are_pairs() -> None:
-    _, frame = frames(
-        ego(0.0),
-        (3.0, 0.0, 0.0, 0.0, 0.0, CAR),  # on the ego
-        (30.0, 0.0, 0.0, 0.0, 0.0, CAR),
-        (33.0, 1.0, 0.0, 0.0, 0.0, CAR),  # on the one before
-        (35.0, 3.0, 0.0, 0.0, 0.0, CAR),  # near, but clear of both
-        (29.0, 0.5, 0.0, 0.0, 0.0, WALKER),  # under the third actor
-    )
-    assert sorted(touching_pairs(frame)) == [(2, 3), (2, 5)]
 
 
 def test_sumo_agrees_when_it_names_the_pair_in_either_order() -> None:
