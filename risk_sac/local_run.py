@@ -28,7 +28,6 @@ def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
     """
     Problem.from_spec(spec)  # before the folder is claimed
     with _stop_signal() as stopping, Recorder(spec, folder, Watcher(progress, stopping)) as recorder:
-        progress(recorder.done, recorder.results.metrics)
         return recorder.finish(train(spec, folder, recorder))
 
 

@@ -3,14 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self
+from typing import Self
 
 from pydantic import TypeAdapter
 
-from risk_sac import checkpoint
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
-from risk_sac.records import records_from_json
 from risk_sac.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
 from risk_sac.train import CHECKPOINT, Observer, RunSummary
 from risk_sac.types import EpisodeRecord, RunMetrics
@@ -21,8 +19,9 @@ _LINE = TypeAdapter(EpisodeRecord)
 class Recorder:
     """The observer that writes a run down and hands on to another one what it is told.
 
+    A resumed run tells of its checkpoint's episodes again, so the file of episodes is always begun anew.
+
     Attributes:
-      done: episodes that the checkpoint holds; the run goes on with the next.
       results: what results.json says.
     """
 
@@ -31,7 +30,6 @@ class Recorder:
 
         Raises:
           ConfigError: the folder holds another run.
-          CheckpointError: its checkpoint is damaged.
           OSError: it cannot be written.
         """
         folder.mkdir(parents=True, exist_ok=True)
@@ -39,10 +37,8 @@ class Recorder:
         self._observer = observer
         self.should_stop = observer.should_stop
         self.results = _results_so_far(spec, folder)
-        records = _checkpointed(spec, folder)
-        self.done = len(records)
-        self._contacts = [Contact.of(record) for record in records if record.collision is not None]
-        self._episodes = _restart_episodes(folder, records)
+        self._contacts: list[Contact] = []
+        self._episodes = (folder / EPISODES).open("wb")
 
     def __enter__(self) -> Self:
         return self
@@ -58,7 +54,9 @@ class Recorder:
         self._episodes.flush()
         if series is not None:
             self._contacts.append(Contact.of(record))
-        if (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and record.phase == "train":
+        told = self.results.metrics.episodes if self.results.metrics else 0
+        due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes > told
+        if due and record.phase == "train":
             self._write(replace(self.results, metrics=metrics, contacts=tuple(self._contacts)))
         self._observer.episode(record, metrics, series)
 
@@ -100,17 +98,3 @@ def _results_so_far(spec: RunSpec, folder: Path) -> Results:
     results = Results(spec=spec, spec_digest=spec.digest, finished=False)
     write_results(folder, results)
     return results
-
-
-def _checkpointed(spec: RunSpec, folder: Path) -> list[EpisodeRecord]:
-    if not (folder / CHECKPOINT).exists():
-        return []
-    return records_from_json(checkpoint.load(folder / CHECKPOINT, spec.digest)["records"])
-
-
-def _restart_episodes(folder: Path, records: list[EpisodeRecord]) -> BinaryIO:
-    """Cuts the file of episodes back to those of the checkpoint; the run repeats the rest."""
-    file = (folder / EPISODES).open("wb")
-    file.write(b"".join(_LINE.dump_json(record) + b"\n" for record in records))
-    file.flush()
-    return file

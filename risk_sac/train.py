@@ -41,7 +41,11 @@ class Observer(Protocol):
     """Who wants to know how a run goes, and may end it."""
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
-        """After each episode; `series` names its file below `failures/` if the ego touched something."""
+        """After each episode; `series` names its file below `failures/` if the ego touched something.
+
+        A resumed run first tells of the episodes in its checkpoint again: whoever listened before may have been
+        gone when the last of them were told.
+        """
 
     def should_stop(self) -> bool:
         """Polled between episodes."""
@@ -77,7 +81,8 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
     folder.mkdir(parents=True, exist_ok=True)
     run = Run(spec, folder)
     try:
-        run.resume()
+        for record, metrics in run.resume():
+            observer.episode(record, metrics, None if record.collision is None else series_name(record.index))
         total = spec.budget.episodes + spec.budget.evaluation_episodes
         while len(run.records) < total and not observer.should_stop():
             record, series = run.episode(len(run.records))  # Alg. 1, l. 3
@@ -237,18 +242,17 @@ class Run:
         }
         checkpoint.save(self._folder / CHECKPOINT, state, self._spec.digest)
 
-    def resume(self) -> None:
-        """Goes on from the folder's checkpoint, if there is one."""
+    def resume(self) -> list[tuple[EpisodeRecord, RunMetrics]]:
+        """Goes on from the folder's checkpoint, if there is one; its episodes with the metrics after each."""
         path = self._folder / CHECKPOINT
         if not path.exists():
-            return
+            return []
         state = checkpoint.load(path, self._spec.digest)
         self.records = records_from_json(state["records"])
         self._optimizer.load(state["optimizer"])
         self._agent.load(state["agent"])
-        for record in self.records:
-            self.metrics_after(record)
         logger.info("resumed after %d episodes", len(self.records))
+        return [(record, self.metrics_after(record)) for record in self.records]
 
     def close(self) -> None:
         """Ends the simulation."""

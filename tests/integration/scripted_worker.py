@@ -27,6 +27,8 @@ def main() -> None:
     threading.Thread(target=leave_with_server, daemon=True).start()
     checkpoint = folder / "checkpoint"
     done = int(checkpoint.read_text()) if checkpoint.exists() else 0
+    for index in range(done):  # as the real worker: the last of them may never have been heard
+        send(EpisodeDone(record=record(index), metrics=metrics(index + 1), series=None, wall_s=0.0))
     for index in range(done, spec.budget.episodes):
         if stopping.is_set() and spec.seed != HANGS:
             break
