@@ -26,7 +26,7 @@ from risk_sac.metrics import MetricsAccumulator, results_digest
 from risk_sac.problem import Problem
 from risk_sac.records import records_from_json, records_to_json
 from risk_sac.results import FAILURES, series_name
-from risk_sac.risk.reward import penalised_reward, shaped_reward
+from risk_sac.risk.reward import training_reward
 from risk_sac.scene_optimizer import BotorchOptimizer, SceneOptimizer, SobolOptimizer
 from risk_sac.trace import write_series
 from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
@@ -163,12 +163,18 @@ class Run:
 
     def _shaped(self, reward: float, info: Mapping[str, float], robustness: float, terminated: bool) -> float:
         """R' of this step under today's λ; what the scene optimiser and the record see."""
-        penalised = penalised_reward(reward, info["cost"], self._agent.dual_variable)
-        if not self._method.shaping:
-            return penalised
         config = self._spec.learner
-        vanishing = float(terminated and config.reward.zero_terminal_potential)
-        return shaped_reward(penalised, robustness, info["robustness"], config.sac.discount, vanishing)
+        return training_reward(
+            reward,
+            info["cost"],
+            robustness,
+            info["robustness"],
+            float(terminated),
+            dual_variable=self._agent.dual_variable,
+            shaped=self._method.shaping,
+            zero_terminal_potential=config.reward.zero_terminal_potential,
+            discount=config.sac.discount,
+        )
 
     def _record(
         self,

@@ -15,7 +15,7 @@ from risk_sac.agents.replay import Replay, RiskPrioritizedReplay, Transition, Un
 from risk_sac.agents.sac import SacAgent, UpdateResult
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
-from risk_sac.risk.reward import Value, penalised_reward, shaped_reward
+from risk_sac.risk.reward import Value, training_reward
 
 
 class Learner:
@@ -102,11 +102,17 @@ class Learner:
         self, risk_reward: Value, cost: Value, robustness: Value, next_robustness: Value, terminated: Value
     ) -> Value:
         # Deviation: formed when sampled, so λ is today's and not the one in force when the step was taken.
-        reward = penalised_reward(risk_reward, cost, self._dual.value)  # Alg. 1, l. 9
-        if not self._method.shaping:
-            return reward
-        vanishing = terminated * float(self._config.reward.zero_terminal_potential)
-        return shaped_reward(reward, robustness, next_robustness, self._config.sac.discount, vanishing)  # Alg. 1, l. 10
+        return training_reward(  # Alg. 1, l. 9-10
+            risk_reward,
+            cost,
+            robustness,
+            next_robustness,
+            terminated,
+            dual_variable=self._dual.value,
+            shaped=self._method.shaping,
+            zero_terminal_potential=self._config.reward.zero_terminal_potential,
+            discount=self._config.sac.discount,
+        )
 
     def _td_error(self, transition: Transition) -> float:
         """|δ| at insertion (Alg. 1, l. 11); uniform replay does without."""
