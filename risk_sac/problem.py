@@ -6,7 +6,7 @@ Everything a campaign can get wrong beyond its types is found here, without load
 from dataclasses import dataclass
 
 from risk_sac.config import CampaignSpec, EgoConfig, Odd, Requirement, RunSpec
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, OddError
 from risk_sac.risk.rss import RssParameters
 from risk_sac.risk.stl import check_requirements
 from risk_sac.scenario.families import FAMILIES, Family
@@ -38,6 +38,12 @@ class Problem:
         """
         family = FAMILIES[spec.family]
         odd = intersect(family.odd, spec.odd)
+        if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
+            raise OddError(
+                f"odd.dynamic.actor_kinds is {list(odd.dynamic.actor_kinds or ())}; wanted {sorted(missing)} too, "
+                f"which every scene of the {family.name!r} family has",
+                field="odd.dynamic.actor_kinds",
+            )
         shipped = requirements_from_odd(odd, spec.ego.reaction_time_s)
         check_requirements(spec.requirements, STEP_S, family.horizon_steps)
         taken = {requirement.name for requirement in shipped}

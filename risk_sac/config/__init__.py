@@ -12,13 +12,14 @@ from risk_sac.config.learner import (
     SceneOptimizerConfig,
 )
 from risk_sac.config.methods import METHODS, Method, MethodName
-from risk_sac.config.odd import DynamicElements, Environment, Odd, Scenery
+from risk_sac.config.odd import CrossingType, DynamicElements, Environment, Odd, Scenery, SignalType
 
 __all__ = [
     "METHODS",
     "Budget",
     "CampaignSpec",
     "CarFollowing",
+    "CrossingType",
     "DynamicElements",
     "EgoConfig",
     "Environment",
@@ -38,4 +39,5 @@ __all__ = [
     "Scenery",
     "SensorConfig",
     "Settings",
+    "SignalType",
 ]

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from risk_sac.config import DynamicElements, Environment, FamilyName, Interval, Odd, Scenery
+from risk_sac.config import CrossingType, DynamicElements, Environment, FamilyName, Interval, Odd, Scenery, SignalType
 from risk_sac.scenario.layout import Area, Layout, PedestrianStart, VehicleStart
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Role
@@ -51,13 +51,16 @@ def _walking(low: float, high: float) -> Parameter:
     return Parameter("pedestrian_speed_mps", "m/s", low, high, "initial walking speed", "dynamic.pedestrian_speed_mps")
 
 
-def _odd(*, lanes: float, limit_mps: float, signals: bool, pedestrians: bool) -> Odd:
+def _odd(
+    *, lanes: float, limit_mps: float, signals: tuple[SignalType, ...], crossings: tuple[CrossingType, ...]
+) -> Odd:
+    pedestrians = crossings != ("none",)
     return Odd(
         scenery=Scenery(
             lanes=Interval(low=lanes, high=lanes),
             speed_limit_mps=Interval(low=limit_mps, high=limit_mps),
-            signal_types=("fixed_time", "none") if signals else ("none",),
-            crossing_types=("none", "signalised", "zebra") if pedestrians else ("none",),
+            signal_types=signals,
+            crossing_types=crossings,
         ),
         environment=Environment(friction=Interval(low=0.6, high=1.0), visibility_m=Interval(low=100, high=2000)),
         dynamic=DynamicElements(
@@ -113,7 +116,7 @@ LOW = Family(
             _friction(),
         ),
     ),
-    odd=_odd(lanes=3, limit_mps=16.67, signals=False, pedestrians=False),
+    odd=_odd(lanes=3, limit_mps=16.67, signals=("none",), crossings=("none",)),
     vehicles=("lead", "left", "right"),
     pedestrians=(),
     layout=_low,
@@ -202,7 +205,7 @@ MIXED = Family(
             _friction(),
         ),
     ),
-    odd=_odd(lanes=2, limit_mps=13.89, signals=True, pedestrians=True),
+    odd=_odd(lanes=2, limit_mps=13.89, signals=("fixed_time", "none"), crossings=("signalised", "zebra")),
     vehicles=("occluder",),
     pedestrians=("pedestrian",),
     layout=_mixed,
@@ -329,7 +332,7 @@ DENSE = Family(
             _friction(),
         ),
     ),
-    odd=_odd(lanes=2, limit_mps=13.89, signals=True, pedestrians=True),
+    odd=_odd(lanes=2, limit_mps=13.89, signals=("fixed_time",), crossings=("signalised",)),
     vehicles=("oncoming", "from_left", "from_right"),
     pedestrians=("pedestrian",),
     layout=_dense,

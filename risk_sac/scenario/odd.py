@@ -6,7 +6,7 @@ Source: RISK-SAC, Sec. II-A; ISO 34503 for the ODD's branches.
 import math
 from typing import Any, TypeVar
 
-from risk_sac.config import Interval, Odd, Requirement, Settings
+from risk_sac.config import Interval, Odd, Requirement, Scenery, Settings
 from risk_sac.errors import OddError
 from risk_sac.scenario.space import Parameter, SceneSpace
 
@@ -46,7 +46,7 @@ def intersect(default: Odd, user: Odd) -> Odd:
     """
     check(user)
     return Odd(
-        scenery=_intersect_branch("scenery", default.scenery, user.scenery),
+        scenery=_without_dark_signals(_intersect_branch("scenery", default.scenery, user.scenery)),
         environment=_intersect_branch("environment", default.environment, user.environment),
         dynamic=_intersect_branch("dynamic", default.dynamic, user.dynamic),
     )
@@ -167,6 +167,19 @@ def _intersect_branch(branch: str, default: Branch, user: Branch) -> Branch:
         if not common:
             raise _error(f"{branch}.{name}", theirs, f"an overlap with {_text(ours)}, which the family supports")
     return type(default)(**values)
+
+
+def _without_dark_signals(scenery: Scenery) -> Scenery:
+    """A signalised crossing needs a signal: without one, only the other crossings stay."""
+    crossings = scenery.crossing_types
+    if crossings is None or "fixed_time" in (scenery.signal_types or ("fixed_time",)):
+        return scenery
+    left = tuple(kind for kind in crossings if kind != "signalised")
+    if not left:
+        raise _error(
+            "scenery.crossing_types", crossings, "a crossing without a signal, or signal_types with fixed_time"
+        )
+    return scenery.model_copy(update={"crossing_types": left})
 
 
 def _common(ours: Any, theirs: Any) -> Any:

@@ -1,0 +1,98 @@
+import pytest
+
+from risk_sac.config import (
+    CampaignSpec,
+    DynamicElements,
+    EgoConfig,
+    Environment,
+    Interval,
+    Odd,
+    Requirement,
+    RunSpec,
+    Scenery,
+)
+from risk_sac.errors import ConfigError, FormulaError, OddError
+from risk_sac.problem import Problem, check_campaign
+
+
+def problem(family: str = "mixed", **settings: object) -> Problem:
+    return Problem.from_spec(RunSpec(family=family, method="risk-sac", seed=0, **settings))
+
+
+def bounds(posed: Problem, name: str) -> tuple[float, float]:
+    [parameter] = [p for p in posed.space.parameters if p.name == name]
+    return parameter.low, parameter.high
+
+
+def test_the_default_odd_leaves_the_whole_scene_space() -> None:
+    for family in ("low", "mixed", "dense"):
+        posed = problem(family)
+        assert posed.space.parameters == posed.family.space.parameters
+
+
+def test_a_users_odd_narrows_the_scene_space_and_the_requirements() -> None:
+    odd = Odd(
+        environment=Environment(friction=Interval(low=0.6, high=0.7), visibility_m=Interval(low=40, high=500)),
+        dynamic=DynamicElements(ego_speed_mps=Interval(low=8, high=10)),
+    )
+    posed = problem(odd=odd)
+    assert bounds(posed, "ego_speed_mps") == (8, 10)
+    assert bounds(posed, "friction") == (0.6, 0.7)
+    assert posed.visibility_m == 100  # the family's default ODD already asks for as much
+    assert problem(odd=Odd(environment=Environment(visibility_m=Interval(low=150, high=500)))).visibility_m == 150
+
+
+def test_an_odd_without_signals_leaves_the_zebra() -> None:
+    low, high = bounds(problem(odd=Odd(scenery=Scenery(signal_types=("none",)))), "crossing")
+    assert low == 0
+    assert high < 0.5
+
+
+@pytest.mark.parametrize(
+    ("family", "odd", "field"),
+    [
+        ("dense", Odd(scenery=Scenery(signal_types=("none",))), "odd.scenery.signal_types"),
+        ("mixed", Odd(scenery=Scenery(crossing_types=("none",))), "odd.scenery.crossing_types"),
+        (
+            "mixed",
+            Odd(scenery=Scenery(signal_types=("none",), crossing_types=("signalised",))),
+            "odd.scenery.crossing_types",
+        ),
+        ("mixed", Odd(dynamic=DynamicElements(actor_kinds=("vehicle",))), "odd.dynamic.actor_kinds"),
+        ("low", Odd(dynamic=DynamicElements(actor_kinds=("pedestrian",))), "odd.dynamic.actor_kinds"),
+        ("low", Odd(scenery=Scenery(lanes=Interval(low=1, high=2))), "odd.scenery.lanes"),
+        ("low", Odd(environment=Environment(friction=Interval(low=0.1, high=0.3))), "odd.environment.friction"),
+        ("low", Odd(dynamic=DynamicElements(ego_speed_mps=Interval(low=0, high=5))), "odd.dynamic.ego_speed_mps"),
+    ],
+)
+def test_an_odd_that_leaves_no_scene_is_an_error_that_names_its_field(family: str, odd: Odd, field: str) -> None:
+    with pytest.raises(OddError) as refused:
+        problem(family, odd=odd)
+    assert refused.value.field == field
+    assert "wanted" in str(refused.value)
+
+
+def test_a_users_requirement_joins_the_shipped_ones() -> None:
+    mine = Requirement(name="wide_berth", formula="pedestrian_gap_m >= 2", scale=2)
+    assert problem(requirements=(mine,)).requirements[-1] == mine
+
+
+def test_a_requirement_may_not_take_a_shipped_name() -> None:
+    with pytest.raises(ConfigError, match="safe_ttc") as refused:
+        problem(requirements=(Requirement(name="safe_ttc", formula="ttc_s >= 9", scale=1),))
+    assert refused.value.field == "requirements[0].name"
+
+
+def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs() -> None:
+    spec = CampaignSpec(
+        families=("low", "mixed"), requirements=(Requirement(name="soon", formula="eventually(ttc_s > 1)", scale=1),)
+    )
+    with pytest.raises(FormulaError) as refused:
+        check_campaign(spec)
+    assert refused.value.field == "requirements[0].formula"
+    assert refused.value.position == 0
+
+
+def test_rss_answers_with_the_egos_reaction_time_and_the_worst_friction() -> None:
+    assert problem(ego=EgoConfig(reaction_time_s=1.0)).rss.response_s == 1.0
+    assert problem(odd=Odd(environment=Environment(friction=Interval(low=0.6, high=1)))).rss.brake_min_mps2 == 4.5
