@@ -6,8 +6,7 @@ Source: RISK-SAC, Algorithm 1; each line is tagged where it happens. Lines 9-16 
 
 import logging
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -79,38 +78,21 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
     """
     started = time.monotonic()
     folder.mkdir(parents=True, exist_ok=True)
-    with _one_fast_thread():
-        run = Run(spec, folder)
-        try:
-            for record, metrics in run.resume():
-                observer.episode(record, metrics, None if record.collision is None else series_name(record.index))
-            total = spec.budget.episodes + spec.budget.evaluation_episodes
-            while len(run.records) < total and not observer.should_stop():
-                record, series = run.episode(len(run.records))  # Alg. 1, l. 3
-                observer.episode(record, run.metrics_after(record), series)
-                if len(run.records) % spec.learner.checkpoint_every == 0:
-                    run.save()
-            run.save()
-        finally:
-            run.close()
-        return run.summary(finished=len(run.records) == total, wall_s=time.monotonic() - started)
-
-
-@contextmanager
-def _one_fast_thread() -> Iterator[None]:
-    """Torch on one thread, as runs are what is parallel, and without denormals.
-
-    Adam's moments of idle units decay into denormals, and an update slows down from 3 to 28 ms. The processor's flag
-    is put back afterwards, since it changes the arithmetic of everything else in the process.
-    """
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    torch.set_flush_denormal(True)
+    torch.set_num_threads(1)  # runs are what is parallel
+    run = Run(spec, folder)
     try:
-        yield
+        for record, metrics in run.resume():
+            observer.episode(record, metrics, None if record.collision is None else series_name(record.index))
+        total = spec.budget.episodes + spec.budget.evaluation_episodes
+        while len(run.records) < total and not observer.should_stop():
+            record, series = run.episode(len(run.records))  # Alg. 1, l. 3
+            observer.episode(record, run.metrics_after(record), series)
+            if len(run.records) % spec.learner.checkpoint_every == 0:
+                run.save()
+        run.save()
     finally:
-        torch.set_flush_denormal(False)
-        torch.set_num_threads(threads)
+        run.close()
+    return run.summary(finished=len(run.records) == total, wall_s=time.monotonic() - started)
 
 
 class Run:
