@@ -157,10 +157,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _start(self, scene: Scene) -> tuple[Observation, dict[str, Any]]:
         self._unit_scene = self.problem.space.to_unit(scene)
         layout = self.problem.family.layout(scene.values)
-        self._limits = limits_from_odd(self.problem.odd, layout.friction)
+        limits = limits_from_odd(self.problem.odd, layout.friction)
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._frame = self._sim.reset(layout, sumo_seed, controlled=self._controlled)
-        self._adversaries = Adversaries(self.problem.family, self._limits, layout, self._frame)
+        self._adversaries = Adversaries(self.problem.family, limits, layout, self._frame)
         self._monitor.reset()
         self._perception.reset()
         self._trace = Trace(self._monitor.names)
