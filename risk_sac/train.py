@@ -61,6 +61,7 @@ class RunSummary:
     finished: bool  # False when the observer ended it
     versions: Mapping[str, str]
     wall_s: float  # of this process; excludes what was done before a resume
+    cpu_s: float  # the same in processor time, which a busy machine does not lengthen
 
 
 def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
@@ -76,7 +77,7 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
       CheckpointError: the checkpoint is damaged or of another run.
       OSError: the folder cannot be written.
     """
-    started = time.monotonic()
+    started, started_cpu = time.monotonic(), time.process_time()
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)  # runs are what is parallel
     run = Run(spec, folder)
@@ -92,7 +93,11 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
         run.save()
     finally:
         run.close()
-    return run.summary(finished=len(run.records) == total, wall_s=time.monotonic() - started)
+    return run.summary(
+        finished=len(run.records) == total,
+        wall_s=time.monotonic() - started,
+        cpu_s=time.process_time() - started_cpu,
+    )
 
 
 class Run:
@@ -228,7 +233,7 @@ class Run:
         """Counts a record, in its own phase."""
         return (self._search if record.phase == "train" else self._evaluation).add(record)
 
-    def summary(self, *, finished: bool, wall_s: float) -> RunSummary:
+    def summary(self, *, finished: bool, wall_s: float, cpu_s: float) -> RunSummary:
         """What the run has achieved so far."""
         return RunSummary(
             metrics=self._search.metrics(),
@@ -237,6 +242,7 @@ class Run:
             finished=finished,
             versions={name: version(name) for name in PACKAGES},
             wall_s=wall_s,
+            cpu_s=cpu_s,
         )
 
     def save(self) -> None:
