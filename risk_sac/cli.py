@@ -157,7 +157,8 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
         "efficiency ES": f"{metrics.efficiency:.3f}",
         "realism cost per step": f"{metrics.cost_rate:.3f}",
         "dispersion OFD": _or_dash(metrics.dispersion, ".3f"),
-        "steps per failure": _or_dash(metrics.steps_per_failure, ".0f"),
+        "distinct failures": f"{metrics.distinct_failures}",
+        "steps per distinct failure": _or_dash(metrics.steps_per_distinct_failure, ".0f"),
     }
 
 

@@ -19,6 +19,7 @@ from risk_sac.types import Collision, EpisodeRecord, Floats, Outcome, RunMetrics
 WINDOW = 100  # episodes of the sliding ECR
 NORMAL_QUANTILE = 1.959963984540054  # two-sided 95 %
 RESAMPLES = 10_000
+DISTINCT = 0.1  # least distance, as OFD measures it, of two failures that are not the same one again
 
 
 class Feature(NamedTuple):
@@ -121,12 +122,6 @@ def cost_rate(records: Sequence[EpisodeRecord]) -> float:
     return cost / max(1, sum(record.steps for record in records))
 
 
-def steps_per_failure(records: Sequence[EpisodeRecord]) -> float | None:
-    """Environment steps paid per valid failure; None without one."""
-    failures = sum(record.outcome is Outcome.FAILURE for record in records)
-    return sum(record.steps for record in records) / failures if failures else None
-
-
 def outcome_features(collision: Collision) -> Floats:
     """Outcome features of one failure, each scaled to [0, 1] and clipped.
 
@@ -166,6 +161,41 @@ def outcome_dispersion(features: Floats) -> float | None:
     return total / pairs / math.sqrt(width)
 
 
+class DistinctFailures:
+    """Which failures are new, decided one by one.
+
+    Choice: a failure is distinct if no earlier distinct one with the same striker, and the same zones on both bodies,
+    has outcome features nearer than `DISTINCT`. A policy that repeats its one way to make the ego fail is then paid
+    for that way once.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._found: dict[tuple[str, str, str], list[Floats]] = {}
+
+    def add(self, collision: Collision) -> bool:
+        """Whether a failure is distinct from all before it; it then counts among them.
+
+        Raises:
+            NotFinite: an outcome feature is NaN.
+        """
+        features = outcome_features(collision)
+        alike = self._found.setdefault((collision.other_id, collision.ego_zone, collision.other_zone), [])
+        if alike:
+            nearest = float(np.sqrt(((np.array(alike) - features) ** 2).mean(axis=1)).min())
+            if nearest < DISTINCT:
+                return False
+        alike.append(features)
+        self.count += 1
+        return True
+
+
+def distinct_failures(collisions: Sequence[Collision]) -> tuple[int, ...]:
+    """Positions of the distinct ones among failures in order of occurrence; see `DistinctFailures`."""
+    found = DistinctFailures()
+    return tuple(position for position, collision in enumerate(collisions) if found.add(collision))
+
+
 def results_digest(records: Sequence[EpisodeRecord]) -> str:
     """SHA-256 over one line of canonical JSON per record; equal digests mean equal results.
 
@@ -193,6 +223,7 @@ class MetricsAccumulator:
         self._cost = self._distance = 0.0
         self._window: deque[bool] = deque(maxlen=WINDOW)
         self._features = np.empty((64, len(FEATURES)))  # doubled when full; the first `_failures` rows count
+        self._distinct = DistinctFailures()
         self._dual_variable = self._temperature = 0.0
 
     def add(self, record: EpisodeRecord) -> RunMetrics:
@@ -226,6 +257,7 @@ class MetricsAccumulator:
         self._distance += _distances(self._features[: self._failures], features)
         self._features[self._failures] = features
         self._failures += 1
+        self._distinct.add(record.collision)
 
     def metrics(self) -> RunMetrics:
         """The figures over all episodes added so far."""
@@ -245,9 +277,10 @@ class MetricsAccumulator:
             efficiency=saved,
             cost_rate=self._cost / max(1, self._steps),
             dispersion=self._distance / pairs / math.sqrt(len(FEATURES)) if pairs else None,
-            steps_per_failure=self._steps / self._failures if self._failures else None,
             dual_variable=self._dual_variable,
             temperature=self._temperature,
+            distinct_failures=self._distinct.count,
+            steps_per_distinct_failure=self._steps / self._distinct.count if self._distinct.count else None,
         )
 
 

@@ -54,6 +54,7 @@ class Results:
     digest: str | None = None  # of all records; None while the run goes on
     versions: Mapping[str, str] | None = None
     wall_s: float = 0.0  # over all resumes
+    cpu_s: float = 0.0  # the same in processor time
     contacts: tuple[Contact, ...] = ()  # in the order of the episodes
 
     def contact(self, id_: str) -> Contact:

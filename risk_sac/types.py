@@ -88,6 +88,10 @@ class Outcome(StrEnum):
     FAILURE = "failure"  # valid collision
 
 
+# The rules, among a collision's verdicts, that speak of the simulator or the control and not of who is to blame.
+ARTEFACT_RULES = frozenset({"no_teleport", "no_spawn_overlap", "after_first_second", "inside_limits", "solid_bodies"})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Collision:
     """The ego's first contact with another actor, with everything later tiers need to judge it."""
@@ -116,6 +120,11 @@ class Collision:
     def valid(self) -> bool:
         """Tier 2: every validity rule passed."""
         return all(self.verdicts.values())
+
+    @property
+    def artefact(self) -> bool:
+        """Whether the simulator or the control made the contact, by one of `ARTEFACT_RULES`."""
+        return any(rule in ARTEFACT_RULES and not passed for rule, passed in self.verdicts.items())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,6 +166,8 @@ class RunMetrics:
     efficiency: float  # ES
     cost_rate: float  # rho_c
     dispersion: float | None  # OFD; None with fewer than two failures
-    steps_per_failure: float | None  # environment steps per valid failure
     dual_variable: float  # λ
     temperature: float  # α
+    # With defaults, so that what was stored before they were counted can still be read.
+    distinct_failures: int = 0  # valid failures that resemble no earlier one, see `risk_sac.metrics`
+    steps_per_distinct_failure: float | None = None  # environment steps; None without a failure

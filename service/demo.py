@@ -189,7 +189,7 @@ def _run_folder(data_dir: Path, campaign: Json, run_id: str) -> Path:
 
 def _summarise(found: Json, console: Console) -> None:
     table = Table(title="What the search found", box=SIMPLE_HEAD, padding=0)  # 80 columns hold the longest method
-    for name in ("method", "episodes", "raw", "valid", "ECR", "95 %", "ES", "cost", "OFD", "steps\n/valid"):
+    for name in ("method", "episodes", "raw", "valid", "ECR", "95 %", "ES", "cost", "OFD", "steps\n/dist."):
         table.add_column(name, justify="left" if name == "method" else "right")
     for total in found["results"]["totals"]:
         table.add_row(
@@ -202,7 +202,7 @@ def _summarise(found: Json, console: Console) -> None:
             _number(total["efficiency"]),
             _number(total["cost_rate"], 3),
             _number(total["dispersion"]),
-            _number(total["steps_per_failure"], 0),
+            _number(total["steps_per_distinct_failure"], 0),
         )
     console.print(table)
 

@@ -2,13 +2,10 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from risk_sac.metrics import bootstrap_interval
 from risk_sac.types import RunMetrics
 from service.records import Campaign, Run
 from service.schemas import Results, RunResult, Total
-
-RESAMPLES = 2000
 
 
 def results(campaign: Campaign) -> Results:
@@ -35,16 +32,13 @@ def interval(group: Sequence[RunMetrics]) -> tuple[float, float]:
     """95 % interval of the mean ECR: Wilson for one run, percentile bootstrap over the seeds for more."""
     if len(group) == 1:
         return group[0].ecr_low, group[0].ecr_high
-    rates = np.array([metrics.ecr for metrics in group])
-    picks = np.random.default_rng(0).integers(len(rates), size=(RESAMPLES, len(rates)))
-    low, high = np.quantile(rates[picks].mean(axis=1), [0.025, 0.975])
-    return float(low), float(high)
+    return bootstrap_interval([metrics.ecr for metrics in group], seed=0)
 
 
 def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
     low, high = interval(group)
     steps = sum(metrics.environment_steps for metrics in group)
-    failures = sum(metrics.failures for metrics in group)
+    distinct = sum(metrics.distinct_failures for metrics in group)
     dispersions = [metrics.dispersion for metrics in group if metrics.dispersion is not None]
     return Total.model_validate(
         {
@@ -54,7 +48,7 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
             "episodes": sum(metrics.episodes for metrics in group),
             "rejected": sum(metrics.rejected for metrics in group),
             "raw_collisions": sum(metrics.raw_collisions for metrics in group),
-            "failures": failures,
+            "failures": sum(metrics.failures for metrics in group),
             "environment_steps": steps,
             "ecr": _mean([metrics.ecr for metrics in group]),
             "ecr_low": low,
@@ -62,7 +56,8 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
             "efficiency": _mean([metrics.efficiency for metrics in group]),
             "cost_rate": _mean([metrics.cost_rate for metrics in group]),
             "dispersion": _mean(dispersions) if dispersions else None,
-            "steps_per_failure": steps / failures if failures else None,
+            "distinct_failures": distinct,
+            "steps_per_distinct_failure": steps / distinct if distinct else None,
         }
     )
 

@@ -49,12 +49,14 @@ class Metrics(Body):
     """Mean realism cost per step, in [0, 1]."""
     dispersion: Real
     """Outcome feature dispersion of the failures, in [0, 1]; null with fewer than two."""
-    steps_per_failure: Real
-    """Environment steps per valid failure; null without one."""
     dual_variable: Real
     """λ."""
     temperature: Real
     """α."""
+    distinct_failures: int
+    """Valid collisions that resemble no earlier one: another actor, other zones of contact or other outcome features."""
+    steps_per_distinct_failure: Real
+    """Environment steps per distinct failure; null without one."""
 
 
 class Run(Body):
@@ -301,7 +303,9 @@ class Total(Body):
     """Mean over the runs."""
     dispersion: Real
     """Mean over the runs that have one."""
-    steps_per_failure: Real
+    distinct_failures: int
+    """Sum over the runs; what two runs found alike counts twice."""
+    steps_per_distinct_failure: Real
 
 
 class Results(Body):

@@ -79,6 +79,11 @@ class CampaignSpec(Settings):
             raise ValueError(f"requirements are named {names}; wanted each name once")
         return self
 
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the canonical JSON, the label included."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
+
     def runs(self) -> tuple[RunSpec, ...]:
         """The runs in the order they are queued: seeds outermost, so that early results compare methods."""
         shared = {name: getattr(self, name) for name in ("budget", "ego", "odd", "requirements", "learner")}

@@ -101,7 +101,6 @@ def metrics(episodes: int) -> RunMetrics:
         efficiency=0.0,
         cost_rate=0.0,
         dispersion=None,
-        steps_per_failure=None,
         dual_variable=0.0,
         temperature=0.0,
     )

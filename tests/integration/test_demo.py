@@ -42,7 +42,7 @@ def test_summary_of_every_method_fits_80_columns(capsys):
         "raw_collisions": 999,
         "failures": 999,
         **dict.fromkeys(("ecr", "ecr_low", "ecr_high", "efficiency", "cost_rate", "dispersion"), 0.5),
-        "steps_per_failure": 12_345.0,
+        "steps_per_distinct_failure": 12_345.0,
     }
     totals = [total | {"method": method} for method in METHODS]
     demo._summarise({"results": {"totals": totals}}, demo.Console(width=80))

@@ -149,7 +149,8 @@ def test_interrupt_ends_the_run_after_its_episode_and_it_goes_on(tmp_path: Path)
     stopped = run(SPEC, tmp_path / "parts", interrupt)
     assert (stopped.finished, stopped.metrics and stopped.metrics.episodes) == (False, 2)
     resumed = run(SPEC, tmp_path / "parts", ignore)
-    assert replace(resumed, wall_s=0.0) == replace(whole, wall_s=0.0)
+    assert replace(resumed, wall_s=0.0, cpu_s=0.0) == replace(whole, wall_s=0.0, cpu_s=0.0)
+    assert resumed.cpu_s > stopped.cpu_s > 0
     assert resumed.wall_s > stopped.wall_s
     parts, at_once = ((tmp_path / name / "episodes.jsonl").read_bytes() for name in ("parts", "whole"))
     assert parts == at_once
@@ -158,9 +159,12 @@ def test_interrupt_ends_the_run_after_its_episode_and_it_goes_on(tmp_path: Path)
 def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path: Path) -> None:
     whole = run(SPEC, tmp_path, ignore)
     (tmp_path / "checkpoint").unlink()  # as if killed before the first one
-    write_results(tmp_path, replace(whole, metrics=None, digest=None, finished=False, contacts=(), wall_s=0.0))
+    write_results(
+        tmp_path, replace(whole, metrics=None, digest=None, finished=False, contacts=(), wall_s=0.0, cpu_s=0.0)
+    )
     (tmp_path / "episodes.jsonl").write_text("stale\n" * 5)
-    assert replace(run(SPEC, tmp_path, ignore), wall_s=0.0) == replace(whole, wall_s=0.0)
+    again = run(SPEC, tmp_path, ignore)
+    assert replace(again, wall_s=0.0, cpu_s=0.0) == replace(whole, wall_s=0.0, cpu_s=0.0)
     assert len((tmp_path / "episodes.jsonl").read_text().splitlines()) == 3
 
 

@@ -25,9 +25,10 @@ def metrics() -> RunMetrics:
         efficiency=0.5,
         cost_rate=0.1,
         dispersion=None,
-        steps_per_failure=400.0,
         dual_variable=0.3,
         temperature=0.2,
+        distinct_failures=1,
+        steps_per_distinct_failure=400.0,
     )
 
 

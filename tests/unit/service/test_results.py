@@ -19,7 +19,7 @@ def test_totals_are_per_family_and_method_over_the_seeds(ledger, metrics):
     assert [run.metrics is not None for run in found.runs] == [True, False, True, False]
     (total,) = found.totals
     assert (total.method, total.runs, total.episodes, total.failures) == ("sac", 2, 8, 4)
-    assert (total.ecr, total.dispersion, total.steps_per_failure) == (0.5, 0.5, 200.0)
+    assert (total.ecr, total.dispersion, total.steps_per_distinct_failure) == (0.5, 0.5, 400.0)
     assert total.ecr_low <= 0.5 <= total.ecr_high
 
 

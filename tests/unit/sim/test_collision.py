@@ -8,7 +8,7 @@ import pytest
 
 from risk_sac.geometry import relative_view
 from risk_sac.sim.collision import Contact, History, agrees, find_contact, verdicts
-from risk_sac.types import STEP_S, Frame, Kind, Role, Signal
+from risk_sac.types import ARTEFACT_RULES, STEP_S, Frame, Kind, Role, Signal
 
 LENGTH_M, WIDTH_M = 4.6, 1.85
 START_S = 0.1
@@ -170,6 +170,14 @@ def test_a_standing_ego_has_no_part_in_its_collision(speed_mps: float, rules: se
 @pytest.mark.parametrize(("after_s", "rules"), [(0.95, {"after_first_second"}), (1.05, set())])
 def test_the_first_second_does_not_count(after_s: float, rules: set[str]) -> None:
     assert broken(frames(*INTO_LEADER, time_s=START_S + after_s)) == rules
+
+
+def test_artefact_rules_are_verdicts_that_blame_nobody() -> None:
+    contact = contact_of(*frames(*INTO_LEADER))
+    assert contact is not None
+    named = set(verdicts(contact, frames(*INTO_LEADER)[1], CLEAN))
+    assert named - ARTEFACT_RULES == {"not_from_behind", "ego_moving", "no_sideswipe", "seen_before"}
+    assert named > ARTEFACT_RULES
 
 
 def test_every_broken_rule_is_named() -> None:
