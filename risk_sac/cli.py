@@ -1,24 +1,30 @@
-"""`risk-sac`: one run without a server, pictures of what it found, and the server itself."""
+"""`risk-sac`: one run or a comparison of methods without a server, pictures of failures, and the server itself."""
 
 import argparse
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from risk_sac.config import METHODS, RunSpec
+from risk_sac.config import METHODS, FamilyName, RunSpec
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.results import Results, read_results
-from risk_sac.spec_file import read_spec
+from risk_sac.spec_file import read_campaign, read_spec
 from risk_sac.types import RunMetrics
 
+if TYPE_CHECKING:
+    from risk_sac.evaluate import Job
+
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
+SEEDS = 5  # of a comparison that names none
 console = Console(highlight=False)
 errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
@@ -26,6 +32,7 @@ errors = Console(stderr=True, highlight=False, soft_wrap=True)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
     options = _parser().parse_args(arguments)
+    options.typed = shlex.join(["risk-sac", *(sys.argv[1:] if arguments is None else arguments)])
     try:
         status: int = options.command(options)
     except ConfigError as error:
@@ -54,6 +61,21 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
     run.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags go first")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
+    evaluate = commands.add_parser(
+        "evaluate", help="compare methods over seeds, with tables and figures; the same command again goes on with it"
+    )
+    evaluate.set_defaults(command=_evaluate)
+    evaluate.add_argument("--families", nargs="+", metavar="low|mixed|dense", help="(default: all)")
+    evaluate.add_argument("--methods", nargs="+", metavar="NAME", help=f"of {', '.join(METHODS)} (default: all)")
+    evaluate.add_argument("--seeds", type=int, metavar="N", help=f"how many (default: {SEEDS})")
+    evaluate.add_argument("--first-seed", type=int, metavar="S", help="the N seeds begin here (default: 0)")
+    evaluate.add_argument("--episodes", type=int, metavar="N", help="search episodes of each run (default: 300)")
+    evaluate.add_argument(
+        "--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)"
+    )
+    evaluate.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags go first")
+    evaluate.add_argument("--jobs", type=int, metavar="N", help="runs at a time (default: one per core)")
+    evaluate.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of runs, tables and figures")
     show = commands.add_parser("show", help="list a run's contacts, or draw one")
     show.set_defaults(command=_show)
     show.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
@@ -89,6 +111,62 @@ def _run(options: argparse.Namespace) -> int:
     console.print(_summary(spec, results))
     console.print(f"Results: {options.out}/results.json")
     return OK
+
+
+def _evaluate(options: argparse.Namespace) -> int:
+    flags = {name: getattr(options, name) for name in ("families", "methods", "episodes", "evaluation_episodes")}
+    defaults = {"families": get_args(FamilyName), "methods": tuple(METHODS), "seeds": range(SEEDS)}
+    defaults = {name: list(values) for name, values in defaults.items()}
+    spec = read_campaign(options.spec, flags | {"seeds": _seeds(options)}, defaults)
+    from risk_sac.evaluate import evaluate  # here, because loading what checks the settings takes seconds
+
+    with _progress_bar() as bar:
+        jobs = options.jobs if options.jobs is not None else os.cpu_count() or 1
+        evaluation = evaluate(spec, options.out, options.typed, jobs, _Board(bar))
+    for job in evaluation.failed:
+        _complain(f"{job.name}: {job.reason}")
+    comparison = evaluation.comparison
+    runs = f"{len(comparison.runs)} of {len(comparison.runs) + len(comparison.missing)} runs"
+    console.print(f"Report of {runs}: {options.out}/table.md, table.json, table.csv, figures/", soft_wrap=True)
+    if evaluation.stopped:
+        console.print("Stopped. The same command again goes on from there.")
+        return INTERRUPTED
+    return FAILED if comparison.missing else OK
+
+
+def _seeds(options: argparse.Namespace) -> list[int] | None:
+    """The seeds that flags ask for; None where they ask for none."""
+    if options.seeds is None and options.first_seed is None:
+        return None
+    count = SEEDS if options.seeds is None else options.seeds
+    if not 1 <= count <= 100:
+        raise ConfigError(f"got {count}; wanted 1 to 100 seeds", field="seeds")
+    first = options.first_seed or 0
+    return list(range(first, first + count))
+
+
+class _Board:
+    """One bar for the campaign, and one for each run at work."""
+
+    def __init__(self, bar: Progress) -> None:
+        self._bar = bar
+        self._all = bar.add_task("all runs", total=None, found="")
+        self._tasks: dict[str, Any] = {}
+
+    def __call__(self, jobs: "Sequence[Job]") -> None:
+        """Draws the present state."""
+        done = {job.name: job.total if job.state == "finished" else job.done() for job in jobs}
+        finished = sum(job.state == "finished" for job in jobs)
+        failed = sum(job.state == "failed" for job in jobs)
+        found = f"{finished}/{len(jobs)} runs" + (f", {failed} failed" if failed else "")
+        self._bar.update(self._all, completed=sum(done.values()), total=sum(job.total for job in jobs), found=found)
+        for job in jobs:
+            if job.state == "running" and job.name not in self._tasks:
+                self._tasks[job.name] = self._bar.add_task(job.name, total=job.total, found="")
+            elif job.state != "running" and job.name in self._tasks:
+                self._bar.remove_task(self._tasks.pop(job.name))
+        for name, task in self._tasks.items():
+            self._bar.update(task, completed=done[name])
 
 
 def _show(options: argparse.Namespace) -> int:

@@ -1,16 +1,14 @@
 """One run without a server: started or resumed in a folder, written down as it goes, stopped by Ctrl-C."""
 
-import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 
 from risk_sac.config import RunSpec
 from risk_sac.problem import Problem
 from risk_sac.recorder import Recorder
 from risk_sac.results import Results
+from risk_sac.stopping import stop_signal
 from risk_sac.train import train
 from risk_sac.types import EpisodeRecord, RunMetrics
 
@@ -27,7 +25,7 @@ def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
       OSError: the folder cannot be written.
     """
     Problem.from_spec(spec)  # before the folder is claimed
-    with _stop_signal() as stopping, Recorder(spec, folder, Watcher(progress, stopping)) as recorder:
+    with stop_signal() as stopping, Recorder(spec, folder, Watcher(progress, stopping)) as recorder:
         return recorder.finish(train(spec, folder, recorder))
 
 
@@ -41,23 +39,3 @@ class Watcher:
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
         """Counts an episode."""
         self.progress(record.index + 1, metrics)
-
-
-@contextmanager
-def _stop_signal() -> Iterator[Callable[[], bool]]:
-    """Turns the first SIGINT or SIGTERM into an answer; a second one acts as always."""
-    stopping = False
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        nonlocal stopping
-        stopping = True
-        signal.signal(number, earlier[signal.Signals(number)])
-
-    earlier = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    for number in earlier:
-        signal.signal(number, stop)
-    try:
-        yield lambda: stopping
-    finally:
-        for number, handler in earlier.items():
-            signal.signal(number, handler)

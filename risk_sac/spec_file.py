@@ -1,4 +1,4 @@
-"""A run's settings from YAML and command-line flags, checked as strictly as a REST body."""
+"""Settings of runs and campaigns from YAML and command-line flags, checked as strictly as a REST body."""
 
 import json
 from collections.abc import Mapping
@@ -26,14 +26,38 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
       ConfigError: the first wrong field.
     """
     given = {name: value for name, value in flags.items() if value is not None}
-    budget = {name: given.pop(name) for name in ("episodes", "evaluation_episodes") if name in given}
-    data = {"method": "risk-sac", "seed": 0} if file is None else _read_yaml(file)
-    if budget:
-        stored = data.get("budget", {})
-        data["budget"] = {**stored, **budget} if isinstance(stored, dict) else stored
+    data = _with_budget({"method": "risk-sac", "seed": 0} if file is None else _read_yaml(file), given)
     if data.keys() & {"label", *CAMPAIGN_ONLY.values()}:
         return _only_run(data | {CAMPAIGN_ONLY[name]: [value] for name, value in given.items()})
     return _validate(RunSpec, data | given)
+
+
+def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping[str, Any]) -> CampaignSpec:
+    """The campaign described by a file, overridden by flags.
+
+    Args:
+      file: YAML of a CampaignSpec.
+      flags: fields of CampaignSpec, those of its budget under their own names; None where a flag was not given.
+      defaults: fields that neither file nor flags may give.
+
+    Raises:
+      ConfigError: the first wrong field.
+    """
+    given = {name: value for name, value in flags.items() if value is not None}
+    data = _with_budget({} if file is None else _read_yaml(file), given)
+    return _validate(CampaignSpec, {**defaults, **data, **given})
+
+
+def campaign_yaml(spec: CampaignSpec) -> str:
+    """A campaign as YAML that reads back as the same campaign."""
+    return yaml.safe_dump(spec.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+
+
+def _with_budget(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    """Moves the budget's fields from the flags to where a spec has them."""
+    budget = {name: given.pop(name) for name in ("episodes", "evaluation_episodes") if name in given}
+    stored = data.get("budget", {})
+    return data | {"budget": {**stored, **budget}} if budget and isinstance(stored, dict) else data
 
 
 def _read_yaml(file: Path) -> dict[str, Any]:

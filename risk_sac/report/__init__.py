@@ -1,0 +1,32 @@
+"""The report of a campaign: finished runs in, comparison, tables and figures out.
+
+    runs = [read_run(folder) for folder in folders]
+    comparison = compare(spec, runs, command)
+    write_report(comparison, folder)        # table.json, table.md, table.csv, figures/
+    table_markdown(comparison); figure_bytes(comparison, "ecr_low", "svg")
+
+Loads neither torch nor libsumo, so that a server can do it too.
+"""
+
+from risk_sac.report.comparison import Comparison, MissingRun, PairedTest, compare
+from risk_sac.report.data import table_csv, table_json
+from risk_sac.report.figures import figure_bytes, figure_names
+from risk_sac.report.files import write_report
+from risk_sac.report.markdown import run_command, table_markdown
+from risk_sac.report.runs import FinishedRun, read_run
+
+__all__ = [
+    "Comparison",
+    "FinishedRun",
+    "MissingRun",
+    "PairedTest",
+    "compare",
+    "figure_bytes",
+    "figure_names",
+    "read_run",
+    "run_command",
+    "table_csv",
+    "table_json",
+    "table_markdown",
+    "write_report",
+]

@@ -1,0 +1,91 @@
+"""The comparison as data: JSON with everything, CSV with one row per cell and phase."""
+
+import csv
+import io
+import json
+from dataclasses import asdict
+from typing import Any
+
+from risk_sac.report.cells import METRICS, Cell
+from risk_sac.report.comparison import Comparison
+from risk_sac.report.provenance import this_platform
+from risk_sac.report.runs import FinishedRun
+
+FORMAT_VERSION = 1
+_PLAIN = (
+    "episodes",
+    "failures",
+    "distinct_failures",
+    "environment_steps",
+    "steps_per_distinct_failure",
+    "cpu_s_per_distinct_failure",
+    "raw_rate",
+    "artefact_rate",
+    "degenerate_rate",
+    "rejected_rate",
+)
+
+
+def document(comparison: Comparison) -> dict[str, Any]:
+    """What `table.json` holds."""
+    return {
+        "format_version": FORMAT_VERSION,
+        "command": comparison.command,
+        "spec_digest": comparison.spec.digest,
+        "spec": comparison.spec.model_dump(mode="json"),
+        "versions": dict(comparison.versions),
+        "platform": dict(this_platform()),
+        "complete": not comparison.missing,
+        "missing": [
+            {"family": run.spec.family, "method": run.spec.method, "seed": run.spec.seed, "reason": run.reason}
+            for run in comparison.missing
+        ],
+        "reference": comparison.reference,
+        "cells": [asdict(cell) for cell in comparison.cells],
+        "tests": [asdict(test) for test in comparison.tests],
+        "runs": [_row(run) for run in comparison.runs],
+    }
+
+
+def table_json(comparison: Comparison) -> str:
+    """`table.json`."""
+    return json.dumps(document(comparison), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def table_csv(comparison: Comparison) -> str:
+    """`table.csv`; empty where there is no value."""
+    text = io.StringIO()
+    names = ["family", "method", "phase", "runs", *_PLAIN]
+    for metric in METRICS:
+        names += [metric.name, f"{metric.name}_low", f"{metric.name}_high", f"{metric.name}_runs"]
+    writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_cell_row(cell) for cell in comparison.cells)
+    return text.getvalue()
+
+
+def _cell_row(cell: Cell) -> dict[str, Any]:
+    row: dict[str, Any] = {"family": cell.family, "method": cell.method, "phase": cell.phase, "runs": len(cell.seeds)}
+    row |= {name: getattr(cell, name) for name in _PLAIN}
+    for name, estimate in cell.estimates.items():
+        row |= {
+            name: estimate.mean,
+            f"{name}_low": estimate.low,
+            f"{name}_high": estimate.high,
+            f"{name}_runs": estimate.runs,
+        }
+    return row
+
+
+def _row(run: FinishedRun) -> dict[str, Any]:
+    return {
+        "family": run.spec.family,
+        "method": run.spec.method,
+        "seed": run.spec.seed,
+        "digest": run.digest,
+        "spec_digest": run.spec.digest,
+        "metrics": {phase: asdict(metrics) for phase, metrics in run.metrics.items()},
+        "wall_s": run.wall_s,
+        "cpu_s": run.cpu_s,
+        "versions": dict(run.versions),
+    }

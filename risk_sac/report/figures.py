@@ -1,0 +1,256 @@
+"""The comparison as pictures: how the methods search (the paper's Fig. 4a), what they reach (Fig. 4b-d), λ and α."""
+
+import io
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from risk_sac.config import METHODS, FamilyName, MethodName
+from risk_sac.errors import ConfigError
+from risk_sac.metrics import WINDOW
+from risk_sac.report.cells import METRICS, RESAMPLING_SEED, Metric
+from risk_sac.report.comparison import REFERENCE, Comparison
+from risk_sac.report.runs import FinishedRun, Phase
+from risk_sac.types import Floats, Outcome
+
+Format = Literal["png", "svg"]
+FORMATS: tuple[Format, ...] = get_args(Format)
+RESAMPLES = 2000  # per curve; a band needs less than a table
+BARS = ("ecr", "es", "rho_c", "ofd")
+SETTLED = 10  # episodes before which a windowed rate is mostly noise
+CURVE_IN, BARS_IN, DPI = (6.4, 3.4), (7.2, 3.2), 200
+STYLE: dict[Any, Any] = {  # matplotlib types the keys one by one
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "0.9",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "svg.hashsalt": "risk-sac",  # the same ids in every drawing
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a method is drawn in every figure."""
+
+    colour: str
+    dashes: str
+    width: float = 1.3
+
+
+# Paul Tol's "muted" scheme, safe for the colour-blind; line styles tell apart what a grey print does not.
+_MUTED = ("#CC6677", "#332288", "#117733", "#DDCC77", "#88CCEE", "#882255", "#44AA99", "#AA4499", "#999933")
+_DASHES = ("-", "--", "-.")
+_OWN = {
+    REFERENCE: Look("#000000", "-", 2.0),
+    "random": Look("#777777", ":"),
+    "no-adversary": Look("#BBBBBB", ":"),
+}
+
+
+def _looks() -> dict[MethodName, Look]:
+    """By the table of methods, so that a method looks the same whichever others are compared."""
+    others = [method for method in METHODS if method not in _OWN]
+    drawn = {
+        method: Look(_MUTED[place % len(_MUTED)], _DASHES[place % len(_DASHES)]) for place, method in enumerate(others)
+    }
+    return {method: _OWN.get(method) or drawn[method] for method in METHODS}
+
+
+LOOKS = _looks()
+
+
+def figure_names(comparison: Comparison) -> tuple[str, ...]:
+    """What there is to draw."""
+    return tuple(_figures(comparison))
+
+
+def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
+    """One figure as a file; the same comparison gives the same bytes.
+
+    Raises:
+        ConfigError: there is no such figure.
+    """
+    figures = _figures(comparison)
+    if name not in figures:
+        raise ConfigError(f"got {name!r}; wanted one of {', '.join(figures) or 'none: no run has finished'}")
+    with mpl.rc_context(STYLE):
+        figure = figures[name]()
+        file = io.BytesIO()
+        metadata = {"Date": None} if format_ == "svg" else {"Software": None}
+        figure.savefig(file, format=format_, dpi=DPI, metadata=metadata)
+    return file.getvalue()
+
+
+def _figures(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
+    """Name -> what draws it."""
+    figures: dict[str, Callable[[], Figure]] = {}
+    for family in (family for family in comparison.spec.families if comparison.group(family, "search")):
+        for curve in CURVES:
+            if any(_drawn(comparison, family, curve)):
+                figures[f"{curve.name}_{family}"] = lambda family=family, curve=curve: _curves(  # type: ignore[misc]
+                    comparison, family, curve
+                )
+    for phase in comparison.phases:
+        for metric in (metric for metric in METRICS if metric.name in BARS):
+            suffix = "" if phase == "search" else f"_{phase}"
+            figures[f"bars_{metric.name}{suffix}"] = lambda metric=metric, phase=phase: _bars(  # type: ignore[misc]
+                comparison, metric, phase
+            )
+    return figures
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """A figure over the episodes of the search."""
+
+    name: str
+    label: str
+    values: Callable[[FinishedRun], Floats]  # one per search episode
+    methods: Callable[[MethodName], bool]
+    log: bool = False
+    top: float | None = None
+    first: int = 1  # episode at which it begins
+
+
+def window_ecr(run: FinishedRun) -> Floats:
+    """ECR over the newest `WINDOW` episodes, after each episode; over all while there are fewer."""
+    failed = [record.outcome is Outcome.FAILURE for record in run.phase("search")]
+    total = np.concatenate(([0], np.cumsum(failed)))
+    after = np.arange(1, len(total))
+    begin = np.maximum(0, after - WINDOW)
+    rates: Floats = (total[after] - total[begin]) / (after - begin)
+    return rates
+
+
+CURVES = (
+    Curve(
+        name="ecr",
+        label=f"ECR, newest {WINDOW} episodes",
+        values=window_ecr,
+        methods=lambda method: True,
+        top=1.0,
+        first=SETTLED,
+    ),
+    Curve(
+        name="lambda",
+        label="dual variable λ",
+        values=lambda run: np.array([record.dual_variable for record in run.phase("search")]),
+        methods=lambda method: METHODS[method].lagrangian,
+    ),
+    Curve(
+        name="alpha",
+        label="temperature α",
+        values=lambda run: np.array([record.temperature for record in run.phase("search")]),
+        methods=lambda method: METHODS[method].agent == "sac",
+        log=True,
+    ),
+)
+
+
+def _drawn(comparison: Comparison, family: FamilyName, curve: Curve) -> Iterator[tuple[MethodName, Floats]]:
+    """The methods of a figure with their runs' values, `runs x episodes`."""
+    for method in comparison.methods:
+        runs = comparison.of_cell(family, method)
+        if runs and curve.methods(method):
+            yield method, np.array([curve.values(run) for run in runs])
+
+
+def _curves(comparison: Comparison, family: FamilyName, curve: Curve) -> Figure:
+    figure, axes = _canvas(CURVE_IN)
+    most = 1
+    for rank, (method, values) in enumerate(_drawn(comparison, family, curve)):
+        most = max(most, len(values))
+        look = LOOKS[method]
+        front = 100 - rank  # the reference lies on top
+        episodes = np.arange(1, values.shape[1] + 1)
+        first = min(curve.first, len(episodes)) - 1
+        episodes, values = episodes[first:], values[:, first:]
+        axes.plot(
+            episodes,
+            values.mean(axis=0),
+            color=look.colour,
+            linestyle=look.dashes,
+            linewidth=look.width,
+            label=method,
+            zorder=front,
+        )
+        if len(values) > 1:
+            axes.fill_between(episodes, *_band(values), color=look.colour, alpha=0.13, linewidth=0, zorder=1)
+    axes.set_xlabel("search episode")
+    axes.set_ylabel(curve.label)
+    axes.margins(x=0)
+    if curve.log:
+        axes.set_yscale("log")
+    else:
+        axes.set_ylim(0, curve.top)
+    band = "; band: 95 % bootstrap interval" if most > 1 else ""
+    axes.set_title(f"{family}: mean over {_seeds(most)}{band}", fontsize=9, loc="left")
+    _legend(figure, axes)
+    return figure
+
+
+def _band(values: Floats) -> tuple[Floats, Floats]:
+    """Pointwise bootstrap over the runs, all points by the same draws."""
+    runs = len(values)
+    drawn = np.random.default_rng(RESAMPLING_SEED).multinomial(runs, [1 / runs] * runs, size=RESAMPLES)
+    low, high = np.quantile(drawn / runs @ values, (0.025, 0.975), axis=0)
+    return low, high
+
+
+def _bars(comparison: Comparison, metric: Metric, phase: Phase) -> Figure:
+    figure, axes = _canvas(BARS_IN)
+    families = [family for family in comparison.spec.families if comparison.group(family, phase)]
+    methods = [method for method in comparison.methods if any(cell.method == method for cell in comparison.cells)]
+    width = 0.84 / len(methods)
+    most = 1
+    for place, method in enumerate(methods):
+        label: str | None = method
+        for middle, family in enumerate(families):
+            cells = [cell for cell in comparison.group(family, phase) if cell.method == method]
+            estimate = cells[0].estimates[metric.name] if cells else None
+            x = middle + (place - (len(methods) - 1) / 2) * width
+            most = max(most, estimate.runs if estimate else 0)
+            mean = estimate.mean if estimate else None
+            if not mean:  # a bar that nobody sees
+                axes.text(x, 0, "–" if mean is None else "0", ha="center", va="bottom", color="0.4", fontsize=7)
+            axes.bar(x, mean or 0.0, 0.9 * width, color=LOOKS[method].colour, label=label)
+            label = None
+            if estimate and mean is not None and estimate.low is not None and estimate.high is not None:
+                error = [[mean - estimate.low], [estimate.high - mean]]
+                axes.errorbar(x, mean, error, color="0.35", linewidth=0.9, capsize=1.5 if len(methods) > 5 else 3)
+    axes.set_xticks(range(len(families)), families)
+    axes.tick_params(axis="x", length=0)
+    axes.grid(visible=False, axis="x")
+    axes.set_ylabel(f"{metric.symbol} ({phase})")
+    axes.set_ylim(bottom=0)
+    interval = "; lines: 95 % bootstrap interval" if most > 1 else ""
+    axes.set_title(f"mean over {_seeds(most)}{interval}; –: no value", fontsize=9, loc="left")
+    _legend(figure, axes)
+    return figure
+
+
+def _canvas(size: tuple[float, float]) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.add_subplot()
+
+
+def _seeds(runs: int) -> str:
+    return "1 seed" if runs == 1 else f"{runs} seeds"
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    """Beside the axes, where ten methods hide nothing."""
+    handles: Sequence[object]
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right upper", fontsize=8, handlelength=2.4)

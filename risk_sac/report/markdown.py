@@ -1,0 +1,233 @@
+"""The comparison as a page to read: tables, tests, and everything needed to judge and repeat them."""
+
+import shlex
+from collections.abc import Iterable, Iterator, Sequence
+
+from risk_sac.config import FamilyName, RunSpec
+from risk_sac.metrics import DISTINCT
+from risk_sac.report.cells import METRICS, Cell, Estimate
+from risk_sac.report.comparison import LEVEL, Comparison, PairedTest
+from risk_sac.report.provenance import this_platform
+from risk_sac.report.runs import Phase
+from risk_sac.report.statistics import pairs_needed, smallest_p
+from risk_sac.types import ARTEFACT_RULES
+
+DASH = "–"
+CONTROL = "no-adversary"
+SYMBOLS = {metric.name: metric.symbol for metric in METRICS}
+SHOWN = tuple(metric.name for metric in METRICS if metric.name != "distinct_per_1000_steps")  # as its reciprocal
+# RISK-SAC's row of the paper's Table I: ECR, ES, ρ̄_c (at most), OFD.
+PAPER: dict[FamilyName, tuple[float, float, float, float]] = {
+    "low": (0.97, 0.94, 0.15, 0.82),
+    "mixed": (0.92, 0.88, 0.25, 0.85),
+    "dense": (0.89, 0.84, 0.30, 0.92),
+}
+
+
+def table_markdown(comparison: Comparison) -> str:
+    """`table.md`."""
+    sections = [_head(comparison), _missing(comparison)]
+    for family in comparison.spec.families:
+        for phase in comparison.phases:
+            sections += [_cells(comparison, family, phase), _tests(comparison, family, phase)]
+    sections += [_control(comparison), _paper(comparison), _definitions(), _repeat(comparison)]
+    return "\n".join(section for section in sections if section)
+
+
+def _head(comparison: Comparison) -> str:
+    spec, platform = comparison.spec, this_platform()
+    versions = ", ".join(f"{name} {version}" for name, version in comparison.versions.items())
+    facts = {
+        "campaign": f"`{spec.digest}`",
+        "runs": f"{len(comparison.runs)} of {len(comparison.runs) + len(comparison.missing)}: "
+        f"families {', '.join(spec.families)} × {len(spec.methods)} methods × seeds {', '.join(map(str, spec.seeds))}",
+        "budget of a run": f"{spec.budget.episodes} search episodes, {spec.budget.evaluation_episodes} evaluation "
+        "episodes with the policy frozen",
+        "versions": versions or DASH,
+        "platform": f"{platform['machine']}, {platform['cpu']}, Python {platform['python']}",
+    }
+    lines = (f"- {name}: {value}" for name, value in facts.items())
+    return f"# Comparison of methods\n\n```\n{comparison.command}\n```\n\n" + "\n".join(lines) + "\n"
+
+
+def _missing(comparison: Comparison) -> str:
+    if not comparison.missing:
+        return ""
+    rows = ([run.spec.family, run.spec.method, str(run.spec.seed), run.reason] for run in comparison.missing)
+    title = f"## Missing: {len(comparison.missing)} runs\n\nThe tables hold only what has finished.\n\n"
+    return title + _table(["family", "method", "seed", "why"], rows, left=4)
+
+
+def _cells(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
+    seeds = len(comparison.spec.seeds)
+    columns = ["method", "seeds", *(SYMBOLS[name] for name in SHOWN if _has(phase, name)), "distinct"]
+    columns += ["steps / distinct", "CPU s / distinct"] if phase == "search" else ["steps / distinct"]
+    columns += ["artefact", "degenerate", "rejected"]
+    rows = [_cell(cell, seeds) for cell in comparison.group(family, phase)]
+    return f"## {family}, {phase}\n\n" + _table(columns, rows) if rows else ""
+
+
+def _has(phase: Phase, name: str) -> bool:
+    return any(metric.name == name and phase in metric.phases for metric in METRICS)
+
+
+def _cell(cell: Cell, seeds: int) -> list[str]:
+    runs = len(cell.seeds)
+    row = [cell.method, str(runs) if runs == seeds else f"{runs} of {seeds}"]
+    row += [_estimate(cell.estimates[name], runs) for name in SHOWN if name in cell.estimates]
+    row += [str(cell.distinct_failures), _number(cell.steps_per_distinct_failure, ",.0f")]
+    if cell.phase == "search":
+        row.append(_number(cell.cpu_s_per_distinct_failure, ",.1f"))
+    return row + [_percent(rate) for rate in (cell.artefact_rate, cell.degenerate_rate, cell.rejected_rate)]
+
+
+def _estimate(estimate: Estimate, runs: int) -> str:
+    if estimate.mean is None:
+        return DASH
+    text = f"{estimate.mean:.3f}" + _interval(estimate.low, estimate.high)
+    return text if estimate.runs == runs else f"{text} ({estimate.runs} of {runs} seeds)"
+
+
+def _tests(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
+    tests = [test for test in comparison.tests if (test.family, test.phase) == (family, phase)]
+    if not tests:
+        return ""
+    columns = ["metric", "against", "pairs", "difference (95 %)", "A12", "p", "p (Holm)"]
+    title = f"### {comparison.reference} against the others: {family}, {phase}\n\n"
+    return title + _table(columns, map(_test, tests), left=2) + "\n" + "".join(_power(tests)) + "\n"
+
+
+def _test(test: PairedTest) -> list[str]:
+    p_holm = _p(test.p_holm)
+    return [
+        SYMBOLS[test.metric],
+        test.method,
+        str(test.pairs),
+        _number(test.difference, "+.3f") + _interval(test.low, test.high, "+.3f"),
+        _number(test.a12, ".2f"),
+        _p(test.p),
+        f"**{p_holm}**" if test.significant else p_holm,
+    ]
+
+
+def _power(tests: Sequence[PairedTest]) -> Iterator[str]:
+    """What the number of pairs lets the tests say."""
+    hypotheses = sum(test.p is not None for test in tests)
+    if not hypotheses:
+        yield "No pair of methods has two seeds in common, so nothing is tested."
+        return
+    pairs = max(test.pairs for test in tests)
+    least = smallest_p(pairs)
+    yield f"The smallest p that {pairs} pairs can give is {least:.4g}; corrected over {hypotheses} tests it is at best "
+    yield f"{min(1.0, hypotheses * least):.3g}. "
+    if hypotheses * least > LEVEL:
+        needed = pairs_needed(hypotheses, LEVEL)
+        yield f"So no corrected test can fall below {LEVEL:g} here, whatever the methods do: "
+        yield f"that takes {needed} seeds. "
+        yield "Read the intervals and A12 instead."
+
+
+def _control(comparison: Comparison) -> str:
+    """How often the simulator makes a contact by itself."""
+    cells = [cell for cell in comparison.cells if cell.method == CONTROL]
+    if not cells:
+        return ""
+    rows = ([cell.family, cell.phase, str(cell.episodes), _percent(cell.raw_rate)] for cell in cells)
+    title = "## The simulator's own artefacts\n\nContacts of any kind with `no-adversary`, where nobody attacks.\n\n"
+    return title + _table(["family", "phase", "episodes", "raw contacts"], rows, left=2)
+
+
+def _paper(comparison: Comparison) -> str:
+    """The paper's Table I beside ours, for the method that is in both."""
+    ours = [cell for cell in comparison.cells if cell.method == "risk-sac"]
+    if not ours:
+        return ""
+    rows: list[list[str]] = []
+    for cell in ours:
+        means = (cell.estimates[name].mean for name in ("ecr", "es", "rho_c", "ofd"))
+        paper = PAPER[cell.family]
+        rows.append([cell.family, cell.phase])
+        for name, mean, value in zip(("ecr", "es", "rho_c", "ofd"), means, paper, strict=True):
+            rows[-1] += [_number(mean, ".2f"), f"{'≤ ' if name == 'rho_c' else ''}{value:.2f}"]
+    columns = ["family", "phase"]
+    for symbol in ("ECR", "ES", "ρ̄_c", "OFD"):
+        columns += [symbol, f"{symbol} paper"]
+    title = (
+        "## Beside the paper\n\nThe paper's RISK-SAC was measured in CARLA, against another ego and with other "
+        "definitions of a failure, of realism and of outcome features; the numbers are no target.\n\n"
+    )
+    return title + _table(columns, rows, left=2)
+
+
+def _definitions() -> str:
+    lines = [f"- {metric.symbol}: {metric.meaning}." for metric in METRICS]
+    rules = ", ".join(sorted(ARTEFACT_RULES))
+    lines += [
+        "- search: the training episodes, rejected scenes included; evaluation: the frozen policy acting by its mean.",
+        "- mean over seeds and, in brackets, its 95 % interval: percentile bootstrap over seeds, which with fewer than "
+        "about ten seeds is narrower than its name; Wilson's for the rates of a single run.",
+        "- n of m seeds: the mean is over the n runs that have a value; OFD needs two valid failures.",
+        f"- distinct: valid failures of which no earlier one of the same run, with the same striker and the same zones "
+        f"of contact, lies nearer than {DISTINCT:g} in the distance of OFD; summed over seeds.",
+        "- steps / distinct: environment steps over all seeds / distinct failures over all seeds.",
+        "- CPU s / distinct: the same with the processor seconds of the whole runs, evaluation episodes included; a "
+        "process's start and what a crashed attempt spent are not.",
+        f"- artefact: episodes whose contact was refused by a rule that speaks of the simulator or the control "
+        f"({rules}) / episodes.",
+        "- degenerate: all refused contacts / episodes, artefacts among them. rejected: infeasible scenes / episodes.",
+        "- difference: mean over the seeds that both methods have a value for, first method minus the other, with a "
+        "paired bootstrap 95 % interval.",
+        "- A12 (Vargha-Delaney): chance that a run of the first method has the larger value; 0.5 is no difference.",
+        "- p: Wilcoxon signed-rank, two-sided, exact also with ties; zero differences are left out.",
+        "- p (Holm): corrected over all methods and metrics of one family and phase, which are one family of "
+        f"hypotheses; bold below {LEVEL:g}.",
+        "- distinct / 1000 steps is tested in place of its reciprocal, steps / distinct, because a run without a "
+        "failure has it too.",
+    ]
+    return "## Definitions\n\n" + "\n".join(lines) + "\n"
+
+
+def _repeat(comparison: Comparison) -> str:
+    """The command that gives one row's digest again."""
+    if not comparison.runs:
+        return ""
+    run = comparison.runs[0]
+    return (
+        "## Repeat one run\n\n"
+        f"```\n{run_command(run.spec, comparison.spec_file, 'repeated')}\n```\n\n"
+        f"gives a `results.json` with the digest `{run.digest}`; `table.json` has the digest of every run. The same "
+        "digest needs the same versions and the same kind of processor.\n"
+    )
+
+
+def run_command(spec: RunSpec, spec_file: str, out: str) -> str:
+    """The command of a single run of a campaign whose spec lies in a file."""
+    picked = ["--family", spec.family, "--method", spec.method, "--seed", str(spec.seed)]
+    return shlex.join(["risk-sac", "run", "--spec", spec_file, *picked, "--out", out])
+
+
+def _table(columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
+    """The first columns hold words, the others numbers."""
+    rule = ["---" if place < left else "---:" for place in range(len(columns))]
+    lines = [columns, rule, *rows]
+    return "\n".join(f"| {' | '.join(_escaped(cell) for cell in line)} |" for line in lines) + "\n"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")
+
+
+def _interval(low: float | None, high: float | None, format_: str = ".3f") -> str:
+    return "" if low is None or high is None else f" [{low:{format_}}, {high:{format_}}]"
+
+
+def _number(value: float | None, format_: str) -> str:
+    return DASH if value is None else format(value, format_)
+
+
+def _percent(rate: float) -> str:
+    return f"{100 * rate:.1f} %"
+
+
+def _p(value: float | None) -> str:
+    return _number(value, ".3g")

@@ -1,0 +1,103 @@
+"""A finished run as the report reads it from its folder."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from pydantic import TypeAdapter, ValidationError
+
+from risk_sac.config import FamilyName, MethodName, RunSpec
+from risk_sac.errors import ConfigError
+from risk_sac.metrics import MetricsAccumulator, results_digest
+from risk_sac.results import EPISODES, Results, read_results
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.types import EpisodeRecord, RunMetrics
+
+Phase = Literal["search", "evaluation"]
+RECORDED: dict[Phase, str] = {"search": "train", "evaluation": "evaluate"}  # as `EpisodeRecord.phase` has it
+_RECORD: TypeAdapter[EpisodeRecord] = TypeAdapter(EpisodeRecord)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FinishedRun:
+    """Everything the report says of a run follows from its records; processor time apart."""
+
+    spec: RunSpec
+    digest: str  # of the records
+    records: tuple[EpisodeRecord, ...]
+    versions: Mapping[str, str]
+    wall_s: float
+    cpu_s: float
+
+    @property
+    def cell(self) -> tuple[FamilyName, MethodName]:
+        """Where it belongs in the table."""
+        return self.spec.family, self.spec.method
+
+    def phase(self, phase: Phase) -> tuple[EpisodeRecord, ...]:
+        """Its episodes of one phase."""
+        return tuple(record for record in self.records if record.phase == RECORDED[phase])
+
+    @cached_property
+    def metrics(self) -> Mapping[Phase, RunMetrics]:
+        """The metrics of each phase that has episodes."""
+        found: dict[Phase, RunMetrics] = {}
+        for phase in RECORDED:
+            accumulator = MetricsAccumulator(FAMILIES[self.spec.family].horizon_steps)
+            records = self.phase(phase)
+            for record in records:
+                accumulator.add(record)
+            if records:
+                found[phase] = accumulator.metrics()
+        return found
+
+    def artefacts(self, phase: Phase) -> int:
+        """Contacts that the simulator or the control made."""
+        return sum(record.collision is not None and record.collision.artefact for record in self.phase(phase))
+
+
+def read_run(folder: Path) -> FinishedRun:
+    """Reads a finished run back.
+
+    Raises:
+        ConfigError: the folder holds none, or its episodes are not those that its digest was formed over.
+        OSError: it cannot be read.
+    """
+    results = read_results(folder)
+    if not results.finished or results.digest is None:
+        raise ConfigError(f"the run in {folder} is not finished; finish it with the command that began it")
+    records = read_records(folder / EPISODES)
+    if results_digest(records) != results.digest:
+        raise ConfigError(
+            f"{folder / EPISODES} does not hold the {len(results.contacts)} contacts and the other episodes that "
+            f"digest {results.digest[:12]} was formed over; delete the folder and run it again"
+        )
+    return finished_run(results, records)
+
+
+def read_records(file: Path) -> tuple[EpisodeRecord, ...]:
+    """Reads a file of episodes, one JSON object per line.
+
+    Raises:
+        ConfigError: a line is something else.
+        OSError: it cannot be read.
+    """
+    lines = file.read_bytes().splitlines()
+    try:
+        return tuple(_RECORD.validate_json(line) for line in lines)
+    except ValidationError as error:
+        raise ConfigError(f"{file} was not written by a run: {error.errors()[0]['msg']}") from error
+
+
+def finished_run(results: Results, records: tuple[EpisodeRecord, ...]) -> FinishedRun:
+    """Joins what lies in two files."""
+    return FinishedRun(
+        spec=results.spec,
+        digest=results.digest or results_digest(records),
+        records=records,
+        versions=results.versions or {},
+        wall_s=results.wall_s,
+        cpu_s=results.cpu_s,
+    )
