@@ -1,17 +1,21 @@
 """The Gaussian process over scenes and its acquisition function; higher values are better here.
 
-All functions are pure, work in float64 and draw no random numbers: fitting goes through `fit_gpytorch_mll_scipy`
+The model is BoTorch's; its likelihood and posterior are computed here by exact linear algebra. Everything is pure,
+works in float64 and draws no random numbers: fitting goes through `fit_gpytorch_mll_scipy`
 because `fit_gpytorch_mll` restarts a failed fit from torch's global generator.
 
 References:
     Ament et al. 2023, Unexpected improvements to expected improvement (LogEI).
     Hvarfner et al. 2024, Vanilla Bayesian optimization performs great in high dimensions (BoTorch's priors).
+    Rasmussen and Williams 2006, Gaussian processes for machine learning.
 """
 
+import math
 import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 
 import torch
 from torch import Tensor
@@ -19,35 +23,30 @@ from torch import Tensor
 with warnings.catch_warnings():
     # linear_operator compiles its helpers with torch.jit while it is imported.
     warnings.filterwarnings("ignore", message=r"`torch\.jit\.script", category=DeprecationWarning)
-    from botorch.acquisition.analytic import LogExpectedImprovement
+    from botorch.acquisition.analytic import _log_ei_helper
     from botorch.exceptions.warnings import OptimizationWarning
-    from botorch.generation.gen import gen_candidates_scipy
     from botorch.models import SingleTaskGP
+    from botorch.optim.closures import ForwardBackwardClosure
     from botorch.optim.fit import fit_gpytorch_mll_scipy
     from gpytorch.mlls import ExactMarginalLogLikelihood
-    from linear_operator.settings import max_cholesky_size
-    from linear_operator.utils.warnings import NumericalWarning
 
 Hyperparameters = dict[str, Tensor]
 """Raw kernel, mean and noise parameters by their name in the model."""
 
 FIT_ITERATIONS = 50  # a warm start goes on from here at the next refit
-REFINED = 4  # best candidates polished by gradient ascent
-REFINEMENT_ITERATIONS = 15
-# A line search that ends early leaves the best parameters or scene so far, which is all that is needed.
-_STOPPED_EARLY = r"(?s).*(status|iterations)"
 
 
 @contextmanager
-def _exact() -> Iterator[None]:
-    """Exact linear algebra, and silence about the two warnings that are no news here."""
-    # Above its default of 800 points gpytorch turns to conjugate gradients, with probes from the global generator.
-    with max_cholesky_size(100_000), warnings.catch_warnings(record=True) as caught:
-        warnings.filterwarnings("ignore", category=NumericalWarning, message=".*jitter")
-        warnings.filterwarnings("ignore", category=OptimizationWarning, message=_STOPPED_EARLY)
+def _may_stop_early() -> Iterator[None]:
+    """Silence about a line search that ends early: it leaves the best parameters so far, which is all that is needed.
+
+    BoTorch forces its OptimizationWarning past any filter, so warnings are caught and those of other kinds repeated.
+    """
+    with warnings.catch_warnings(record=True) as caught:
         yield
-    for entry in caught:  # BoTorch forces its OptimizationWarning past any filter, so it is filtered here once more
-        if not (issubclass(entry.category, OptimizationWarning) and re.match(_STOPPED_EARLY, str(entry.message))):
+    for entry in caught:
+        expected = re.match(r"(?s).*(status|iterations)", str(entry.message))
+        if not (issubclass(entry.category, OptimizationWarning) and expected):
             warnings.warn_explicit(entry.message, entry.category, entry.filename, entry.lineno)
 
 
@@ -71,36 +70,76 @@ def condition(points: Tensor, values: Tensor, hyperparameters: Hyperparameters |
 def fit(points: Tensor, values: Tensor, start: Hyperparameters | None) -> Hyperparameters:
     """Maximise the marginal likelihood from `start`; arguments as for `condition`."""
     model = condition(points, values, start)
-    with _exact():
-        fit_gpytorch_mll_scipy(
-            ExactMarginalLogLikelihood(model.likelihood, model.train()), options={"maxiter": FIT_ITERATIONS}
-        )
+    likelihood = ExactMarginalLogLikelihood(model.likelihood, model)
+    closure = ForwardBackwardClosure(partial(loss, model), dict(likelihood.named_parameters()))
+    with _may_stop_early():
+        fit_gpytorch_mll_scipy(likelihood, closure=closure, options={"maxiter": FIT_ITERATIONS})
     return {name: parameter.detach().clone() for name, parameter in model.named_parameters()}
 
 
-def propose(model: SingleTaskGP, points: Tensor, candidates: Tensor) -> Tensor:
-    """The point of largest log expected improvement.
+def loss(model: SingleTaskGP) -> Tensor:
+    """What `ExactMarginalLogLikelihood` of the model makes of its own data, negated, in half the time.
 
-    Choice: analytic LogEI over the best posterior mean at the observed points. That incumbent is not fooled by one
-    lucky noisy value, as the best observation would be, and costs one pass, where (q)LogNEI integrates over the
-    incumbent by sampling at more than ten times the price.
+    -(log N(y; c, K) + Σ log prior) / n,  K = k(X, X) + σ² I,  k(x, x') = exp(-½ Σ_i (x_i - x'_i)² / l_i²)
 
-    Args:
-        model: from `condition`.
-        points: `n x d`, the observed points.
-        candidates: `k x d`, in [0, 1]; the best few are refined by bounded gradient ascent.
-
-    Returns:
-        `d`, in [0, 1].
+    Source: Rasmussen and Williams 2006, Eq. 2.30.
     """
-    with _exact():
-        with torch.no_grad():
-            incumbent = model.posterior(points).mean.max()
-            acquisition = LogExpectedImprovement(model, incumbent)
-            scores = acquisition(candidates.unsqueeze(-2))  # k
-        starts = candidates[scores.topk(min(REFINED, len(candidates))).indices].unsqueeze(-2)  # REFINED x 1 x d
-        refined, refined_scores = gen_candidates_scipy(
-            starts, acquisition, 0.0, 1.0, options={"maxiter": REFINEMENT_ITERATIONS}
-        )
-    best: Tensor = refined[refined_scores.argmax(), 0].detach().clamp(0.0, 1.0)
-    return best
+    _, factor, residuals = _factorise(model)
+    count = len(residuals)
+    whitened = torch.linalg.solve_triangular(factor, residuals[:, None], upper=False)
+    log_likelihood = -0.5 * (whitened.square().sum() + count * math.log(2 * math.pi)) - factor.diagonal().log().sum()
+    log_prior = sum(prior.log_prob(value(module)).sum() for _, module, prior, value, _ in model.named_priors())
+    result: Tensor = -(log_likelihood + log_prior) / count
+    return result
+
+
+def _factorise(model: SingleTaskGP) -> tuple[Tensor, Tensor, Tensor]:
+    """Scaled points X / l, `n x d`; Cholesky factor of K, `n x n`; residuals y - c of standardised values, `n`."""
+    points = model.train_inputs[0] / model.covar_module.lengthscale
+    residuals = model.train_targets - model.mean_module.constant
+    noise = model.likelihood.noise * torch.eye(len(residuals), dtype=residuals.dtype)  # BoTorch keeps σ² >= 1e-4
+    return points, torch.linalg.cholesky(_kernel(points, points) + noise), residuals
+
+
+def _kernel(a: Tensor, b: Tensor) -> Tensor:
+    """exp(-½ |a_i - b_j|²), `n x k`, from scaled points, `n x d` and `k x d`."""
+    return (a @ b.T - 0.5 * a.square().sum(1)[:, None] - 0.5 * b.square().sum(1)).exp()
+
+
+class Posterior:
+    """What `model.posterior` says, in a few matrix products: without its generality, and so without its overhead.
+
+    m(x) = c + k(x)ᵀ K⁻¹ (y - c),  s²(x) = 1 - k(x)ᵀ K⁻¹ k(x)
+
+    Source: Rasmussen and Williams 2006, Alg. 2.1.
+    """
+
+    @torch.no_grad()
+    def __init__(self, model: SingleTaskGP) -> None:
+        """Factorise K once, for the model that `condition` returned."""
+        self._lengthscales, self._constant = model.covar_module.lengthscale, model.mean_module.constant
+        self._location, self._scale = model.outcome_transform.means[0, 0], model.outcome_transform.stdvs[0, 0]
+        self._points, self._factor, residuals = _factorise(model)
+        self._weights = torch.cholesky_solve(residuals[:, None], self._factor)[:, 0]  # n
+        self._incumbent = self(model.train_inputs[0])[0].max()
+
+    @torch.no_grad()
+    def __call__(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean and standard deviation without noise, `k` each, at x, `k x d`."""
+        cross = _kernel(self._points, x / self._lengthscales)  # n x k
+        explained = torch.linalg.solve_triangular(self._factor, cross, upper=False).square().sum(0)
+        deviation = (1.0 - explained).clamp_min(1e-12).sqrt()
+        return self._location + self._scale * (self._constant + self._weights @ cross), self._scale * deviation
+
+    def log_expected_improvement(self, x: Tensor) -> Tensor:
+        """Analytic LogEI at x, `k x d`, over the best posterior mean at the observed points.
+
+        Choice: that incumbent is not fooled by one lucky noisy value, as the best observation would be, and costs one
+        pass, where (q)LogNEI integrates over the incumbent by sampling at a hundred times the price.
+
+        Returns:
+            `k`.
+        """
+        mean, deviation = self(x)
+        score: Tensor = _log_ei_helper((mean - self._incumbent) / deviation) + deviation.log()
+        return score

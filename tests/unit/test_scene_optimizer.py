@@ -16,6 +16,7 @@ from risk_sac.scene_optimizer import (
     SceneOptimizer,
     SobolOptimizer,
     objective,
+    surrogate,
     update_running_maximum,
 )
 from risk_sac.types import Floats
@@ -222,6 +223,64 @@ def test_exploration_of_one_never_builds_a_model():
     assert optimizer.state()["hyperparameters"] is None
 
 
+def test_fits_become_rarer_as_observations_accumulate():
+    optimizer = BotorchOptimizer(2, SceneOptimizerConfig(initial_scenes=10, refit_every=3, exploration=0.0), 0)
+    fitted_at = []
+    for episode in range(60):
+        u = optimizer.ask()
+        optimizer.tell(u, bowl(episode, u))
+        fitted_at.append(optimizer.state()["fitted_at"])
+    assert sorted(set(fitted_at)) == [0, 10, 13, 16, 19, 23, 28, 34, 42, 52]
+
+
+# Its Gaussian process
+
+
+def observations(count: int, dimension: int, seed: int) -> tuple[torch.Tensor, torch.Tensor]:
+    """Points, some of them repeated, and noisy values."""
+    random = np.random.default_rng(seed)
+    points = random.random((count, dimension))
+    points[: count // 5] = points[-(count // 5) :]
+    values = 40 * np.sin(4 * points[:, 0]) + points[:, -1] + random.standard_normal(count) - 300
+    return torch.from_numpy(points), torch.from_numpy(values)
+
+
+@pytest.mark.parametrize(("count", "dimension"), [(10, 1), (40, 12), (150, 5)])
+def test_posterior_and_acquisition_equal_botorchs(count, dimension):
+    from botorch.acquisition.analytic import LogExpectedImprovement
+
+    points, values = observations(count, dimension, seed=count)
+    model = surrogate.condition(points, values, surrogate.fit(points, values, None))
+    ours = surrogate.Posterior(model)
+    x = torch.cat((points, torch.from_numpy(np.random.default_rng(0).random((50, dimension)))))
+    with torch.no_grad():
+        theirs = model.posterior(x)
+        acquisition = LogExpectedImprovement(model, model.posterior(points).mean.max())(x.unsqueeze(-2))
+    mean, deviation = ours(x)
+    torch.testing.assert_close(mean, theirs.mean[:, 0], rtol=1e-8, atol=1e-8)
+    torch.testing.assert_close(deviation**2, theirs.variance[:, 0], rtol=1e-8, atol=1e-8)
+    torch.testing.assert_close(ours.log_expected_improvement(x), acquisition, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize(("count", "dimension"), [(10, 1), (40, 12), (150, 5)])
+def test_loss_and_its_gradient_equal_gpytorchs(count, dimension):
+    from gpytorch.mlls import ExactMarginalLogLikelihood
+
+    points, values = observations(count, dimension, seed=count)
+    model = surrogate.condition(points, values, None).train()
+    likelihood = ExactMarginalLogLikelihood(model.likelihood, model)
+    parameters = list(model.parameters())
+    ours, theirs = surrogate.loss(model), -likelihood(model(*model.train_inputs), model.train_targets)
+    torch.testing.assert_close(ours, theirs, rtol=1e-10, atol=1e-10)
+    for gradient, wanted in zip(
+        torch.autograd.grad(ours, parameters), torch.autograd.grad(theirs, parameters), strict=True
+    ):
+        torch.testing.assert_close(gradient, wanted, rtol=1e-8, atol=1e-8)
+
+
+# How well it searches
+
+
 def test_finds_the_optimum_of_a_noisy_function_far_more_often_than_sobol():
     centre = np.array([0.2, 0.7, 0.6, 0.35])
 
@@ -244,3 +303,44 @@ def test_learns_to_avoid_rejected_scenes():
     optimizer = BotorchOptimizer(2, SceneOptimizerConfig(exploration=0.0), 0)
     asked = drive(optimizer, 60, lambda episode, u: None if u[0] > 0.5 else float(u[1] + 0.1 * math.sin(episode)))
     assert (asked[20:, 0] > 0.5).mean() < 0.2
+
+
+HARTMANN_RATES = np.array(
+    [[10, 3, 17, 3.5, 1.7, 8], [0.05, 10, 17, 0.1, 8, 14], [3, 3.5, 1.7, 10, 17, 8], [17, 8, 0.05, 10, 0.1, 14]]
+)
+HARTMANN_CENTRES = np.array(
+    [
+        [0.1312, 0.1696, 0.5569, 0.0124, 0.8283, 0.5886],
+        [0.2329, 0.4135, 0.8307, 0.3736, 0.1004, 0.9991],
+        [0.2348, 0.1451, 0.3522, 0.2883, 0.3047, 0.6650],
+        [0.4047, 0.8828, 0.8732, 0.5743, 0.1091, 0.0381],
+    ]
+)
+
+
+def hartmann(u: Floats) -> float:
+    """Four bumps in six dimensions; at most 3.322."""
+    squares = (HARTMANN_RATES * (u[:6] - HARTMANN_CENTRES) ** 2).sum(1)
+    return float((np.array([1.0, 1.2, 3.0, 3.2]) * np.exp(-squares)).sum())
+
+
+def ackley(u: Floats) -> float:
+    """One peak, 0, in a field of smaller ones."""
+    x = 8 * (u - 0.37)
+    return float(20 * np.exp(-0.2 * np.sqrt((x**2).mean())) + np.exp(np.cos(2 * np.pi * x).mean()) - 20 - np.e)
+
+
+@pytest.mark.parametrize(
+    ("function", "largest", "dimension", "noise", "share"),
+    [(hartmann, 3.32237, 6, 0.0, 0.3), (ackley, 0.0, 5, 0.0, 0.6), (hartmann, 3.32237, 12, 0.2, 0.6)],
+    ids=["hartmann", "ackley", "noisy hartmann, half the parameters idle"],
+)
+def test_simple_regret_is_a_fraction_of_sobols(function, largest, dimension, noise, share):
+    def regret(kind: type[SceneOptimizer], seed: int) -> float:
+        noises = np.random.default_rng(seed).normal(scale=noise, size=80)
+        optimizer = kind(dimension, SceneOptimizerConfig(), seed)
+        asked = drive(optimizer, 80, lambda episode, u: function(u) + noises[episode])
+        return largest - max(map(function, asked))
+
+    found, by_chance = (np.mean([regret(kind, seed) for seed in range(3)]) for kind in reversed(KINDS))
+    assert found < share * by_chance
