@@ -116,7 +116,8 @@ def evaluate(spec: CampaignSpec, folder: Path, command: str, jobs: int, progress
         raise ConfigError(f"got {jobs}; wanted at least one process", field="jobs")
     for run in {run.family: run for run in spec.runs()}.values():
         Problem.from_spec(run)  # before the folder is claimed
-    with _claimed(spec, folder) as lock, stop_signal((*STOPPING, signal.SIGHUP)) as stopping:
+    hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
+    with _claimed(spec, folder) as lock, stop_signal((*STOPPING, *hung_up)) as stopping:
         queue = [Job(spec=run, folder=folder / RUNS / _name(run)) for run in spec.runs()]
         _Executor(folder / SPEC, queue, lock, progress).execute(jobs, stopping)
         comparison = _report(spec, folder, command, queue)
@@ -183,7 +184,7 @@ class _Executor:
         try:
             while self._running or (waiting and not stopping()):
                 while waiting and len(self._running) < processes and not stopping():
-                    self._start(waiting.popleft())
+                    self._begin(waiting.popleft())
                 if stopping() and not told_to_stop:
                     told_to_stop = True
                     for _, process in self._running:
@@ -204,6 +205,12 @@ class _Executor:
         except ConfigError as error:
             job.state, job.reason = "failed", str(error)
         return job.state != "waiting"
+
+    def _begin(self, job: Job) -> None:
+        try:
+            self._start(job)
+        except OSError as error:  # of this run's folder; the others may have better luck
+            job.state, job.reason = "failed", str(error)
 
     def _start(self, job: Job) -> None:
         job.folder.mkdir(parents=True, exist_ok=True)

@@ -5,7 +5,7 @@ import pytest
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
-from risk_sac.spec_file import read_spec
+from risk_sac.spec_file import campaign_yaml, read_campaign, read_spec
 
 FLAGS: dict[str, Any] = dict.fromkeys(("family", "method", "seed", "episodes", "evaluation_episodes"))
 
@@ -84,3 +84,31 @@ def test_wrong_flag_names_the_field() -> None:
     with pytest.raises(ConfigError, match="greater than or equal to 1") as raised:
         read_spec(None, FLAGS | {"family": "low", "episodes": -2})
     assert raised.value.field == "budget.episodes"
+
+
+CAMPAIGN_FLAGS: dict[str, Any] = dict.fromkeys(("families", "methods", "seeds", "episodes", "evaluation_episodes"))
+DEFAULTS: dict[str, Any] = {"families": ["low"], "methods": ["sac"], "seeds": [0, 1]}
+
+
+def test_campaign_takes_flags_before_file_before_defaults(tmp_path: Path) -> None:
+    file = yaml_file(tmp_path, "methods: [random]\nseeds: [7]\nbudget: {episodes: 9, evaluation_episodes: 2}\n")
+    spec = read_campaign(file, CAMPAIGN_FLAGS | {"seeds": [3], "episodes": 4}, DEFAULTS)
+    assert (spec.families, spec.methods, spec.seeds) == (("low",), ("random",), (3,))
+    assert (spec.budget.episodes, spec.budget.evaluation_episodes) == (4, 2)
+
+
+def test_campaign_written_as_yaml_is_the_same_campaign(tmp_path: Path) -> None:
+    text = "label: 'a: b'\nego: {profile: perfect}\nlearner: {lagrangian: {learning_rate: 1.0e-7}}\n"
+    text += "odd: {environment: {friction: {low: 0.5, high: 0.7}}}\n"
+    text += "requirements: [{name: slow, formula: ego_speed_mps < 5, scale: 1.0}]\n"
+    spec = read_campaign(yaml_file(tmp_path, text), CAMPAIGN_FLAGS, DEFAULTS)
+    again = read_campaign(yaml_file(tmp_path, campaign_yaml(spec)), CAMPAIGN_FLAGS, {})
+    assert again == spec
+    assert again.digest == spec.digest
+    assert read_campaign(None, CAMPAIGN_FLAGS, DEFAULTS).digest != spec.digest
+
+
+def test_campaign_refuses_the_file_of_a_run(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="not permitted") as raised:
+        read_campaign(yaml_file(tmp_path, "family: low\n"), CAMPAIGN_FLAGS, DEFAULTS)
+    assert raised.value.field == "family"

@@ -1,0 +1,129 @@
+import subprocess
+import sys
+
+import pytest
+
+from risk_sac.config import CampaignSpec
+from risk_sac.metrics import bootstrap_interval, wilson_interval
+from risk_sac.report import compare
+from risk_sac.scenario.families import FAMILIES
+
+HORIZON = FAMILIES["low"].horizon_steps
+
+
+@pytest.fixture
+def comparison(spec, runs):
+    return compare(spec, runs, "risk-sac evaluate")
+
+
+def cell(comparison, method, phase="search"):
+    (found,) = [each for each in comparison.cells if (each.method, each.phase) == (method, phase)]
+    return found
+
+
+def test_the_reference_comes_first_and_phases_are_apart(comparison):
+    assert [(each.phase, each.method) for each in comparison.cells] == [
+        (phase, method) for phase in ("search", "evaluation") for method in ("risk-sac", "sac", "no-adversary")
+    ]
+    assert comparison.phases == ("search", "evaluation")
+
+
+def test_a_cell_is_the_mean_over_seeds_and_sums_over_seeds(comparison):
+    found = cell(comparison, "risk-sac")
+    ecr = found.estimates["ecr"]
+    assert (ecr.mean, ecr.runs) == (0.5, 2)  # 3/4 and 1/4
+    assert (ecr.low, ecr.high) == bootstrap_interval([0.75, 0.25], 0) == (0.25, 0.75)
+    assert found.estimates["es"].mean == pytest.approx(4 * (1 - 50 / HORIZON) / 8)
+    assert found.estimates["rho_c"].mean == pytest.approx(0.2)
+    assert (found.episodes, found.failures, found.environment_steps) == (8, 4, 350)
+    assert found.distinct_failures == 3  # f and F of one seed, f of the other
+    assert found.steps_per_distinct_failure == pytest.approx(350 / 3)
+    assert found.cpu_s_per_distinct_failure == pytest.approx(120 / 3)
+    assert found.rejected_rate == 1 / 8
+
+
+def test_dispersion_is_taken_over_the_seeds_that_have_one(comparison):
+    ofd = cell(comparison, "risk-sac").estimates["ofd"]
+    assert (ofd.mean, ofd.runs) == (pytest.approx(2 / 3 * 0.5 / 2), 1)  # two pairs of three differ by half a range
+    assert (ofd.low, ofd.high) == (None, None)
+    assert cell(comparison, "sac").estimates["ofd"].mean is None
+    assert cell(comparison, "no-adversary").steps_per_distinct_failure is None
+
+
+def test_artefacts_are_the_contacts_nobody_is_to_blame_for(comparison):
+    sac, control = cell(comparison, "sac"), cell(comparison, "no-adversary")
+    assert (sac.raw_rate, sac.degenerate_rate, sac.artefact_rate) == (3 / 8, 2 / 8, 1 / 8)
+    assert (control.raw_rate, control.artefact_rate) == (1 / 8, 1 / 8)
+
+
+def test_evaluation_has_neither_seconds_nor_a_last_window(comparison):
+    found = cell(comparison, "risk-sac", "evaluation")
+    assert found.estimates["ecr"].mean == 0.5
+    assert "ecr_last" not in found.estimates
+    assert found.steps_per_distinct_failure == 100
+    assert found.cpu_s_per_distinct_failure is None
+
+
+def test_one_seed_has_wilsons_interval(spec, runs):
+    alone = spec.model_copy(update={"seeds": (0,)})
+    ecr = cell(compare(alone, runs, ""), "risk-sac").estimates["ecr"]
+    assert (ecr.low, ecr.high) == wilson_interval(3, 4)
+
+
+def test_runs_are_tested_in_pairs_of_a_seed(comparison):
+    (test,) = [each for each in comparison.tests if (each.phase, each.metric, each.method) == ("search", "ecr", "sac")]
+    assert (test.reference, test.pairs) == ("risk-sac", 2)
+    assert test.difference == pytest.approx((0.75 + 0.0) / 2)
+    assert (test.low, test.high) == (0.0, 0.75)
+    assert test.p == 1.0  # one difference is 0, and one alone says nothing
+    assert test.a12 == pytest.approx((1 + 1 + 1 + 0.5) / 4)
+
+
+def test_holm_corrects_over_family_and_phase(comparison):
+    search = [test for test in comparison.tests if test.phase == "search"]
+    assert len(search) == 2 * 5
+    with_p = [test for test in search if test.p is not None]
+    assert all(test.p_holm >= test.p for test in with_p)
+    ofd = [test for test in search if test.metric == "ofd"]
+    assert all(
+        (test.pairs, test.p, test.p_holm, test.difference, test.a12) == (0, None, None, None, None) for test in ofd
+    )
+
+
+def test_a_missing_seed_costs_its_pair(spec, runs):
+    without = [run for run in runs if (run.spec.method, run.spec.seed) != ("sac", 1)]
+    comparison = compare(spec, without, "", reasons={run.spec.digest: "crashed" for run in runs})
+    (missing,) = comparison.missing
+    assert (missing.spec.method, missing.spec.seed, missing.reason) == ("sac", 1, "crashed")
+    assert cell(comparison, "sac").seeds == (0,)
+    tests = [test for test in comparison.tests if test.method == "sac" and test.metric == "ecr"]
+    assert [(test.pairs, test.p) for test in tests] == [(1, None), (1, None)]
+
+
+def test_nothing_finished_is_a_comparison_too(spec):
+    comparison = compare(spec, [], "")
+    assert comparison.cells == ()
+    assert len(comparison.missing) == 6
+    assert all(test.pairs == 0 for test in comparison.tests)
+
+
+def test_runs_of_other_specs_are_left_out(spec, runs, finished):
+    other = CampaignSpec(families=("low",), seeds=(0, 1)).runs()
+    stray = [finished(run, "ffff") for run in other]
+    assert compare(spec, runs + stray, "") == compare(spec, runs, "")
+
+
+def test_the_order_of_the_runs_does_not_matter(spec, runs):
+    assert compare(spec, runs[::-1], "") == compare(spec, runs, "")
+
+
+def test_without_risk_sac_the_first_method_is_the_reference(spec, runs):
+    others = spec.model_copy(update={"methods": ("sac", "no-adversary")})
+    assert compare(others, runs, "").reference == "sac"
+
+
+def test_report_loads_without_torch_and_libsumo():
+    heavy = {"torch", "libsumo", "botorch", "numba", "rtamt"}
+    code = f"import sys, risk_sac.report; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,94 @@
+import math
+
+import numpy as np
+import pytest
+import scipy.stats
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.metrics import bootstrap_interval
+from risk_sac.report.statistics import holm, pairs_needed, smallest_p, vargha_delaney, wilcoxon_p
+
+differences = st.lists(st.integers(-6, 6).map(lambda tenths: tenths / 10), max_size=10)
+
+
+@pytest.mark.parametrize(
+    ("values", "p"),
+    [
+        ([0.1, 0.2, 0.3, 0.4, 0.5], 2 / 2**5),  # all on one side: one pattern of 32 in either tail
+        ([-0.1, 0.2, 0.3, 0.4, 0.5], 4 / 2**5),  # rank sums 0 and 1: two patterns
+        ([-0.1, -0.2, 0.3, 0.4, 0.5], 2 * 5 / 2**5),  # rank sums 0, 1, 2, 3 (twice)
+        ([0.1, -0.1], 1.0),
+        ([0.2, 0.2, 0.2], 2 / 2**3),  # ties
+        ([0.5, 0.0, 0.25, 0.0], 2 / 2**2),  # zeros are left out
+        ([0.0, 0.0], 1.0),
+        ([], 1.0),
+    ],
+)
+def test_wilcoxon_literals(values, p):
+    assert wilcoxon_p(values) == pytest.approx(p)
+
+
+def test_wilcoxon_takes_rounding_for_ties():
+    assert wilcoxon_p([0.3 - 0.1, 0.2, -0.2]) == wilcoxon_p([0.2, 0.2, -0.2]) == 1.0
+    assert wilcoxon_p([0.1 + 0.2 - 0.3, 1.0, 2.0]) == wilcoxon_p([1.0, 2.0])
+
+
+@given(st.lists(st.integers(1, 1000), min_size=1, max_size=12, unique=True), st.randoms())
+def test_wilcoxon_agrees_with_scipy_where_nothing_ties(ranks, random):
+    values = [rank * random.choice((-1, 1)) for rank in ranks]
+    assert wilcoxon_p(values) == pytest.approx(scipy.stats.wilcoxon(values, method="exact").pvalue)
+
+
+@given(differences)
+def test_wilcoxon_is_the_share_of_sign_patterns_at_least_as_extreme(values):
+    left = [value for value in values if value]
+    ranks = scipy.stats.rankdata(np.abs(left))
+    centre = ranks.sum() / 2
+    seen = abs(ranks[np.array(left) > 0].sum() - centre) if left else 0
+    patterns = (np.arange(2 ** len(left))[:, None] >> np.arange(len(left))) & 1
+    extreme = np.abs(patterns @ ranks - centre) >= seen - 1e-9
+    assert wilcoxon_p(values) == pytest.approx(extreme.mean())
+
+
+@given(differences)
+def test_wilcoxon_does_not_care_who_is_first(values):
+    assert wilcoxon_p(values) == wilcoxon_p([-value for value in values])
+    assert smallest_p(len(values)) <= wilcoxon_p(values) <= 1
+
+
+def test_smallest_p_and_the_pairs_it_takes():
+    assert [smallest_p(pairs) for pairs in (0, 1, 2, 5)] == [1, 1, 0.5, 0.0625]
+    assert pairs_needed(1, 0.05) == 6  # 2/2^6 = 0.031
+    assert pairs_needed(20, 0.05) == 10  # 20 · 2/2^10 = 0.039
+    assert 20 * smallest_p(10) <= 0.05 < 20 * smallest_p(9)
+
+
+def test_holm_by_hand():
+    # Sorted 0.005, 0.01, 0.03, 0.04, times 4, 3, 2, 1 = 0.02, 0.03, 0.06, 0.04; never below the one before.
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.9, 0.8]) == [1.0, 1.0]
+    assert holm([]) == []
+
+
+@given(st.lists(st.floats(0, 1), max_size=8))
+def test_holm_only_raises_and_keeps_the_order(values):
+    adjusted = holm(values)
+    assert all(p <= p_holm <= 1 for p, p_holm in zip(values, adjusted, strict=True))
+    assert [p for _, p in sorted(zip(values, adjusted, strict=True))] == sorted(adjusted)
+
+
+def test_a12_by_hand():
+    assert vargha_delaney([3, 4], [1, 2]) == 1
+    assert vargha_delaney([1, 2], [3, 4]) == 0
+    assert vargha_delaney([1, 2], [1, 2]) == 0.5
+    assert vargha_delaney([1, 3, 5], [2, 3]) == pytest.approx((0 + 1.5 + 2) / 6)
+
+
+def test_paired_interval_covers_a_known_mean_about_as_often_as_it_says():
+    random = np.random.default_rng(0)
+    covered = 0
+    for _ in range(200):
+        low, high = bootstrap_interval(list(random.normal(0.3, 1.0, size=20)), 0)
+        covered += low <= 0.3 <= high
+    assert math.isclose(covered / 200, 0.93, abs_tol=0.05)
