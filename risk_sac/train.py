@@ -19,6 +19,7 @@ from risk_sac import checkpoint
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.random import RandomAgent
 from risk_sac.agents.replay import Transition
+from risk_sac.agents.scripted import ScriptedAgent
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
@@ -34,6 +35,11 @@ from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
+CONTROLS: dict[str, type[RandomAgent | ScriptedAgent]] = {
+    "scripted": ScriptedAgent,
+    "random": RandomAgent,
+    "none": RandomAgent,
+}
 PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
 
 
@@ -113,11 +119,11 @@ class Run:
         self._optimizer: SceneOptimizer  # Alg. 1, l. 1
         optimizer = BotorchOptimizer if self._method.scenes == "botorch" else SobolOptimizer
         self._optimizer = optimizer(self._problem.space.dimension, spec.learner.scenes, spec.seed)
-        self._agent: Learner | RandomAgent  # Alg. 1, l. 2
-        if self._method.agent == "sac":
-            self._agent = Learner(observation_size, action_size, self._method, spec.learner, spec.seed)
+        self._agent: Learner | RandomAgent | ScriptedAgent  # Alg. 1, l. 2
+        if self._method.agent in CONTROLS:
+            self._agent = CONTROLS[self._method.agent](action_size, spec.seed)
         else:
-            self._agent = RandomAgent(action_size, spec.seed)
+            self._agent = Learner(observation_size, action_size, self._method, spec.learner, spec.seed)
         self.records: list[EpisodeRecord] = []
         self._search = MetricsAccumulator(self._problem.family.horizon_steps)
         self._evaluation = MetricsAccumulator(self._problem.family.horizon_steps)
@@ -178,7 +184,7 @@ class Run:
             dual_variable=self._agent.dual_variable,
             shaped=self._method.shaping,
             zero_terminal_potential=config.reward.zero_terminal_potential,
-            discount=config.sac.discount,
+            discount=config.agent.discount,
         )
 
     def _record(

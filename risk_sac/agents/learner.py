@@ -6,28 +6,45 @@ actions from [-1, 1] to an environment's box is the caller's.
 Source: RISK-SAC, Alg. 1, l. 7 and 9-16.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from risk_sac.agents.agent import Agent, UpdateResult
+from risk_sac.agents.ddpg import DdpgAgent
+from risk_sac.agents.device import choose_device, random_batch
 from risk_sac.agents.lagrangian import DualVariable
 from risk_sac.agents.replay import Replay, RiskPrioritizedReplay, Transition, UniformReplay, Vector
-from risk_sac.agents.sac import SacAgent, UpdateResult
+from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.risk.reward import Value, training_reward
 
 
 class Learner:
-    """What happens between two environment steps; of the method it reads `lagrangian`, `shaping` and `replay`."""
+    """What happens between two environment steps; of the method it reads all but the scene sampler.
+
+    Attributes:
+      device: where the networks live.
+    """
 
     def __init__(
         self, observation_size: int, action_size: int, method: Method, config: LearnerConfig, seed: int
     ) -> None:
+        """Draws the networks.
+
+        Raises:
+          ConfigError: the device that `config` names is not there.
+        """
         self._method = method
         self._config = config
         self._action_size = action_size
-        self._agent = SacAgent(observation_size, action_size, config.sac, seed)
+        make = {"sac": self._sac, "ddpg": self._ddpg}[method.agent]
+        self._make = partial(make, observation_size, action_size, seed)
+        trial = random_batch(observation_size, action_size, config.agent.batch_size)
+        self.device = choose_device(config.agent.device, self._make, trial)
+        self._agent = self._make(self.device)
         replay = RiskPrioritizedReplay if method.replay == "rper" else UniformReplay
         self._replay: Replay = replay(observation_size, action_size, config.replay)
         self._dual = DualVariable(config.lagrangian, enabled=method.lagrangian)
@@ -46,7 +63,7 @@ class Learner:
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
         """Action in [-1, 1], `action_size`; uniformly random in the first `warmup_steps` explored steps."""
-        if explore and self._steps < self._config.sac.warmup_steps:
+        if explore and self._steps < self._config.agent.warmup_steps:
             return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
         return self._agent.act(observation, explore)  # Alg. 1, l. 7
 
@@ -62,14 +79,15 @@ class Learner:
           NotFinite: learning has diverged.
         """
         result = None
-        if self._steps >= self._config.sac.warmup_steps and len(self._replay):
-            for _ in range(self._config.sac.updates_per_step):
+        if self._steps >= self._config.agent.warmup_steps and len(self._replay):
+            for _ in range(self._config.agent.updates_per_step):
                 result = self._update_once()
         return result
 
     def state(self) -> dict[str, Any]:
         """Everything the next step depends on, generators included; tensors, arrays and plain values."""
         return {
+            "device": self.device,
             "agent": self._agent.state(),
             "replay": self._replay.state(),
             "dual_variable": self._dual.value,
@@ -78,19 +96,28 @@ class Learner:
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`, as if never interrupted.
+        """Continue from `state()`, as if never interrupted, on the device of old.
 
         Raises:
           CheckpointError: the state is of another shape.
         """
+        if state["device"] != self.device:
+            self.device = state["device"]
+            self._agent = self._make(self.device)
         self._replay.load(state["replay"])
         self._agent.load(state["agent"])
         self._dual.value = state["dual_variable"]
         self._generator.bit_generator.state = state["generator"]
         self._steps = state["steps"]
 
+    def _sac(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
+        return SacAgent(observation_size, action_size, self._config.agent, self._config.sac, seed, device)
+
+    def _ddpg(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
+        return DdpgAgent(observation_size, action_size, self._config.agent, self._config.ddpg, seed, device)
+
     def _update_once(self) -> UpdateResult:
-        batch = self._replay.sample(self._config.sac.batch_size, self._generator)  # Alg. 1, l. 13
+        batch = self._replay.sample(self._config.agent.batch_size, self._generator).on(self.device)  # Alg. 1, l. 13
         reward = self._reward(batch.risk_reward, batch.cost, batch.robustness, batch.next_robustness, batch.terminated)
         result = self._agent.update(batch, reward)  # Alg. 1, l. 14
         self._replay.update(batch.indices, result.td_errors)
@@ -111,7 +138,7 @@ class Learner:
             dual_variable=self._dual.value,
             shaped=self._method.shaping,
             zero_terminal_potential=self._config.reward.zero_terminal_potential,
-            discount=self._config.sac.discount,
+            discount=self._config.agent.discount,
         )
 
     def _td_error(self, transition: Transition) -> float:

@@ -6,7 +6,7 @@ when it samples.
 Source: RISK-SAC, Sec. III-D and Alg. 1, l. 11-13.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
 import numpy as np
@@ -52,6 +52,13 @@ class Batch:
     terminated: Tensor  # n, 0 or 1
     weight: Tensor  # n, importance weights in (0, 1]
     indices: Indices  # n, the slots they came from
+
+    def on(self, device: str) -> "Batch":
+        """The same transitions on a device."""
+        if device == "cpu":  # where they are sampled
+            return self
+        tensors = {f.name: getattr(self, f.name).to(device) for f in fields(self) if f.name != "indices"}
+        return Batch(**tensors, indices=self.indices)
 
 
 class Replay(Protocol):

@@ -5,29 +5,16 @@ Source: RISK-SAC, Eq. 4; Haarnoja et al., "Soft actor-critic algorithms and appl
 
 import copy
 import math
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from risk_sac.agents.networks import Policy, TwinCritics, tanh_gaussian
+from risk_sac.agents.agent import UpdateResult, all_finite, loading, row
+from risk_sac.agents.critics import Critics
+from risk_sac.agents.networks import Mlp, bounded_log_std, tanh_gaussian, tanh_gaussian_gradient
 from risk_sac.agents.replay import Batch, Vector
-from risk_sac.config.learner import SacConfig
-from risk_sac.errors import CheckpointError, NotFinite
-from risk_sac.types import Floats
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UpdateResult:
-    """What one update of all networks found out."""
-
-    td_errors: Floats  # batch; |δ|, mean over the two critics
-    critic_loss: float
-    actor_loss: float
-    temperature: float  # α after the update
-    entropy: float  # of the policy over the batch, nats
+from risk_sac.config.learner import AgentConfig, SacConfig
 
 
 def soft_target(
@@ -59,20 +46,6 @@ def soft_target(
     return reward + discount * (1.0 - terminated) * soft_value
 
 
-def critic_loss(td_errors: Tensor, weight: Tensor) -> Tensor:
-    """Importance-weighted squared error of both critics.
-
-    J_Q = Σ_i E[w · ½ (y - Q_ψi(s, a))²]
-
-    Args:
-      td_errors: `2 x batch`, y - Q_ψi.
-      weight: `batch`, importance weights of (10).
-
-    Source: Haarnoja et al. 2018, Eq. 5, times w of RISK-SAC, Eq. 10.
-    """
-    return 0.5 * (weight * td_errors.square()).mean(dim=1).sum()
-
-
 def actor_loss(log_prob: Tensor, values: Tensor, temperature: Tensor) -> Tensor:
     """Negative soft value of the policy's own actions, the term in the sum of (4).
 
@@ -82,177 +55,150 @@ def actor_loss(log_prob: Tensor, values: Tensor, temperature: Tensor) -> Tensor:
 
     Args:
       log_prob: `batch`.
-      values: `2 x batch`.
+      values: `batch`, the smaller of both critics'.
       temperature: α, held constant.
 
     Source: Haarnoja et al. 2018, Eq. 7-9.
     """
-    return (temperature * log_prob - values.amin(dim=0)).mean()
+    return (temperature * log_prob - values).mean()
 
 
-def temperature_loss(log_temperature: Tensor, log_prob: Tensor, target_entropy: float) -> Tensor:
+def temperature_gradient(temperature: Tensor, entropy: Tensor, target_entropy: float) -> Tensor:
     """Pulls the policy's entropy towards its target.
 
-    J(α) = E[-α (log π(a|s) + H̄)], minimised over log α so that α stays positive
+    J(α) = E[-α (log π(a|s) + H̄)],  ∂J/∂log α = α (H - H̄) with the policy's entropy H = E[-log π(a|s)]
+
+    Choice: minimised over log α, so that α stays positive.
 
     Args:
-      log_temperature: log α.
-      log_prob: `batch`, held constant.
+      temperature: α.
+      entropy: H, nats.
       target_entropy: H̄, nats.
+
+    Returns:
+      ∂J/∂log α.
 
     Source: Haarnoja et al. 2018, Eq. 18.
     """
-    return -log_temperature.exp() * (log_prob.detach().mean() + target_entropy)
+    return temperature * (entropy - target_entropy)
 
 
 class SacAgent:
     """Policy, twin critics with targets and learned temperature; all noise from one generator."""
 
-    def __init__(self, observation_size: int, action_size: int, config: SacConfig, seed: int) -> None:
+    def __init__(
+        self,
+        observation_size: int,
+        action_size: int,
+        config: AgentConfig,
+        sac: SacConfig,
+        seed: int,
+        device: str = "cpu",
+    ) -> None:
         self._config = config
-        self._target_entropy = config.target_entropy_per_action * action_size
-        self._generator = torch.Generator().manual_seed(seed)
-        sizes = (observation_size, action_size, config.hidden_sizes)
-        self._policy = Policy(*sizes, self._generator)
-        self._critics = TwinCritics(*sizes, self._generator)
-        self._targets = copy.deepcopy(self._critics).requires_grad_(False)
-        self._log_temperature = torch.tensor(math.log(config.initial_temperature), requires_grad=True)
-        self._critic_optimizer = torch.optim.Adam(
-            self._critics.parameters(), lr=config.critic_learning_rate, fused=True
-        )
-        # α rides in the actor's optimiser: one backward pass and one fused step serve both.
-        self._actor_parameters = [*self._policy.parameters(), self._log_temperature]
+        self._target_entropy = sac.target_entropy_per_action * action_size
+        self._device = torch.device(device)
+        self._generator = torch.Generator(self._device).manual_seed(seed)
+        self._policy = Mlp((observation_size, *config.hidden_sizes, 2 * action_size), self._generator)
+        self._critics = Critics(2, observation_size, action_size, config, self._generator)
+        self._log_temperature = torch.full((1,), math.log(sac.initial_temperature), device=self._device)
         self._actor_optimizer = torch.optim.Adam(
             [
-                {"params": list(self._policy.parameters()), "lr": config.actor_learning_rate},
-                {"params": [self._log_temperature], "lr": config.temperature_learning_rate},
+                {"params": [self._policy.parameters], "lr": config.actor_learning_rate},
+                {"params": [self._log_temperature], "lr": sac.temperature_learning_rate},
             ],
             fused=True,
         )
-        self._critic_tensors = [parameter.detach() for parameter in self._critics.parameters()]  # same memory
-        self._target_tensors = [parameter.detach() for parameter in self._targets.parameters()]
 
     @property
     def temperature(self) -> float:
         """α."""
         return self._log_temperature.exp().item()
 
-    @torch.no_grad()
     def act(self, observation: Vector, explore: bool) -> Vector:
-        """Action in [-1, 1], `action_size`: a draw from the policy, or tanh of its mean.
+        """See `Agent.act`: a draw from the policy, or tanh of its mean."""
+        raw = self._policy.forward(row(observation, self._device))[-1]
+        action = self._sample(raw)[0] if explore else torch.tanh(raw.chunk(2, dim=1)[0])
+        return action[0].cpu().numpy()
 
-        Args:
-          observation: `observation_size`.
-          explore: draw (Alg. 1, l. 7), or take the mean.
-        """
-        mean, log_std = self._policy(_row(observation))
-        action: Tensor = self._sample(mean, log_std)[0] if explore else torch.tanh(mean)
-        return action.squeeze(0).numpy()
-
-    @torch.no_grad()
     def td_error(
         self, observation: Vector, action: Vector, reward: float, next_observation: Vector, terminated: bool
     ) -> float:
-        """|δ| of one transition, mean over the two critics; arguments as in `soft_target`, unbatched."""
+        """See `Agent.td_error`."""
+        following = row(next_observation, self._device)
+        next_action, next_log_prob, _ = self._sample(self._policy.forward(following)[-1])
         target = self._target(
-            torch.tensor([reward], dtype=torch.float32), _row(next_observation), torch.tensor([float(terminated)])
+            torch.tensor([reward], dtype=torch.float32, device=self._device),
+            torch.tensor([float(terminated)], device=self._device),
+            following,
+            next_action,
+            next_log_prob,
         )
-        values: Tensor = self._critics(_row(observation), _row(action))
+        values = self._critics.values(row(observation, self._device), row(action, self._device))
         return (target - values).abs().mean().item()
 
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
-        """One step of critics, policy, temperature and target networks (Alg. 1, l. 14).
+        """See `Agent.update`."""
+        count = len(reward)
+        # The policy changes last, so one pass serves the critics' targets and its own step.
+        activations = self._policy.forward(torch.cat((batch.next_observation, batch.observation)))
+        raw = activations[-1]
+        action, log_prob, noise = self._sample(raw)
+        target = self._target(reward, batch.terminated, batch.next_observation, action[:count], log_prob[:count])
+        td_errors, loss_q = self._critics.fit(batch.observation, batch.action, target, batch.weight)
 
-        Args:
-          batch: transitions with their importance weights.
-          reward: `batch`, the reward of each under the current dual variable.
+        raw, action, log_prob, noise = raw[count:], action[count:], log_prob[count:], noise[count:]
+        values, slope = self._critics.smallest(batch.observation, action)
+        temperature = self._log_temperature.exp()
+        gradient = tanh_gaussian_gradient(raw, noise, action, slope / -count, temperature / count)
+        self._policy.backward([each[count:] for each in activations], gradient)
+        entropy = -log_prob.mean()
+        self._log_temperature.grad = temperature_gradient(temperature, entropy, self._target_entropy)
+        self._actor_optimizer.step()
+        self._critics.follow()
 
-        Raises:
-          NotFinite: a loss is NaN or infinite.
-        """
-        td_errors, loss_q = self._update_critics(batch, reward)
-        loss_pi, log_prob = self._update_actor(batch.observation)
-        torch._foreach_lerp_(self._target_tensors, self._critic_tensors, self._config.target_rate)
-        figures = torch.stack((loss_q, loss_pi, self._log_temperature.detach().exp(), -log_prob.mean())).tolist()
-        if not all(map(math.isfinite, figures)):
-            raise NotFinite(
-                f"critic loss, actor loss, temperature and entropy are {figures}; wanted finite numbers."
-                " Lower the learning rates of learner.sac or the weights of learner.reward."
-            )
+        loss_pi = actor_loss(log_prob, values, temperature)
+        figures = torch.stack((loss_q, loss_pi, self._log_temperature.exp()[0], entropy)).tolist()
+        critic_figure, actor_figure, temperature_figure, entropy_figure = all_finite(figures)
         return UpdateResult(
-            td_errors=td_errors.abs().mean(dim=0).double().numpy(),
-            critic_loss=figures[0],
-            actor_loss=figures[1],
-            temperature=figures[2],
-            entropy=figures[3],
+            td_errors=td_errors.abs().mean(dim=0).double().cpu().numpy(),
+            critic_loss=critic_figure,
+            actor_loss=actor_figure,
+            temperature=temperature_figure,
+            entropy=entropy_figure,
         )
 
     def state(self) -> dict[str, Any]:
-        """Networks, optimisers and generator, copied; tensors and plain values only."""
+        """See `Agent.state`."""
         return copy.deepcopy(
             {
-                "policy": dict(self._policy.state_dict()),
-                "critics": dict(self._critics.state_dict()),
-                "targets": dict(self._targets.state_dict()),
-                "log_temperature": self._log_temperature.detach(),
-                "critic_optimizer": self._critic_optimizer.state_dict(),
+                "policy": self._policy.parameters,
+                "critics": self._critics.state(),
+                "log_temperature": self._log_temperature,
                 "actor_optimizer": self._actor_optimizer.state_dict(),
                 "generator": self._generator.get_state(),
             }
         )
 
     def load(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`.
-
-        Raises:
-          CheckpointError: the state is of other networks; the agent is not to be used any further.
-        """
+        """See `Agent.load`."""
         state = copy.deepcopy(state)  # the optimisers would share its tensors
-        try:
-            self._policy.load_state_dict(state["policy"])
-            self._critics.load_state_dict(state["critics"])
-            self._targets.load_state_dict(state["targets"])
-            self._log_temperature.data.copy_(state["log_temperature"])
-            self._critic_optimizer.load_state_dict(state["critic_optimizer"])
+        with loading():
+            self._policy.parameters.copy_(state["policy"])
+            self._critics.load(state["critics"])
+            self._log_temperature.copy_(state["log_temperature"])
             self._actor_optimizer.load_state_dict(state["actor_optimizer"])
             self._generator.set_state(state["generator"])
-        except (KeyError, RuntimeError, ValueError) as error:
-            raise CheckpointError(
-                f"agent in the checkpoint does not fit: {error}. Resume with the learner.sac.hidden_sizes of the run"
-                " that wrote it."
-            ) from error
 
-    def _update_critics(self, batch: Batch, reward: Tensor) -> tuple[Tensor, Tensor]:
-        with torch.no_grad():
-            target = self._target(reward, batch.next_observation, batch.terminated)
-        td_errors = target - self._critics(batch.observation, batch.action)  # 2 x batch
-        loss = critic_loss(td_errors, batch.weight)
-        self._critic_optimizer.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        self._critic_optimizer.step()
-        return td_errors.detach(), loss.detach()
-
-    def _update_actor(self, observation: Tensor) -> tuple[Tensor, Tensor]:
-        action, log_prob = self._sample(*self._policy(observation))
-        loss = actor_loss(log_prob, self._critics(observation, action), self._log_temperature.detach().exp())
-        self._actor_optimizer.zero_grad()
-        # `inputs` keeps gradients out of the critics and saves computing them.
-        (loss + temperature_loss(self._log_temperature, log_prob, self._target_entropy)).backward(  # type: ignore[no-untyped-call]
-            inputs=self._actor_parameters
-        )
-        self._actor_optimizer.step()
-        return loss.detach(), log_prob.detach()
-
-    def _target(self, reward: Tensor, next_observation: Tensor, terminated: Tensor) -> Tensor:
-        next_action, next_log_prob = self._sample(*self._policy(next_observation))
-        next_values = self._targets(next_observation, next_action)
+    def _target(
+        self, reward: Tensor, terminated: Tensor, next_observation: Tensor, next_action: Tensor, next_log_prob: Tensor
+    ) -> Tensor:
+        next_values = self._critics.target_values(next_observation, next_action)
         temperature = self._log_temperature.exp()
         return soft_target(reward, terminated, next_values, next_log_prob, temperature, self._config.discount)
 
-    def _sample(self, mean: Tensor, log_std: Tensor) -> tuple[Tensor, Tensor]:
-        return tanh_gaussian(mean, log_std, torch.randn(mean.shape, generator=self._generator))
-
-
-def _row(vector: Vector) -> Tensor:
-    """A batch of one, `1 x size`."""
-    return torch.from_numpy(np.asarray(vector, np.float32)[None])
+    def _sample(self, raw: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Action, its log-probability and the noise it was drawn with."""
+        mean, raw_log_std = raw.chunk(2, dim=1)
+        noise = torch.randn(mean.shape, generator=self._generator, device=self._device)
+        return *tanh_gaussian(mean, bounded_log_std(raw_log_std), noise), noise

@@ -4,6 +4,8 @@ from risk_sac.config.base import Interval, Settings
 from risk_sac.config.campaign import Budget, CampaignSpec, FamilyName, Requirement, RunSpec
 from risk_sac.config.ego import CarFollowing, EgoConfig, SensorConfig
 from risk_sac.config.learner import (
+    AgentConfig,
+    DdpgConfig,
     LagrangianConfig,
     LearnerConfig,
     ReplayConfig,
@@ -16,10 +18,12 @@ from risk_sac.config.odd import CrossingType, DynamicElements, Environment, Odd,
 
 __all__ = [
     "METHODS",
+    "AgentConfig",
     "Budget",
     "CampaignSpec",
     "CarFollowing",
     "CrossingType",
+    "DdpgConfig",
     "DynamicElements",
     "EgoConfig",
     "Environment",

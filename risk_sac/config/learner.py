@@ -3,7 +3,7 @@
 Defaults hold for all families and methods alike; the README says how they were chosen.
 """
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -12,8 +12,8 @@ from risk_sac.config.base import Fraction, NonNegative, Positive, Settings
 Count = Annotated[int, Field(ge=1)]
 
 
-class SacConfig(Settings):
-    """Soft Actor-Critic (Haarnoja et al. 2018), Eq. 4."""
+class AgentConfig(Settings):
+    """What all agents share: networks, optimisers and the pace of learning."""
 
     hidden_sizes: Annotated[tuple[Count, ...], Field(min_length=1, max_length=4)] = (128, 128)
     """Units of each hidden layer, actor and critics alike."""
@@ -22,16 +22,31 @@ class SacConfig(Settings):
     """γ; 0.98 at 0.1 s looks about 5 s ahead."""
     actor_learning_rate: Positive = 3e-4
     critic_learning_rate: Positive = 1e-3
-    temperature_learning_rate: Positive = 3e-4
-    initial_temperature: Positive = 0.2
-    """α at the start."""
-    target_entropy_per_action: float = -1.0
-    """Target entropy divided by the action dimension, nats."""
     target_rate: Annotated[float, Field(gt=0, le=1)] = 0.005
     """τ of the target networks' moving average."""
     warmup_steps: Annotated[int, Field(ge=0)] = 1000
     """Environment steps with uniformly random actions and no update."""
     updates_per_step: Annotated[int, Field(ge=0, le=20)] = 1
+    device: Literal["auto", "cpu", "cuda"] = "auto"
+    """Where the networks live; `auto` takes the GPU where there is one that updates them faster than the processor.
+    Results are reproducible on equal devices only."""
+
+
+class SacConfig(Settings):
+    """Soft Actor-Critic (Haarnoja et al. 2018), Eq. 4."""
+
+    temperature_learning_rate: Positive = 3e-4
+    initial_temperature: Positive = 0.2
+    """α at the start."""
+    target_entropy_per_action: float = -1.0
+    """Target entropy divided by the action dimension, nats."""
+
+
+class DdpgConfig(Settings):
+    """Deep deterministic policy gradient (Lillicrap et al. 2016)."""
+
+    exploration_deviation: NonNegative = 0.2
+    """Standard deviation of the Gaussian noise added to actions in [-1, 1]."""
 
 
 class ReplayConfig(Settings):
@@ -101,7 +116,9 @@ class SceneOptimizerConfig(Settings):
 class LearnerConfig(Settings):
     """Everything a method may tune, the same for all families."""
 
+    agent: AgentConfig = AgentConfig()
     sac: SacConfig = SacConfig()
+    ddpg: DdpgConfig = DdpgConfig()
     replay: ReplayConfig = ReplayConfig()
     lagrangian: LagrangianConfig = LagrangianConfig()
     reward: RewardConfig = RewardConfig()

@@ -4,14 +4,26 @@ from typing import Literal
 
 from risk_sac.config.base import Settings
 
-MethodName = Literal["risk-sac", "risk-sac-only-rper", "risk-sac-only-rs", "sac-lag", "sac", "random", "no-adversary"]
+MethodName = Literal[
+    "risk-sac",
+    "risk-sac-only-rper",
+    "risk-sac-only-rs",
+    "sac-lag",
+    "sac",
+    "ddpg-lag",
+    "ddpg",
+    "bo-only",
+    "random",
+    "no-adversary",
+]
 
 
 class Method(Settings):
     """One row of the table of methods."""
 
-    agent: Literal["sac", "random", "none"]
-    """`random`: uniform actions; `none`: SUMO drives the adversary vehicles, pedestrians stand."""
+    agent: Literal["sac", "ddpg", "scripted", "random", "none"]
+    """`scripted`: cuts in and brakes, or keeps on; `random`: uniform actions; `none`: SUMO drives the adversary
+    vehicles, pedestrians stand."""
     lagrangian: bool = False
     """Whether λ follows the realism cost; without it λ stays 0."""
     shaping: bool = False
@@ -39,6 +51,11 @@ METHODS: dict[MethodName, Method] = {
     ),
     "sac-lag": Method(agent="sac", lagrangian=True, scenes="botorch", summary="SAC under the realism constraint."),
     "sac": Method(agent="sac", scenes="botorch", summary="Plain SAC on the risk reward."),
+    "ddpg-lag": Method(agent="ddpg", lagrangian=True, scenes="botorch", summary="DDPG under the realism constraint."),
+    "ddpg": Method(agent="ddpg", scenes="botorch", summary="Plain DDPG on the risk reward."),
+    "bo-only": Method(
+        agent="scripted", scenes="botorch", summary="Control: BoTorch scenes, and adversaries that follow one script."
+    ),
     "random": Method(agent="random", summary="Control: Sobol scenes and uniformly random actions."),
     "no-adversary": Method(agent="none", summary="Control: nobody attacks; what remains is the artefact rate."),
 }

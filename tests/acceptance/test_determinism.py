@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.config import Budget, LearnerConfig, ReplayConfig, RunSpec, SacConfig, SceneOptimizerConfig
+from risk_sac.config import AgentConfig, Budget, LearnerConfig, ReplayConfig, RunSpec, SceneOptimizerConfig
 from risk_sac.records import records_to_json
 from risk_sac.train import RunSummary, train
 from risk_sac.types import EpisodeRecord, RunMetrics
@@ -16,7 +16,7 @@ from risk_sac.types import EpisodeRecord, RunMetrics
 EPISODES, EVALUATION = 6, 1
 # Small enough for seconds, and still learning, modelling and replaying by priority before the run is over.
 LEARNER = LearnerConfig(
-    sac=SacConfig(hidden_sizes=(32, 32), batch_size=32, warmup_steps=150),
+    agent=AgentConfig(hidden_sizes=(32, 32), batch_size=32, warmup_steps=150),
     replay=ReplayConfig(capacity=1000),
     scenes=SceneOptimizerConfig(initial_scenes=2, refit_every=1, candidates=32, exploration=0.0),
     checkpoint_every=1,
@@ -58,7 +58,7 @@ def test_the_run_has_learnt_something_to_be_deterministic_about(uninterrupted: t
     summary, listener = uninterrupted
     assert summary.finished
     assert [r.phase for r in listener.records] == ["train"] * EPISODES + ["evaluate"] * EVALUATION
-    assert listener.records[-1].environment_steps > 2 * LEARNER.sac.warmup_steps
+    assert listener.records[-1].environment_steps > 2 * LEARNER.agent.warmup_steps
     assert len({r.temperature for r in listener.records}) > 1
     assert len({r.dual_variable for r in listener.records}) > 1
 

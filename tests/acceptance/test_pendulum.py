@@ -9,19 +9,19 @@ import torch
 
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.replay import Transition
-from risk_sac.config import METHODS, LearnerConfig, MethodName, ReplayConfig, SacConfig
+from risk_sac.config import METHODS, AgentConfig, LearnerConfig, MethodName, ReplayConfig, SacConfig
 
 STEPS = 10_000
 CONFIG = LearnerConfig(
-    sac=SacConfig(
+    agent=AgentConfig(
         hidden_sizes=(64, 64),
         batch_size=64,
         actor_learning_rate=1e-3,
         critic_learning_rate=2e-3,
-        temperature_learning_rate=1e-3,
         target_rate=0.01,
         warmup_steps=500,
     ),
+    sac=SacConfig(temperature_learning_rate=1e-3),
     replay=ReplayConfig(capacity=STEPS),
 )
 
@@ -82,10 +82,15 @@ def mean_return(learner: Learner, episodes: int) -> float:
     return total / episodes
 
 
-@pytest.mark.parametrize(
-    ("method", "seed"), [("sac", 0), ("sac", 1), ("sac", 2), ("risk-sac-only-rper", 0)], ids=lambda value: str(value)
-)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("method", ["sac", "ddpg"])
 def test_learner_swings_up_the_pendulum_in_10_000_steps(method: MethodName, seed: int) -> None:
     learner = Learner(3, 1, METHODS[method], CONFIG, seed)
     train(learner, seed)
+    assert mean_return(learner, episodes=20) >= -250.0
+
+
+def test_risk_prioritised_replay_swings_it_up_too() -> None:
+    learner = Learner(3, 1, METHODS["risk-sac-only-rper"], CONFIG, 0)
+    train(learner, 0)
     assert mean_return(learner, episodes=20) >= -250.0

@@ -7,16 +7,32 @@ import torch
 
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.replay import Transition
-from risk_sac.config import METHODS, LagrangianConfig, LearnerConfig, MethodName, ReplayConfig, RewardConfig, SacConfig
+from risk_sac.config import (
+    METHODS,
+    AgentConfig,
+    LagrangianConfig,
+    LearnerConfig,
+    MethodName,
+    ReplayConfig,
+    RewardConfig,
+)
 from risk_sac.errors import CheckpointError
 
 Make = Callable[..., Transition]
 CONFIG = LearnerConfig(
-    sac=SacConfig(hidden_sizes=(8,), batch_size=16, warmup_steps=20),
+    agent=AgentConfig(hidden_sizes=(8,), batch_size=16, warmup_steps=20),
     replay=ReplayConfig(capacity=1000),
     lagrangian=LagrangianConfig(learning_rate=0.01, cost_limit=0.1),
 )
-LEARNING: tuple[MethodName, ...] = ("risk-sac", "risk-sac-only-rper", "risk-sac-only-rs", "sac-lag", "sac")
+LEARNING: tuple[MethodName, ...] = (
+    "risk-sac",
+    "risk-sac-only-rper",
+    "risk-sac-only-rs",
+    "sac-lag",
+    "sac",
+    "ddpg-lag",
+    "ddpg",
+)
 
 
 def learner(method: MethodName = "risk-sac", config: LearnerConfig = CONFIG, seed: int = 0) -> Learner:
@@ -57,7 +73,7 @@ def test_warm_up_acts_at_random_and_learns_nothing(random_transition: Make) -> N
     subject = learner()
     stream = np.random.default_rng(0)
     before = subject.act(np.ones(3, np.float32), explore=False)
-    for _ in range(CONFIG.sac.warmup_steps - 1):
+    for _ in range(CONFIG.agent.warmup_steps - 1):
         assert (np.abs(subject.act(np.ones(3, np.float32))) <= 1.0).all()
         subject.observe(random_transition(stream))
         assert subject.update() is None
@@ -68,7 +84,7 @@ def test_warm_up_acts_at_random_and_learns_nothing(random_transition: Make) -> N
 
 
 def test_nothing_is_learned_from_an_empty_memory() -> None:
-    config = CONFIG.model_copy(update={"sac": CONFIG.sac.model_copy(update={"warmup_steps": 0})})
+    config = CONFIG.model_copy(update={"agent": CONFIG.agent.model_copy(update={"warmup_steps": 0})})
     assert learner(config=config).update() is None
 
 
@@ -77,7 +93,7 @@ def test_dual_variable_rises_with_cost_only_where_the_method_constrains_it(
     method: MethodName, transition: Make
 ) -> None:
     subject = learner(method)
-    for _ in range(CONFIG.sac.warmup_steps):
+    for _ in range(CONFIG.agent.warmup_steps):
         subject.observe(transition(cost=0.6))
     subject.update()
     # λ = 0 + 0.01 (0.6 - 0.1)
@@ -99,7 +115,7 @@ def test_equation_8_to_the_letter_pays_the_terminal_potential() -> None:
 
 
 def test_state_of_other_networks_is_refused() -> None:
-    wider = CONFIG.model_copy(update={"sac": CONFIG.sac.model_copy(update={"hidden_sizes": (9,)})})
+    wider = CONFIG.model_copy(update={"agent": CONFIG.agent.model_copy(update={"hidden_sizes": (9,)})})
     with pytest.raises(CheckpointError, match="hidden_sizes"):
         learner(config=wider).load(learner().state())
 

@@ -1,13 +1,22 @@
+import copy
 import math
 
-import numpy as np
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from torch.distributions import Independent, Normal, TanhTransform, TransformedDistribution
 
-from risk_sac.agents.networks import LOG_STD_MAX, LOG_STD_MIN, Policy, TwinCritics, bounded_log_std, tanh_gaussian
+from risk_sac.agents.networks import (
+    LOG_STD_MAX,
+    LOG_STD_MIN,
+    ONEDNN_FROM,
+    Mlp,
+    bounded_log_std,
+    tanh_gaussian,
+    tanh_gaussian_gradient,
+)
+from tests.unit.agents.plain import PlainMlp
 
 
 def test_log_prob_of_a_hand_computed_case() -> None:
@@ -58,28 +67,55 @@ def test_log_std_stays_within_its_bounds(raw: float) -> None:
     assert LOG_STD_MIN <= bounded_log_std(torch.tensor(raw)).item() <= LOG_STD_MAX
 
 
-def test_stacked_critics_equal_two_separate_networks() -> None:
-    critics = TwinCritics(3, 2, (8, 5), torch.Generator().manual_seed(0))
-    observation, action = torch.randn(7, 3), torch.rand(7, 2)
-    values = critics(observation, action)
-    for twin in range(2):
-        hidden = torch.cat((observation, action), dim=1)
-        for layer, (weight, bias) in enumerate(zip(critics.weights, critics.biases, strict=True)):
-            hidden = hidden @ weight[twin] + bias[twin]
-            hidden = hidden.relu() if layer < 2 else hidden
-        torch.testing.assert_close(values[twin], hidden.squeeze(1))
-    assert not torch.equal(values[0], values[1])
+# Narrow layers, one column at the end, and layers wide enough for oneDNN.
+@pytest.mark.parametrize("sizes", [(5, 16, 12, 3), (5, 16, 12, 1), (130, ONEDNN_FROM, 140, 2)], ids=str)
+def test_values_and_gradients_equal_autograd(sizes: tuple[int, ...]) -> None:
+    generator = torch.Generator().manual_seed(0)
+    network = Mlp(sizes, generator)
+    plain = PlainMlp(network)
+    inputs = torch.randn(ONEDNN_FROM, sizes[0], generator=generator, requires_grad=True)
+    slope = torch.randn(ONEDNN_FROM, sizes[-1], generator=generator)
+    expected = plain(inputs)
+    expected.backward(slope)
+    activations = network.forward(inputs.detach())
+    torch.testing.assert_close(activations[-1], expected.detach(), rtol=1e-5, atol=1e-5)
+    network.backward(activations, slope)
+    torch.testing.assert_close(network.parameters.grad, plain.gradient(), rtol=1e-5, atol=1e-4)
+    columns = slice(2, 5)
+    partial = network.input_gradient(activations, slope, columns)
+    torch.testing.assert_close(partial, inputs.grad[:, columns], rtol=1e-5, atol=1e-5)
+
+
+@given(st.integers(0, 1000))
+def test_gradient_through_the_tanh_gaussian_equals_autograd(seed: int) -> None:
+    generator = torch.Generator().manual_seed(seed)
+    raw = torch.randn(7, 6, generator=generator, dtype=torch.float64).mul_(2.0).requires_grad_()
+    noise, slope = torch.randn(2, 7, 3, generator=generator, dtype=torch.float64)
+    mean, raw_log_std = raw.chunk(2, dim=1)
+    action, log_prob = tanh_gaussian(mean, bounded_log_std(raw_log_std), noise)
+    ((slope * action).sum() + 0.3 * log_prob.sum()).backward()
+    torch.testing.assert_close(tanh_gaussian_gradient(raw.detach(), noise, action.detach(), slope, 0.3), raw.grad)
 
 
 def test_initialisation_follows_the_seed_and_leaves_the_global_generator_alone() -> None:
     before = torch.get_rng_state()
-    first, same, other = (Policy(4, 2, (16,), torch.Generator().manual_seed(seed)) for seed in (1, 1, 2))
+    first, same, other = (Mlp((4, 16, 2), torch.Generator().manual_seed(seed)) for seed in (1, 1, 2))
     assert torch.equal(torch.get_rng_state(), before)
-    assert torch.equal(first.weights[0], same.weights[0])
-    assert not torch.equal(first.weights[0], other.weights[0])
+    assert torch.equal(first.parameters, same.parameters)
+    assert not torch.equal(first.parameters, other.parameters)
 
 
 def test_initial_weights_fill_the_range_of_a_linear_layer() -> None:
-    policy = Policy(100, 2, (200,), torch.Generator().manual_seed(0))
-    assert np.abs(policy.weights[0].detach().numpy()).max() == pytest.approx(0.1, rel=1e-3)
-    assert policy.weights[0].std().item() == pytest.approx(0.1 / math.sqrt(3.0), rel=0.02)
+    weight = Mlp((100, 200), torch.Generator().manual_seed(0)).parameters[: 100 * 200]
+    assert weight.abs().max().item() == pytest.approx(0.1, rel=1e-3)
+    assert weight.std().item() == pytest.approx(0.1 / math.sqrt(3.0), rel=0.02)
+
+
+def test_a_copy_learns_apart_from_its_original() -> None:
+    network = Mlp((3, 4, 1), torch.Generator().manual_seed(0))
+    twin = copy.deepcopy(network)
+    inputs = torch.ones(1, 3)
+    before = network.forward(inputs)[-1].item()
+    twin.parameters.mul_(2.0)  # the layers are views of the flat parameters, in the copy too
+    assert twin.forward(inputs)[-1].item() != pytest.approx(before)
+    assert network.forward(inputs)[-1].item() == before

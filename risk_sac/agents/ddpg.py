@@ -1,0 +1,133 @@
+"""Deep deterministic policy gradient: targets, loss, and the agent that applies them.
+
+Source: Lillicrap et al., "Continuous control with deep reinforcement learning", 2016. Read beside `sac.py`.
+"""
+
+import copy
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from risk_sac.agents.agent import UpdateResult, all_finite, loading, row
+from risk_sac.agents.critics import Critics
+from risk_sac.agents.networks import Mlp
+from risk_sac.agents.replay import Batch, Vector
+from risk_sac.config.learner import AgentConfig, DdpgConfig
+
+
+def deterministic_target(reward: Tensor, terminated: Tensor, next_value: Tensor, discount: float) -> Tensor:
+    """Target of the critic.
+
+    y = r + γ (1 - terminated) Q̄_ψ(s', μ̄_θ(s'))
+
+    Args:
+      reward: `batch`, the reward to be maximised.
+      terminated: `batch`, 1 where s' is terminal; 0 where only the time limit was reached.
+      next_value: `batch`, target critic at the target policy's action.
+      discount: γ.
+
+    Returns:
+      `batch`.
+
+    Source: Lillicrap et al. 2016, Alg. 1.
+    """
+    return reward + discount * (1.0 - terminated) * next_value
+
+
+class DdpgAgent:
+    """Policy and critic with targets; Gaussian noise explores.
+
+    Choice: Gaussian noise instead of an Ornstein-Uhlenbeck process, which later work found to gain nothing.
+    """
+
+    temperature = 0.0
+
+    def __init__(
+        self,
+        observation_size: int,
+        action_size: int,
+        config: AgentConfig,
+        ddpg: DdpgConfig,
+        seed: int,
+        device: str = "cpu",
+    ) -> None:
+        self._config = config
+        self._ddpg = ddpg
+        self._device = torch.device(device)
+        self._generator = torch.Generator(self._device).manual_seed(seed)
+        self._policy = Mlp((observation_size, *config.hidden_sizes, action_size), self._generator)
+        self._target_policy = copy.deepcopy(self._policy)
+        self._critics = Critics(1, observation_size, action_size, config, self._generator)
+        self._actor_optimizer = torch.optim.Adam([self._policy.parameters], lr=config.actor_learning_rate, fused=True)
+
+    def act(self, observation: Vector, explore: bool) -> Vector:
+        """See `Agent.act`: the policy's action, with noise while exploring."""
+        action = torch.tanh(self._policy.forward(row(observation, self._device))[-1][0])
+        if explore:
+            noise = torch.randn(action.shape, generator=self._generator, device=self._device)
+            action = (action + self._ddpg.exploration_deviation * noise).clamp(-1.0, 1.0)
+        return action.cpu().numpy()
+
+    def td_error(
+        self, observation: Vector, action: Vector, reward: float, next_observation: Vector, terminated: bool
+    ) -> float:
+        """See `Agent.td_error`."""
+        target = self._target(
+            torch.tensor([reward], dtype=torch.float32, device=self._device),
+            torch.tensor([float(terminated)], device=self._device),
+            row(next_observation, self._device),
+        )
+        values = self._critics.values(row(observation, self._device), row(action, self._device))
+        return (target - values).abs().mean().item()
+
+    def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
+        """See `Agent.update`."""
+        target = self._target(reward, batch.terminated, batch.next_observation)
+        td_errors, loss_q = self._critics.fit(batch.observation, batch.action, target, batch.weight)
+
+        activations = self._policy.forward(batch.observation)
+        action = torch.tanh(activations[-1])
+        values, slope = self._critics.smallest(batch.observation, action)
+        # J_μ = -E[Q_ψ(s, μ_θ(s))]
+        gradient = slope * (1.0 - action.square()) / -len(reward)
+        self._policy.backward(activations, gradient)
+        self._actor_optimizer.step()
+        self._critics.follow()
+        self._target_policy.parameters.lerp_(self._policy.parameters, self._config.target_rate)
+
+        critic_figure, actor_figure = all_finite(torch.stack((loss_q, -values.mean())).tolist())
+        return UpdateResult(
+            td_errors=td_errors.abs().mean(dim=0).double().cpu().numpy(),
+            critic_loss=critic_figure,
+            actor_loss=actor_figure,
+            temperature=0.0,
+            entropy=0.0,
+        )
+
+    def state(self) -> dict[str, Any]:
+        """See `Agent.state`."""
+        return copy.deepcopy(
+            {
+                "policy": self._policy.parameters,
+                "target_policy": self._target_policy.parameters,
+                "critics": self._critics.state(),
+                "actor_optimizer": self._actor_optimizer.state_dict(),
+                "generator": self._generator.get_state(),
+            }
+        )
+
+    def load(self, state: dict[str, Any]) -> None:
+        """See `Agent.load`."""
+        state = copy.deepcopy(state)  # the optimisers would share its tensors
+        with loading():
+            self._policy.parameters.copy_(state["policy"])
+            self._target_policy.parameters.copy_(state["target_policy"])
+            self._critics.load(state["critics"])
+            self._actor_optimizer.load_state_dict(state["actor_optimizer"])
+            self._generator.set_state(state["generator"])
+
+    def _target(self, reward: Tensor, terminated: Tensor, next_observation: Tensor) -> Tensor:
+        next_action = torch.tanh(self._target_policy.forward(next_observation)[-1])
+        next_value = self._critics.target_values(next_observation, next_action)[0]
+        return deterministic_target(reward, terminated, next_value, self._config.discount)

@@ -1,0 +1,191 @@
+"""What every agent must do, whichever algorithm it runs."""
+
+import dataclasses
+import io
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+
+from risk_sac.agents.agent import Agent
+from risk_sac.agents.ddpg import DdpgAgent
+from risk_sac.agents.replay import Batch
+from risk_sac.agents.sac import SacAgent
+from risk_sac.config import AgentConfig, DdpgConfig, SacConfig
+from risk_sac.errors import CheckpointError, NotFinite
+from tests.unit.agents.plain import PlainDdpg, PlainMlp, PlainSac
+
+OBSERVATIONS, ACTIONS, ROWS = 5, 2, 16
+CONFIG = AgentConfig(hidden_sizes=(16, 16), batch_size=ROWS, critic_learning_rate=1e-3, target_rate=0.01)
+Make = Callable[..., Agent]
+
+
+def sac(config: AgentConfig = CONFIG, *, seed: int = 0) -> SacAgent:
+    return SacAgent(OBSERVATIONS, ACTIONS, config, SacConfig(), seed)
+
+
+def ddpg(config: AgentConfig = CONFIG, *, seed: int = 0) -> DdpgAgent:
+    return DdpgAgent(OBSERVATIONS, ACTIONS, config, DdpgConfig(), seed)
+
+
+both = pytest.mark.parametrize("make", [sac, ddpg])
+
+
+def random_batch(generator: np.random.Generator, rows: int = ROWS) -> Batch:
+    def normal(*shape: int) -> Tensor:
+        return torch.from_numpy(generator.standard_normal(shape).astype(np.float32))
+
+    return Batch(
+        observation=normal(rows, OBSERVATIONS),
+        action=normal(rows, ACTIONS).tanh(),
+        risk_reward=normal(rows),
+        cost=normal(rows).abs(),
+        robustness=normal(rows),
+        next_robustness=normal(rows),
+        next_observation=normal(rows, OBSERVATIONS),
+        terminated=(normal(rows) > 1.0).float(),
+        weight=normal(rows).abs().clamp(0.1, 1.0),
+        indices=np.arange(rows),
+    )
+
+
+@both
+def test_actions_stay_in_the_unit_box_and_the_frozen_policy_is_deterministic(make: Make) -> None:
+    agent = make()
+    observation = np.full(OBSERVATIONS, 100.0)
+    drawn = np.array([agent.act(observation, explore=True) for _ in range(50)])
+    assert drawn.shape == (50, ACTIONS)
+    assert drawn.dtype == np.float32
+    assert (np.abs(drawn) <= 1.0).all()
+    assert len(np.unique(drawn, axis=0)) > 1
+    assert np.array_equal(agent.act(observation, explore=False), agent.act(observation, explore=False))
+
+
+@both
+def test_agent_neither_reads_nor_moves_the_global_generator(make: Make) -> None:
+    torch.manual_seed(1)
+    before = torch.get_rng_state()
+    figures = []
+    for global_seed in (1, 2):
+        agent = make(seed=3)
+        agent.act(np.zeros(OBSERVATIONS, np.float32), explore=True)
+        batch = random_batch(np.random.default_rng(0))
+        figures.append(agent.update(batch, batch.risk_reward))
+        assert torch.equal(torch.get_rng_state(), before)
+        torch.manual_seed(global_seed + 1)
+        before = torch.get_rng_state()
+    assert figures[0].actor_loss == figures[1].actor_loss
+    assert figures[0].critic_loss == figures[1].critic_loss
+
+
+@both
+def test_td_error_of_one_transition_is_that_of_the_batch_at_equal_noise(make: Make) -> None:
+    agent = make()
+    state = agent.state()
+    batch = random_batch(np.random.default_rng(0))
+    one = agent.td_error(
+        batch.observation[0].numpy(), batch.action[0].numpy(), 0.5, batch.next_observation[0].numpy(), False
+    )
+    agent.load(state)
+    single = dataclasses.replace(
+        batch,
+        observation=batch.observation[:1],
+        action=batch.action[:1],
+        next_observation=batch.next_observation[:1],
+        terminated=torch.zeros(1),
+        weight=torch.ones(1),
+    )
+    assert agent.update(single, torch.tensor([0.5])).td_errors == pytest.approx([one], rel=1e-6)
+
+
+@both
+def test_reward_that_is_no_number_is_noticed(make: Make) -> None:
+    agent = make()
+    batch = random_batch(np.random.default_rng(0))
+    with pytest.raises(NotFinite, match="learning rates"):
+        agent.update(batch, batch.risk_reward * float("nan"))
+
+
+@both
+def test_resumed_agent_equals_one_never_interrupted_bit_for_bit(make: Make) -> None:
+    agents = [make(seed=seed) for seed in (0, 99)]
+    generator = np.random.default_rng(0)
+    for _ in range(10):
+        batch = random_batch(generator)
+        agents[0].update(batch, batch.risk_reward)
+    file = io.BytesIO()
+    torch.save(agents[0].state(), file)
+    file.seek(0)
+    state = torch.load(file, weights_only=True)
+    agents[1].load(state)
+    resumed_later = make(seed=7)
+    for agent in agents:
+        generator = np.random.default_rng(1)
+        for _ in range(10):
+            batch = random_batch(generator)
+            agent.update(batch, batch.risk_reward)
+    observation = np.ones(OBSERVATIONS, np.float32)
+    drawn = [agent.act(observation, explore=True) for agent in agents]
+    assert np.array_equal(*drawn)
+    first, second = (flatten(agent.state()) for agent in agents)
+    assert first.keys() == second.keys()
+    assert all(torch.equal(torch.as_tensor(first[key]), torch.as_tensor(second[key])) for key in first)
+    # A state can be loaded again after the agent that loaded it has moved on.
+    resumed_later.load(state)
+    assert not np.array_equal(resumed_later.act(observation, explore=False), agents[1].act(observation, explore=False))
+
+
+def flatten(state: object, prefix: str = "") -> dict[str, object]:
+    if isinstance(state, dict):
+        items = state.items()
+    elif isinstance(state, list | tuple):
+        items = enumerate(state)
+    else:
+        return {} if state is None else {prefix: state}
+    return {key: leaf for name, value in items for key, leaf in flatten(value, f"{prefix}/{name}").items()}
+
+
+@both
+def test_state_of_wider_networks_is_refused(make: Make) -> None:
+    wider = CONFIG.model_copy(update={"hidden_sizes": (17, 16)})
+    with pytest.raises(CheckpointError, match="hidden_sizes"):
+        make(wider).load(make().state())
+
+
+def close(fast: list[Tensor], plain: list[PlainMlp]) -> None:
+    for parameters, network in zip(fast, plain, strict=True):
+        torch.testing.assert_close(parameters, network.parameters(), rtol=0, atol=1e-5)
+
+
+# The sizes beside the defaults reach the widths at which products go to oneDNN.
+@pytest.mark.parametrize(("sizes", "rows"), [((16, 16), ROWS), ((128, 128), 128)], ids=str)
+def test_a_hundred_updates_of_sac_equal_a_plain_autograd_reference(sizes: tuple[int, ...], rows: int) -> None:
+    config = CONFIG.model_copy(update={"hidden_sizes": sizes})
+    agent = sac(config)
+    plain = PlainSac(agent, config, SacConfig(), ACTIONS)
+    generator = np.random.default_rng(0)
+    for _ in range(100):
+        batch = random_batch(generator, rows)
+        agent.update(batch, batch.risk_reward)
+        plain.update(batch, batch.risk_reward)
+    close([agent._policy.parameters], [plain.policy])
+    close(agent._critics._parameters, plain.critics.online)
+    close(agent._critics._target_parameters, plain.critics.targets)
+    assert agent.temperature == pytest.approx(plain.log_temperature.exp().item(), abs=1e-5)
+
+
+@pytest.mark.parametrize(("sizes", "rows"), [((16, 16), ROWS), ((128, 128), 128)], ids=str)
+def test_a_hundred_updates_of_ddpg_equal_a_plain_autograd_reference(sizes: tuple[int, ...], rows: int) -> None:
+    config = CONFIG.model_copy(update={"hidden_sizes": sizes})
+    agent = ddpg(config)
+    plain = PlainDdpg(agent, config)
+    generator = np.random.default_rng(0)
+    for _ in range(100):
+        batch = random_batch(generator, rows)
+        agent.update(batch, batch.risk_reward)
+        plain.update(batch, batch.risk_reward)
+    close([agent._policy.parameters, agent._target_policy.parameters], [plain.policy, plain.target_policy])
+    close(agent._critics._parameters, plain.critics.online)
+    close(agent._critics._target_parameters, plain.critics.targets)
