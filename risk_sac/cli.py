@@ -21,7 +21,7 @@ from risk_sac.spec_file import read_campaign, read_spec
 from risk_sac.types import RunMetrics
 
 if TYPE_CHECKING:
-    from risk_sac.evaluate import Job
+    from risk_sac.processes import Job
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 SEEDS = 5  # of a comparison that names none

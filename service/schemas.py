@@ -54,7 +54,7 @@ class Metrics(Body):
     temperature: Real
     """α."""
     distinct_failures: int
-    """Valid collisions that resemble no earlier one: another actor, other zones of contact or other outcome features."""
+    """Valid collisions that resemble no earlier one: another actor, other zones of contact or outcome features."""
     steps_per_distinct_failure: Real
     """Environment steps per distinct failure; null without one."""
 

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, get_args
 
 import matplotlib as mpl
@@ -97,15 +98,11 @@ def _figures(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
     for family in (family for family in comparison.spec.families if comparison.group(family, "search")):
         for curve in CURVES:
             if any(_drawn(comparison, family, curve)):
-                figures[f"{curve.name}_{family}"] = lambda family=family, curve=curve: _curves(  # type: ignore[misc]
-                    comparison, family, curve
-                )
+                figures[f"{curve.name}_{family}"] = partial(_curves, comparison, family, curve)
     for phase in comparison.phases:
         for metric in (metric for metric in METRICS if metric.name in BARS):
             suffix = "" if phase == "search" else f"_{phase}"
-            figures[f"bars_{metric.name}{suffix}"] = lambda metric=metric, phase=phase: _bars(  # type: ignore[misc]
-                comparison, metric, phase
-            )
+            figures[f"bars_{metric.name}{suffix}"] = partial(_bars, comparison, metric, phase)
     return figures
 
 
@@ -167,9 +164,9 @@ def _drawn(comparison: Comparison, family: FamilyName, curve: Curve) -> Iterator
 
 def _curves(comparison: Comparison, family: FamilyName, curve: Curve) -> Figure:
     figure, axes = _canvas(CURVE_IN)
-    most = 1
+    counts = []
     for rank, (method, values) in enumerate(_drawn(comparison, family, curve)):
-        most = max(most, len(values))
+        counts.append(len(values))
         look = LOOKS[method]
         front = 100 - rank  # the reference lies on top
         episodes = np.arange(1, values.shape[1] + 1)
@@ -193,8 +190,8 @@ def _curves(comparison: Comparison, family: FamilyName, curve: Curve) -> Figure:
         axes.set_yscale("log")
     else:
         axes.set_ylim(0, curve.top)
-    band = "; band: 95 % bootstrap interval" if most > 1 else ""
-    axes.set_title(f"{family}: mean over {_seeds(most)}{band}", fontsize=9, loc="left")
+    band = "; band: 95 % bootstrap interval" if max(counts) > 1 else ""
+    axes.set_title(f"{family}: mean over {_seeds(counts)}{band}", fontsize=9, loc="left")
     _legend(figure, axes)
     return figure
 
@@ -212,14 +209,14 @@ def _bars(comparison: Comparison, metric: Metric, phase: Phase) -> Figure:
     families = [family for family in comparison.spec.families if comparison.group(family, phase)]
     methods = [method for method in comparison.methods if any(cell.method == method for cell in comparison.cells)]
     width = 0.84 / len(methods)
-    most = 1
+    counts = []
     for place, method in enumerate(methods):
         label: str | None = method
         for middle, family in enumerate(families):
             cells = [cell for cell in comparison.group(family, phase) if cell.method == method]
             estimate = cells[0].estimates[metric.name] if cells else None
             x = middle + (place - (len(methods) - 1) / 2) * width
-            most = max(most, estimate.runs if estimate else 0)
+            counts += [estimate.runs] if estimate and estimate.runs else []
             mean = estimate.mean if estimate else None
             if not mean:  # a bar that nobody sees
                 axes.text(x, 0, "–" if mean is None else "0", ha="center", va="bottom", color="0.4", fontsize=7)
@@ -233,8 +230,8 @@ def _bars(comparison: Comparison, metric: Metric, phase: Phase) -> Figure:
     axes.grid(visible=False, axis="x")
     axes.set_ylabel(f"{metric.symbol} ({phase})")
     axes.set_ylim(bottom=0)
-    interval = "; lines: 95 % bootstrap interval" if most > 1 else ""
-    axes.set_title(f"mean over {_seeds(most)}{interval}; –: no value", fontsize=9, loc="left")
+    interval = "; lines: 95 % bootstrap interval" if max(counts, default=0) > 1 else ""
+    axes.set_title(f"mean over {_seeds(counts)}{interval}; –: no value", fontsize=9, loc="left")
     _legend(figure, axes)
     return figure
 
@@ -245,8 +242,10 @@ def _canvas(size: tuple[float, float]) -> tuple[Figure, Axes]:
     return figure, figure.add_subplot()
 
 
-def _seeds(runs: int) -> str:
-    return "1 seed" if runs == 1 else f"{runs} seeds"
+def _seeds(counts: Sequence[int]) -> str:
+    """Over how many runs the means were taken, in words."""
+    most = max(counts, default=0)
+    return ("" if len(set(counts)) < 2 else "up to ") + ("1 seed" if most == 1 else f"{most} seeds")
 
 
 def _legend(figure: Figure, axes: Axes) -> None:

@@ -196,7 +196,7 @@ def _repeat(comparison: Comparison) -> str:
         "## Repeat one run\n\n"
         f"```\n{run_command(run.spec, comparison.spec_file, 'repeated')}\n```\n\n"
         f"gives a `results.json` with the digest `{run.digest}`; `table.json` has the digest of every run. The same "
-        "digest needs the same versions and the same kind of processor.\n"
+        "digest needs the same versions and the same kind of processor or GPU.\n"
     )
 
 

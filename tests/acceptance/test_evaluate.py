@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from risk_sac import cli, evaluate
+from risk_sac import cli, processes
 
 RISK_SAC = [sys.executable, "-m", "risk_sac"]
 # Small networks and a short warm-up, so that the few episodes learn; two contacts in twelve episodes or so.
@@ -24,7 +24,7 @@ families: [low, mixed]
 seeds: [0, 1]
 budget: {episodes: 9, evaluation_episodes: 1}
 learner:
-  sac: {hidden_sizes: [32, 32], batch_size: 32, warmup_steps: 100}
+  agent: {hidden_sizes: [32, 32], batch_size: 32, warmup_steps: 100}
   scenes: {initial_scenes: 2, candidates: 32}
   checkpoint_every: 2
 """
@@ -143,7 +143,7 @@ def crash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], No
         count = f"echo crash >> {tmp_path}/crashes; [ $(wc -l < {tmp_path}/crashes) -gt {times} ] || kill -SEGV $$"
         python.write_text(f'#!/bin/sh\n{count}\nexec {sys.executable} "$@"\n')
         python.chmod(0o755)
-        monkeypatch.setattr(evaluate.sys, "executable", str(python))
+        monkeypatch.setattr(processes.sys, "executable", str(python))
 
     return arrange
 
