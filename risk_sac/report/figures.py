@@ -1,6 +1,7 @@
 """The comparison as pictures: how the methods search (the paper's Fig. 4a), what they reach (Fig. 4b-d), λ and α."""
 
 import io
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -38,6 +39,8 @@ STYLE: dict[Any, Any] = {  # matplotlib types the keys one by one
     "svg.hashsalt": "risk-sac",  # the same ids in every drawing
 }
 
+_STYLED = threading.Lock()  # matplotlib has one style per process
+
 
 @dataclass(frozen=True, slots=True)
 class Look:
@@ -49,7 +52,7 @@ class Look:
 
 
 # Paul Tol's "muted" scheme, safe for the colour-blind; line styles tell apart what a grey print does not.
-_MUTED = ("#CC6677", "#332288", "#117733", "#DDCC77", "#88CCEE", "#882255", "#44AA99", "#AA4499", "#999933")
+_MUTED = ("#CC6677", "#332288", "#117733", "#882255", "#88CCEE", "#44AA99", "#DDCC77", "#AA4499", "#999933")
 _DASHES = ("-", "--", "-.")
 _OWN = {
     REFERENCE: Look("#000000", "-", 2.0),
@@ -84,7 +87,7 @@ def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
     figures = _figures(comparison)
     if name not in figures:
         raise ConfigError(f"got {name!r}; wanted one of {', '.join(figures) or 'none: no run has finished'}")
-    with mpl.rc_context(STYLE):
+    with _STYLED, mpl.rc_context(STYLE):
         figure = figures[name]()
         file = io.BytesIO()
         metadata = {"Date": None} if format_ == "svg" else {"Software": None}
