@@ -1,8 +1,5 @@
 """Risk-guided replay against the obvious way to draw by priority: a cumulative sum and a binary search."""
 
-import time
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -11,6 +8,7 @@ from risk_sac.agents.replay import RiskPrioritizedReplay, Transition
 from risk_sac.agents.sum_tree import SumTree
 from risk_sac.config import ReplayConfig
 from risk_sac.types import Floats
+from tests.benchmarks.timing import interleaved
 
 STORED, BATCH, ROUNDS = 100_000, 256, 400
 OBSERVATIONS, ACTIONS = 60, 6
@@ -63,17 +61,6 @@ def full_replay() -> RiskPrioritizedReplay:
     return replay
 
 
-def interleaved(*calls: Callable[[], object]) -> list[float]:
-    """Median seconds of each call, the calls taking turns so that they meet the same machine."""
-    taken: list[list[float]] = [[] for _ in calls]
-    for _ in range(ROUNDS):
-        for call, times in zip(calls, taken, strict=True):
-            start = time.perf_counter()
-            call()
-            times.append(time.perf_counter() - start)
-    return [float(np.median(times)) for times in taken]
-
-
 @pytest.mark.bench
 def test_rper_sampling_and_update_beat_a_cumulative_sum() -> None:
     tree, plain = full_replay(), full_replay()
@@ -85,7 +72,7 @@ def test_rper_sampling_and_update_beat_a_cumulative_sum() -> None:
     def turn(replay: RiskPrioritizedReplay) -> None:
         replay.update(replay.sample(BATCH, generator).indices, errors)
 
-    tree_s, plain_s = interleaved(lambda: turn(tree), lambda: turn(plain))
+    tree_s, plain_s = np.median(interleaved(lambda: turn(tree), lambda: turn(plain), rounds=ROUNDS), axis=0)
     print(
         f"\nRPER sample + update, {STORED} stored, batch {BATCH}: {tree_s * 1e6:.0f} µs;"
         f" cumulative sum {plain_s * 1e6:.0f} µs; {plain_s / tree_s:.2f} times as fast"

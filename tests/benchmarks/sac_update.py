@@ -1,0 +1,112 @@
+"""One learner update beside Stable-Baselines3's and beside its matrix products alone; a program of its own, because
+torch's threads are fixed at the start of a process.
+
+Run: OMP_NUM_THREADS=1 python -m tests.benchmarks.sac_update 256 256; prints the seconds of each round as JSON.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from itertools import pairwise
+
+import gymnasium as gym
+import numpy as np
+import torch
+from stable_baselines3 import SAC
+from stable_baselines3.common.logger import Logger
+
+from risk_sac.agents import networks
+from risk_sac.agents.learner import Learner
+from risk_sac.agents.replay import Transition
+from risk_sac.config import METHODS, LearnerConfig
+from tests.benchmarks.timing import interleaved
+
+OBSERVATIONS, ACTIONS, STORED = 48, 6, 5000
+WARM_UP = 20
+ONE_THREAD = {"rounds": 25, "repeats": 8}
+THREADS = {"rounds": 60, "repeats": 2}  # short, so that a round meets one state of the machine
+
+
+class Still(gym.Env[np.ndarray, np.ndarray]):
+    """Spaces to build a model from."""
+
+    observation_space = gym.spaces.Box(-5.0, 5.0, (OBSERVATIONS,), np.float32)
+    action_space = gym.spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
+
+
+def sb3(width: int, batch: int) -> SAC:
+    policy = {"net_arch": [width, width]}
+    model = SAC("MlpPolicy", Still(), batch_size=batch, buffer_size=STORED, policy_kwargs=policy, device="cpu")
+    model.set_logger(Logger(None, []))
+    return model
+
+
+def ours(width: int, batch: int) -> Learner:
+    agent = {"hidden_sizes": (width, width), "batch_size": batch, "warmup_steps": 0, "device": "cpu"}
+    config = LearnerConfig.model_validate({"agent": agent, "replay": {"capacity": STORED}})
+    return Learner(OBSERVATIONS, ACTIONS, METHODS["sac"], config, 0)
+
+
+def fill(model: SAC, learner: Learner) -> None:
+    generator = np.random.default_rng(0)
+    for _ in range(STORED):
+        observation, following = generator.standard_normal((2, OBSERVATIONS), np.float32)
+        action = generator.uniform(-1.0, 1.0, ACTIONS).astype(np.float32)
+        reward = generator.standard_normal(1)
+        model.replay_buffer.add(observation, following, action, reward, np.zeros(1), [{}])
+        learner.observe(
+            Transition(
+                observation=observation,
+                action=action,
+                risk_reward=reward.item(),
+                cost=0.1,
+                robustness=0.0,
+                next_robustness=0.0,
+                next_observation=following,
+                terminated=False,
+                accumulated_reward=0.0,
+            )
+        )
+
+
+def products(width: int, batch: int) -> Callable[[], None]:
+    """All matrix products that an update of SAC consists of, by whatever computes them fastest, and nothing else."""
+    policy, critic = (OBSERVATIONS, width, width, 2 * ACTIONS), (OBSERVATIONS + ACTIONS, width, width, 1)
+
+    def forward(sizes: tuple[int, ...], rows: int) -> list[tuple[int, int, int]]:
+        return [(rows, fan_in, out) for fan_in, out in pairwise(sizes)]
+
+    def through(sizes: tuple[int, ...]) -> list[tuple[int, int, int]]:
+        return [(batch, out, fan_in) for fan_in, out in pairwise(sizes[1:])]
+
+    def weights(sizes: tuple[int, ...]) -> list[tuple[int, int, int]]:
+        return [(fan_in, batch, out) for fan_in, out in pairwise(sizes)]
+
+    fit = forward(critic, batch) + through(critic) + weights(critic)
+    slope = [*forward(critic, batch), *through(critic), (batch, width, ACTIONS)]  # of Q in the action
+    shapes = forward(policy, 2 * batch) + through(policy) + weights(policy)
+    shapes += 2 * (forward(critic, batch) + fit + slope)  # twin critics, their targets first
+    factors = [(torch.randn(rows, inner), torch.randn(inner, columns)) for rows, inner, columns in shapes]
+
+    def multiply() -> None:
+        for left, right in factors:
+            networks._product(left, right)
+
+    return multiply
+
+
+def main(width: int, batch: int) -> None:
+    model, learner = sb3(width, batch), ours(width, batch)
+    fill(model, learner)
+    calls = (lambda: model.train(1, batch), learner.update, products(width, batch))
+    interleaved(*calls, rounds=WARM_UP)
+    if torch.get_num_threads() == 1:
+        seconds = interleaved(*calls, **ONE_THREAD, clock=time.process_time)
+    else:  # they share the work, so wall time is what they save
+        seconds = interleaved(*calls, **THREADS)
+    json.dump(seconds.tolist(), sys.stdout)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
