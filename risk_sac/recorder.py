@@ -70,6 +70,7 @@ class Recorder:
                 evaluation=summary.evaluation,
                 digest=summary.digest,
                 versions=summary.versions,
+                device=summary.device,
                 wall_s=self.results.wall_s + summary.wall_s,
                 cpu_s=self.results.cpu_s + summary.cpu_s,
                 contacts=tuple(self._contacts),

@@ -53,6 +53,7 @@ class Results:
     evaluation: RunMetrics | None = None  # of the frozen policy
     digest: str | None = None  # of all records; None while the run goes on
     versions: Mapping[str, str] | None = None
+    device: str | None = None  # where the networks lived; None while the run goes on
     wall_s: float = 0.0  # over all resumes
     cpu_s: float = 0.0  # the same in processor time
     contacts: tuple[Contact, ...] = ()  # in the order of the episodes

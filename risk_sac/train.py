@@ -66,6 +66,7 @@ class RunSummary:
     digest: str  # of all records: the same spec gives the same digest
     finished: bool  # False when the observer ended it
     versions: Mapping[str, str]
+    device: str  # where the networks lived
     wall_s: float  # of this process; excludes what was done before a resume
     cpu_s: float  # the same in processor time, which a busy machine does not lengthen
 
@@ -247,6 +248,7 @@ class Run:
             digest=results_digest(self.records),
             finished=finished,
             versions={name: version(name) for name in PACKAGES},
+            device=self._agent.device,
             wall_s=wall_s,
             cpu_s=cpu_s,
         )

@@ -10,6 +10,7 @@ from risk_sac.agents.replay import Transition, Vector
 class RandomAgent:
     """Uniform actions in [-1, 1]; λ and α are 0."""
 
+    device = "cpu"
     dual_variable = 0.0
     temperature = 0.0
 

@@ -18,6 +18,7 @@ class ScriptedAgent:
     λ and α are 0.
     """
 
+    device = "cpu"
     dual_variable = 0.0
     temperature = 0.0
 
