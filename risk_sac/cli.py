@@ -219,7 +219,8 @@ def _summary(spec: RunSpec, results: Results) -> Table:
     """One column per phase."""
     phases = {"search": results.metrics, "evaluation": results.evaluation}
     columns = {name: _figures(metrics) for name, metrics in phases.items() if metrics is not None}
-    table = Table("", *columns, title=f"{spec.family} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}")
+    title = f"{spec.family} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}"
+    table = Table("", *columns, title=title)
     for figure in next(iter(columns.values()), {}):
         table.add_row(figure, *(column[figure] for column in columns.values()))
     return table
