@@ -1,0 +1,91 @@
+"""Where a run's time goes: all but the simulator and the learner should be next to nothing."""
+
+import time
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+
+import pytest
+
+from risk_sac.agents.learner import Learner
+from risk_sac.config import Budget, RunSpec
+from risk_sac.env import RiskSacEnv
+from risk_sac.local_run import run
+from risk_sac.recorder import Recorder
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scene_optimizer import BotorchOptimizer
+from risk_sac.train import Run
+from risk_sac.types import RunMetrics
+
+WARM_UP, EPISODES = 30, 60  # the first 1000 steps and 16 scenes are drawn without a model; then what is measured
+LIMIT = 0.15
+PARTS = {
+    "simulator": ((RiskSacEnv, "reset"), (RiskSacEnv, "step")),
+    "learner": ((Learner, "act"), (Learner, "observe"), (Learner, "update")),
+    "scene optimiser": ((BotorchOptimizer, "ask"), (BotorchOptimizer, "tell")),
+    "everything else": ((Run, "save"), (Recorder, "episode")),  # and what is in none of these
+}
+
+
+class Stopwatch:
+    """Wall time of each method, from the moment of `begin`."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        self.seconds: dict[str, dict[str, float]] = {part: {} for part in PARTS}
+        for part, methods in PARTS.items():
+            for owner, name in methods:
+                patch.setattr(owner, name, self._timed(self.seconds[part], getattr(owner, name)))
+
+    def begin(self, episodes: int, metrics: RunMetrics | None) -> None:
+        """An observer's progress, heard once the warm-up is over."""
+        if episodes == WARM_UP:
+            self.started = time.perf_counter()
+            for seconds in self.seconds.values():
+                seconds.update(dict.fromkeys(seconds, 0.0))
+
+    def stop(self) -> None:
+        self.total = time.perf_counter() - self.started
+
+    def share(self, *parts: str) -> float:
+        return sum(sum(self.seconds[part].values()) for part in parts) / self.total
+
+    def of(self, part: str) -> str:
+        return ", ".join(f"{name} {seconds / self.total:.1%}" for name, seconds in self.seconds[part].items())
+
+    @staticmethod
+    def _timed(seconds: dict[str, float], call: Callable[..., object]) -> Callable[..., object]:
+        name = call.__name__
+        seconds[name] = 0.0
+
+        @wraps(call)
+        def timed(*args: object, **kwargs: object) -> object:
+            started = time.perf_counter()
+            try:
+                return call(*args, **kwargs)
+            finally:
+                seconds[name] += time.perf_counter() - started
+
+        return timed
+
+
+@pytest.mark.bench
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("family", FAMILIES)
+def test_little_of_a_run_lies_outside_simulator_and_learner(
+    family: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = RunSpec(family=family, method="risk-sac", seed=0, budget=Budget(episodes=WARM_UP + EPISODES))
+    watch = Stopwatch(monkeypatch)
+    run(spec, tmp_path / "run", watch.begin)
+    watch.stop()
+    overhead = 1.0 - watch.share("simulator", "learner")
+    rest = overhead - watch.share("scene optimiser")
+    print(
+        f"\n{family}, risk-sac, {EPISODES} episodes after the warm-up in {watch.total:.0f} s: "
+        f"simulator {watch.share('simulator'):.1%} ({watch.of('simulator')}); "
+        f"learner {watch.share('learner'):.1%} ({watch.of('learner')}); "
+        f"scene optimiser {watch.share('scene optimiser'):.1%} ({watch.of('scene optimiser')}); "
+        f"everything else {rest:.1%} ({watch.of('everything else')}); "
+        f"outside simulator and learner {overhead:.1%}"
+    )
+    assert overhead <= LIMIT
