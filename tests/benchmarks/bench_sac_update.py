@@ -10,15 +10,16 @@ import numpy as np
 import pytest
 
 from risk_sac.config import LearnerConfig
-from risk_sac.types import Floats
+from tests.benchmarks.timing import Times
 
 ROOT = Path(__file__).parents[2]
 CORES = len(os.sched_getaffinity(0))
 DEFAULT = LearnerConfig().agent
+ENOUGH_ROUNDS = 15
 
 
-def measured(threads: int, width: int, batch: int) -> Floats:
-    """Seconds of theirs, ours and the matrix products alone, `rounds x 3`."""
+def measured(threads: int, width: int, batch: int) -> Times:
+    """Theirs, ours and the matrix products alone."""
     done = subprocess.run(
         [sys.executable, "-m", "tests.benchmarks.sac_update", str(width), str(batch)],
         env={**os.environ, "OMP_NUM_THREADS": str(threads), "MKL_NUM_THREADS": str(threads)},
@@ -28,7 +29,7 @@ def measured(threads: int, width: int, batch: int) -> Floats:
         check=False,
     )
     assert done.returncode == 0, done.stderr[-2000:]
-    return np.array(json.loads(done.stdout))
+    return Times(**{name: np.array(rows) for name, rows in json.loads(done.stdout).items()})
 
 
 @pytest.mark.bench
@@ -41,14 +42,20 @@ def test_an_update_is_faster_than_that_of_stable_baselines3(
 ) -> None:
     if threads > CORES:
         pytest.skip(f"{threads} threads need {threads} cores; this process may use {CORES}")
-    seconds = measured(threads, width, batch)
-    ratios = seconds[:, 0] / seconds[:, 1]
-    low, ratio, high = np.percentile(ratios, (25, 50, 75))
+    times = measured(threads, width, batch)
+    # Threads share the work, so wall time is what they save; of one, CPU time tells the same without the neighbours.
+    kind, seconds = ("CPU", times.cpu_s) if threads == 1 else ("wall", times.wall_s)
+    cores = times.cpu_s.sum(axis=1) / times.wall_s.sum(axis=1)
+    alone = (cores >= 0.75 * threads) | (threads == 1)
+    enough = alone.sum() >= ENOUGH_ROUNDS
+    seconds = seconds[alone] if enough else seconds
+    low, ratio, high = np.percentile(seconds[:, 0] / seconds[:, 1], (25, 50, 75))
     theirs, ours, products = 1e3 * np.median(seconds, axis=0)
     print(
         f"\nSAC update, hidden {width}-{width}, batch {batch}, {threads} {'thread' if threads == 1 else 'threads'}: "
-        f"{ours:.2f} ms {'CPU' if threads == 1 else 'wall'} time, Stable-Baselines3 {theirs:.2f} ms; "
-        f"{ratio:.2f} times as fast (half of the rounds {low:.2f} to {high:.2f}); "
-        f"its matrix products alone {products:.2f} ms"
+        f"{ours:.2f} ms {kind} time, Stable-Baselines3 {theirs:.2f} ms; {ratio:.2f} times as fast "
+        f"(half of {len(seconds)} rounds {low:.2f} to {high:.2f}); the matrix products alone {products:.2f} ms"
     )
+    if not enough:
+        pytest.skip(f"busy machine: {threads} threads had {np.median(cores):.1f} cores; wait until it is idle")
     assert ratio >= wanted

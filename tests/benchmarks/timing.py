@@ -2,24 +2,29 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from risk_sac.types import Floats
 
 
-def interleaved(
-    *calls: Callable[[], object],
-    rounds: int,
-    repeats: int = 1,
-    clock: Callable[[], float] = time.perf_counter,
-) -> Floats:
-    """Seconds of each call, `rounds x calls`, the calls taking turns so that they meet the same machine."""
-    seconds = np.empty((rounds, len(calls)))
-    for row in seconds:
-        for column, call in enumerate(calls):
-            started = clock()
-            for _ in range(repeats):
-                call()
-            row[column] = (clock() - started) / repeats
-    return seconds
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Times:
+    """What each call took in each round."""
+
+    wall_s: Floats  # rounds x calls
+    cpu_s: Floats  # rounds x calls, of all threads together
+
+
+def interleaved(*calls: Callable[[], object], rounds: int, repeats: int = 1) -> Times:
+    """Times the calls by turns, so that they meet the same machine; a time is the mean of `repeats` in a row."""
+    times = Times(wall_s=np.empty((rounds, len(calls))), cpu_s=np.empty((rounds, len(calls))))
+    for turn in np.ndindex(times.wall_s.shape):
+        call = calls[turn[1]]
+        started, started_cpu = time.perf_counter(), time.process_time()
+        for _ in range(repeats):
+            call()
+        times.wall_s[turn] = (time.perf_counter() - started) / repeats
+        times.cpu_s[turn] = (time.process_time() - started_cpu) / repeats
+    return times
