@@ -8,7 +8,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 
 from risk_sac import __version__
-from service.api import campaigns, catalogue
+from service.api import campaigns, catalogue, reports
 from service.api.body import body_schemas
 from service.api.context import Context
 from service.api.problems import add_problem_handlers
@@ -16,6 +16,7 @@ from service.errors import StorageError
 from service.executor import Executor, LocalExecutor
 from service.locks import try_lock
 from service.manager import Manager
+from service.reports import Reports
 from service.settings import ServiceSettings
 from service.store import Store
 
@@ -42,6 +43,7 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         title="RISK-SAC", description=DESCRIPTION, version=__version__, lifespan=lifespan, redirect_slashes=False
     )
     app.include_router(campaigns.router)
+    app.include_router(reports.router)
     app.include_router(catalogue.router)
     add_problem_handlers(app)
     app.openapi = lambda: openapi(app)  # type: ignore[method-assign]  # FastAPI's documented way
@@ -60,7 +62,7 @@ def opened(settings: ServiceSettings, executor: Executor) -> Iterator[Context]:
         manager = Manager(settings, store, executor)
         manager.start()
         try:
-            yield Context(settings, store, manager)
+            yield Context(settings, store, manager, Reports(settings))
         finally:
             manager.stop()
             store.close()

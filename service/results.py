@@ -1,8 +1,12 @@
-"""What a campaign found, summed per family and method. Pure."""
+"""What a campaign found so far, summed per family and method. Pure.
+
+Live figures of runs that go on; `service.reports` compares those that have finished. The mean ECR and its interval are
+those of the report.
+"""
 
 from collections.abc import Sequence
 
-from risk_sac.metrics import bootstrap_interval
+from risk_sac.report.cells import METRICS, estimate
 from risk_sac.types import RunMetrics
 from service.records import Campaign, Run
 from service.schemas import Results, RunResult, Total
@@ -19,6 +23,9 @@ def results(campaign: Campaign) -> Results:
     )
 
 
+_ECR = next(metric for metric in METRICS if metric.name == "ecr")
+
+
 def totals(runs: Sequence[Run]) -> list[Total]:
     """One total per family and method, of the runs that have begun, in the order of the runs."""
     groups: dict[tuple[str, str], list[RunMetrics]] = {}
@@ -28,15 +35,8 @@ def totals(runs: Sequence[Run]) -> list[Total]:
     return [_total(family, method, group) for (family, method), group in groups.items()]
 
 
-def interval(group: Sequence[RunMetrics]) -> tuple[float, float]:
-    """95 % interval of the mean ECR: Wilson for one run, percentile bootstrap over the seeds for more."""
-    if len(group) == 1:
-        return group[0].ecr_low, group[0].ecr_high
-    return bootstrap_interval([metrics.ecr for metrics in group], seed=0)
-
-
 def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
-    low, high = interval(group)
+    ecr = estimate(_ECR, group)
     steps = sum(metrics.environment_steps for metrics in group)
     distinct = sum(metrics.distinct_failures for metrics in group)
     dispersions = [metrics.dispersion for metrics in group if metrics.dispersion is not None]
@@ -50,9 +50,9 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
             "raw_collisions": sum(metrics.raw_collisions for metrics in group),
             "failures": sum(metrics.failures for metrics in group),
             "environment_steps": steps,
-            "ecr": _mean([metrics.ecr for metrics in group]),
-            "ecr_low": low,
-            "ecr_high": high,
+            "ecr": ecr.mean,
+            "ecr_low": ecr.low,
+            "ecr_high": ecr.high,
             "efficiency": _mean([metrics.efficiency for metrics in group]),
             "cost_rate": _mean([metrics.cost_rate for metrics in group]),
             "dispersion": _mean(dispersions) if dispersions else None,

@@ -52,6 +52,7 @@ class Comparison:
     spec: CampaignSpec
     command: str
     spec_file: str  # where `risk-sac run --spec` finds the campaign
+    spec_command: str  # what a reader types to have that file; empty where it lies there already
     methods: tuple[MethodName, ...]  # the reference first
     runs: tuple[FinishedRun, ...]  # by family, method and seed
     missing: tuple[MissingRun, ...]
@@ -91,6 +92,7 @@ def compare(
     command: str,
     *,
     spec_file: str = "spec.yaml",
+    spec_command: str = "",
     reasons: Mapping[str, str] | None = None,
 ) -> Comparison:
     """Compares the methods of a campaign by the runs that have finished.
@@ -100,6 +102,7 @@ def compare(
         runs: finished runs, in any order; those of other specs are left out.
         command: what a reader types to get the same.
         spec_file: where `risk-sac run --spec` finds the campaign.
+        spec_command: what a reader types to have that file; empty where it lies there already.
         reasons: why a run is missing, by `RunSpec.digest`; "not finished" for the rest.
     """
     methods = _reference_first(spec.methods)
@@ -115,6 +118,7 @@ def compare(
         spec=spec,
         command=command,
         spec_file=spec_file,
+        spec_command=spec_command,
         methods=methods,
         runs=kept,
         missing=missing,

@@ -188,13 +188,15 @@ def _definitions() -> str:
 
 
 def _repeat(comparison: Comparison) -> str:
-    """The command that gives one row's digest again."""
+    """The commands that give one row's digest again."""
     if not comparison.runs:
         return ""
     run = comparison.runs[0]
+    again = run_command(run.spec, comparison.spec_file, "repeated")
+    commands = [comparison.spec_command, again] if comparison.spec_command else [again]
     return (
         "## Repeat one run\n\n"
-        f"```\n{run_command(run.spec, comparison.spec_file, 'repeated')}\n```\n\n"
+        "```\n" + "\n".join(commands) + "\n```\n\n"
         f"gives a `results.json` with the digest `{run.digest}`; `table.json` has the digest of every run. The same "
         "digest needs the same versions and the same kind of processor or GPU.\n"
     )

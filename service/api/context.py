@@ -6,6 +6,7 @@ from typing import Annotated, cast
 from fastapi import Depends, Request
 
 from service.manager import Manager
+from service.reports import Reports
 from service.settings import ServiceSettings
 from service.store import Store
 
@@ -17,6 +18,7 @@ class Context:
     settings: ServiceSettings
     store: Store
     manager: Manager
+    reports: Reports
 
 
 def _context(request: Request) -> Context:

@@ -12,6 +12,7 @@ def _problem(status: int, description: str) -> Responses:
 
 
 MALFORMED = _problem(400, "The body is no JSON")
+UNACCEPTABLE = _problem(406, "The Accept header names none of the media types there are")
 NOT_JSON = _problem(415, "The body is not declared as application/json")
 UNKNOWN = _problem(404, "Nothing has this id")
 INVALID = _problem(422, "A field is wrong; `errors` names it")

@@ -104,21 +104,28 @@ def scripted() -> ModuleType:
 
 
 @pytest.fixture(scope="module")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
+def client(serve_shared: Callable[..., Service]) -> httpx.Client:
     """A client of one server for all tests of a module that leave no trace."""
-    service = Service(tmp_path_factory.mktemp("shared") / "data", "scripted_worker", 10)
-    yield service.client
-    service.stop()
-    service.client.close()
+    return serve_shared().client
 
 
 @pytest.fixture
 def serve(tmp_path: Path) -> Iterator[Callable[..., Service]]:
-    """Starts servers and stops them at the end."""
+    """Starts servers and stops them at the end of the test."""
+    yield from _servers(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def serve_shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Service]]:
+    """Starts servers and stops them at the end of the module."""
+    yield from _servers(tmp_path_factory.mktemp("shared"))
+
+
+def _servers(folder: Path) -> Iterator[Callable[..., Service]]:
     services: list[Service] = []
 
     def start(worker_module: str = "scripted_worker", grace_s: float = 10, data_dir: Path | None = None) -> Service:
-        services.append(Service(data_dir or tmp_path / "data", worker_module, grace_s))
+        services.append(Service(data_dir or folder / "data", worker_module, grace_s))
         return services[-1]
 
     yield start

@@ -124,7 +124,8 @@ def test_the_server_process_loads_neither_torch_nor_libsumo():
     )
     loaded = json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout)
     assert "service.manager" in loaded
-    assert not {"torch", "libsumo", "botorch", "gpytorch", "service.worker"} & set(loaded)
+    assert "risk_sac.report" in loaded
+    assert not {"torch", "libsumo", "botorch", "gpytorch", "matplotlib.pyplot", "service.worker"} & set(loaded)
 
 
 def test_a_disk_that_is_full_for_a_worker_stops_the_campaign_with_that_reason(serve, scripted):

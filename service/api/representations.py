@@ -1,0 +1,61 @@
+"""What a client wants to have, and whether it has it already."""
+
+import re
+from collections.abc import Sequence
+
+from fastapi import HTTPException, Request, Response
+
+_QUALITY = re.compile(r"\s*q\s*=\s*([01](?:\.\d{0,3})?)\s*", re.IGNORECASE)
+
+
+def accepted(accept: str, offered: Sequence[str]) -> str:
+    """The offered media type that an Accept header likes best, the first among equals; anything will do without one.
+
+    Raises:
+      HTTPException: 406, it likes none.
+    """
+    liked = dict(_range(part) for part in accept.split(",") if part.strip()) or {"*/*": 1.0}
+
+    def quality(media_type: str) -> float:
+        """Of the most specific range that includes it."""
+        ranges = (media_type, f"{media_type.partition('/')[0]}/*", "*/*")
+        return next((liked[name] for name in ranges if name in liked), 0.0)
+
+    best = max(offered, key=quality)
+    if not quality(best):
+        raise HTTPException(406, f"accept is {accept!r}; wanted one of {', '.join(offered)}")
+    return best
+
+
+def _range(part: str) -> tuple[str, float]:
+    """`text/*;q=0.5` -> ("text/*", 0.5)."""
+    name, *parameters = part.split(";")
+    qualities = (match for match in map(_QUALITY.fullmatch, parameters) if match)
+    return name.strip().lower(), float(next((match[1] for match in qualities), 1.0))
+
+
+def entity_tag(*parts: str) -> str:
+    """A tag for a representation; weak, because it names what is shown and not the bytes of the picture."""
+    return f'W/"{"-".join(parts)}"'
+
+
+def has(request: Request, tag: str) -> bool:
+    """Whether the client says that it has the representation with this tag."""
+    given = request.headers.get("if-none-match", "").split(",")
+    return tag.removeprefix("W/") in (each.strip().removeprefix("W/") for each in given)
+
+
+def not_modified(tag: str, vary: str = "") -> Response:
+    """Nothing, since the client has it."""
+    return Response(status_code=304, headers=caching(tag, vary))
+
+
+def caching(tag: str | None, vary: str = "") -> dict[str, str]:
+    """Headers of what may be kept, but is to be asked for again before it is used.
+
+    Args:
+      tag: names the representation; None where the same tag could come to mean another one.
+      vary: the request header that the representation was chosen by.
+    """
+    headers = {"Cache-Control": "no-cache", "ETag": tag or "", "Vary": vary}
+    return {name: value for name, value in headers.items() if value}

@@ -1,0 +1,225 @@
+"""The report of a campaign over REST: real server, real workers, and `risk_sac.report` on the same folders."""
+
+import csv
+import io
+import json
+import re
+import shlex
+import xml.etree.ElementTree as ElementTree
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from risk_sac import cli
+from risk_sac.config import CampaignSpec
+from risk_sac.report import compare, figure_bytes, figure_names, read_run, table_csv, table_json, table_markdown
+from risk_sac.report.figures import FORMATS
+from risk_sac.spec_file import read_campaign
+from service.report_schemas import Table
+
+SPEC = {
+    "methods": ["random", "no-adversary"],
+    "seeds": [0, 1],
+    "budget": {"episodes": 12, "evaluation_episodes": 1},
+    "learner": {"agent": {"actor_learning_rate": 1e-5}},  # which YAML takes for a string when JSON writes it
+}
+TYPES = {"json": "application/json", "md": "text/markdown; charset=utf-8", "csv": "text/csv; charset=utf-8"}
+
+
+@pytest.fixture(scope="module")
+def service(serve_shared):
+    return serve_shared("service.worker", grace_s=30)
+
+
+@pytest.fixture(scope="module")
+def campaign(service):
+    """A campaign that has succeeded."""
+    ended = service.wait(service.post(**SPEC))
+    assert ended["state"] == "succeeded", ended["reason"]
+    return ended
+
+
+@pytest.fixture
+def get(service, campaign):
+    """Gets a part of the campaign."""
+    return lambda part, **options: service.client.get(f"/v1/campaigns/{campaign['id']}{part}", **options)
+
+
+@pytest.fixture(scope="module")
+def comparison(service, campaign):
+    """The same comparison made here."""
+    folder = service.data_dir / "campaigns" / campaign["id"]
+    runs = [read_run(folder / run["id"]) for run in campaign["runs"]]
+    base = f"http://127.0.0.1:{service.port}/v1/campaigns"
+    return compare(
+        CampaignSpec.model_validate_json(json.dumps(campaign["spec"])),
+        runs,
+        f"curl -s {base}/{campaign['id']}/spec | curl {base} -H 'content-type: application/json' -d @-",
+        spec_command=f"curl -s '{base}/{campaign['id']}/spec?format=yaml' -o spec.yaml",
+    )
+
+
+@pytest.mark.parametrize(("name", "made"), [("json", table_json), ("md", table_markdown), ("csv", table_csv)])
+def test_table_is_what_the_report_makes_of_the_same_folders(get, comparison, name, made):
+    by_query, by_header = get("/table", params={"format": name}), get("/table", headers={"accept": TYPES[name]})
+    assert by_query.status_code == by_header.status_code == 200
+    assert by_query.headers["content-type"] == by_header.headers["content-type"] == TYPES[name]
+    assert by_query.text == by_header.text == made(comparison)
+
+
+def test_table_has_every_run_once_complete_and_as_documented(get, campaign):
+    table = get("/table").json()
+    assert (table["complete"], table["missing"]) == (True, [])
+    digests = {run["id"]: run["digest"] for run in get("/results").json()["runs"]}
+    assert {f"{row['family']}-{row['method']}-{row['seed']}": row["digest"] for row in table["runs"]} == digests
+    assert [(cell["method"], cell["phase"], cell["seeds"]) for cell in table["cells"]] == [
+        ("random", "search", [0, 1]),
+        ("no-adversary", "search", [0, 1]),
+        ("random", "evaluation", [0, 1]),
+        ("no-adversary", "evaluation", [0, 1]),
+    ]
+    assert len(list(csv.DictReader(io.StringIO(get("/table?format=csv").text)))) == 4
+    documented = Table.model_validate(table).model_dump(mode="json")
+    assert documented == table  # neither more nor less than the schema says
+
+
+def test_results_and_table_agree_on_the_search(get):
+    totals = {total["method"]: total for total in get("/results").json()["totals"]}
+    for cell in get("/table").json()["cells"]:
+        if cell["phase"] == "search":
+            total = totals[cell["method"]]
+            ecr = cell["estimates"]["ecr"]
+            assert (total["ecr"], total["ecr_low"], total["ecr_high"]) == (ecr["mean"], ecr["low"], ecr["high"])
+            assert total["efficiency"] == cell["estimates"]["es"]["mean"]
+            assert total["dispersion"] == cell["estimates"]["ofd"]["mean"]
+            for name in ("episodes", "failures", "distinct_failures", "steps_per_distinct_failure"):
+                assert total[name] == cell[name]
+
+
+def test_commands_on_the_page_repeat_a_run_and_the_campaign(get, service, campaign, tmp_path, monkeypatch):
+    page = get("/table", params={"format": "md"}).text
+    fetch, run = re.findall(r"^(?:curl .* -o spec.yaml|risk-sac run .*)$", page, re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    url = shlex.split(fetch)[2]
+    (tmp_path / "spec.yaml").write_text(service.client.get(url).text)
+    assert read_campaign(tmp_path / "spec.yaml", {}, {}).digest == get("/table").json()["spec_digest"]
+    assert cli.main(shlex.split(run)[1:]) == 0
+    assert json.loads((tmp_path / "repeated" / "results.json").read_text())["digest"] in page
+
+    again = service.client.post(
+        "/v1/campaigns", content=get("/spec").content, headers={"content-type": "application/json"}
+    )
+    assert again.status_code == 202, again.text
+    assert again.json()["spec"] == campaign["spec"]
+    service.client.post(f"{again.headers['location']}/cancel")
+    service.wait(again.json()["id"])
+
+
+def test_spec_is_yaml_by_the_accept_header_too(get):
+    spec = get("/spec", headers={"accept": "application/yaml"})
+    assert spec.headers["content-type"] == "application/yaml"
+    assert spec.text == get("/spec", params={"format": "yaml"}).text
+
+
+def test_figures_asked_for_at_once_are_the_files_of_the_report(get, comparison):
+    listed = get("/figures").json()
+    assert listed["complete"]
+    assert [item["name"] for item in listed["items"]] == list(figure_names(comparison))
+    files = [file for item in listed["items"] for file in item["files"]]
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda file: get(file["href"].partition(listed_at(file))[2]), files))
+    for file, answer in zip(files, answers, strict=True):
+        name = file["href"].rpartition("/")[2].removesuffix(f".{file['format']}")
+        assert answer.status_code == 200
+        assert answer.headers["content-type"] == file["media_type"]
+        assert answer.content == figure_bytes(comparison, name, file["format"])
+        if file["format"] == "png":
+            assert answer.content.startswith(b"\x89PNG\r\n\x1a\n")
+        else:
+            assert ElementTree.fromstring(answer.content).tag == "{http://www.w3.org/2000/svg}svg"
+    assert {file["format"] for file in files} == set(FORMATS)
+
+
+def listed_at(file):
+    """The part of a link that leads to the campaign."""
+    return "/".join(file["href"].split("/")[:4])
+
+
+@pytest.mark.parametrize("part", ["/table", "/table?format=csv", "/figures", "/figures/ecr_low.png"])
+def test_what_the_client_has_is_not_sent_again(get, part):
+    first = get(part)
+    tag = first.headers["etag"]
+    assert first.headers["cache-control"] == "no-cache"
+    for given in (tag, tag.removeprefix("W/"), f'"other", {tag}'):
+        again = get(part, headers={"if-none-match": given})
+        assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag)
+        assert again.headers.get("vary") == first.headers.get("vary")
+    assert get(part, headers={"if-none-match": 'W/"other"'}).content == first.content
+
+
+def test_every_representation_has_a_tag_of_its_own(get):
+    parts = ["/table", "/table?format=md", "/table?format=csv", "/figures", "/figures/ecr_low.png"]
+    assert len({get(part).headers["etag"] for part in [*parts, "/figures/ecr_low.svg", "/figures/bars_es.svg"]}) == 7
+
+
+@pytest.mark.parametrize("part", ["/table", "/figures", "/figures/ecr_low.png", "/spec"])
+def test_unknown_campaign_is_a_problem(service, part):
+    response = service.client.get(f"/v1/campaigns/c0{part}")
+    assert response.status_code == 404
+    assert response.headers["content-type"] == "application/problem+json"
+    assert response.json()["errors"][0]["field"] == "campaign_id"
+
+
+@pytest.mark.parametrize(
+    ("part", "accept", "status", "said"),
+    [
+        ("/figures/ecr_dense.png", "*/*", 404, "has no figure 'ecr_dense'"),
+        ("/figures/ecr_low.gif", "*/*", 422, "format: Input should be 'png' or 'svg'"),
+        ("/figures/ecr_low", "*/*", 404, "nothing is at"),
+        ("/table?format=pdf", "*/*", 422, "format: Input should be 'json', 'md' or 'csv'"),
+        ("/table", "image/png", 406, "wanted one of application/json, text/markdown, text/csv"),
+        ("/spec", "text/csv", 406, "wanted one of application/json, application/yaml"),
+    ],
+)
+def test_what_there_is_not_is_a_problem_that_says_what_there_is(get, part, accept, status, said):
+    response = get(part, headers={"accept": accept})
+    assert response.status_code == status
+    assert response.headers["content-type"] == "application/problem+json"
+    assert said in response.json()["detail"]
+
+
+def test_table_grows_with_the_runs_and_names_those_that_are_missing(service):
+    campaign_id = service.post(methods=["random", "no-adversary"], seeds=[0, 1, 2, 3], budget={"episodes": 2})
+    empty = service.client.get(f"/v1/campaigns/{campaign_id}/table")
+    assert empty.status_code == 200
+    assert (empty.json()["complete"], empty.json()["cells"], len(empty.json()["missing"])) == (False, [], 8)
+    assert service.get(campaign_id, "/figures")["items"] == []
+    assert service.client.get(f"/v1/campaigns/{campaign_id}/table?format=md").text.startswith("# Comparison")
+
+    service.wait_for(campaign_id, lambda seen: any(run["state"] == "succeeded" for run in seen["runs"]))
+    part = service.client.get(f"/v1/campaigns/{campaign_id}/table", headers={"if-none-match": empty.headers["etag"]})
+    assert part.status_code == 200
+    assert part.json()["cells"]
+    assert {run["reason"] for run in part.json()["missing"]} <= {"queued", "running"}
+
+    service.client.post(f"/v1/campaigns/{campaign_id}/cancel")
+    ended = service.wait(campaign_id)
+    table = service.client.get(f"/v1/campaigns/{campaign_id}/table", headers={"if-none-match": part.headers["etag"]})
+    assert table.status_code == 200
+    found = {(run["method"], run["seed"]) for run in ended["runs"] if run["state"] == "succeeded"}
+    assert {(run["method"], run["seed"]) for run in table.json()["runs"]} == found
+    assert len(table.json()["missing"]) == 8 - len(found) > 0
+    assert {run["reason"] for run in table.json()["missing"]} == {"cancelled"}
+    assert service.get(campaign_id, "/figures")["complete"] is False
+
+
+def test_run_whose_folder_is_lost_is_named_and_nothing_is_kept_for_later(serve, scripted):
+    service = serve()  # its workers leave no results behind
+    campaign_id = service.post(seeds=[scripted.WELL_BEHAVED, scripted.EXITS], budget={"episodes": 3})
+    service.wait(campaign_id)
+    table = service.client.get(f"/v1/campaigns/{campaign_id}/table")
+    assert table.status_code == 200
+    assert "etag" not in table.headers
+    lost, failed = table.json()["missing"]
+    assert lost["reason"].startswith("it succeeded, but its results are lost: there is no ")
+    assert failed["reason"] == "failed: worker exited with status 1: Traceback: the policy is NaN"
