@@ -21,7 +21,7 @@ SPEC = {
     "methods": ["random", "no-adversary"],
     "seeds": [0, 1],
     "budget": {"episodes": 12, "evaluation_episodes": 1},
-    "learner": {"agent": {"actor_learning_rate": 1e-5}},  # which YAML takes for a string when JSON writes it
+    "learner": {"agent": {"actor_learning_rate": 1e-7}},  # which YAML reads as a string where JSON wrote it
 }
 TYPES = {"json": "application/json", "md": "text/markdown; charset=utf-8", "csv": "text/csv; charset=utf-8"}
 
