@@ -15,11 +15,11 @@ Count = Annotated[int, Field(ge=1)]
 class AgentConfig(Settings):
     """What all agents share: networks, optimisers and the pace of learning."""
 
-    hidden_sizes: Annotated[tuple[Count, ...], Field(min_length=1, max_length=4)] = (128, 128)
+    hidden_sizes: Annotated[tuple[Count, ...], Field(min_length=1, max_length=4)] = (64, 64)
     """Units of each hidden layer, actor and critics alike."""
-    batch_size: Annotated[int, Field(ge=1, le=4096)] = 128
-    discount: Annotated[float, Field(gt=0, lt=1)] = 0.98
-    """γ; 0.98 at 0.1 s looks about 5 s ahead."""
+    batch_size: Annotated[int, Field(ge=1, le=4096)] = 256
+    discount: Annotated[float, Field(gt=0, lt=1)] = 0.99
+    """γ; 0.99 at 0.1 s looks about 10 s ahead."""
     actor_learning_rate: Positive = 3e-4
     critic_learning_rate: Positive = 1e-3
     target_rate: Annotated[float, Field(gt=0, le=1)] = 0.005
@@ -36,7 +36,7 @@ class SacConfig(Settings):
     """Soft Actor-Critic (Haarnoja et al. 2018), Eq. 4."""
 
     temperature_learning_rate: Positive = 3e-4
-    initial_temperature: Positive = 0.2
+    initial_temperature: Positive = 0.02
     """α at the start."""
     target_entropy_per_action: float = -1.0
     """Target entropy divided by the action dimension, nats."""
@@ -73,21 +73,21 @@ class LagrangianConfig(Settings):
     """η_λ."""
     cost_limit: NonNegative = 0.2
     """d, on the mean realism cost per step."""
-    maximum: Positive = 2.0
+    maximum: Positive = 0.5
     """Cap on λ, so that a burst of cost cannot drown the risk reward for good."""
 
 
 class RewardConfig(Settings):
     """R_risk (terms of Eq. 1) and the shaping potential (Eq. 6-8)."""
 
-    valid_collision: NonNegative = 10.0
+    valid_collision: NonNegative = 20.0
     """Bonus for a valid collision."""
-    degenerate_collision: NonNegative = 2.0
+    degenerate_collision: NonNegative = 4.0
     """Penalty for contact that a validity rule refuses."""
-    ttc_weight: NonNegative = 0.1
+    ttc_weight: NonNegative = 0.2
     """Weight of exp(-TTC / ttc_scale_s)."""
     ttc_scale_s: Positive = 1.0
-    rss_weight: NonNegative = 0.05
+    rss_weight: NonNegative = 0.1
     """Reward per step in which both RSS margins are violated."""
     softmin_sharpness: Positive = 5.0
     """β of Eq. 7; robustness is in units of each requirement's scale."""
@@ -107,7 +107,7 @@ class SceneOptimizerConfig(Settings):
     """Fewest observations between two fits of the kernel's hyper-parameters; a fifth of those kept if that is more."""
     candidates: Annotated[int, Field(ge=16, le=8192)] = 256
     """Sobol points at which the acquisition is scored before local refinement."""
-    exploration: Fraction = 0.25
+    exploration: Fraction = 0.1
     """Share of scenes drawn at random, so that no region is given up."""
     running_maximum_rate: Annotated[float, Field(gt=0, le=1)] = 0.1
     """Share of the way that M̄_e moves towards the largest mean return so far, in every episode."""
