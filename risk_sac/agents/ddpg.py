@@ -89,14 +89,15 @@ class DdpgAgent:
         activations = self._policy.forward(batch.observation)
         action = torch.tanh(activations[-1])
         values, slope = self._critics.smallest(batch.observation, action)
-        # J_μ = -E[Q_ψ(s, μ_θ(s))]
-        gradient = slope * (1.0 - action.square()) / -len(reward)
+        # J_μ = -E[w Q_ψ(s, μ_θ(s))]
+        weight = batch.weight / batch.weight.mean()
+        gradient = weight.unsqueeze(1) * slope * (1.0 - action.square()) / -len(reward)
         self._policy.backward(activations, gradient)
         self._actor_optimizer.step()
         self._critics.follow()
         self._target_policy.parameters.lerp_(self._policy.parameters, self._config.target_rate)
 
-        critic_figure, actor_figure = all_finite(torch.stack((loss_q, -values.mean())).tolist())
+        critic_figure, actor_figure = all_finite(torch.stack((loss_q, -(weight * values).mean())).tolist())
         return UpdateResult(
             td_errors=td_errors.abs().mean(dim=0).double().cpu().numpy(),
             critic_loss=critic_figure,

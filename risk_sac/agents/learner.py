@@ -121,8 +121,9 @@ class Learner:
         reward = self._reward(batch.risk_reward, batch.cost, batch.robustness, batch.next_robustness, batch.terminated)
         result = self._agent.update(batch, reward)  # Alg. 1, l. 14
         self._replay.update(batch.indices, result.td_errors)
-        # The plain mean, as printed: RPER draws costly transitions more often, so λ leans to the safe side.
-        self._dual.update(batch.cost.mean().item())  # Alg. 1, l. 15-16
+        # Weighted, since RPER draws costly transitions more often: their plain mean overstates the policy's cost.
+        weight = batch.weight / batch.weight.mean()
+        self._dual.update((weight * batch.cost).mean().item())  # Alg. 1, l. 15-16
         return result
 
     def _reward(

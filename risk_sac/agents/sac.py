@@ -46,21 +46,23 @@ def soft_target(
     return reward + discount * (1.0 - terminated) * soft_value
 
 
-def actor_loss(log_prob: Tensor, values: Tensor, temperature: Tensor) -> Tensor:
+def actor_loss(log_prob: Tensor, values: Tensor, weight: Tensor, temperature: Tensor) -> Tensor:
     """Negative soft value of the policy's own actions, the term in the sum of (4).
 
-    J_π = E[α log π(a|s) - min_i Q_ψi(s, a)],  a ~ π(·|s) reparameterised
+    J_π = E[w (α log π(a|s) - min_i Q_ψi(s, a))],  a ~ π(·|s) reparameterised
 
-    Choice: importance weights are left out here, as in most PER agents; they correct the values' bias.
+    Choice: weighted like the critics' loss. Most PER agents weight that alone, but then the policy learns for the
+    states that are replayed most and forgets the quiet ones, from which an attack has to begin.
 
     Args:
       log_prob: `batch`.
       values: `batch`, the smaller of both critics'.
+      weight: `batch`, importance weights of (10), 1 on average.
       temperature: α, held constant.
 
     Source: Haarnoja et al. 2018, Eq. 7-9.
     """
-    return (temperature * log_prob - values).mean()
+    return (weight * (temperature * log_prob - values)).mean()
 
 
 def temperature_gradient(temperature: Tensor, entropy: Tensor, target_entropy: float) -> Tensor:
@@ -150,14 +152,15 @@ class SacAgent:
         raw, action, log_prob, noise = raw[count:], action[count:], log_prob[count:], noise[count:]
         values, slope = self._critics.smallest(batch.observation, action)
         temperature = self._log_temperature.exp()
+        weight = batch.weight / batch.weight.mean()
         gradient = tanh_gaussian_gradient(raw, noise, action, slope / -count, temperature / count)
-        self._policy.backward([each[count:] for each in activations], gradient)
+        self._policy.backward([each[count:] for each in activations], weight.unsqueeze(1) * gradient)
         entropy = -log_prob.mean()
         self._log_temperature.grad = temperature_gradient(temperature, entropy, self._target_entropy)
         self._actor_optimizer.step()
         self._critics.follow()
 
-        loss_pi = actor_loss(log_prob, values, temperature)
+        loss_pi = actor_loss(log_prob, values, weight, temperature)
         figures = torch.stack((loss_q, loss_pi, self._log_temperature.exp()[0], entropy)).tolist()
         critic_figure, actor_figure, temperature_figure, entropy_figure = all_finite(figures)
         return UpdateResult(

@@ -99,7 +99,8 @@ class PlainSac:
         self.critics.fit(batch, reward + self.config.discount * (1.0 - batch.terminated) * value)
         action, log_prob = self.sample(batch.observation, noise[rows:])
         value = self.critics.smallest(self.critics.online, batch.observation, action)
-        step(self.policy_optimizer, (temperature * log_prob - value).mean())
+        weight = batch.weight / batch.weight.mean()
+        step(self.policy_optimizer, (weight * (temperature * log_prob - value)).mean())
         entropy_gap = log_prob.detach() + self.target_entropy
         step(self.temperature_optimizer, (-self.log_temperature.exp() * entropy_gap).mean())
         self.critics.follow()
@@ -117,6 +118,7 @@ class PlainDdpg:
         value = self.critics.smallest(self.critics.targets, batch.next_observation, action)
         self.critics.fit(batch, reward + self.config.discount * (1.0 - batch.terminated) * value)
         action = torch.tanh(self.policy(batch.observation))
-        step(self.policy_optimizer, -self.critics.smallest(self.critics.online, batch.observation, action).mean())
+        value = self.critics.smallest(self.critics.online, batch.observation, action)
+        step(self.policy_optimizer, -(batch.weight / batch.weight.mean() * value).mean())
         self.critics.follow()
         self.target_policy.follow(self.policy, self.config.target_rate)

@@ -20,7 +20,7 @@ from risk_sac.errors import CheckpointError
 
 Make = Callable[..., Transition]
 CONFIG = LearnerConfig(
-    agent=AgentConfig(hidden_sizes=(8,), batch_size=16, warmup_steps=20),
+    agent=AgentConfig(hidden_sizes=(8,), batch_size=16, discount=0.98, warmup_steps=20),
     replay=ReplayConfig(capacity=1000),
     lagrangian=LagrangianConfig(learning_rate=0.01, cost_limit=0.1),
 )

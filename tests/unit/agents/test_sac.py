@@ -19,8 +19,9 @@ def test_soft_target_of_a_hand_computed_case() -> None:
 
 
 def test_actor_loss_of_a_hand_computed_case() -> None:
-    loss = actor_loss(torch.tensor([-1.0, 1.0]), torch.tensor([1.0, 0.0]), torch.tensor(0.5))
-    assert loss.item() == pytest.approx(((-0.5 - 1.0) + (0.5 - 0.0)) / 2)
+    log_prob, values, weight = torch.tensor([[-1.0, 1.0], [1.0, 0.0], [1.5, 0.5]])
+    loss = actor_loss(log_prob, values, weight, torch.tensor(0.5))
+    assert loss.item() == pytest.approx((1.5 * (-0.5 - 1.0) + 0.5 * (0.5 - 0.0)) / 2)
 
 
 def test_temperature_falls_while_entropy_exceeds_its_target_and_rises_below() -> None:
