@@ -21,6 +21,7 @@ from risk_sac.agents.random import RandomAgent
 from risk_sac.agents.replay import Transition
 from risk_sac.agents.scripted import ScriptedAgent
 from risk_sac.config import METHODS, RunSpec
+from risk_sac.crashes import CrashGuard
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
 from risk_sac.metrics import MetricsAccumulator, results_digest
@@ -28,6 +29,8 @@ from risk_sac.problem import Problem
 from risk_sac.records import records_from_json, records_to_json
 from risk_sac.results import FAILURES, series_name
 from risk_sac.risk.reward import training_reward
+from risk_sac.risk.stl import ROBUSTNESS_CLIP
+from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.scene_optimizer import BotorchOptimizer, SceneOptimizer, SobolOptimizer
 from risk_sac.trace import write_series
 from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
@@ -35,6 +38,7 @@ from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
+SIMULATOR_CRASH = "simulator_crash"  # reason of a rejection
 CONTROLS: dict[str, type[RandomAgent | ScriptedAgent]] = {
     "scripted": ScriptedAgent,
     "random": RandomAgent,
@@ -92,12 +96,14 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
         for record, metrics in run.resume():
             observer.episode(record, metrics, None if record.collision is None else series_name(record.index))
         total = spec.budget.episodes + spec.budget.evaluation_episodes
-        while len(run.records) < total and not observer.should_stop():
-            record, series = run.episode(len(run.records))  # Alg. 1, l. 3
-            observer.episode(record, run.metrics_after(record), series)
-            if len(run.records) % spec.learner.checkpoint_every == 0:
-                run.save()
-        run.save()
+        with CrashGuard(folder) as guard:
+            while len(run.records) < total and not observer.should_stop():
+                playable = guard.begin(len(run.records))
+                record, series = run.episode(len(run.records), playable)  # Alg. 1, l. 3
+                observer.episode(record, run.metrics_after(record), series)
+                if len(run.records) % spec.learner.checkpoint_every == 0:
+                    run.save()
+            run.save()
     finally:
         run.close()
     return run.summary(
@@ -129,8 +135,10 @@ class Run:
         self._search = MetricsAccumulator(self._problem.family.horizon_steps)
         self._evaluation = MetricsAccumulator(self._problem.family.horizon_steps)
 
-    def episode(self, index: int) -> tuple[EpisodeRecord, str | None]:
+    def episode(self, index: int, playable: bool = True) -> tuple[EpisodeRecord, str | None]:
         """One episode of Algorithm 1, lines 4 to 22; in the evaluation phase the policy is frozen.
+
+        An episode that is not `playable`, since it crashes the simulator, is treated like a rejected scene.
 
         Choice: scenes keep coming from the method's own sampler during evaluation, since it is the pair of
         sampler and policy that generates scenarios.
@@ -141,6 +149,8 @@ class Run:
         scene = self._problem.space.from_unit(point)
         tally = Tally()
         try:
+            if not playable:
+                raise InfeasibleScene("this episode crashes the simulator", reason=SIMULATOR_CRASH)
             observation, info = self._env.reset(seed=seed, options={"scene": scene})  # Alg. 1, l. 5
         except InfeasibleScene as infeasible:
             self._optimizer.tell(point, None)
@@ -218,8 +228,8 @@ class Run:
             risk_return=tally.risk_return,
             shaped_return=tally.shaped_return,
             mean_cost=tally.cost / tally.steps if tally.steps else 0.0,
-            min_ttc_s=self._env.min_ttc_s,
-            min_robustness=self._env.min_robustness,
+            min_ttc_s=TTC_CAP_S if rejected == SIMULATOR_CRASH else self._env.min_ttc_s,
+            min_robustness=ROBUSTNESS_CLIP if rejected == SIMULATOR_CRASH else self._env.min_robustness,
             objective=objective,
             dual_variable=self._agent.dual_variable,
             temperature=self._agent.temperature,

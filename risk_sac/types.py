@@ -136,7 +136,7 @@ class EpisodeRecord:
     seed: int
     scene: Mapping[str, float]
     outcome: Outcome
-    reason: str  # rejection rule, or the failed validity rules joined by ", "; else ""
+    reason: str  # rejection rule or simulator_crash, or the failed validity rules joined by ", "; else ""
     steps: int
     risk_return: float  # Σ R_risk
     shaped_return: float  # Σ R'
