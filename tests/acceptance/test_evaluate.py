@@ -157,10 +157,10 @@ def test_a_crashed_run_is_tried_again(crash: Callable[[int], None], tmp_path: Pa
     assert [(row["method"], row["seed"]) for row in table(tmp_path)["runs"]] == [("random", 4)]
 
 
-def test_a_run_that_crashes_twice_has_failed(
+def test_a_run_that_crashes_every_time_has_failed(
     crash: Callable[[int], None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    crash(2)
+    crash(processes.ATTEMPTS)
     assert cli.main(["evaluate", *ONE, str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err.startswith("low-random-4: killed by SIGSEGV after 0 of 1 episodes")
     assert "Segmentation" not in table(tmp_path)["missing"][0]["reason"]

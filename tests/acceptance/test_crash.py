@@ -1,0 +1,39 @@
+"""A run whose simulator dies in the same episode again and again comes to its end all the same."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from risk_sac.crashes import FATAL
+
+# The second episode reads address 0 inside libsumo's process, as a crash in libsumo does.
+RISK_SAC = """
+import ctypes, sys
+from risk_sac import cli
+from risk_sac.train import Run
+
+play = Run.episode
+
+def episode(self, index, playable=True):
+    if index == 1 and playable:
+        ctypes.string_at(0)
+    return play(self, index, playable)
+
+Run.episode = episode
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+def test_the_episode_is_left_out_and_counted(tmp_path: Path) -> None:
+    command = ["run", "--family", "low", "--method", "random", "--episodes", "3", "--out", str(tmp_path / "run")]
+    ends = [
+        subprocess.run([sys.executable, "-c", RISK_SAC, *command], capture_output=True, timeout=100).returncode
+        for _ in range(FATAL + 1)
+    ]
+    assert ends == [*FATAL * [-11], 0]
+    records = [json.loads(line) for line in (tmp_path / "run" / "episodes.jsonl").read_text().splitlines()]
+    assert [record["index"] for record in records] == [0, 1, 2]
+    assert (records[1]["outcome"], records[1]["reason"], records[1]["steps"]) == ("rejected", "simulator_crash", 0)
+    assert records[2]["steps"] > 0
+    assert "Segmentation fault" not in (tmp_path / "run" / "crash.log").read_text()  # the last process went well
