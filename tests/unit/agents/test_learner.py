@@ -24,15 +24,7 @@ CONFIG = LearnerConfig(
     replay=ReplayConfig(capacity=1000),
     lagrangian=LagrangianConfig(learning_rate=0.01, cost_limit=0.1),
 )
-LEARNING: tuple[MethodName, ...] = (
-    "risk-sac",
-    "risk-sac-only-rper",
-    "risk-sac-only-rs",
-    "sac-lag",
-    "sac",
-    "ddpg-lag",
-    "ddpg",
-)
+LEARNING = tuple(name for name, method in METHODS.items() if method.agent in ("sac", "ddpg"))
 
 
 def learner(method: MethodName = "risk-sac", config: LearnerConfig = CONFIG, seed: int = 0) -> Learner:
