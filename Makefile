@@ -1,6 +1,6 @@
 # Everything runs in .venv, which the first target that needs it makes. Needs Python 3.11 or 3.12 and make.
 .DEFAULT_GOAL := help
-.PHONY: help install demo test serve bench lint openapi nets clean
+.PHONY: help install demo test serve bench torture load lint openapi settings nets image smoke clean
 
 BIN := .venv/bin
 PYTHON := $(BIN)/python
@@ -35,6 +35,13 @@ serve: $(STAMP) ## run the service on http://127.0.0.1:8000
 bench: $(STAMP) ## measure speed as ratios
 	$(PYTHON) -m pytest -m bench -s tests/benchmarks/bench_*.py
 
+torture: $(STAMP) ## kill, fill, damage and fuzz the service in earnest, about two hours
+	RISK_SAC_TORTURE=full RISK_SAC_SCHEMATHESIS_CASES=20000 $(PYTHON) -m pytest --timeout 7200 \
+		tests/torture tests/contract/test_fuzzing.py
+
+load: $(STAMP) ## poll and follow the service while it searches, and fill its database; half an hour on a quiet machine
+	$(PYTHON) -m tests.load.run
+
 lint: $(STAMP) ## style, types and import rules
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
@@ -44,8 +51,18 @@ lint: $(STAMP) ## style, types and import rules
 openapi: $(STAMP) ## write openapi.yaml
 	$(PYTHON) -m service.openapi
 
+settings: $(STAMP) ## write the table of settings into README.md
+	$(PYTHON) -m service.settings_table
+
 nets: $(STAMP) ## rebuild sumo_nets/*/*.net.xml
 	PATH="$(CURDIR)/$(BIN):$$PATH" sumo_nets/build.sh
+
+image: ## build the container image localhost/risk-sac with docker
+	docker build --file docker/Dockerfile --tag localhost/risk-sac --build-arg REVISION=$$(git rev-parse HEAD) \
+		$(if $(TORCH_INDEX_URL),--build-arg TORCH_INDEX_URL=$(TORCH_INDEX_URL)) .
+
+smoke: $(STAMP) ## build the image, run it, and say in one line whether it works
+	docker/smoke
 
 clean: ## remove .venv, caches and builds; data/ and results/ stay
 	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks .import_linter_cache

@@ -1,13 +1,14 @@
 """A run's state on disk: written whole or not at all, and read only if every byte is as written.
 
 A file is an 8-byte magic, the SHA-256 of the rest, and a `torch.save` archive that `weights_only=True` reads, so a
-damaged file is told from a good one before anything in it is parsed, and no file can run code.
+damaged file is told from a good one before anything in it is parsed, and no file can run code. The last but one is
+kept beside it, for the day on which the last one is damaged.
 """
 
-import contextlib
+import errno
 import hashlib
 import io
-import os
+import logging
 import pickle
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,10 @@ from typing import Any
 import numpy as np
 import torch
 
-from risk_sac.errors import CheckpointError
+from risk_sac.durable import replace_file, set_aside
+from risk_sac.errors import CheckpointError, DamagedCheckpoint
+
+logger = logging.getLogger(__name__)
 
 State = dict[str, Any]
 """Nested dicts, lists and tuples of tensors, arrays, None, bool, int (of any size), float, str and bytes."""
@@ -27,7 +31,7 @@ _PLAIN = (type(None), bool, int, float, str, bytes)
 
 
 def save(path: Path, state: State, run_digest: str) -> None:
-    """Replace the checkpoint at `path` in one step; a crash at any moment leaves the old or the new one.
+    """Replace the checkpoint at `path`, and keep the one before it; a crash at any moment leaves a good one.
 
     One writer per path. Tensors are stored as they are on the CPU, views without the storage they look into.
 
@@ -43,27 +47,48 @@ def save(path: Path, state: State, run_digest: str) -> None:
     archive = io.BytesIO()
     torch.save({"run_digest": run_digest, "state": _encode(state, "state")}, archive)
     payload = archive.getbuffer()
-    temporary = path.with_name(f".{path.name}.tmp")  # same folder: a rename across file systems is not atomic
-    try:
-        with temporary.open("wb") as file:
-            file.write(MAGIC)
-            file.write(hashlib.sha256(payload).digest())
-            file.write(payload)
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except OSError:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise
-    _sync_folder(path.parent)  # makes the rename itself survive a power cut
+    replace_file(path, MAGIC, hashlib.sha256(payload).digest(), payload, keep=previous(path))
+
+
+def previous(path: Path) -> Path:
+    """Where the checkpoint before the one at `path` is kept."""
+    return path.with_name(f"{path.name}.previous")
+
+
+def exists(path: Path) -> bool:
+    """Whether there is a checkpoint, good or not."""
+    return path.exists() or previous(path).exists()
+
+
+def load_newest(path: Path, run_digest: str) -> State | None:
+    """The newest of the two checkpoints that is undamaged, or None: a run can always begin anew.
+
+    A damaged one is renamed, so that it never takes the place of a good one.
+
+    Raises:
+        CheckpointError: it belongs to another run.
+        OSError: one exists but cannot be read.
+    """
+    for candidate in (path, previous(path)):
+        if not candidate.exists():
+            continue
+        try:
+            return load(candidate, run_digest)
+        except DamagedCheckpoint as error:
+            logger.warning("%s; it is kept as %s, and the run falls back", error, set_aside(candidate).name)
+        except OSError as error:
+            if error.errno != errno.EIO:  # a sector that cannot be read will not be readable later
+                raise
+            logger.warning("checkpoint %s cannot be read (%s); the run falls back", candidate, error.strerror)
+    return None
 
 
 def load(path: Path, run_digest: str) -> State:
     """Read a checkpoint back, tensors on the CPU.
 
     Raises:
-        CheckpointError: it is missing, is no checkpoint, is damaged, or belongs to another run.
+        DamagedCheckpoint: it is no checkpoint, or its bytes are not those that were written.
+        CheckpointError: it is missing, or belongs to another run.
         OSError: it exists but cannot be read.
     """
     try:
@@ -89,24 +114,16 @@ def load(path: Path, run_digest: str) -> State:
 
 def _verify(content: bytes, path: Path) -> None:
     if not content.startswith(MAGIC):
-        raise CheckpointError(
+        raise DamagedCheckpoint(
             f"{path} starts with {content[: len(MAGIC)]!r}; a checkpoint starts with {MAGIC!r}. It was written by "
-            "something else, or its start is damaged; delete it"
+            "something else, or its start is damaged"
         )
     stored, actual = content[len(MAGIC) : _HEADER_BYTES], hashlib.sha256(content[_HEADER_BYTES:]).digest()
     if stored != actual:
-        raise CheckpointError(
+        raise DamagedCheckpoint(
             f"checkpoint {path} is damaged or cut short: its {len(content)} bytes have SHA-256 {actual.hex()}, and "
-            f"{stored.hex() or 'nothing'} was stored; delete it and start the run again"
+            f"{stored.hex() or 'nothing'} was stored"
         )
-
-
-def _sync_folder(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _encode(value: object, where: str) -> object:

@@ -7,7 +7,9 @@ RiskSacError
 ├── SceneError             a scene is not a point of its family's space
 │   └── InfeasibleScene    C_hard: the scene's first frame is physically impossible
 ├── SimulationError        libsumo refused a command or died
-├── CheckpointError        a checkpoint is missing, damaged or belongs to another run
+├── CheckpointError        a checkpoint is missing or belongs to another run
+│   └── DamagedCheckpoint  its bytes are not those that were written
+├── DamagedError           a file that carries its own checksum is not as it was written
 └── NotFinite              a number at a boundary is NaN or infinite
 """
 
@@ -57,6 +59,14 @@ class SimulationError(RiskSacError):
 
 class CheckpointError(RiskSacError):
     """A checkpoint is missing, damaged, or was written by another run."""
+
+
+class DamagedCheckpoint(CheckpointError):
+    """A checkpoint's bytes are not those that were written."""
+
+
+class DamagedError(RiskSacError):
+    """A file that carries its own checksum is not as it was written."""
 
 
 class NotFinite(RiskSacError):

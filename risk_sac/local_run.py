@@ -10,7 +10,7 @@ from risk_sac.recorder import Recorder
 from risk_sac.results import Results
 from risk_sac.stopping import stop_signal
 from risk_sac.train import train
-from risk_sac.types import EpisodeRecord, RunMetrics
+from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 
 Progress = Callable[[int, RunMetrics | None], None]
 """Told of the episodes done so far and of the metrics of the current phase."""
@@ -21,7 +21,7 @@ def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
 
     Raises:
       ConfigError: the spec poses no problem that can be run, or the folder holds a run of another one.
-      CheckpointError: the folder's checkpoint is damaged.
+      CheckpointError: the folder's checkpoint is of another run.
       OSError: the folder cannot be written.
     """
     Problem.from_spec(spec)  # before the folder is claimed
@@ -36,6 +36,6 @@ class Watcher:
     progress: Progress
     should_stop: Callable[[], bool]
 
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         """Counts an episode."""
         self.progress(record.index + 1, metrics)

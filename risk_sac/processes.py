@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Literal
 
 from risk_sac.config import RunSpec
-from risk_sac.crashes import FATAL
+from risk_sac.crashes import PATIENCE
 from risk_sac.errors import ConfigError
 from risk_sac.results import EPISODES, RESULTS, read_results
 
 LOG = "run.log"  # in a run's folder: what its process printed
-ATTEMPTS = FATAL + 1  # the last one without the episode that crashed the others
+ATTEMPTS = PATIENCE + 1  # the last one without the episode that crashed the others
 MISUSED = 2  # the exit status of a run that can never succeed
 POLL_S = 0.1
 

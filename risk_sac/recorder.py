@@ -1,5 +1,7 @@
 """Writes a run down as it goes; what its folder then holds is told in `risk_sac.results`."""
 
+import logging
+import os
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -7,11 +9,15 @@ from typing import Self
 
 from pydantic import TypeAdapter
 
+from risk_sac import checkpoint
 from risk_sac.config import RunSpec
+from risk_sac.durable import set_aside
 from risk_sac.errors import ConfigError
 from risk_sac.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
 from risk_sac.train import CHECKPOINT, Observer, RunSummary
-from risk_sac.types import EpisodeRecord, RunMetrics
+from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
+
+logger = logging.getLogger(__name__)
 
 _LINE = TypeAdapter(EpisodeRecord)
 
@@ -48,11 +54,11 @@ class Recorder:
     ) -> None:
         self._episodes.close()
 
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         """Writes an episode down."""
         self._episodes.write(_LINE.dump_json(record) + b"\n")
         self._episodes.flush()
-        if series is not None:
+        if record.collision is not None:
             self._contacts.append(Contact.of(record))
         told = self.results.metrics.episodes if self.results.metrics else 0
         due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes > told
@@ -61,7 +67,8 @@ class Recorder:
         self._observer.episode(record, metrics, series)
 
     def finish(self, summary: RunSummary) -> Results:
-        """Writes down what the run came to."""
+        """Writes down what the run came to; its episodes first, so that no digest stands without them."""
+        os.fsync(self._episodes.fileno())
         self._write(
             replace(
                 self.results,
@@ -86,7 +93,7 @@ class Recorder:
 def _results_so_far(spec: RunSpec, folder: Path) -> Results:
     """What earlier invocations left, or an empty start that claims the folder for `spec`."""
     if (folder / RESULTS).exists():
-        results = read_results(folder)
+        results = _read(spec, folder)
         if results.spec_digest != spec.digest:
             differing = [name for name in RunSpec.model_fields if getattr(results.spec, name) != getattr(spec, name)]
             raise ConfigError(
@@ -95,8 +102,30 @@ def _results_so_far(spec: RunSpec, folder: Path) -> Results:
                 field="out",
             )
         return replace(results, finished=False, digest=None)
-    if (folder / CHECKPOINT).exists():
+    if checkpoint.exists(folder / CHECKPOINT):
         raise ConfigError(f"{folder} holds a checkpoint but no {RESULTS}; wanted an empty folder", field="out")
+    return _claim(spec, folder)
+
+
+def _claim(spec: RunSpec, folder: Path) -> Results:
     results = Results(spec=spec, spec_digest=spec.digest, finished=False)
     write_results(folder, results)
     return results
+
+
+def _read(spec: RunSpec, folder: Path) -> Results:
+    """What results.json says; an empty start if it is damaged, since the run writes it anew.
+
+    Raises:
+      ConfigError: no run was ever in this folder, so the file is not ours to replace.
+      CheckpointError: another run was.
+    """
+    try:
+        return read_results(folder)
+    except ConfigError as error:
+        if not (folder / EPISODES).exists():
+            raise
+        checkpoint.load_newest(folder / CHECKPOINT, spec.digest)
+        aside = set_aside(folder / RESULTS)
+        logger.warning("%s. It is kept as %s and written anew; the time spent so far is lost", error, aside.name)
+        return _claim(spec, folder)

@@ -1,20 +1,22 @@
 """What a run leaves in its folder, under `risk-sac run` and in the service alike, and how it is read back.
 
-results.json    the spec, the metrics and every contact; rewritten at each checkpoint and at the end
-episodes.jsonl  one `EpisodeRecord` per line
+results.json    the spec, the metrics and every contact, sealed; rewritten at each checkpoint and at the end
+episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
 failures/       the time series of every contact, see `risk_sac.trace`
-checkpoint      from which the run goes on
+checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from risk_sac.config import RunSpec
-from risk_sac.errors import ConfigError
+from risk_sac.durable import replace_file
+from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.seal import seal, unseal
 from risk_sac.types import EpisodeRecord, RunMetrics
 
 RESULTS = "results.json"
@@ -45,6 +47,8 @@ class Contact:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
     """Results of one run."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # see `unseal`
 
     spec: RunSpec
     spec_digest: str
@@ -80,24 +84,23 @@ def write_results(folder: Path, results: Results) -> None:
     Raises:
       OSError: the folder cannot be written.
     """
-    temporary = folder / f".{RESULTS}.tmp"
-    with temporary.open("wb") as file:
-        file.write(_RESULTS.dump_json(results, indent=2) + b"\n")
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(folder / RESULTS)
+    replace_file(folder / RESULTS, seal(_RESULTS.dump_json(results, indent=2)))
 
 
 def read_results(path: Path) -> Results:
     """Reads results.json, or the one in a folder.
 
     Raises:
-      ConfigError: there is none, or it is something else.
+      ConfigError: there is none, it is damaged, or it is something else.
     """
     file = path / RESULTS if path.is_dir() else path
     try:
-        return _RESULTS.validate_json(file.read_bytes())
+        return _RESULTS.validate_json(unseal(file.read_bytes()))
     except FileNotFoundError as error:
         raise ConfigError(f"there is no {file}; wanted the folder of a run", field="RESULTS") from error
+    except DamagedError as error:
+        raise ConfigError(f"{file} is damaged: {error}", field="RESULTS") from error
     except ValidationError as error:
-        raise ConfigError(f"{file} was not written by a run: {error.errors()[0]['msg']}", field="RESULTS") from error
+        raise ConfigError(
+            f"{file} is damaged, or was not written by a run: {error.errors()[0]['msg']}", field="RESULTS"
+        ) from error

@@ -1,6 +1,7 @@
 """The full time series of one episode, kept while it runs and written only if the ego touched something."""
 
-import os
+import hashlib
+import io
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.durable import replace_file
 from risk_sac.risk.publish import Assessment
-from risk_sac.types import Bools, Floats, Frame
+from risk_sac.types import Bools, Floats, Frame, SeriesFile
 
 PER_ACTOR = ("x_m", "y_m", "heading_rad", "speed_mps", "lateral_mps", "accel_mps2")
 PER_OTHER: dict[str, Callable[[Assessment], Floats | Bools]] = {
@@ -84,19 +86,18 @@ class Trace:
         return result
 
 
-def write_series(path: Path, series: dict[str, NDArray[np.generic]]) -> None:
-    """Writes an .npz that is either complete or absent.
+def write_series(path: Path, series: dict[str, NDArray[np.generic]]) -> SeriesFile:
+    """Writes an .npz that is either complete or absent; the same arrays give the same bytes.
 
     Raises:
       OSError: the disk is full or the folder cannot be written.
     """
+    archive = io.BytesIO()
+    np.savez_compressed(archive, allow_pickle=False, **series)
+    content = archive.getbuffer()
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_suffix(".partial")
-    with temporary.open("wb") as file:
-        np.savez_compressed(file, allow_pickle=False, **series)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
+    replace_file(path, content)
+    return SeriesFile(path.name, hashlib.sha256(content).hexdigest())
 
 
 def read_series(path: Path) -> dict[str, NDArray[np.generic]]:

@@ -22,6 +22,7 @@ from risk_sac.agents.replay import Transition
 from risk_sac.agents.scripted import ScriptedAgent
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.crashes import CrashGuard
+from risk_sac.durable import sha256
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
 from risk_sac.metrics import MetricsAccumulator, results_digest
@@ -33,12 +34,12 @@ from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.scene_optimizer import BotorchOptimizer, SceneOptimizer, SobolOptimizer
 from risk_sac.trace import write_series
-from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
+from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
 
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
-SIMULATOR_CRASH = "simulator_crash"  # reason of a rejection
+SIM_CRASH = "sim_crash"  # reason of a rejection
 CONTROLS: dict[str, type[RandomAgent | ScriptedAgent]] = {
     "scripted": ScriptedAgent,
     "random": RandomAgent,
@@ -50,8 +51,8 @@ PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "num
 class Observer(Protocol):
     """Who wants to know how a run goes, and may end it."""
 
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
-        """After each episode; `series` names its file below `failures/` if the ego touched something.
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        """After each episode; `series` is its file below `failures/` if the ego touched something.
 
         A resumed run first tells of the episodes in its checkpoint again: whoever listened before may have been
         gone when the last of them were told.
@@ -85,7 +86,7 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
 
     Raises:
       ConfigError: the spec poses no problem that can be run.
-      CheckpointError: the checkpoint is damaged or of another run.
+      CheckpointError: the checkpoint is of another run.
       OSError: the folder cannot be written.
     """
     started, started_cpu = time.monotonic(), time.process_time()
@@ -94,13 +95,12 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
     run = Run(spec, folder)
     try:
         for record, metrics in run.resume():
-            observer.episode(record, metrics, None if record.collision is None else series_name(record.index))
+            observer.episode(record, metrics, run.series.get(record.index))
         total = spec.budget.episodes + spec.budget.evaluation_episodes
         with CrashGuard(folder) as guard:
             while len(run.records) < total and not observer.should_stop():
-                playable = guard.begin(len(run.records))
-                record, series = run.episode(len(run.records), playable)  # Alg. 1, l. 3
-                observer.episode(record, run.metrics_after(record), series)
+                record = run.episode(len(run.records), guard)  # Alg. 1, l. 3
+                observer.episode(record, run.metrics_after(record), run.series.get(record.index))
                 if len(run.records) % spec.learner.checkpoint_every == 0:
                     run.save()
             run.save()
@@ -114,7 +114,12 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
 
 
 class Run:
-    """The state of a run between two episodes."""
+    """The state of a run between two episodes.
+
+    Attributes:
+      records: of its episodes so far.
+      series: by episode, where the ego touched something.
+    """
 
     def __init__(self, spec: RunSpec, folder: Path) -> None:
         self._spec = spec
@@ -132,31 +137,35 @@ class Run:
         else:
             self._agent = Learner(observation_size, action_size, self._method, spec.learner, spec.seed)
         self.records: list[EpisodeRecord] = []
+        self.series: dict[int, SeriesFile] = {}
+        self._saved = 0  # records in the newest checkpoint
         self._search = MetricsAccumulator(self._problem.family.horizon_steps)
         self._evaluation = MetricsAccumulator(self._problem.family.horizon_steps)
 
-    def episode(self, index: int, playable: bool = True) -> tuple[EpisodeRecord, str | None]:
+    def episode(self, index: int, guard: CrashGuard) -> EpisodeRecord:
         """One episode of Algorithm 1, lines 4 to 22; in the evaluation phase the policy is frozen.
 
-        An episode that is not `playable`, since it crashes the simulator, is treated like a rejected scene.
+        An episode that crashes the simulator, as its guard knows, is treated like a rejected scene.
 
         Choice: scenes keep coming from the method's own sampler during evaluation, since it is the pair of
         sampler and policy that generates scenarios.
         """
         learning = index < self._spec.budget.episodes
         seed = episode_seed(self._spec.seed, index)
+        playable = guard.begin(index)
         point = self._optimizer.ask()  # Alg. 1, l. 4
         scene = self._problem.space.from_unit(point)
         tally = Tally()
         try:
             if not playable:
-                raise InfeasibleScene("this episode crashes the simulator", reason=SIMULATOR_CRASH)
+                raise InfeasibleScene("this episode crashes the simulator", reason=SIM_CRASH)
             observation, info = self._env.reset(seed=seed, options={"scene": scene})  # Alg. 1, l. 5
         except InfeasibleScene as infeasible:
             self._optimizer.tell(point, None)
-            return self._record(index, seed, scene.values, tally, objective=None, rejected=infeasible.reason), None
+            return self._record(index, seed, scene.values, tally, objective=None, rejected=infeasible.reason)
         robustness = info["robustness"]
-        for _ in range(self._problem.family.horizon_steps):  # Alg. 1, l. 6
+        for step in range(self._problem.family.horizon_steps):  # Alg. 1, l. 6
+            guard.step(step)
             action = self._agent.act(observation, explore=learning)  # Alg. 1, l. 7
             next_observation, reward, terminated, truncated, info = self._env.step(action)  # Alg. 1, l. 8
             tally.add(reward, info["cost"], self._shaped(reward, info, robustness, terminated))
@@ -180,8 +189,9 @@ class Run:
                 break
         objective = self._optimizer.tell(point, tally.shaped_return / tally.steps)  # Alg. 1, l. 21-22
         collision = info.get("collision")
-        record = self._record(index, seed, scene.values, tally, objective, collision=collision)
-        return record, self._keep_series(record)
+        if collision is not None:
+            self.series[index] = write_series(self._folder / FAILURES / series_name(index), self._env.trace.series())
+        return self._record(index, seed, scene.values, tally, objective, collision=collision)
 
     def _shaped(self, reward: float, info: Mapping[str, float], robustness: float, terminated: bool) -> float:
         """R' of this step under today's λ; what the scene optimiser and the record see."""
@@ -228,8 +238,8 @@ class Run:
             risk_return=tally.risk_return,
             shaped_return=tally.shaped_return,
             mean_cost=tally.cost / tally.steps if tally.steps else 0.0,
-            min_ttc_s=TTC_CAP_S if rejected == SIMULATOR_CRASH else self._env.min_ttc_s,
-            min_robustness=ROBUSTNESS_CLIP if rejected == SIMULATOR_CRASH else self._env.min_robustness,
+            min_ttc_s=TTC_CAP_S if rejected == SIM_CRASH else self._env.min_ttc_s,
+            min_robustness=ROBUSTNESS_CLIP if rejected == SIM_CRASH else self._env.min_robustness,
             objective=objective,
             dual_variable=self._agent.dual_variable,
             temperature=self._agent.temperature,
@@ -238,13 +248,6 @@ class Run:
         )
         self.records.append(record)
         return record
-
-    def _keep_series(self, record: EpisodeRecord) -> str | None:
-        if record.collision is None:
-            return None
-        name = series_name(record.index)
-        write_series(self._folder / FAILURES / name, self._env.trace.series())
-        return name
 
     def metrics_after(self, record: EpisodeRecord) -> RunMetrics:
         """Counts a record, in its own phase."""
@@ -264,25 +267,48 @@ class Run:
         )
 
     def save(self) -> None:
-        """Writes the checkpoint; only ever called between episodes."""
+        """Writes the checkpoint, if there is something new; only ever called between episodes."""
+        if self._saved == len(self.records):
+            return
         state = {
             "records": records_to_json(self.records),
+            "series": {index: file.sha256 for index, file in self.series.items()},
             "optimizer": self._optimizer.state(),
             "agent": self._agent.state(),
         }
         checkpoint.save(self._folder / CHECKPOINT, state, self._spec.digest)
+        self._saved = len(self.records)
 
     def resume(self) -> list[tuple[EpisodeRecord, RunMetrics]]:
-        """Goes on from the folder's checkpoint, if there is one; its episodes with the metrics after each."""
-        path = self._folder / CHECKPOINT
-        if not path.exists():
+        """Goes on from the folder's newest good checkpoint, if there is one; its episodes with the metrics after each.
+
+        Without one the run begins anew; either way it comes to the same results.
+        """
+        state = checkpoint.load_newest(self._folder / CHECKPOINT, self._spec.digest)
+        if state is None:
             return []
-        state = checkpoint.load(path, self._spec.digest)
         self.records = records_from_json(state["records"])
+        self.series = self._series(state.get("series", {}))  # checkpoints of earlier versions have none
         self._optimizer.load(state["optimizer"])
         self._agent.load(state["agent"])
+        self._saved = len(self.records)
         logger.info("resumed after %d episodes", len(self.records))
         return [(record, self.metrics_after(record)) for record in self.records]
+
+    def _series(self, digests: Mapping[int, str]) -> dict[int, SeriesFile]:
+        """The series of the records, with the digests they were written with, whatever became of the files since."""
+        found = {}
+        for record in self.records:
+            if record.collision is None:
+                continue
+            file = self._folder / FAILURES / series_name(record.index)
+            actual = sha256(file)
+            digest = digests.get(record.index, actual)
+            if actual is None or actual != digest:
+                logger.warning("the time series %s is damaged or gone; only a new run can record it again", file)
+            if digest is not None:
+                found[record.index] = SeriesFile(file.name, digest)
+        return found
 
     def close(self) -> None:
         """Ends the simulation."""

@@ -136,7 +136,7 @@ class EpisodeRecord:
     seed: int
     scene: Mapping[str, float]
     outcome: Outcome
-    reason: str  # rejection rule or simulator_crash, or the failed validity rules joined by ", "; else ""
+    reason: str  # rejection rule or sim_crash, or the failed validity rules joined by ", "; else ""
     steps: int
     risk_return: float  # Σ R_risk
     shaped_return: float  # Σ R'
@@ -148,6 +148,14 @@ class EpisodeRecord:
     temperature: float  # α after the episode
     environment_steps: int  # of the run, up to and including this episode
     collision: Collision | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesFile:
+    """The time series of an episode, below `failures/` in the run's folder."""
+
+    name: str
+    sha256: str  # as it was written, whatever became of it since
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,18 +1,44 @@
 """`python -m service`: serve in the foreground."""
 
-import logging
+import gc
+import sys
 
 import uvicorn
 
+from risk_sac.errors import RiskSacError
 from service.app import create_app
+from service.keys.exposure import check_exposure
+from service.logs import set_up_logs
 from service.settings import ServiceSettings
+
+ANSWERS_END_S = 2  # for answers and streams at work when the server is told to stop; workers are stopped after that
+SWITCH_S = 0.001  # for which a busy thread may hold up the event loop, and with it all answers; 5 ms by default
 
 
 def main() -> None:
     """Serve until told to stop."""
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     settings = ServiceSettings()
-    uvicorn.run(create_app(settings), host=settings.host, port=settings.port, log_config=None, access_log=False)
+    set_up_logs(settings.log_format)
+    try:
+        check_exposure(settings)
+    except RiskSacError as error:
+        sys.exit(str(error))
+    app = create_app(settings)
+    # What the imports left is no garbage; to look through it again and again would hold up all answers for 0.1 s.
+    gc.collect()
+    gc.freeze()
+    sys.setswitchinterval(SWITCH_S)
+    uvicorn.run(
+        app,
+        host=settings.host,
+        port=settings.port,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        ws="none",
+        loop="service.loop:new_event_loop",
+        timeout_graceful_shutdown=ANSWERS_END_S,
+    )
 
 
 if __name__ == "__main__":

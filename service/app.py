@@ -2,27 +2,35 @@
 
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from typing import IO, Any
+from typing import IO
 
+from anyio import to_thread
 from fastapi import FastAPI
-from fastapi.openapi.utils import get_openapi
+from prometheus_client import Histogram
 
 from risk_sac import __version__
-from service.api import campaigns, catalogue, reports
-from service.api.body import body_schemas
+from service.api import campaigns, catalogue, episodes, events, networks, operations, polls, reports
 from service.api.context import Context
+from service.api.description import DESCRIPTION, openapi
+from service.api.guards import add_guards
+from service.api.live import Live
+from service.api.observe import Observe
 from service.api.problems import add_problem_handlers
+from service.api.recall import Recall
+from service.api.stream import Streams
+from service.database import READERS, held
 from service.errors import StorageError
-from service.executor import Executor, LocalExecutor
+from service.executor import Executor
+from service.keys.exposure import check_exposure
+from service.local_executor import LocalExecutor
 from service.locks import try_lock
 from service.manager import Manager
+from service.networks.shelf import Shelf
+from service.priority import give_way
 from service.reports import Reports
 from service.settings import ServiceSettings
 from service.store import Store
-
-DESCRIPTION = """Finds scenarios in which an automated driving system fails.
-
-Post a campaign, follow it, read what it found. All errors are problem details (RFC 9457) that name the field."""
+from service.telemetry import registry, request_latencies
 
 
 def create_app(settings: ServiceSettings, executor: Executor | None = None) -> FastAPI:
@@ -32,55 +40,59 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
       settings: the environment's settings.
       executor: where runs execute; by default processes of this machine.
     """
+    latencies = request_latencies()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with opened(settings, executor or LocalExecutor(settings.worker_module, settings.grace_s)) as context:
+        to_thread.current_default_thread_limiter().total_tokens = READERS
+        local = executor or LocalExecutor(settings)
+        with opened(settings, local, latencies) as context:
             app.state.context = context
+            give_way(settings.worker_niceness)
             yield
 
     app = FastAPI(
         title="RISK-SAC", description=DESCRIPTION, version=__version__, lifespan=lifespan, redirect_slashes=False
     )
-    app.include_router(campaigns.router)
-    app.include_router(reports.router)
-    app.include_router(catalogue.router)
+    for routes in (campaigns, polls, episodes, events, reports, networks, catalogue, operations):
+        app.include_router(routes.router)
     add_problem_handlers(app)
+    app.add_middleware(Recall)
+    add_guards(app, settings)
+    app.add_middleware(Observe, latencies=latencies)
     app.openapi = lambda: openapi(app)  # type: ignore[method-assign]  # FastAPI's documented way
     return app
 
 
 @contextmanager
-def opened(settings: ServiceSettings, executor: Executor) -> Iterator[Context]:
+def opened(settings: ServiceSettings, executor: Executor, latencies: Histogram) -> Iterator[Context]:
     """The data folder, held exclusively, with its database open and its queue at work.
 
     Raises:
       StorageError: the data folder is in use, or cannot be written.
+      ConfigError: other machines could call, and no API key exists.
+      KeysError: the API keys cannot be read.
     """
+    check_exposure(settings)
     with _data_folder(settings):
-        store = Store(settings.database)
-        manager = Manager(settings, store, executor)
-        manager.start()
+        store = Store(settings.url)
         try:
-            yield Context(settings, store, manager, Reports(settings))
+            with held(store.engine):
+                manager = Manager(settings, store, executor)
+                manager.start()
+                try:
+                    yield _context(settings, store, manager, latencies)
+                finally:
+                    manager.stop()
         finally:
-            manager.stop()
             store.close()
 
 
-def openapi(app: FastAPI) -> dict[str, Any]:
-    """The app's OpenAPI document, with every error response declared as a problem."""
-    if app.openapi_schema is not None:
-        return app.openapi_schema
-    document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
-    document["components"]["schemas"] |= body_schemas()
-    for operations in document["paths"].values():
-        for operation in operations.values():
-            for status, response in operation["responses"].items():
-                if int(status) >= 400:
-                    response["content"] = {"application/problem+json": response["content"]["application/json"]}
-    app.openapi_schema = document
-    return document
+def _context(settings: ServiceSettings, store: Store, manager: Manager, latencies: Histogram) -> Context:
+    live = Live(store, settings)
+    metrics = registry(latencies, store, manager)
+    networks = Shelf(settings.networks_dir)
+    return Context(settings, store, manager, Reports(settings), networks, live, Streams(store, live), metrics)
 
 
 def _data_folder(settings: ServiceSettings) -> IO[bytes]:

@@ -2,7 +2,8 @@
 
 queued ──> running ──> succeeded | failed
    │ ^        │ └────> cancelling ──> cancelled (or the end it had already reached)
-   │ └────────┘        the server stopped under it: it will resume from its checkpoint
+   │ ├────────┤        its worker died or the server stopped: it will resume from its checkpoint
+   │ └─ paused <┘      the disk refused: it goes on when there is room
    └─────────────────> cancelled | failed
 """
 
@@ -17,6 +18,7 @@ class State(StrEnum):
 
     QUEUED = "queued"
     RUNNING = "running"
+    PAUSED = "paused"
     CANCELLING = "cancelling"
     CANCELLED = "cancelled"
     SUCCEEDED = "succeeded"
@@ -29,13 +31,17 @@ class State(StrEnum):
 
 
 TRANSITIONS: dict[State, frozenset[State]] = {
-    State.QUEUED: frozenset({State.RUNNING, State.CANCELLED, State.FAILED}),
-    State.RUNNING: frozenset({State.QUEUED, State.CANCELLING, State.SUCCEEDED, State.FAILED}),
+    State.QUEUED: frozenset({State.RUNNING, State.PAUSED, State.CANCELLED, State.FAILED}),
+    State.RUNNING: frozenset({State.QUEUED, State.PAUSED, State.CANCELLING, State.SUCCEEDED, State.FAILED}),
+    State.PAUSED: frozenset({State.QUEUED, State.RUNNING, State.CANCELLING, State.CANCELLED, State.FAILED}),
     State.CANCELLING: frozenset({State.CANCELLED, State.SUCCEEDED, State.FAILED}),
     State.CANCELLED: frozenset(),
     State.SUCCEEDED: frozenset(),
     State.FAILED: frozenset(),
 }
+# What a run comes back as when the server that had it in hand is gone, or the disk that refused it has room again.
+RESUMED = {State.RUNNING: State.QUEUED, State.PAUSED: State.QUEUED, State.CANCELLING: State.CANCELLED}
+FINAL = frozenset(state for state in State if not TRANSITIONS[state])
 
 
 def advance(current: State, new: State) -> State:
@@ -66,6 +72,8 @@ def campaign_state(current: State, runs: Collection[State]) -> State:
         return _verdict(current, runs)
     if current is State.CANCELLING:
         return current
+    if State.PAUSED in runs:
+        return State.PAUSED
     started = any(run is not State.QUEUED for run in runs)
     return State.RUNNING if started else State.QUEUED
 

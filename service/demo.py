@@ -9,8 +9,6 @@ import socket
 import subprocess
 import sys
 import time
-import urllib.error
-import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,13 +18,13 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
+from risk_sac.client import Campaign, Client, ClientError, Unreachable
 from risk_sac.results import FAILURES, series_name
 from service.settings import ServiceSettings
 
 START_S = 60.0
 STOP_S = 60.0
-POLL_S = 1.0
-FINAL = ("succeeded", "failed", "cancelled")
+AWAY_S = 10.0  # nobody starts it again
 
 Json = dict[str, Any]
 
@@ -40,17 +38,17 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     console = Console()
     try:
-        with _service(options.data_dir, console) as url:
-            campaign = _follow(url, _post(url, options)["id"], console)
-            found = _collect(url, campaign)
-    except DemoError as error:
+        with _service(options.data_dir, console) as client:
+            campaign = _follow(client, client.submit(_spec(options)).id, console)
+            found = _collect(client, campaign)
+    except (DemoError, ClientError) as error:
         console.print(f"demo failed: {error}", style="bold red", markup=False)
         return 1
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(json.dumps(found, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     _summarise(found, console)
     console.print(f"results: {options.out}")
-    console.print(f"recorded failures: {options.data_dir}/campaigns/{campaign['id']}", soft_wrap=True)
+    console.print(f"recorded failures: {options.data_dir}/campaigns/{campaign.id}", soft_wrap=True)
     _invite(found, options.data_dir, console)
     return _verdict(found, console)
 
@@ -72,8 +70,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 @contextlib.contextmanager
-def _service(data_dir: Path, console: Console) -> Iterator[str]:
-    """The service on a free loopback port, stopped at the end."""
+def _service(data_dir: Path, console: Console) -> Iterator[Client]:
+    """A client of the service on a free loopback port, which is stopped at the end."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     data_dir.mkdir(parents=True, exist_ok=True)
@@ -86,10 +84,10 @@ def _service(data_dir: Path, console: Console) -> Iterator[str]:
     with log.open("wb") as stream:
         process = subprocess.Popen([sys.executable, "-m", "service"], env=environment, stdout=stream, stderr=stream)
     try:
-        url = f"http://127.0.0.1:{port}"
-        _wait_until_up(url, process, log)
-        console.print(f"service: {url} (log: {log})")
-        yield url
+        with Client(f"http://127.0.0.1:{port}") as client:
+            _wait_until_up(client.url, process, log)
+            console.print(f"service: {client.url} (log: {log})")
+            yield client
     finally:
         process.terminate()
         try:
@@ -101,79 +99,58 @@ def _service(data_dir: Path, console: Console) -> Iterator[str]:
 
 def _wait_until_up(url: str, process: subprocess.Popen[bytes], log: Path) -> None:
     deadline = time.monotonic() + START_S
-    while time.monotonic() < deadline:
-        if process.poll() is not None:
-            raise DemoError(f"the service ended with status {process.returncode}; its log is {log}")
-        try:
-            _call(f"{url}/healthz")
-        except DemoError:
-            time.sleep(0.1)
-        else:
-            return
+    with Client(url, patience_s=0) as client:
+        while time.monotonic() < deadline:
+            if process.poll() is not None:
+                raise DemoError(f"the service ended with status {process.returncode}; its log is {log}")
+            try:
+                next(client.campaigns(), None)
+            except Unreachable:
+                time.sleep(0.1)
+            else:
+                return
     raise DemoError(f"the service did not answer within {START_S:g} s; its log is {log}")
 
 
-def _post(url: str, options: argparse.Namespace) -> Json:
-    spec = {
+def _spec(options: argparse.Namespace) -> Json:
+    return {
         "label": "demo",
         "families": [options.family],
         "methods": options.methods,
         "seeds": options.seeds,
         "budget": {"episodes": options.episodes},
     }
-    return _call(f"{url}/v1/campaigns", spec)
 
 
-def _call(url: str, body: Json | None = None) -> Json:
-    """GET, or POST where there is a body.
-
-    Raises:
-      DemoError: the service does not answer, or answers with a problem.
-    """
-    data = None if body is None else json.dumps(body).encode()
-    request = urllib.request.Request(url, data, {"content-type": "application/json"})
-    try:
-        with urllib.request.urlopen(request, timeout=30) as response:
-            answer: Json = json.load(response)
-            return answer
-    except urllib.error.HTTPError as error:
-        with error:
-            raise DemoError(f"{url} answered {error.code}: {json.load(error).get('detail')}") from error
-    except OSError as error:
-        raise DemoError(f"{url} does not answer: {error}") from error
-
-
-def _follow(url: str, campaign_id: str, console: Console) -> Json:
+def _follow(client: Client, campaign_id: str, console: Console) -> Campaign:
     """The campaign once it has ended, with a bar that moves until then."""
     columns = (BarColumn(bar_width=15), MofNCompleteColumn(), TextColumn("episodes  {task.fields[figures]}"))
     with Progress(*columns, console=console) as bar:
         task = bar.add_task("search", total=None, figures="")
-        while True:
-            campaign = _call(f"{url}/v1/campaigns/{campaign_id}")
-            seen = campaign["progress"]
-            bar.update(task, completed=seen["episodes_done"], total=seen["episodes_total"], figures=_figures(campaign))
-            if campaign["state"] in FINAL:
-                return campaign
-            time.sleep(POLL_S)
+
+        def draw(campaign: Campaign) -> None:
+            seen = campaign.progress
+            bar.update(task, completed=seen.episodes_done, total=seen.episodes_total, figures=_figures(campaign))
+
+        return client.wait(campaign_id, draw, away_s=AWAY_S)
 
 
-def _figures(campaign: Json) -> str:
-    seen = campaign["progress"]
-    eta = "?" if seen["eta_s"] is None else f"{seen['eta_s']:.0f} s"
+def _figures(campaign: Campaign) -> str:
+    seen = campaign.progress
+    eta = "?" if seen.eta_s is None else f"{seen.eta_s:.0f} s"
     return (
-        f"{seen['raw_collisions']} collisions, {seen['failures']} valid  "
-        f"ECR {_number(seen['window_ecr'])}  λ {_number(seen['dual_variable'])}  ETA {eta}"
+        f"{seen.raw_collisions} collisions, {seen.failures} valid  "
+        f"ECR {_number(seen.window_ecr)}  λ {_number(seen.dual_variable)}  ETA {eta}"
     )
 
 
-def _collect(url: str, campaign: Json) -> Json:
-    base = f"{url}/v1/campaigns/{campaign['id']}"
+def _collect(client: Client, campaign: Campaign) -> Json:
+    failures = [failure.model_dump(mode="json") for failure in client.failures(campaign.id)]
+    found = campaign.model_dump(mode="json")
     return {
-        "campaign": campaign,
-        "results": _call(f"{base}/results"),
-        "failures": [
-            failure | {"series": _series(campaign, failure)} for failure in _call(f"{base}/failures?limit=500")["items"]
-        ],
+        "campaign": found,
+        "results": client.results(campaign.id).model_dump(mode="json"),
+        "failures": [failure | {"series": _series(found, failure)} for failure in failures],
     }
 
 

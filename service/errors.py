@@ -4,6 +4,9 @@ RiskSacError
 └── ServiceError
     ├── NotFoundError      no such campaign, run or failure
     ├── CursorError        a page cursor that this service did not issue
+    ├── ConflictError      what is asked for does not fit what there is
+    ├── QuotaError         a project has used up its share
+    ├── KeysError          the API keys cannot be read, or have no such key
     ├── StorageError       the database or the data folder refused
     └── TransitionError    a change of state that the table of transitions does not allow
 """
@@ -30,6 +33,26 @@ class CursorError(ServiceError):
     def __init__(self, got: str) -> None:
         super().__init__(f"cursor is {got!r}; wanted the `next` of an earlier page, unchanged")
         self.got = got
+
+
+class ConflictError(ServiceError):
+    """What is asked for does not fit what there is; `reason` is a stable name for why."""
+
+    def __init__(self, message: str, *, reason: str) -> None:
+        super().__init__(message)
+        self.reason = reason
+
+
+class QuotaError(ServiceError):
+    """A project has used up its share; asking again pays after `retry_after_s` seconds."""
+
+    def __init__(self, message: str, retry_after_s: float) -> None:
+        super().__init__(message)
+        self.retry_after_s = retry_after_s
+
+
+class KeysError(ServiceError):
+    """The file of the API keys cannot be read or written, is damaged, or has no such key."""
 
 
 class StorageError(ServiceError):

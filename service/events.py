@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from risk_sac.types import EpisodeRecord, RunMetrics
 
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}$")]
 
 
@@ -27,6 +28,12 @@ class Started(Message):
     pid: int
 
 
+class Heartbeat(Message):
+    """The worker lives; sent about every second, whatever else it does."""
+
+    type: Literal["heartbeat"] = "heartbeat"
+
+
 class EpisodeDone(Message):
     """An episode ended."""
 
@@ -36,6 +43,8 @@ class EpisodeDone(Message):
     """Of the episode's phase so far."""
     series: FileName | None
     """File of its full time series in the run's folder `failures`, if the ego touched something."""
+    series_sha256: Sha256 | None = None
+    """SHA-256 of that file, as it was written."""
     wall_s: float
     """Wall time since the previous event, s."""
 
@@ -62,20 +71,21 @@ class Failed(Message):
     """The disk refused, so sibling runs would fail too."""
 
 
-Event = Annotated[Started | EpisodeDone | Finished | Failed, Field(discriminator="type")]
+Event = Started | EpisodeDone | Finished | Failed
+"""What becomes of a run."""
 
-_EVENT: TypeAdapter[Event] = TypeAdapter(Event)
+_WORD: TypeAdapter[Event | Heartbeat] = TypeAdapter(Annotated[Event | Heartbeat, Field(discriminator="type")])
 
 
-def encode(event: Event) -> bytes:
+def encode(word: Event | Heartbeat) -> bytes:
     """One line, newline included."""
-    return event.model_dump_json().encode() + b"\n"
+    return word.model_dump_json().encode() + b"\n"
 
 
-def decode(line: bytes) -> Event:
-    """The event in one line.
+def decode(line: bytes) -> Event | Heartbeat:
+    """What one line says.
 
     Raises:
-      pydantic.ValidationError: the line holds no event.
+      pydantic.ValidationError: it says nothing that a worker may say.
     """
-    return _EVENT.validate_json(line)
+    return _WORD.validate_json(line)

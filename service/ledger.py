@@ -2,23 +2,23 @@
 
 import secrets
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
 from pydantic_core import to_json
-from sqlalchemy import select
+from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
 from risk_sac.types import EpisodeRecord, Outcome
-from service.campaigns import State, advance, campaign_state
-from service.errors import StorageError
+from service.campaigns import RESUMED, State, advance, campaign_state
+from service.database import storage_errors
+from service.errors import ConflictError
 from service.events import EpisodeDone, Finished
 from service.records import Campaign
-from service.store import Store, campaign_record, find_campaign, storage_errors
-from service.tables import CampaignRow, EpisodeRow, RunRow
-
-_ACTIVE = (State.RUNNING, State.CANCELLING)
+from service.snapshots import campaign_record
+from service.store import HOUR_S, Store, find_campaign
+from service.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow, UsageRow
 
 
 class Ledger:
@@ -26,11 +26,28 @@ class Ledger:
 
     def __init__(self, store: Store) -> None:
         self._store = store
+        self._repeated_s: dict[int, float] = {}  # time of runs that only repeated what was known
 
-    def create(self, spec: CampaignSpec) -> Campaign:
+    def find(self, project: str, key: str, spec: CampaignSpec) -> Campaign | None:
+        """The campaign that was created with this idempotency key.
+
+        Raises:
+          ConflictError: the key was used for another campaign.
+        """
+        with storage_errors("reading"), Session(self._store.engine) as session:
+            row = session.scalars(select(CampaignRow).filter_by(project=project, idempotency_key=key)).one_or_none()
+            if row is None:
+                return None
+            found = campaign_record(row, self._store.revision(row.id))
+        if found.spec != spec:
+            message = f"Idempotency-Key {key!r} belongs to campaign {found.id}, which differs; wanted another key"
+            raise ConflictError(message, reason="idempotency_key_reused")
+        return found
+
+    def create(self, spec: CampaignSpec, project: str = "default", key: str | None = None) -> Campaign:
         """Write a new campaign and its runs down, all queued."""
-        row = CampaignRow(id=f"c{secrets.token_hex(8)}", spec=spec.model_dump_json(), state=State.QUEUED)
-        row.created_at = time.time()
+        row = CampaignRow(id=f"c{secrets.token_hex(8)}", project=project, idempotency_key=key, label=spec.label)
+        row.spec, row.state, row.created_at = spec.model_dump_json(), State.QUEUED, time.time()
         row.runs = [
             RunRow(
                 id=f"{run.family}-{run.method}-{run.seed}",
@@ -46,24 +63,25 @@ class Ledger:
         with self._writing("creating a campaign") as session:
             session.add(row)
             session.flush()
-            return campaign_record(row)
+            return campaign_record(row, str(row.revision))
 
     def start_run(self, number: int) -> None:
         """A worker is being launched for this run."""
-        with self._run(number, "starting a run") as row:
-            row.state = advance(State(row.state), State.RUNNING)
+        with self._run(number, "starting a run") as (session, row):
+            _move(session, row, State.RUNNING)
             row.started_at = row.started_at or time.time()
+            row.attempts += 1
 
-    def add_episode(self, number: int, event: EpisodeDone) -> None:
-        """Store an episode, or replace it where a resumed run reports it again."""
-        with self._writing("storing an episode") as session:
+    def add_episode(self, number: int, event: EpisodeDone) -> bool:
+        """Store an episode, or replace it where a resumed run reports another outcome; False if it was known."""
+        with self._writing("storing an episode", episode=True) as session:
             run = session.get_one(RunRow, number)
-            query = select(EpisodeRow).where(
-                EpisodeRow.run_number == number,
-                EpisodeRow.phase == event.record.phase,
-                EpisodeRow.index == event.record.index,
-            )
+            query = select(EpisodeRow).filter_by(run_number=number, phase=event.record.phase, index=event.record.index)
             row = session.scalars(query).one_or_none()
+            self._repeated_s[number] = self._repeated_s.get(number, 0.0) + event.wall_s
+            if row is not None and row.record == _json(event.record) and row.series_sha256 == event.series_sha256:
+                return False
+            new = row is None
             if row is None:
                 row = EpisodeRow(campaign_number=run.campaign_number, run_number=number)
                 session.add(row)
@@ -75,13 +93,16 @@ class Ledger:
                 run.metrics = _json(event.metrics)
             else:
                 run.evaluation = _json(event.metrics)
-            run.busy_s += event.wall_s
+            busy_s = self._repeated_s.pop(number)
+            run.busy_s += busy_s
+            _use(session, run.campaign.project, busy_s)
+            run.campaign.revision += 1  # its state follows those of its runs, which an episode leaves alone
+            return new
 
     def end_run(self, number: int, state: State, reason: str | None = None, result: Finished | None = None) -> None:
         """A run reached its end; its campaign ends with the last one."""
-        with self._run(number, "ending a run") as row:
-            row.state = advance(State(row.state), state)
-            row.reason = reason
+        with self._run(number, "ending a run") as (session, row):
+            _move(session, row, state, reason)
             row.finished_at = time.time()
             if result is not None:
                 row.metrics = _json(result.metrics)
@@ -89,100 +110,120 @@ class Ledger:
                 row.digest = result.digest
                 row.versions = _json(dict(result.versions))
 
-    def requeue_run(self, number: int) -> None:
-        """The server stops under a run; it will resume from its checkpoint."""
-        with self._run(number, "putting a run back in the queue") as row:
-            row.state = advance(State(row.state), State.QUEUED)
+    def requeue_run(self, number: int, reason: str | None = None) -> None:
+        """A run lost its worker; it will resume from its checkpoint."""
+        with self._run(number, "putting a run back in the queue") as (session, row):
+            _move(session, row, State.QUEUED, reason)
 
-    def recover(self) -> int:
-        """Settle what a server that died left behind; returns how many runs went back to the queue."""
-        with self._writing("recovering") as session:
-            rows = list(session.scalars(select(RunRow).where(RunRow.state.in_(_ACTIVE))))
+    def pause(self, numbers: Collection[int], reason: str) -> None:
+        """The disk refused these runs, which had workers."""
+        with self._writing("pausing") as session:
+            for row in session.scalars(select(RunRow).where(RunRow.number.in_(numbers))):
+                if row.state == State.RUNNING:
+                    _move(session, row, State.PAUSED, reason)
+                    _settle(session, row.campaign)
+
+    def resume(self) -> int:
+        """Settle what has no worker any more, after a pause or an earlier server; returns how many runs wait again."""
+        with self._writing("resuming") as session:
+            rows = list(session.scalars(select(RunRow).where(RunRow.state.in_(RESUMED))))
             for row in rows:
-                interrupted = State(row.state)
-                row.state = advance(interrupted, _RESUME[interrupted])
-                _settle(row.campaign)
+                _move(session, row, RESUMED[State(row.state)])
+                _settle(session, row.campaign)
             return sum(row.state == State.QUEUED for row in rows)
 
-    def cancel(self, campaign_id: str) -> list[int]:
-        """Cancel what is queued and mark what runs; returns the numbers of the runs to stop.
+    def cancel(self, campaign_id: str, project: str | None = None) -> list[int]:
+        """Cancel what waits and mark what runs; returns the numbers of the runs to stop.
 
         Raises:
           NotFoundError: there is no such campaign.
         """
         with self._writing("cancelling a campaign") as session:
-            campaign = find_campaign(session, campaign_id)
+            campaign = find_campaign(session, campaign_id, project)
             if State(campaign.state).final:
                 return []
-            if campaign.state == State.RUNNING:
-                campaign.state = State.CANCELLING
+            running = [run for run in campaign.runs if run.state == State.RUNNING]
+            if running and campaign.state != State.CANCELLING:
+                campaign.state = advance(State(campaign.state), State.CANCELLING)
+                _log(session, campaign.number, None, State.CANCELLING, None)
             for run in campaign.runs:
-                _cancel(run)
-            _settle(campaign)
+                if run in running:
+                    _move(session, run, State.CANCELLING)
+                elif run.state in (State.QUEUED, State.PAUSED):
+                    _move(session, run, State.CANCELLED)
+                    run.finished_at = time.time()
+            _settle(session, campaign)
             return [run.number for run in campaign.runs if run.state == State.CANCELLING]
 
-    def fail(self, campaign_id: str, reason: str) -> None:
-        """Fail a campaign and all it has not finished; remembered for later where it cannot be written."""
-        self._store.unsaved[campaign_id] = reason
-        self.save_failures()
+    def delete(self, campaign_id: str) -> None:
+        """Remove a campaign with all that belongs to it.
 
-    def save_failures(self) -> None:
-        """Write down the failures that the disk refused before."""
-        for campaign_id, reason in list(self._store.unsaved.items()):
-            try:
-                self._fail(campaign_id, reason)
-            except StorageError:
-                return  # still refused; the manager asks again
-            del self._store.unsaved[campaign_id]
-
-    def _fail(self, campaign_id: str, reason: str) -> None:
-        with self._writing("failing a campaign") as session:
-            campaign = find_campaign(session, campaign_id)
-            for run in campaign.runs:
-                if not State(run.state).final:
-                    run.state = advance(State(run.state), State.FAILED)
-                    run.reason = reason
-                    run.finished_at = time.time()
-            if not State(campaign.state).final:
-                campaign.state = advance(State(campaign.state), State.FAILED)
-                campaign.finished_at = time.time()
-            campaign.reason = reason
+        Raises:
+          NotFoundError: there is no such campaign.
+        """
+        with self._writing("deleting a campaign") as session:
+            number = find_campaign(session, campaign_id).number
+            session.expunge_all()
+            for table in (EpisodeRow, ChangeRow, RunRow):
+                session.execute(delete(table).where(table.campaign_number == number))
+            session.execute(delete(CampaignRow).where(CampaignRow.number == number))
+        self._store.revisions.forget(campaign_id)
 
     @contextmanager
-    def _run(self, number: int, doing: str) -> Iterator[RunRow]:
+    def _run(self, number: int, doing: str) -> Iterator[tuple[Session, RunRow]]:
         with self._writing(doing) as session:
             row = session.get_one(RunRow, number)
-            yield row
-            _settle(row.campaign)
+            yield session, row
+            _settle(session, row.campaign)
 
     @contextmanager
-    def _writing(self, doing: str) -> Iterator[Session]:
-        with storage_errors(doing), Session(self._store.engine) as session, session.begin():
-            yield session
+    def _writing(self, doing: str, *, episode: bool = False) -> Iterator[Session]:
+        with storage_errors(doing), Session(self._store.engine, expire_on_commit=False) as session:
+            with session.begin():
+                yield session
+            for row in session.identity_map.values():
+                if isinstance(row, CampaignRow):
+                    self._store.revisions.note(row.id, row.project, row.revision, episode=episode)
 
 
-_RESUME = {State.RUNNING: State.QUEUED, State.CANCELLING: State.CANCELLED}
+def _move(session: Session, run: RunRow, state: State, reason: str | None = None) -> None:
+    run.state = advance(State(run.state), state)
+    run.reason = reason
+    _log(session, run.campaign_number, run.id, state, reason)
 
 
-def _settle(campaign: CampaignRow) -> None:
+def _settle(session: Session, campaign: CampaignRow) -> None:
+    """Let a campaign follow its runs, and show that something of it has changed."""
+    campaign.revision += 1
     current = State(campaign.state)
     new = campaign_state(current, [State(run.state) for run in campaign.runs])
     if new is current:
         return
     campaign.state = new
+    campaign.reason = next((f"run {run.id}: {run.reason}" for run in campaign.runs if _tells(run, new)), None)
     if new is State.RUNNING:
         campaign.started_at = campaign.started_at or time.time()
     if new.final:
         campaign.finished_at = time.time()
-        campaign.reason = next((f"run {run.id}: {run.reason}" for run in campaign.runs if run.reason), None)
+    _log(session, campaign.number, None, new, campaign.reason)
 
 
-def _cancel(run: RunRow) -> None:
-    if run.state == State.QUEUED:
-        run.state = State.CANCELLED
-        run.finished_at = time.time()
-    elif run.state == State.RUNNING:
-        run.state = State.CANCELLING
+def _tells(run: RunRow, state: State) -> bool:
+    """Whether a run is why its campaign is in this state."""
+    return bool(run.reason) and run.state == state
+
+
+def _log(session: Session, campaign: int, run_id: str | None, state: State, reason: str | None) -> None:
+    session.add(ChangeRow(campaign_number=campaign, run_id=run_id, state=state, reason=reason, at=time.time()))
+
+
+def _use(session: Session, project: str, busy_s: float) -> None:
+    hour = int(time.time() // HOUR_S)
+    row = session.get(UsageRow, (project, hour))
+    if row is None:
+        session.add(UsageRow(project=project, hour=hour, busy_s=busy_s))
+    else:
+        row.busy_s += busy_s
 
 
 def _count(run: RunRow, outcome: Outcome, sign: int) -> None:
@@ -199,6 +240,7 @@ def _fill(row: EpisodeRow, event: EpisodeDone) -> None:
     row.outcome = record.outcome
     row.record = _json(record)
     row.series = event.series
+    row.series_sha256 = event.series_sha256
     row.wall_s = event.wall_s
 
 

@@ -22,12 +22,5 @@ def try_lock(folder: Path) -> IO[bytes]:
     return handle
 
 
-def wait_for_lock(folder: Path) -> IO[bytes]:
-    """Lock a folder once its holder lets go; close the returned file to give it back."""
-    handle = _open(folder)
-    fcntl.flock(handle, fcntl.LOCK_EX)
-    return handle
-
-
 def _open(folder: Path) -> IO[bytes]:
     return (folder / ".lock").open("ab")

@@ -1,25 +1,35 @@
-"""Queue, limits, launch, cancel, recover: the only writer of the database."""
+"""Queue, limits, launch, retry, pause, cancel, recover, delete: the only writer of the database."""
 
 import logging
 import threading
+import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
 from risk_sac.config import CampaignSpec
 from risk_sac.problem import check_campaign
 from service.campaigns import State
-from service.errors import StorageError
+from service.disposal import dispose, settle
+from service.errors import ConflictError, StorageError
 from service.events import EpisodeDone, Event, Failed, Finished, Started
 from service.executor import Executor, Exited
 from service.ledger import Ledger
+from service.quota import check_quota, exhausted
 from service.records import Campaign, Run
 from service.settings import ServiceSettings
 from service.store import Store
 
 logger = logging.getLogger(__name__)
 
-TICK_S = 1.0  # how soon a write that the disk refused is tried again
-UNKILLABLE_S = 10.0  # how long after SIGKILL a worker may take to vanish
+TICK_S = 1.0
+UNKILLABLE_S = 3.0  # how long after SIGKILL a worker may take to vanish
+PROBE_BYTES = 16 << 20  # what there must be room for before a pause ends: a checkpoint and then some
+FIRST_WAIT_S, LONGEST_WAIT_S = 1.0, 30.0  # before a disk that refused is tried again; doubles while it goes on
+CALM_S = 60.0  # a disk that behaved for so long is trusted again
+RETENTION_S = 10.0  # between two looks for campaigns to delete
+DAY_S = 86400.0
+BATCH = 10  # campaigns deleted in one look, so that the lock is free in between
 
 
 @dataclass(slots=True)
@@ -27,15 +37,24 @@ class _Active:
     """A run whose worker lives."""
 
     run: Run
+    project: str
     cancelled: bool = False
-    abandoned: bool = False  # its campaign has failed; what it still says is not wanted
+    abandoned: bool = False  # the disk refused; what it still says is not wanted, since it will be said again
     last: Finished | Failed | None = None
+
+    @property
+    def ids(self) -> dict[str, str]:
+        """What a line of the log says it is about."""
+        return {"campaign": self.run.campaign_id, "run": self.run.id}
 
 
 class Manager:
     """Runs campaigns: one thread turns what workers say into rows and starts what waits.
 
-    Requests call `submit` and `cancel` from their own threads; the lock makes every step whole.
+    Requests call `submit`, `cancel` and `delete` from their own threads; the lock makes every step whole.
+
+    Attributes:
+      restarts: workers that were lost and replaced, by cause.
     """
 
     def __init__(self, settings: ServiceSettings, store: Store, executor: Executor) -> None:
@@ -44,8 +63,12 @@ class Manager:
         self._ledger = Ledger(store)
         self._executor = executor
         self._active: dict[int, _Active] = {}
+        self._deaths: Counter[int] = Counter()  # of a run's workers in a row, without a new episode
+        self.restarts: Counter[str] = Counter()
         self._lock = threading.RLock()
         self._stopping = False
+        self._refused_at, self._patience_s = float("-inf"), FIRST_WAIT_S
+        self._retired_at = float("-inf")
         self._thread = threading.Thread(target=self._work, name="manager", daemon=True)
 
     @property
@@ -53,13 +76,22 @@ class Manager:
         """Whether campaigns make progress."""
         return self._thread.is_alive()
 
+    @property
+    def storage_problem(self) -> str | None:
+        """Why campaigns are paused, while they are."""
+        return self._store.refusal
+
     def start(self) -> None:
         """Take up what an earlier server left, then work the queue.
 
         Raises:
-          StorageError: the database cannot be written.
+          StorageError: the database or the data folder cannot be written.
         """
-        resumed = self._ledger.recover()
+        try:
+            settle(self._settings.data_dir / "campaigns", self._store.exists)
+        except OSError as error:
+            raise StorageError(_refused("tidying the data folder", self._settings.data_dir, error)) from error
+        resumed = self._ledger.resume()
         if resumed:
             logger.info("%d interrupted runs go back to the queue", resumed)
         self._thread.start()
@@ -72,27 +104,33 @@ class Manager:
         with self._lock:
             self._stopping = True
             for number in self._active:
-                self._executor.cancel(number)
+                self._executor.cancel(number, self._settings.stop_s)
         self._executor.wake()
-        self._thread.join(self._settings.grace_s + UNKILLABLE_S)
+        self._thread.join(self._settings.stop_s + UNKILLABLE_S)
         if self._thread.is_alive():
             logger.error("workers of runs %s did not end", sorted(self._active))
 
-    def submit(self, spec: CampaignSpec) -> Campaign:
-        """Queue a campaign.
+    def submit(self, spec: CampaignSpec, *, project: str = "default", key: str | None = None) -> Campaign:
+        """Queue a campaign, or find the one that this idempotency key has queued before.
 
         Raises:
           ConfigError: the campaign cannot be run; the error names the field.
+          ConflictError: the key has queued another campaign.
+          QuotaError: the project has used up its share.
           StorageError: it cannot be written down.
         """
         check_campaign(spec)
         with self._lock:
-            campaign = self._ledger.create(spec)
-        logger.info("campaign %s: %d runs queued", campaign.id, len(campaign.runs))
+            found = None if key is None else self._ledger.find(project, key, spec)
+            if found is not None:
+                return found
+            check_quota(self._store.usage(project), len(spec.runs()), self._settings)
+            campaign = self._ledger.create(spec, project, key)
+        logger.info("%d runs queued", len(campaign.runs), extra={"campaign": campaign.id})
         self._executor.wake()
         return campaign
 
-    def cancel(self, campaign_id: str) -> Campaign:
+    def cancel(self, campaign_id: str, project: str | None = None) -> Campaign:
         """Cancel a campaign; does nothing to one that has ended.
 
         Raises:
@@ -100,10 +138,35 @@ class Manager:
           StorageError: the cancellation cannot be written down.
         """
         with self._lock:
-            for number in self._ledger.cancel(campaign_id):
-                self._active[number].cancelled = True
-                self._executor.cancel(number)
+            for number in self._ledger.cancel(campaign_id, project):
+                if number in self._active:
+                    self._active[number].cancelled = True
+                    self._executor.cancel(number, self._settings.grace_s)
             return self._store.campaign(campaign_id)
+
+    def delete(self, campaign_id: str, project: str | None = None) -> None:
+        """Remove a campaign that has ended, with its files.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+          ConflictError: it has not ended.
+          StorageError: its files or rows cannot be removed.
+        """
+        with self._lock:
+            campaign = self._store.campaign(campaign_id, project)
+            leaving = any(active.run.campaign_id == campaign_id for active in self._active.values())
+            if not campaign.state.final or leaving:
+                message = f"campaign {campaign_id} is {campaign.state}; cancel it and wait until it has ended"
+                raise ConflictError(message, reason="not_ended")
+            self._dispose(campaign_id)
+
+    def _dispose(self, campaign_id: str) -> None:
+        folder = self._settings.campaign_folder(campaign_id)
+        try:
+            dispose(folder, lambda: self._ledger.delete(campaign_id))
+        except OSError as error:
+            raise StorageError(_refused("deleting a campaign", folder, error)) from error
+        logger.info("deleted", extra={"campaign": campaign_id})
 
     def _work(self) -> None:
         while True:
@@ -111,25 +174,36 @@ class Manager:
                 with self._lock:
                     self._handle(self._active[number], message)
             with self._lock:
-                self._ledger.save_failures()
-                if not self._stopping:
-                    self._launch_waiting()
+                if self._stopping:
+                    if not self._active:
+                        return
+                elif self._store.refusal is None:
+                    self._tend()
                 elif not self._active:
-                    return
+                    self._try_again()
+
+    def _tend(self) -> None:
+        try:
+            self._launch_waiting()
+            self._retire()
+        except StorageError as error:
+            self._pause(str(error))
 
     def _handle(self, active: _Active, message: Event | Exited) -> None:
+        number = active.run.number
         try:
             if isinstance(message, Exited):
-                del self._active[active.run.number]
+                del self._active[number]
                 self._end(active, message)
             elif isinstance(message, EpisodeDone) and not active.abandoned:
-                self._ledger.add_episode(active.run.number, message)
+                if self._ledger.add_episode(number, message):
+                    self._deaths.pop(number, None)
             elif isinstance(message, Finished | Failed):
                 active.last = message
             elif isinstance(message, Started):
-                logger.info("run %s of campaign %s: process %d", active.run.id, active.run.campaign_id, message.pid)
+                logger.info("process %d", message.pid, extra=active.ids)
         except StorageError as error:
-            self._abandon(active.run.campaign_id, str(error))
+            self._pause(str(error), active)
 
     def _end(self, active: _Active, exited: Exited) -> None:
         """Decide what became of a run; a worker's own account goes before its exit status."""
@@ -139,7 +213,7 @@ class Manager:
         if isinstance(last, Finished) and last.finished:
             self._ledger.end_run(number, State.SUCCEEDED, result=last)
         elif isinstance(last, Failed) and last.storage:
-            self._abandon(active.run.campaign_id, last.reason)
+            self._pause(last.reason, active)
         elif isinstance(last, Failed):
             self._ledger.end_run(number, State.FAILED, last.reason)
         elif active.cancelled:
@@ -147,40 +221,108 @@ class Manager:
         elif self._stopping:
             self._ledger.requeue_run(number)
         else:
-            self._ledger.end_run(number, State.FAILED, exited.reason or "worker stopped before its run was done")
+            self._replace(active, exited)
+        if active.last is not None or active.cancelled:
+            self._deaths.pop(number, None)
+
+    def _replace(self, active: _Active, exited: Exited) -> None:
+        """A worker was lost: another one goes on from its checkpoint, unless that has failed too often."""
+        number = active.run.number
+        reason = exited.reason or "worker stopped before its run was done"
+        self._deaths[number] += 1
+        self.restarts[exited.cause] += 1
+        logger.warning("%s; attempt %d", reason, self._deaths[number], extra=active.ids)
+        if self._deaths[number] < self._settings.attempts:
+            self._ledger.requeue_run(number, f"{reason}; goes on from its checkpoint")
+        else:
+            times = f"{self._deaths.pop(number)} workers in a row finished no episode"
+            self._ledger.end_run(number, State.FAILED, f"{reason}; {times}")
 
     def _launch_waiting(self) -> None:
         while len(self._active) < self._settings.max_workers:
-            try:
-                run = self._store.next_queued()
-            except StorageError as error:
-                logger.warning("the queue cannot be read: %s", error)
+            number = self._next()
+            if number is None:
                 return
-            if run is None:
-                return
-            self._launch(run)
+            self._launch(self._store.run(number))
+
+    def _next(self) -> int | None:
+        """The run that has waited longest, of the project that has the fewest at work."""
+        at_work = Counter(active.project for active in self._active.values())
+        waiting = self._store.waiting()
+        able = [project for project in waiting if not exhausted(self._store.usage(project), self._settings)]
+        return min(((at_work[project], waiting[project]) for project in able), default=(0, None))[1]
 
     def _launch(self, run: Run) -> None:
         folder = self._settings.run_folder(run.campaign_id, run.id)
+        campaign = self._store.campaign(run.campaign_id)
+        self._ledger.start_run(run.number)
+        self._active[run.number] = active = _Active(run, campaign.project)
         try:
-            spec = self._store.campaign(run.campaign_id).run_spec(run)
-            self._ledger.start_run(run.number)
-            self._executor.submit(run.number, spec, folder)
-            self._active[run.number] = _Active(run)
-        except StorageError as error:
-            self._abandon(run.campaign_id, str(error))
+            self._executor.submit(run.number, campaign.run_spec(run), folder)
         except OSError as error:
-            self._abandon(run.campaign_id, _refused(folder, error))
+            del self._active[run.number]
+            self._pause(_refused("starting a run", folder, error), active)
 
-    def _abandon(self, campaign_id: str, reason: str) -> None:
-        """The disk refused: the campaign ends here, and what it found so far stays readable."""
-        logger.error("campaign %s failed: %s", campaign_id, reason)
+    def _pause(self, reason: str, *without_worker: _Active) -> None:
+        """The disk refused: nothing is lost, since workers have their checkpoints; all wait until it has room.
+
+        Args:
+          reason: what it said.
+          without_worker: runs that are to wait although they have no worker any more.
+        """
+        logger.error("paused: %s", reason)
+        calm = time.monotonic() - self._refused_at > CALM_S
+        self._patience_s = FIRST_WAIT_S if calm else min(2 * self._patience_s, LONGEST_WAIT_S)
+        self._refused_at = time.monotonic()
+        self._store.refusal = reason
         for number, active in self._active.items():
-            if active.run.campaign_id == campaign_id:
-                active.abandoned = True
-                self._executor.cancel(number)
-        self._ledger.fail(campaign_id, reason)
+            active.abandoned = True
+            self._executor.cancel(number, self._settings.stop_s)
+        numbers = {active.run.number for active in (*self._active.values(), *without_worker)}
+        try:
+            self._ledger.pause(numbers, reason)
+        except StorageError:
+            logger.info("the pause itself cannot be written down; it is shown all the same")
+
+    def _try_again(self) -> None:
+        if time.monotonic() - self._refused_at < self._patience_s:
+            return
+        try:
+            _probe(self._settings.data_dir)
+            resumed = self._ledger.resume()
+        except (OSError, StorageError) as error:
+            logger.info("still refused: %s", error)
+            self._refused_at = time.monotonic()
+            self._patience_s = min(2 * self._patience_s, LONGEST_WAIT_S)
+            return
+        logger.info("the disk has room again; %d runs go on", resumed)
+        self._store.refusal = None
+
+    def _retire(self) -> None:
+        """Delete what has been kept long enough."""
+        days = self._settings.retention_days
+        if days is None or time.monotonic() - self._retired_at < RETENTION_S:
+            return
+        old = self._store.ended_before(time.time() - days * DAY_S, BATCH)
+        for campaign_id in old:
+            self._dispose(campaign_id)
+        if len(old) < BATCH:
+            self._retired_at = time.monotonic()
 
 
-def _refused(folder: Path, error: OSError) -> str:
-    return f"storage failed while starting a run: {error.strerror} ({str(error.filename or folder)!r})"
+def _probe(folder: Path) -> None:
+    """Write as much as the next checkpoints may take.
+
+    Raises:
+      OSError: the disk refuses.
+    """
+    probe = folder / ".probe"
+    try:
+        with probe.open("wb", buffering=0) as file:
+            file.write(bytes(PROBE_BYTES))
+    finally:
+        probe.unlink(missing_ok=True)
+
+
+def _refused(doing: str, folder: Path, error: OSError) -> str:
+    return f"storage failed while {doing}: {error.strerror} ({str(error.filename or folder)!r})"

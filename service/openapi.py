@@ -5,7 +5,8 @@ from pathlib import Path
 
 import yaml
 
-from service.app import create_app, openapi
+from service.api.description import openapi
+from service.app import create_app
 from service.settings import ServiceSettings
 
 

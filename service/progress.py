@@ -1,11 +1,15 @@
 """How far a campaign is and when it will end. Pure."""
 
+import math
 from collections.abc import Sequence
 
 from risk_sac.types import RunMetrics
 from service.campaigns import State
 from service.records import Campaign, Run
 from service.schemas import Progress
+
+LOOKS = 20  # that somebody who follows a campaign takes from now to its end
+SOONEST_S, LATEST_S = 1, 30
 
 
 def progress(campaign: Campaign, workers: int) -> Progress:
@@ -28,6 +32,14 @@ def progress(campaign: Campaign, workers: int) -> Progress:
         temperature=_mean([metrics.temperature for metrics in present]),
         eta_s=0.0 if campaign.state.final else eta_s(runs, workers),
     )
+
+
+def retry_after_s(campaign: Campaign, workers: int) -> int | None:
+    """Seconds after which a look pays again: a twentieth of the time left, or None once the campaign has ended."""
+    if campaign.state.final:
+        return None
+    left_s = eta_s(campaign.runs, workers) or 0.0
+    return math.ceil(min(max(left_s / LOOKS, SOONEST_S), LATEST_S))
 
 
 def eta_s(runs: Sequence[Run], workers: int) -> float | None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Generic, TypeVar
 
 from risk_sac.config import CampaignSpec, RunSpec
@@ -21,7 +22,7 @@ class Run:
     seed: int
     spec_digest: str
     state: State
-    reason: str | None  # why it failed
+    reason: str | None  # why it failed, waits again or is paused
     started_at: float | None
     finished_at: float | None
     episodes_total: int  # search and evaluation
@@ -30,6 +31,7 @@ class Run:
     raw_collisions: int
     failures: int
     busy_s: float  # wall time spent so far, earlier attempts included
+    attempts: int  # workers that were started for it
     metrics: RunMetrics | None
     evaluation: RunMetrics | None
     digest: str | None  # of the results; None until it succeeded
@@ -42,13 +44,21 @@ class Campaign:
 
     number: int
     id: str
-    spec: CampaignSpec
+    project: str
+    label: str
+    spec_json: str  # as it was posted, with all defaults
     state: State
     reason: str | None
     created_at: float
     started_at: float | None
     finished_at: float | None
+    revision: str  # another one whenever anything of the campaign, its runs or episodes is
     runs: tuple[Run, ...]
+
+    @property
+    def spec(self) -> CampaignSpec:
+        """What was posted; read only when somebody asks, which a list does not."""
+        return _read_spec(self.spec_json)
 
     def run_spec(self, run: Run) -> RunSpec:
         """What a worker needs to know to execute one of the runs."""
@@ -56,10 +66,17 @@ class Campaign:
         (spec,) = self.spec.model_copy(update=alone).runs()
         return spec
 
-    def failed(self, reason: str) -> "Campaign":
-        """The same campaign, failed for a reason that could not be written down yet."""
-        runs = tuple(run if run.state.final else replace(run, state=State.FAILED, reason=reason) for run in self.runs)
-        return replace(self, state=State.FAILED, reason=reason, runs=runs)
+    def paused(self, reason: str) -> "Campaign":
+        """The same campaign, paused for a reason that could not be written down yet."""
+        runs = tuple(_paused(run, reason) for run in self.runs)
+        return replace(self, state=State.PAUSED, reason=reason, runs=runs)
+
+
+_read_spec = lru_cache(maxsize=64)(CampaignSpec.model_validate_json)
+
+
+def _paused(run: Run, reason: str) -> Run:
+    return replace(run, state=State.PAUSED, reason=reason) if run.state is State.RUNNING else run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,12 +87,32 @@ class Episode:
     run_id: str
     record: EpisodeRecord
     series: str | None  # file name of its full time series
+    series_sha256: str | None  # of that file, as it was written
     wall_s: float
 
     @property
     def id(self) -> str:
         """Unique within the campaign, and the same whenever the same campaign is run again."""
         return f"{self.run_id}-{self.record.phase}-{self.record.index}"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """A campaign, or one of its runs, came into another state."""
+
+    number: int  # in the order of arrival, over all campaigns
+    run_id: str | None  # None: the campaign itself
+    state: State
+    reason: str | None
+    at: float  # seconds since the epoch
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Usage:
+    """What a project takes of the service."""
+
+    queued_runs: int
+    cpu_s: float  # worker time within the last 24 hours
 
 
 T = TypeVar("T")

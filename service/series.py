@@ -1,5 +1,7 @@
 """Full time series of a contact, from the file its worker wrote."""
 
+import hashlib
+import io
 import zipfile
 import zlib
 from pathlib import Path
@@ -15,20 +17,31 @@ from service.schemas import Series
 _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 
 
-def load_series(path: Path) -> Series:
+def load_series(path: Path, sha256: str | None) -> Series:
     """Read an .npz of arrays; numbers that are not finite become None.
 
+    Args:
+      path: the file.
+      sha256: of its content, as its worker told; None for one that is older than that.
+
     Raises:
-      StorageError: the file is missing, damaged, or lacks an array.
+      StorageError: the file is missing, is not the one that was written, or lacks an array.
     """
     try:
-        # Opened here: numpy leaves a file open that it opened itself and found damaged.
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+        content = path.read_bytes()
+        _verify(path, content, sha256)
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return Series.model_validate({name: _plain(name, arrays[name]) for name in Series.model_fields})
     except FileNotFoundError as error:
         raise StorageError(f"the time series {path.name!r} is gone") from error
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise StorageError(f"the time series {path.name!r} is damaged: {error}") from error
+
+
+def _verify(path: Path, content: bytes, sha256: str | None) -> None:
+    actual = hashlib.sha256(content).hexdigest()
+    if sha256 is not None and actual != sha256:
+        raise StorageError(f"the time series {path.name!r} is damaged: its SHA-256 is {actual}, wanted {sha256}")
 
 
 def _plain(name: str, array: NDArray[Any]) -> list[Any]:

@@ -1,11 +1,13 @@
-"""Settings of the server process, read from RISK_SAC_* environment variables."""
+"""Settings of the server process: RISK_SAC_* environment variables, or files of these names in a folder of secrets."""
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+SECRETS = os.environ.get("RISK_SAC_SECRETS_DIR")
 
 
 def _cores() -> int:
@@ -14,28 +16,77 @@ def _cores() -> int:
 
 
 class ServiceSettings(BaseSettings):
-    """Where the server listens, what it may use, and how patient it is."""
+    """Where the server listens, what it may use, whom it lets in, and how patient it is."""
 
-    model_config = SettingsConfigDict(env_prefix="RISK_SAC_", frozen=True, use_attribute_docstrings=True)
+    model_config = SettingsConfigDict(
+        env_prefix="RISK_SAC_", frozen=True, use_attribute_docstrings=True, secrets_dir=SECRETS
+    )
 
     data_dir: Path = Path("data")
-    """Folder of the database, checkpoints and recorded failures."""
+    """Folder of the database, checkpoints, recorded failures, API keys and uploaded networks."""
+    database_url: str | None = None
+    """SQLAlchemy URL of a PostgreSQL database (`postgresql+psycopg://…`); by default SQLite in `data_dir`."""
     host: str = "127.0.0.1"
-    """Address to listen on."""
+    """Address to listen on; any but loopback is refused until an API key exists."""
     port: Annotated[int, Field(ge=1, le=65535)] = 8000
     """TCP port to listen on."""
+    log_format: Literal["text", "json"] = "text"
+    """How the log is written; `json` has one object per line with campaign and run ids as fields."""
+
     max_workers: Annotated[int, Field(ge=1, le=1024)] = Field(default_factory=_cores)
     """Runs executed at the same time, each in a process of its own; by default one per core."""
-    grace_s: Annotated[float, Field(gt=0, le=600)] = 30.0
-    """How long a worker that was asked to stop may finish its episode before it is killed, s."""
     worker_module: str = "service.worker"
     """Module that executes one run, started as `python -m`."""
+    worker_niceness: Annotated[int, Field(ge=0, le=19)] = 5
+    """Added to the niceness of workers, and of the threads that answer requests."""
+    grace_s: Annotated[float, Field(gt=0, le=600)] = 30.0
+    """How long a worker whose run is cancelled may finish its episode before it is killed, s."""
+    stop_s: Annotated[float, Field(gt=0, le=600)] = 15.0
+    """The same when the server stops, s."""
+    lease_s: Annotated[float, Field(gt=0, le=600)] = 4.0
+    """A worker that neither says anything nor uses its processor for so long is killed and its run resumed, s."""
+    stall_s: Annotated[float, Field(gt=0, le=86400)] = 600.0
+    """A worker that finishes no episode for so long is killed and its run resumed, s."""
+    attempts: Annotated[int, Field(ge=1, le=100)] = 5
+    """Workers of one run that may die in a row without finishing an episode, before the run fails."""
+
+    retention_days: Annotated[float, Field(gt=0)] | None = None
+    """Campaigns that ended so many days ago are deleted with their files; by default none is."""
+
+    allowed_hosts: list[str] = ["localhost", "127.0.0.1", "[::1]"]
+    """Host headers that are answered, a JSON list; `*` answers all. The address listened on is always one of them."""
+    cors_origins: list[str] = []
+    """Origins whose web pages may call the service, a JSON list."""
+    max_body_bytes: Annotated[int, Field(ge=1024)] = 1 << 20
+    """Largest body of a request, but for uploads, bytes."""
+    max_upload_bytes: Annotated[int, Field(ge=1024)] = 32 << 20
+    """Largest upload, bytes."""
+    rate_limit: Annotated[int, Field(ge=1)] = 500
+    """Requests per second that one key, or one address without a key, may make."""
+    quota_queued_runs: Annotated[int, Field(ge=1)] = 10_000
+    """Runs that one project may have waiting."""
+    quota_cpu_hours: Annotated[float, Field(gt=0)] | None = None
+    """Worker hours that one project may use in 24 hours; by default as many as there are."""
 
     @property
-    def database(self) -> Path:
-        """The SQLite file."""
-        return self.data_dir / "risk-sac.db"
+    def url(self) -> str:
+        """Where the database is."""
+        return self.database_url or f"sqlite:///{self.data_dir / 'risk-sac.db'}"
+
+    @property
+    def keys_file(self) -> Path:
+        """Hashes of the API keys."""
+        return self.data_dir / "keys.json"
+
+    @property
+    def networks_dir(self) -> Path:
+        """Uploaded road networks."""
+        return self.data_dir / "networks"
+
+    def campaign_folder(self, campaign_id: str) -> Path:
+        """What one campaign leaves on disk."""
+        return self.data_dir / "campaigns" / campaign_id
 
     def run_folder(self, campaign_id: str, run_id: str) -> Path:
         """Where one run keeps its results, its recorded failures, its checkpoint and its log."""
-        return self.data_dir / "campaigns" / campaign_id / run_id
+        return self.campaign_folder(campaign_id) / run_id

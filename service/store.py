@@ -1,68 +1,136 @@
 """Reading the database. Nothing here writes: that is the manager's alone, in `service.ledger`."""
 
-from collections.abc import Collection, Iterator, Mapping
+import time
+import zlib
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from sqlite3 import Connection
+from dataclasses import replace
+from heapq import merge
+from itertools import islice
+from operator import attrgetter
 
-from pydantic import TypeAdapter
-from sqlalchemy import Engine, Select, create_engine, event, select
-from sqlalchemy.exc import DatabaseError, IntegrityError, ProgrammingError
+from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session, selectinload
 
-from risk_sac.config import CampaignSpec
-from risk_sac.types import EpisodeRecord, Outcome, RunMetrics
-from service.campaigns import State
+from risk_sac.types import Outcome
+from service.campaigns import FINAL, State
+from service.database import open_database, storage_errors
 from service.errors import NotFoundError, StorageError
-from service.records import Campaign, Episode, Page, Run
-from service.tables import Base, CampaignRow, EpisodeRow, RunRow
+from service.records import Campaign, Change, Episode, Page, Run, Usage
+from service.revisions import Mark, Revisions
+from service.snapshots import campaign_record, change_record, episode_record, run_record
+from service.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow, UsageRow
 
-_METRICS: TypeAdapter[RunMetrics] = TypeAdapter(RunMetrics)
-_RECORD: TypeAdapter[EpisodeRecord] = TypeAdapter(EpisodeRecord)
-_VERSIONS: TypeAdapter[dict[str, str]] = TypeAdapter(dict[str, str])
+HOUR_S = 3600
+DAY_HOURS = 24
 
 
 class Store:
     """Snapshots of campaigns, runs and episodes.
 
     Attributes:
-      unsaved: reasons of campaigns whose failure could not be written, by id. The disk that fails a
-        campaign also refuses the note about it, and readers must still be told.
+      engine: the database.
+      revisions: of campaigns, kept by those who write and read them.
+      refusal: why the disk refuses, while it does. Campaigns at work are then shown as paused: the disk that stops
+        them may refuse the note about it, too.
     """
 
-    def __init__(self, database: Path) -> None:
+    def __init__(self, url: str) -> None:
         """Open the database, creating it where there is none.
 
         Raises:
-          StorageError: the file cannot be opened or is no database.
+          StorageError: it cannot be opened, is no database, or is damaged.
         """
-        self.engine = _engine(database)
-        self.unsaved: dict[str, str] = {}
-        with storage_errors("opening the database"):
-            Base.metadata.create_all(self.engine)
+        self.engine = open_database(url)
+        self.refusal: str | None = None
+        self.revisions = Revisions()
+        try:
+            self._check()
+        except BaseException:
+            self.close()
+            raise
 
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
 
-    def campaign(self, campaign_id: str) -> Campaign:
+    def campaign(self, campaign_id: str, project: str | None = None) -> Campaign:
         """The campaign with this id.
+
+        Args:
+          campaign_id: of the campaign.
+          project: who asks; None sees all. Another project's campaign is as unknown as one that never was.
 
         Raises:
           NotFoundError: there is none.
         """
         with self._reading() as session:
-            return self._campaign(find_campaign(session, campaign_id))
+            return self._campaign(find_campaign(session, campaign_id, project))
 
-    def campaigns(self, limit: int, before: int | None = None) -> Page[Campaign]:
-        """Newest first, from the campaign just older than number `before`."""
+    def campaigns(
+        self,
+        limit: int,
+        before: int | None = None,
+        *,
+        project: str | None = None,
+        state: State | None = None,
+        family: str | None = None,
+        method: str | None = None,
+        label: str | None = None,
+    ) -> Page[Campaign]:
+        """Newest first, from the campaign just older than number `before`; family and method are those of one run."""
         query = select(CampaignRow).options(selectinload(CampaignRow.runs)).order_by(CampaignRow.number.desc())
+        wanted = {"project": project, "state": state, "label": label}
+        query = query.filter_by(**{name: value for name, value in wanted.items() if value is not None})
+        run = {name: value for name, value in (("family", family), ("method", method)) if value is not None}
+        if run:
+            query = query.where(CampaignRow.number.in_(select(RunRow.campaign_number).filter_by(**run)))
         if before is not None:
             query = query.where(CampaignRow.number < before)
         with self._reading() as session:
             rows = list(session.scalars(query.limit(limit + 1)))
             last = rows[limit - 1].number if len(rows) > limit else None
             return Page(items=tuple(self._campaign(row) for row in rows[:limit]), last=last)
+
+    def revision(self, campaign_id: str, project: str | None = None) -> str:
+        """A name for what a campaign, its runs and its episodes look like now; another one once they do not.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+        """
+        known = self.known_revision(campaign_id, project)
+        if known is not None:
+            return known
+        with self._reading() as session:
+            row = find_campaign(session, campaign_id, project)
+            return self._shown_revision(self.revisions.learn(row.id, row.project, row.revision).mark.latest)
+
+    def known_revision(self, campaign_id: str, project: str | None = None) -> str | None:
+        """The same if the database need not be asked for it, else None."""
+        known = self.revisions.get(campaign_id)
+        if known is None or project not in (None, known.project):
+            return None
+        return self._shown_revision(known.mark.latest)
+
+    def mark(self, campaign_id: str) -> Mark | None:
+        """What a campaign looks like now; None if the database must be asked for it."""
+        known = self.revisions.get(campaign_id)
+        return None if known is None else replace(known.mark, refusal=self.refusal)
+
+    def mark_of_all(self) -> Mark:
+        """What all campaigns look like now."""
+        return replace(self.revisions.all, refusal=self.refusal)
+
+    def changes(self, campaign_id: str, *, after: int = 0, limit: int = 500) -> list[Change]:
+        """Changes of state of a campaign and its runs in their order, from the one just after number `after`.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+        """
+        with self._reading() as session:
+            campaign = find_campaign(session, campaign_id)
+            query = select(ChangeRow).where(ChangeRow.campaign_number == campaign.number, ChangeRow.number > after)
+            return [change_record(row) for row in session.scalars(query.order_by(ChangeRow.number).limit(limit))]
 
     def episodes(
         self,
@@ -72,6 +140,7 @@ class Store:
         after: int | None = None,
         run_id: str | None = None,
         outcomes: Collection[Outcome] = (),
+        project: str | None = None,
     ) -> Page[Episode]:
         """In order of arrival, from the episode just after number `after`; no outcomes means all.
 
@@ -79,15 +148,14 @@ class Store:
           NotFoundError: there is no such campaign, or it has no such run.
         """
         with self._reading() as session:
-            campaign = find_campaign(session, campaign_id)
-            query = select(EpisodeRow).where(EpisodeRow.campaign_number == campaign.number)
-            if run_id is not None:
-                query = query.where(EpisodeRow.run_number == _find_run(campaign, run_id).number)
-            if outcomes:
-                query = query.where(EpisodeRow.outcome.in_([outcome.value for outcome in outcomes]))
-            return _episode_page(session, query, limit, after)
+            campaign = find_campaign(session, campaign_id, project)
+            if run_id is None:
+                query = select(EpisodeRow).where(EpisodeRow.campaign_number == campaign.number)
+            else:  # without the campaign's number, which would let the database choose a slower index
+                query = select(EpisodeRow).where(EpisodeRow.run_number == _find_run(session, campaign, run_id))
+            return _episode_page(session, query, outcomes, limit, after or 0)
 
-    def failure(self, campaign_id: str, failure_id: str) -> Episode:
+    def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> Episode:
         """The episode with this id in which the ego touched something.
 
         Raises:
@@ -95,7 +163,7 @@ class Store:
         """
         run_id, phase, index = _split(failure_id)
         with self._reading() as session:
-            campaign = find_campaign(session, campaign_id)
+            campaign = find_campaign(session, campaign_id, project)
             query = (
                 select(EpisodeRow)
                 .join(EpisodeRow.run)
@@ -106,20 +174,49 @@ class Store:
             row = session.scalars(query).one_or_none()
             if row is None:
                 raise _unknown_failure(campaign_id, failure_id)
-            return _episode(row)
+            return episode_record(row)
 
-    def next_queued(self) -> Run | None:
-        """The run that has waited longest."""
+    def waiting(self) -> dict[str, int]:
+        """Number of the run that has waited longest, for each project that has runs in the queue."""
         query = (
-            select(RunRow)
+            select(CampaignRow.project, func.min(RunRow.number).label("number"))
             .join(RunRow.campaign)
-            .where(RunRow.state == State.QUEUED, CampaignRow.id.not_in(self.unsaved))
-            .order_by(RunRow.number)
-            .limit(1)
+            .where(RunRow.state == State.QUEUED)
+            .group_by(CampaignRow.project)
         )
         with self._reading() as session:
-            row = session.scalars(query).one_or_none()
-            return None if row is None else _run(row)
+            return {row.project: row.number for row in session.execute(query)}
+
+    def run(self, number: int) -> Run:
+        """The run with this number, which there is."""
+        with self._reading() as session:
+            row = session.get_one(RunRow, number)
+            return run_record(row, row.campaign.id)
+
+    def usage(self, project: str) -> Usage:
+        """What a project takes of the service now."""
+        queued = (
+            select(func.count())
+            .select_from(RunRow)
+            .join(RunRow.campaign)
+            .where(CampaignRow.project == project, RunRow.state == State.QUEUED)
+        )
+        oldest = int(time.time() // HOUR_S) - DAY_HOURS
+        hours = select(UsageRow).where(UsageRow.project == project, UsageRow.hour > oldest)
+        with self._reading() as session:
+            cpu_s = sum(row.busy_s for row in session.scalars(hours))
+            return Usage(queued_runs=session.scalar(queued) or 0, cpu_s=cpu_s)
+
+    def ended_before(self, moment: float, limit: int) -> list[str]:
+        """Ids of campaigns that ended before a moment (seconds since the epoch), the oldest first."""
+        query = select(CampaignRow.id).where(CampaignRow.state.in_(FINAL), CampaignRow.finished_at < moment)
+        with self._reading() as session:
+            return list(session.scalars(query.order_by(CampaignRow.number).limit(limit)))
+
+    def exists(self, campaign_id: str) -> bool:
+        """Whether there is a campaign with this id."""
+        with self._reading() as session:
+            return session.scalar(select(CampaignRow.number).where(CampaignRow.id == campaign_id)) is not None
 
     @contextmanager
     def _reading(self) -> Iterator[Session]:
@@ -127,79 +224,60 @@ class Store:
             yield session
 
     def _campaign(self, row: CampaignRow) -> Campaign:
-        campaign = campaign_record(row)
-        reason = self.unsaved.get(campaign.id)
-        return campaign if reason is None else campaign.failed(reason)
+        campaign = campaign_record(row, self._shown_revision(row.revision))
+        at_work = campaign.state in (State.RUNNING, State.PAUSED)
+        return campaign.paused(self.refusal) if self.refusal is not None and at_work else campaign
+
+    def _shown_revision(self, revision: int) -> str:
+        return f"{revision}" if self.refusal is None else f"{revision}-{zlib.crc32(self.refusal.encode()):x}"
+
+    def _check(self) -> None:
+        """Read every campaign and run once, which verifies them, and count the episodes they should have."""
+        counted = select(func.count()).where(EpisodeRow.run_number == RunRow.number).scalar_subquery()
+        with self._reading() as session:
+            for table in (CampaignRow, RunRow):
+                for _ in session.scalars(select(table).execution_options(yield_per=1000)):
+                    pass
+            lacking = session.scalars(select(RunRow.id).where(RunRow.episodes_done != counted)).first()
+        if lacking is not None:
+            raise StorageError(f"database is damaged: run {lacking!r} lacks episodes; restore a copy or move it away")
 
 
-@contextmanager
-def storage_errors(doing: str) -> Iterator[None]:
-    """Turn what the database driver raises into a StorageError with its reason.
-
-    Broken constraints and statements are bugs, not storage, and pass through.
-    """
-    try:
-        yield
-    except (IntegrityError, ProgrammingError):
-        raise
-    except DatabaseError as error:
-        raise StorageError(f"storage failed while {doing}: {error.orig}") from error
-
-
-def find_campaign(session: Session, campaign_id: str) -> CampaignRow:
-    """The row with this public id.
+def find_campaign(session: Session, campaign_id: str, project: str | None = None) -> CampaignRow:
+    """The row with this public id, if it is the project's.
 
     Raises:
       NotFoundError: there is none.
     """
-    row = session.scalars(select(CampaignRow).where(CampaignRow.id == campaign_id)).one_or_none()
-    if row is None:
+    # No id has a NUL, and PostgreSQL does not even look for one.
+    query = select(CampaignRow).where(CampaignRow.id == campaign_id)
+    row = None if "\0" in campaign_id else session.scalars(query).one_or_none()
+    if row is None or project not in (None, row.project):
         message = f"no campaign has the id {campaign_id!r}; GET /v1/campaigns lists those there are"
         raise NotFoundError(message, field="campaign_id", got=campaign_id)
     return row
 
 
-def campaign_record(row: CampaignRow) -> Campaign:
-    """The snapshot of a row and its runs."""
-    return Campaign(
-        number=row.number,
-        id=row.id,
-        spec=CampaignSpec.model_validate_json(row.spec),
-        state=State(row.state),
-        reason=row.reason,
-        created_at=row.created_at,
-        started_at=row.started_at,
-        finished_at=row.finished_at,
-        runs=tuple(_run(run) for run in row.runs),
-    )
-
-
-def _engine(database: Path) -> Engine:
-    engine = create_engine(f"sqlite:///{database}")
-
-    @event.listens_for(engine, "connect")
-    def _set_up(connection: Connection, _: object) -> None:
-        for pragma in ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000"):
-            connection.execute(f"PRAGMA {pragma}").close()
-
-    return engine
-
-
-def _find_run(campaign: CampaignRow, run_id: str) -> RunRow:
-    for run in campaign.runs:
-        if run.id == run_id:
-            return run
+def _find_run(session: Session, campaign: CampaignRow, run_id: str) -> int:
+    query = select(RunRow.number).filter_by(campaign_number=campaign.number, id=run_id)
+    number = None if "\0" in run_id else session.scalar(query)
+    if number is not None:
+        return number
     known = ", ".join(run.id for run in campaign.runs[:10])
     message = f"campaign {campaign.id} has no run {run_id!r}; its runs are {known}"
     raise NotFoundError(message, field="run", got=run_id)
 
 
-def _episode_page(session: Session, query: Select[EpisodeRow], limit: int, after: int | None) -> Page[Episode]:
-    if after is not None:
-        query = query.where(EpisodeRow.number > after)
-    rows = list(session.scalars(query.order_by(EpisodeRow.number).limit(limit + 1)))
+def _episode_page(
+    session: Session, query: Select[EpisodeRow], outcomes: Collection[Outcome], limit: int, after: int
+) -> Page[Episode]:
+    """A query for each outcome: the index has the order of a page only within one."""
+    query = query.where(EpisodeRow.number > after).order_by(EpisodeRow.number).limit(limit + 1)
+    queries = [query.where(EpisodeRow.outcome == outcome) for outcome in outcomes] or [query]
+    found = merge(*(session.scalars(each) for each in queries), key=attrgetter("number"))
+    rows = list(islice(found, limit + 1))
     last = rows[limit - 1].number if len(rows) > limit else None
-    return Page(items=tuple(_episode(row) for row in rows[:limit]), last=last)
+    return Page(items=tuple(episode_record(row) for row in rows[:limit]), last=last)
 
 
 def _split(failure_id: str) -> tuple[str, str, int]:
@@ -209,54 +287,10 @@ def _split(failure_id: str) -> tuple[str, str, int]:
     if not rest:
         run_id, _, rest = failure_id.partition("-evaluate-")
         phase = "evaluate"
-    well_formed = rest.isascii() and rest.isdigit() and len(rest) < 10
+    well_formed = "\0" not in run_id and rest.isascii() and rest.isdigit() and len(rest) < 10
     return (run_id, phase, int(rest)) if well_formed else ("", phase, -1)
 
 
 def _unknown_failure(campaign_id: str, failure_id: str) -> NotFoundError:
     message = f"campaign {campaign_id} has no failure {failure_id!r}; GET its `failures?tier=raw` lists all contacts"
     return NotFoundError(message, field="failure_id", got=failure_id)
-
-
-def _run(row: RunRow) -> Run:
-    return Run(
-        number=row.number,
-        campaign_id=row.campaign.id,
-        id=row.id,
-        family=row.family,
-        method=row.method,
-        seed=row.seed,
-        spec_digest=row.spec_digest,
-        state=State(row.state),
-        reason=row.reason,
-        started_at=row.started_at,
-        finished_at=row.finished_at,
-        episodes_total=row.episodes_total,
-        episodes_done=row.episodes_done,
-        rejected=row.rejected,
-        raw_collisions=row.raw_collisions,
-        failures=row.failures,
-        busy_s=row.busy_s,
-        metrics=_metrics(row.metrics),
-        evaluation=_metrics(row.evaluation),
-        digest=row.digest,
-        versions=_versions(row.versions),
-    )
-
-
-def _metrics(text: str | None) -> RunMetrics | None:
-    return None if text is None else _METRICS.validate_json(text)
-
-
-def _versions(text: str) -> Mapping[str, str]:
-    return _VERSIONS.validate_json(text)
-
-
-def _episode(row: EpisodeRow) -> Episode:
-    return Episode(
-        number=row.number,
-        run_id=row.run.id,
-        record=_RECORD.validate_json(row.record),
-        series=row.series,
-        wall_s=row.wall_s,
-    )

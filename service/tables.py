@@ -1,42 +1,74 @@
-"""The database: campaigns, their runs, the runs' episodes.
+"""The database: campaigns, their runs, the runs' episodes, what changed when, and who used how much.
 
 Records of the method are stored as the JSON that the worker sent; what is filtered or counted has a
 column of its own. Numbers are primary keys in order of arrival, so that a page continues where the
-last one ended however much was inserted meanwhile.
+last one ended however much was inserted meanwhile. Its history is in `service.migrations`.
+
+Every row carries a checksum of its other columns, because a database notices only some of the bits
+that a disk flips. It is written with the row and verified whenever the row is read.
 """
 
-from sqlalchemy import ForeignKey, Index, Text, UniqueConstraint
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+import zlib
+from collections.abc import Callable
+from functools import cache
+from operator import attrgetter
+from typing import Any
+
+from pydantic_core import to_json
+from sqlalchemy import BigInteger, ForeignKey, Index, Text, event, inspect
+from sqlalchemy.orm import DeclarativeBase, Mapped, Mapper, mapped_column, relationship
+from sqlalchemy.sql.schema import ScalarElementColumnDefault
+
+from service.errors import StorageError
 
 
 class Base(DeclarativeBase):
     """Root of the mapped tables."""
 
 
-class CampaignRow(Base):
+class Checked:
+    """A row that carries its checksum; None in rows from before there was one."""
+
+    checksum: Mapped[int | None] = mapped_column(BigInteger)
+
+
+class CampaignRow(Checked, Base):
     """A posted campaign."""
 
     __tablename__ = "campaigns"
-    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012 - SQLAlchemy's own protocol
+    __table_args__ = (
+        Index("campaigns_idempotency", "project", "idempotency_key", unique=True),
+        Index("campaigns_state", "state", "number"),
+        Index("campaigns_label", "label", "number"),
+        Index("campaigns_project", "project", "number"),
+        {"sqlite_autoincrement": True},
+    )
 
     number: Mapped[int] = mapped_column(primary_key=True)
     id: Mapped[str] = mapped_column(unique=True)
+    project: Mapped[str]
+    label: Mapped[str]
+    idempotency_key: Mapped[str | None]
     spec: Mapped[str] = mapped_column(Text)
     state: Mapped[str]
     reason: Mapped[str | None]
     created_at: Mapped[float]
     started_at: Mapped[float | None]
     finished_at: Mapped[float | None]
+    revision: Mapped[int] = mapped_column(default=1)
     runs: Mapped[list["RunRow"]] = relationship(back_populates="campaign", order_by="RunRow.number")
 
 
-class RunRow(Base):
+class RunRow(Checked, Base):
     """One (family, method, seed) of a campaign."""
 
     __tablename__ = "runs"
     __table_args__ = (
-        UniqueConstraint("campaign_number", "id"),
+        Index("runs_ids", "campaign_number", "id", unique=True),
         Index("runs_queue", "state", "number"),
+        Index("runs_families", "family", "campaign_number"),
+        Index("runs_methods", "method", "campaign_number"),
+        Index("runs_tallies", "family", "method", "state", "episodes_done", "failures"),  # all that metrics sum up
         {"sqlite_autoincrement": True},
     )
 
@@ -57,6 +89,7 @@ class RunRow(Base):
     raw_collisions: Mapped[int] = mapped_column(default=0)
     failures: Mapped[int] = mapped_column(default=0)
     busy_s: Mapped[float] = mapped_column(default=0.0)
+    attempts: Mapped[int] = mapped_column(default=0)
     metrics: Mapped[str | None] = mapped_column(Text)
     evaluation: Mapped[str | None] = mapped_column(Text)
     digest: Mapped[str | None]
@@ -64,13 +97,14 @@ class RunRow(Base):
     campaign: Mapped[CampaignRow] = relationship(back_populates="runs")
 
 
-class EpisodeRow(Base):
+class EpisodeRow(Checked, Base):
     """One episode of a run; a resumed run may report it again, which replaces it."""
 
     __tablename__ = "episodes"
     __table_args__ = (
-        UniqueConstraint("run_number", "phase", "index"),
+        Index("episodes_ids", "run_number", "phase", "index", unique=True),
         Index("episodes_pages", "campaign_number", "number"),
+        Index("episodes_runs", "run_number", "number"),
         Index("episodes_outcomes", "campaign_number", "outcome", "number"),
         {"sqlite_autoincrement": True},
     )
@@ -83,5 +117,57 @@ class EpisodeRow(Base):
     outcome: Mapped[str]
     record: Mapped[str] = mapped_column(Text)
     series: Mapped[str | None]
+    series_sha256: Mapped[str | None]
     wall_s: Mapped[float]
     run: Mapped[RunRow] = relationship(lazy="joined", innerjoin=True)
+
+
+class ChangeRow(Checked, Base):
+    """A campaign, or one of its runs, came into another state."""
+
+    __tablename__ = "changes"
+    __table_args__ = (Index("changes_pages", "campaign_number", "number"), {"sqlite_autoincrement": True})
+
+    number: Mapped[int] = mapped_column(primary_key=True)
+    campaign_number: Mapped[int] = mapped_column(ForeignKey("campaigns.number"))
+    run_id: Mapped[str | None]
+    state: Mapped[str]
+    reason: Mapped[str | None]
+    at: Mapped[float]
+
+
+class UsageRow(Checked, Base):
+    """Worker time that a project has used in one hour since the epoch."""
+
+    __tablename__ = "usage"
+
+    project: Mapped[str] = mapped_column(primary_key=True)
+    hour: Mapped[int] = mapped_column(primary_key=True)
+    busy_s: Mapped[float]
+
+
+def checksum(row: Checked) -> int:
+    """CRC-32 of a row's columns but its own and the number that the database gives."""
+    return zlib.crc32(to_json(_summed(inspect(type(row)))(row), inf_nan_mode="strings"))
+
+
+@cache
+def _summed(mapper: Mapper[Any]) -> Callable[[Checked], tuple[Any, ...]]:
+    return attrgetter(*(name for name in mapper.columns.keys() if name not in ("number", "checksum")))  # noqa: SIM118
+
+
+@event.listens_for(Checked, "before_insert", propagate=True)
+@event.listens_for(Checked, "before_update", propagate=True)
+def _seal(mapper: Mapper[Any], connection: object, row: Checked) -> None:
+    for name, column in mapper.columns.items():
+        if getattr(row, name) is None and isinstance(column.default, ScalarElementColumnDefault):
+            setattr(row, name, column.default.arg)  # else the INSERT would fill it in, after this
+    row.checksum = checksum(row)
+
+
+@event.listens_for(Checked, "load", propagate=True)
+@event.listens_for(Checked, "refresh", propagate=True)
+def _verify(row: Checked, *_: object) -> None:
+    if row.checksum is not None and row.checksum != checksum(row):
+        name, table = getattr(row, "id", None) or getattr(row, "number", ""), inspect(type(row)).local_table.name
+        raise StorageError(f"row {name} of the table {table!r} is damaged; restore the database from a copy")

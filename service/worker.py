@@ -1,84 +1,139 @@
-"""`python -m service.worker FOLDER`: execute one run in a process of its own.
+"""`python -m service.worker FOLDER NICENESS`: execute one run in a process of its own.
 
 The run is one line of JSON on stdin, events are lines of JSON on stdout, everything else a library
-prints goes to stderr. SIGTERM stops the run at the next episode boundary. The end of stdin means
+prints goes to stderr. SIGTERM stops the run at the next episode boundary, with a checkpoint; before the first
+episode there is nothing to keep, and it ends the process at once. The end of stdin means
 that the server has died: nobody would store what comes now, so the worker leaves at once, and the
 next server resumes from the last checkpoint.
 """
 
+import io
 import logging
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import IO
+from typing import TYPE_CHECKING
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
-from risk_sac.types import EpisodeRecord, RunMetrics
-from service.events import EpisodeDone, Event, Failed, Finished, Started, encode
-from service.locks import wait_for_lock
+from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
+from service.events import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
+from service.takeover import take_over
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer
 
 logger = logging.getLogger(__name__)
+
+BEAT_S = 1.0
 
 
 class Reporter:
     """The observer of a run that tells the manager."""
 
-    def __init__(self, stream: IO[bytes]) -> None:
+    def __init__(self, stream: io.FileIO) -> None:
         self._stream = stream
+        self._sending = threading.Lock()
+        self._asked = 0
         self._stopping = False
         self._since = time.monotonic()
 
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         """Report an episode."""
+        name, sha256 = (None, None) if series is None else (series.name, series.sha256)
         now = time.monotonic()
-        self.send(EpisodeDone(record=record, metrics=metrics, series=series, wall_s=now - self._since))
+        wall_s = now - self._since
+        self.send(EpisodeDone(record=record, metrics=metrics, series=name, series_sha256=sha256, wall_s=wall_s))
         self._since = now
 
     def should_stop(self) -> bool:
-        """Whether the manager asked to stop."""
+        """Whether the manager asked to stop.
+
+        The run asks before each episode. From the second time on there is an episode worth a checkpoint, so SIGTERM
+        waits for the next question; until then it acts as always, in the middle of an import or a compilation too.
+        """
+        self._asked += 1
+        if self._asked == 2:
+            signal.signal(signal.SIGTERM, self._stop)
         return self._stopping
 
-    def stop(self, signal_number: int, frame: FrameType | None) -> None:
-        """Handle SIGTERM."""
+    def _stop(self, signal_number: int, frame: FrameType | None) -> None:
         self._stopping = True
 
-    def send(self, event: Event) -> None:
-        """Write one event at once."""
-        self._stream.write(encode(event))
-        self._stream.flush()
+    def send(self, word: Event | Heartbeat) -> None:
+        """Write one line at once."""
+        line = memoryview(encode(word))
+        try:
+            with self._sending:
+                while line:
+                    line = line[self._stream.write(line) :]
+        except BrokenPipeError:
+            os._exit(0)  # the server has died
+
+    @contextmanager
+    def beating(self) -> Iterator[None]:
+        """Sends heartbeats meanwhile."""
+        over = threading.Event()
+
+        def beat() -> None:
+            while not over.wait(BEAT_S):
+                self.send(Heartbeat())
+
+        thread = threading.Thread(target=beat, name="heartbeat", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+
+class Log(io.FileIO):
+    """A log that a full disk leaves incomplete, but never ends the run."""
+
+    def write(self, data: "ReadableBuffer", /) -> int:
+        """Bytes written, or given up."""
+        try:
+            return super().write(data)
+        except OSError:
+            return memoryview(data).nbytes
 
 
 def main() -> int:
     """Execute the run; returns the exit status."""
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    folder = Path(sys.argv[1])
+    folder, niceness = Path(sys.argv[1]), int(sys.argv[2])
+    os.nice(niceness)
     reporter = Reporter(_take_stdout())
-    signal.signal(signal.SIGTERM, reporter.stop)
+    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     spec = RunSpec.model_validate_json(sys.stdin.buffer.readline())
     threading.Thread(target=_leave_with_server, daemon=True).start()
     reporter.send(Started(pid=os.getpid()))
+    with reporter.beating():
+        last = _run(spec, folder, reporter)
+    reporter.send(last)
+    return 1 if isinstance(last, Failed) else 0
+
+
+def _run(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished | Failed:
     try:
-        with wait_for_lock(folder):  # a worker of a server that was killed may still be leaving
-            reporter.send(_execute(spec, folder, reporter))
+        with take_over(folder):
+            return _execute(spec, folder, reporter)
     except OSError as error:
         logger.exception("the disk refused")
-        reporter.send(Failed(reason=_refused(error), storage=True))
-        return 1
+        return Failed(reason=_refused(error), storage=True)
     except RiskSacError as error:
         logger.exception("the run cannot go on")
-        reporter.send(Failed(reason=str(error)))
-        return 1
-    return 0
+        return Failed(reason=str(error))
 
 
 def _execute(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished:
-    from risk_sac.recorder import Recorder  # here, so that a signal during the slow import is not lost
+    from risk_sac.recorder import Recorder  # here, so that the slow import happens with a heartbeat
     from risk_sac.train import train
 
     with Recorder(spec, folder, reporter) as recorder:
@@ -95,10 +150,14 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished:
     )
 
 
-def _take_stdout() -> IO[bytes]:
-    """Keep stdout for events alone: whatever else is printed, by C++ too, goes to stderr."""
-    events = os.fdopen(os.dup(1), "wb")
+def _take_stdout() -> io.FileIO:
+    """Keep stdout for events alone: whatever else is printed, by C++ too, goes to the log."""
+    events = io.FileIO(os.dup(1), "wb")
     os.dup2(2, 1)
+    sys.stdout, sys.stderr = (
+        io.TextIOWrapper(io.BufferedWriter(Log(number, "wb", closefd=False)), errors="replace", line_buffering=True)
+        for number in (1, 2)
+    )
     return events
 
 
@@ -114,4 +173,6 @@ def _refused(error: OSError) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    status = main()
+    logging.shutdown()
+    os._exit(status)  # all is written; taking the libraries down in order would take seconds more

@@ -1,108 +1,107 @@
-"""/v1/campaigns: post, follow, read, cancel."""
+"""/v1/campaigns: post, list, cancel, delete."""
 
-from typing import Annotated, Literal
+from hashlib import blake2b
+from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 
-from risk_sac.types import Outcome
-from service import records
+from risk_sac.config import FamilyName, MethodName
+from service.api.access import CurrentCaller
 from service.api.body import DOCUMENTED_BODY, PostedCampaign
 from service.api.context import Service
+from service.api.live import waiting
 from service.api.pages import Cursor, Limit, decode_cursor, encode_cursor
-from service.api.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses
-from service.api.views import campaign_body, episode_body, failure_body, summary_body, tier_outcomes
-from service.records import Page
-from service.results import results
-from service.schemas import Campaign, CampaignPage, EpisodePage, Failure, Results
+from service.api.recall import remember
+from service.api.representations import Representation, caching, entity_tag
+from service.api.responses import (
+    ACCEPTED,
+    INVALID,
+    MALFORMED,
+    NOT_ENDED,
+    NOT_JSON,
+    REUSED,
+    STORAGE,
+    TAGGED,
+    UNKNOWN,
+)
+from service.api.views import campaign_body, summary_body
+from service.campaigns import State
+from service.records import Campaign as CampaignRecord
+from service.schemas import Campaign, CampaignPage
 
-POLL_S = 1
-ACCEPTED: Responses = {
-    202: {
-        "headers": {
-            "Location": {"description": "Where to follow it.", "required": True, "schema": {"type": "string"}},
-            "Retry-After": {
-                "description": "Seconds until a look pays.",
-                "required": True,
-                "schema": {"type": "integer"},
-            },
-        }
-    }
-}
+POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON
+IdempotencyKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        pattern=r"^[\x21-\x7e]+$",
+        description="Any string of the client's own. Posting the same campaign again with the same key gives the"
+        " campaign that there is, so that a client that got no answer can simply try again.",
+    ),
+]
 
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
 
 
-@router.post("", status_code=202, responses=ACCEPTED | MALFORMED | NOT_JSON, openapi_extra=DOCUMENTED_BODY)
-def post_campaign(spec: PostedCampaign, service: Service, response: Response) -> Campaign:
+@router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=DOCUMENTED_BODY)
+def post_campaign(
+    spec: PostedCampaign, service: Service, caller: CurrentCaller, idempotency_key: IdempotencyKey = None
+) -> Response:
     """Queue a campaign: families × methods × seeds on one equal budget."""
-    campaign = service.manager.submit(spec)
-    response.headers["Location"] = f"/v1/campaigns/{campaign.id}"
-    response.headers["Retry-After"] = str(POLL_S)
-    return campaign_body(campaign, service.settings)
+    campaign = service.manager.submit(spec, project=caller.project, key=idempotency_key)
+    return _accepted(campaign, service)
 
 
-@router.get("")
-def list_campaigns(service: Service, limit: Limit = 50, cursor: Cursor = None) -> CampaignPage:
-    """All campaigns, newest first."""
-    page = service.store.campaigns(limit, decode_cursor(cursor))
+@router.get("", response_model=CampaignPage, responses=TAGGED)
+def list_campaigns(
+    request: Request,
+    service: Service,
+    caller: CurrentCaller,
+    state: Annotated[State | None, Query(description="Only campaigns in this state.")] = None,
+    family: Annotated[FamilyName | None, Query(description="Only campaigns with a run of this family.")] = None,
+    method: Annotated[MethodName | None, Query(description="Only campaigns with a run of this method.")] = None,
+    label: Annotated[
+        str | None, Query(max_length=200, pattern=r"^[^\x00]*$", description="Only campaigns with exactly this label.")
+    ] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> Response:
+    """Campaigns, newest first; what is posted meanwhile comes before the first page."""
+    mark = service.store.mark_of_all()
+    page = service.store.campaigns(
+        limit,
+        decode_cursor(cursor),
+        project=caller.sees,
+        state=state,
+        family=family,
+        method=method,
+        label=label,
+    )
     items = [summary_body(campaign, service.settings) for campaign in page.items]
-    return CampaignPage(items=items, next=encode_cursor(page.last))
+    body = CampaignPage(items=items, next=encode_cursor(page.last)).model_dump_json().encode()
+    tag = entity_tag(blake2b(body, digest_size=8).hexdigest())
+    representation = Representation(body, tag, caching(tag))
+    remember(request, representation, mark)
+    return representation.response(request)
 
 
-@router.get("/{campaign_id}", responses=UNKNOWN)
-def get_campaign(campaign_id: str, service: Service) -> Campaign:
-    """State, progress and runs of a campaign."""
-    return campaign_body(service.store.campaign(campaign_id), service.settings)
-
-
-@router.get("/{campaign_id}/results", responses=UNKNOWN)
-def get_results(campaign_id: str, service: Service) -> Results:
-    """What a campaign has found; partial until it has ended."""
-    return results(service.store.campaign(campaign_id))
-
-
-@router.get("/{campaign_id}/episodes", responses=UNKNOWN)
-def list_episodes(
-    campaign_id: str,
-    service: Service,
-    run: Annotated[str | None, Query(description="Only episodes of this run.")] = None,
-    outcome: Annotated[Outcome | None, Query(description="Only episodes that ended so.")] = None,
-    limit: Limit = 50,
-    cursor: Cursor = None,
-) -> EpisodePage:
-    """Episodes of a campaign in the order of their arrival."""
-    outcomes = () if outcome is None else (outcome,)
-    after = decode_cursor(cursor)
-    page = service.store.episodes(campaign_id, limit=limit, after=after, run_id=run, outcomes=outcomes)
-    return _episode_page(page)
-
-
-@router.get("/{campaign_id}/failures", responses=UNKNOWN)
-def list_failures(
-    campaign_id: str,
-    service: Service,
-    tier: Annotated[Literal["valid", "raw"], Query(description="`raw` adds contacts that a rule refused.")] = "valid",
-    run: Annotated[str | None, Query(description="Only failures of this run.")] = None,
-    limit: Limit = 50,
-    cursor: Cursor = None,
-) -> EpisodePage:
-    """Collisions of the ego in the order of their arrival."""
-    after = decode_cursor(cursor)
-    page = service.store.episodes(campaign_id, limit=limit, after=after, run_id=run, outcomes=tier_outcomes(tier))
-    return _episode_page(page)
-
-
-@router.get("/{campaign_id}/failures/{failure_id}", responses=UNKNOWN)
-def get_failure(campaign_id: str, failure_id: str, service: Service) -> Failure:
-    """One collision, valid or not, with its full time series."""
-    return failure_body(campaign_id, service.store.failure(campaign_id, failure_id), service.settings)
-
-
-@router.post("/{campaign_id}/cancel", status_code=202, responses=UNKNOWN)
-def cancel_campaign(campaign_id: str, service: Service) -> Campaign:
+@router.post("/{campaign_id}/cancel", status_code=202, response_model=Campaign, responses=UNKNOWN | ACCEPTED)
+def cancel_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> Response:
     """Stop a campaign and keep what it found; changes nothing once it has ended."""
-    return campaign_body(service.manager.cancel(campaign_id), service.settings)
+    campaign = service.manager.cancel(campaign_id, caller.sees)
+    service.live.expire(campaign_id)
+    return _accepted(campaign, service)
 
 
-def _episode_page(page: Page[records.Episode]) -> EpisodePage:
-    return EpisodePage(items=[episode_body(episode) for episode in page.items], next=encode_cursor(page.last))
+@router.delete("/{campaign_id}", status_code=204, responses=UNKNOWN | NOT_ENDED)
+def delete_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> None:
+    """Remove a campaign that has ended, with all that it found and its files."""
+    service.manager.delete(campaign_id, caller.sees)
+
+
+def _accepted(campaign: CampaignRecord, service: Service) -> Response:
+    headers = {"Location": f"/v1/campaigns/{campaign.id}"} | waiting(campaign, service.settings)
+    body = campaign_body(campaign, service.settings).model_dump_json()
+    return Response(body, status_code=202, headers=headers, media_type="application/json")

@@ -4,8 +4,12 @@ from dataclasses import dataclass
 from typing import Annotated, cast
 
 from fastapi import Depends, Request
+from prometheus_client import CollectorRegistry
 
+from service.api.live import Live
+from service.api.stream import Streams
 from service.manager import Manager
+from service.networks.shelf import Shelf
 from service.reports import Reports
 from service.settings import ServiceSettings
 from service.store import Store
@@ -19,9 +23,14 @@ class Context:
     store: Store
     manager: Manager
     reports: Reports
+    networks: Shelf
+    live: Live
+    streams: Streams
+    metrics: CollectorRegistry
 
 
-def _context(request: Request) -> Context:
+async def _context(request: Request) -> Context:
+    # A coroutine only so that it is not sent to a thread, which costs more than all else of a cheap answer.
     return cast(Context, request.app.state.context)
 
 

@@ -1,9 +1,7 @@
 """The one place where errors become HTTP: problem details (RFC 9457) that name the field."""
 
-import json
 import logging
-import re
-from collections.abc import Sequence
+import math
 from http import HTTPStatus
 from typing import Any
 
@@ -13,79 +11,98 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
 
-from risk_sac.config import CampaignSpec
 from risk_sac.errors import ConfigError
-from service.errors import CursorError, NotFoundError, StorageError
-from service.schemas import FieldProblem, Problem
+from service.api.fields import field_problems, parse, shown
+from service.errors import ConflictError, CursorError, NotFoundError, QuotaError, StorageError
+from service.schemas import FieldProblem, Problem, Reason
 
 logger = logging.getLogger(__name__)
 
-LONGEST_VALUE = 200
-# How this project words an error: "reaction_time_s is 0.55; wanted a multiple of 0.1", or where the
-# field goes without saying: "column 3: got 'x', wanted a signal".
-_HOUSE_STYLES = (
-    re.compile(r"(?P<field>[\w.]+) (?:is|are named) (?P<got>.+?); (?:wanted )?(?P<wanted>.+)", re.DOTALL),
-    re.compile(r"(?P<field>).*?\bgot (?P<got>.+?)[,;] wanted (?P<wanted>.+)", re.DOTALL),
-)
-_LIMITS = {
-    "greater_than": "> {gt}",
-    "greater_than_equal": ">= {ge}",
-    "less_than": "< {lt}",
-    "less_than_equal": "<= {le}",
-    "literal_error": "{expected}",
-    "enum": "{expected}",
-    "string_pattern_mismatch": "a string matching {pattern}",
-    "string_too_short": "at least {min_length} characters",
-    "string_too_long": "at most {max_length} characters",
-    "too_short": "at least {min_length} entries",
-    "too_long": "at most {max_length} entries",
-    "missing": "a value",
-    "finite_number": "a finite number",
-    "float_type": "a number",
-    "int_type": "an integer",
-    "model_type": "a JSON object",
-    "tuple_type": "a JSON array",
+_REASONS = {
+    HTTPStatus.NOT_FOUND: Reason.UNKNOWN_ROUTE,
+    HTTPStatus.METHOD_NOT_ALLOWED: Reason.METHOD_NOT_ALLOWED,
+    HTTPStatus.NOT_ACCEPTABLE: Reason.NOT_ACCEPTABLE,
+    HTTPStatus.UNSUPPORTED_MEDIA_TYPE: Reason.UNSUPPORTED_MEDIA_TYPE,
 }
 
-Location = tuple[int | str, ...]
+
+class ProblemError(Exception):
+    """An answer that a route or a dependency decides on; the response says the same."""
+
+    def __init__(
+        self,
+        status: HTTPStatus,
+        reason: Reason,
+        detail: str,
+        *errors: FieldProblem,
+        headers: dict[str, str] | None = None,
+    ) -> None:
+        super().__init__(detail)
+        self.status = status
+        self.reason = reason
+        self.errors = errors
+        self.headers = headers
+
+
+def invalid_field(field: str, got: object, wanted: str) -> ProblemError:
+    """The answer to a value that no schema could have told to be wrong."""
+    detail = f"{field} is {shown(got)}; wanted {wanted}"
+    item = FieldProblem(field=field, message=detail, got=shown(got), wanted=wanted)
+    return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail, item)
 
 
 def add_problem_handlers(app: FastAPI) -> None:
     """Make every error response of the app a problem."""
     app.add_exception_handler(RequestValidationError, _invalid_request)
     app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(ProblemError, _problem_error)
     app.add_exception_handler(ConfigError, _bad_config)
     app.add_exception_handler(CursorError, _bad_cursor)
     app.add_exception_handler(NotFoundError, _not_found)
+    app.add_exception_handler(ConflictError, _conflict)
+    app.add_exception_handler(QuotaError, _over_quota)
     app.add_exception_handler(StorageError, _storage_failed)
     app.add_exception_handler(Exception, _bug)
 
 
-def problem(
-    request: Request, status: HTTPStatus, detail: str, *errors: FieldProblem, headers: dict[str, str] | None = None
+def problem_response(
+    path: str,
+    status: HTTPStatus,
+    reason: Reason,
+    detail: str,
+    *errors: FieldProblem,
+    headers: dict[str, str] | None = None,
 ) -> JSONResponse:
-    """A problem response; its type is stable for each status."""
+    """A problem as a response, which is an ASGI application: middleware has no more than a path to say.
+
+    Args:
+      path: of the request.
+      status: of the response; the problem's type is stable for each.
+      reason: stable for each cause.
+      detail: what was got, what was wanted, and the remedy.
+      errors: the fields to blame.
+      headers: of the response.
+    """
     body = Problem(
         type=f"urn:risk-sac:problem:{status.name.lower().replace('_', '-')}",
         title=status.phrase,
         status=status,
+        reason=reason,
         detail=detail,
-        instance=request.url.path,
+        instance=path,
         errors=list(errors),
     )
-    return JSONResponse(body.model_dump(), status, headers=headers, media_type="application/problem+json")
+    return JSONResponse(body.model_dump(mode="json"), status, headers=headers, media_type="application/problem+json")
 
 
 async def _invalid_request(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     found = error.errors()
     if any(item["type"] == "json_invalid" for item in found):
-        return problem(request, HTTPStatus.BAD_REQUEST, f"the body is no JSON: {found[0]['ctx']['error']}")
-    locations = [item["loc"] for item in found]
-    causes = [item for item in found if not _follows(item["loc"], locations)]
-    errors = [_field_problem(item) for item in causes]
-    detail = "; ".join(f"{item.field}: {item.message}" if item.field else item.message for item in errors)
-    return problem(request, HTTPStatus.UNPROCESSABLE_ENTITY, detail, *errors)
+        detail = f"the body is no JSON: {found[0]['ctx']['error']}"
+        return problem_response(request.url.path, HTTPStatus.BAD_REQUEST, Reason.MALFORMED_JSON, detail)
+    errors = field_problems(found)
+    return _invalid(request, "; ".join(f"{item.field}: {item.message}".removeprefix(": ") for item in errors), *errors)
 
 
 async def _http_error(request: Request, error: Exception) -> JSONResponse:
@@ -98,38 +115,61 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
         headers["Allow"] = allowed = ", ".join(sorted(_methods(request))) or headers["Allow"]
         detail = f"{request.url.path} does not answer {request.method}; it answers {allowed}"
-    return problem(request, status, detail, headers=headers)
+    return problem_response(request.url.path, status, _REASONS[status], detail, headers=headers)
+
+
+async def _problem_error(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, ProblemError)
+    path, headers = request.url.path, error.headers
+    return problem_response(path, error.status, error.reason, str(error), *error.errors, headers=headers)
 
 
 async def _bad_config(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, ConfigError)
-    _, got, wanted = _parse(str(error))
+    _, got, wanted = parse(str(error))
     item = FieldProblem(field=error.field, message=str(error), got=got, wanted=wanted)
-    return problem(request, HTTPStatus.UNPROCESSABLE_ENTITY, str(error), item)
+    return _invalid(request, str(error), item)
 
 
 async def _bad_cursor(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, CursorError)
     item = FieldProblem(
-        field="cursor", message=str(error), got=_shown(error.got), wanted="the `next` of an earlier page, unchanged"
+        field="cursor", message=str(error), got=shown(error.got), wanted="the `next` of an earlier page, unchanged"
     )
-    return problem(request, HTTPStatus.UNPROCESSABLE_ENTITY, str(error), item)
+    return _invalid(request, str(error), item)
 
 
 async def _not_found(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, NotFoundError)
-    item = FieldProblem(field=error.field, message=str(error), got=_shown(error.got), wanted="an existing id")
-    return problem(request, HTTPStatus.NOT_FOUND, str(error), item)
+    item = FieldProblem(field=error.field, message=str(error), got=shown(error.got), wanted="an existing id")
+    return problem_response(request.url.path, HTTPStatus.NOT_FOUND, Reason.UNKNOWN_ID, str(error), item)
+
+
+async def _conflict(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, ConflictError)
+    return problem_response(request.url.path, HTTPStatus.CONFLICT, Reason(error.reason), str(error))
+
+
+async def _over_quota(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, QuotaError)
+    status, headers = HTTPStatus.TOO_MANY_REQUESTS, {"Retry-After": str(math.ceil(error.retry_after_s))}
+    return problem_response(request.url.path, status, Reason.QUOTA_EXCEEDED, str(error), headers=headers)
 
 
 async def _storage_failed(request: Request, error: Exception) -> JSONResponse:
     logger.error("%s %s: %s", request.method, request.url.path, error)
-    return problem(request, HTTPStatus.SERVICE_UNAVAILABLE, str(error))
+    status = HTTPStatus.SERVICE_UNAVAILABLE
+    return problem_response(request.url.path, status, Reason.STORAGE_UNAVAILABLE, str(error))
 
 
 async def _bug(request: Request, error: Exception) -> JSONResponse:
     detail = f"the service has a bug ({type(error).__name__}); its log has the traceback"
-    return problem(request, HTTPStatus.INTERNAL_SERVER_ERROR, detail)
+    return problem_response(request.url.path, HTTPStatus.INTERNAL_SERVER_ERROR, Reason.INTERNAL_ERROR, detail)
+
+
+def _invalid(request: Request, detail: str, *errors: FieldProblem) -> JSONResponse:
+    status = HTTPStatus.UNPROCESSABLE_ENTITY
+    return problem_response(request.url.path, status, Reason.INVALID_FIELD, detail, *errors)
 
 
 def _methods(request: Request) -> set[str]:
@@ -137,69 +177,3 @@ def _methods(request: Request) -> set[str]:
     paths: dict[str, dict[str, Any]] = request.app.openapi()["paths"]
     matching = (methods for path, methods in paths.items() if compile_path(path)[0].match(request.url.path))
     return {method.upper() for methods in matching for method in methods}
-
-
-def _follows(location: Location, others: Sequence[Location]) -> bool:
-    """Whether an error only repeats one inside it: a list "too short" once its bad entries are dropped."""
-    return any(len(other) > len(location) and other[: len(location)] == location for other in others)
-
-
-def _field_problem(item: dict[str, Any]) -> FieldProblem:
-    location: Location = item["loc"]
-    path = _dotted(location)
-    message = str(item["msg"]).removeprefix("Value error, ")
-    got = "nothing" if item["type"] == "missing" else _shown(item.get("input"))
-    wanted = _wanted(item, location)
-    if item["type"] == "value_error":
-        field, stated, wanted = _parse(message)
-        path = f"{path}.{field}".strip(".")
-        got = stated or got
-    return FieldProblem(field=_ascii(path), message=message, got=got, wanted=wanted)
-
-
-def _dotted(location: Location) -> str:
-    """`requirements[0].name`, without the part that says where in the request it was."""
-    parts = location[1:] if location[0] in ("body", "query", "path") else location
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
-
-
-def _wanted(item: dict[str, Any], location: Location) -> str:
-    if item["type"] == "extra_forbidden":
-        return f"one of {', '.join(_known_fields(location[1:-1]))}"
-    template = _LIMITS.get(item["type"])
-    if template:
-        return template.format(**item.get("ctx", {}))
-    return str(item["msg"]).removeprefix("Input should be ").partition(",")[0]
-
-
-def _parse(message: str) -> tuple[str, str, str]:
-    """Field, got and wanted of a message in house style; the whole message is wanted where it is not."""
-    for style in _HOUSE_STYLES:
-        if match := style.fullmatch(message):
-            return match["field"], match["got"], match["wanted"]
-    return "", "", message
-
-
-def _known_fields(location: Location) -> list[str]:
-    """Names of the fields that a campaign has at a location of its JSON schema."""
-    schema = CampaignSpec.model_json_schema()
-    node = schema
-    for part in location:
-        node = _resolve(schema, node)
-        node = node["properties"][part] if isinstance(part, str) else node["items"]
-    return sorted(_resolve(schema, node)["properties"])
-
-
-def _resolve(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:
-    node = next((option for option in node.get("anyOf", []) if option.get("type") != "null"), node)
-    reference: str | None = node.get("$ref")
-    return node if reference is None else schema["$defs"][reference.rpartition("/")[2]]
-
-
-def _shown(value: object) -> str:
-    text = json.dumps(value, default=str)  # ASCII, so that lone surrogates survive
-    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}…"
-
-
-def _ascii(text: str) -> str:
-    return text.encode("ascii", "backslashreplace").decode()

@@ -14,6 +14,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.report import Comparison, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.spec_file import campaign_yaml
+from service.api.access import CurrentCaller
 from service.api.context import Service
 from service.api.representations import accepted, caching, entity_tag, has, not_modified
 from service.api.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses
@@ -52,7 +53,16 @@ TABLE: Responses = {
         ),
     }
 }
-SPEC: Responses = {200: {"content": _content(yaml="label: ''\nfamilies: [low]\n…")}}
+SPEC: Responses = {
+    200: {
+        "content": {
+            MEDIA_TYPES["yaml"]: {
+                "schema": {"$ref": "#/components/schemas/CampaignSpec"},
+                "example": {"label": "", "families": ["low"]},
+            }
+        }
+    }
+}
 FIGURES: Responses = {200: {"headers": CACHED}}
 FIGURE: Responses = {200: {"headers": CACHED, "content": {media_type: {} for media_type in IMAGE_TYPES.values()}}}
 
@@ -64,12 +74,13 @@ def get_table(
     campaign_id: str,
     request: Request,
     service: Service,
+    caller: CurrentCaller,
     format_: Annotated[
         TableFormat | None, Query(alias="format", description="Instead of the Accept header, for a browser.")
     ] = None,
 ) -> Response:
     """The methods compared over seeds by the runs that have finished, with the others named; empty before the first."""
-    campaign = service.store.campaign(campaign_id)
+    campaign = service.store.campaign(campaign_id, caller.sees)
     name = format_ or _accepted(request, TABLES)
     tag = entity_tag(edition(campaign), name)
     if has(request, tag):
@@ -82,9 +93,9 @@ def get_table(
 
 
 @router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)
-def list_figures(campaign_id: str, request: Request, service: Service) -> Response:
+def list_figures(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """The figures that the finished runs allow: how the methods search, what they reach, λ and α."""
-    campaign = service.store.campaign(campaign_id)
+    campaign = service.store.campaign(campaign_id, caller.sees)
     tag = entity_tag(edition(campaign), "figures")
     if has(request, tag):
         return not_modified(tag)
@@ -102,9 +113,10 @@ def get_figure(
     format: Format,
     request: Request,
     service: Service,
+    caller: CurrentCaller,
 ) -> Response:
     """One figure; drawn when it is first asked for, and again once more runs have finished."""
-    campaign = service.store.campaign(campaign_id)
+    campaign = service.store.campaign(campaign_id, caller.sees)
     tag = entity_tag(edition(campaign), name, format)
     if has(request, tag):
         return not_modified(tag)
@@ -118,12 +130,13 @@ def get_spec(
     campaign_id: str,
     request: Request,
     service: Service,
+    caller: CurrentCaller,
     format_: Annotated[
         SpecFormat | None, Query(alias="format", description="Instead of the Accept header, for a browser.")
     ] = None,
 ) -> Response:
     """The campaign alone: JSON to post again, or YAML for `risk-sac run --spec` and `risk-sac evaluate --spec`."""
-    spec = service.store.campaign(campaign_id).spec
+    spec = service.store.campaign(campaign_id, caller.sees).spec
     name = format_ or _accepted(request, SPECS)
     return Response(SPECS[name](spec), headers={"Vary": "Accept"}, media_type=MEDIA_TYPES[name])
 

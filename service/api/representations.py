@@ -1,7 +1,8 @@
 """What a client wants to have, and whether it has it already."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from fastapi import HTTPException, Request, Response
 
@@ -41,8 +42,8 @@ def entity_tag(*parts: str) -> str:
 
 def has(request: Request, tag: str) -> bool:
     """Whether the client says that it has the representation with this tag."""
-    given = request.headers.get("if-none-match", "").split(",")
-    return tag.removeprefix("W/") in (each.strip().removeprefix("W/") for each in given)
+    given = [each.strip().removeprefix("W/") for each in request.headers.get("if-none-match", "").split(",")]
+    return "*" in given or tag.removeprefix("W/") in given
 
 
 def not_modified(tag: str, vary: str = "") -> Response:
@@ -59,3 +60,18 @@ def caching(tag: str | None, vary: str = "") -> dict[str, str]:
     """
     headers = {"Cache-Control": "no-cache", "ETag": tag or "", "Vary": vary}
     return {name: value for name, value in headers.items() if value}
+
+
+@dataclass(frozen=True, slots=True)
+class Representation:
+    """A JSON body as it is sent, with its headers."""
+
+    body: bytes
+    tag: str
+    headers: Mapping[str, str]
+
+    def response(self, request: Request) -> Response:
+        """The body, or 304 where the client has it."""
+        if has(request, self.tag):
+            return Response(status_code=304, headers=self.headers)
+        return Response(self.body, headers=self.headers, media_type="application/json")

@@ -1,4 +1,4 @@
-"""Error responses as the API's description declares them."""
+"""Responses as the API's description declares them."""
 
 from typing import Any
 
@@ -7,14 +7,45 @@ from service.schemas import Problem
 Responses = dict[int | str, dict[str, Any]]
 
 
-def _problem(status: int, description: str) -> Responses:
+def problem(status: int, description: str) -> Responses:
+    """A response that is a problem."""
     return {status: {"model": Problem, "description": description}}
 
 
-MALFORMED = _problem(400, "The body is no JSON")
-UNACCEPTABLE = _problem(406, "The Accept header names none of the media types there are")
-NOT_JSON = _problem(415, "The body is not declared as application/json")
-UNKNOWN = _problem(404, "Nothing has this id")
-INVALID = _problem(422, "A field is wrong; `errors` names it")
-STORAGE = _problem(503, "The database cannot be read or written")
-STOPPED = _problem(503, "Campaigns make no progress")
+def header(description: str, type_: str = "string", *, required: bool = True) -> dict[str, Any]:
+    """A header of a response."""
+    return {"description": description, "required": required, "schema": {"type": type_}}
+
+
+MALFORMED = problem(400, "The body is no JSON")
+UNKNOWN = problem(404, "Nothing has this id")
+UNACCEPTABLE = problem(406, "The Accept header names none of the media types there are")
+REUSED = problem(409, "The idempotency key has queued another campaign")
+NOT_ENDED = problem(409, "The campaign has not ended")
+NOT_JSON = problem(415, "The body is not declared as application/json")
+INVALID = problem(422, "A field is wrong; `errors` names it")
+STORAGE = problem(503, "The database cannot be read or written")
+STOPPED = problem(503, "Campaigns make no progress")
+UNREADY = problem(503, "The disk or the database refuses")
+
+_RETRY = header(
+    "Seconds until a look pays: a twentieth of the time left; absent once the campaign has ended.",
+    "integer",
+    required=False,
+)
+_TAGGED = {
+    "ETag": header("Changes whenever the body does."),
+    "Cache-Control": header("`no-cache`: keep it, and ask with If-None-Match."),
+}
+
+
+def _tagged(headers: dict[str, Any]) -> Responses:
+    return {
+        200: {"headers": headers},
+        304: {"description": "What If-None-Match names still holds", "headers": headers},
+    }
+
+
+TAGGED = _tagged(_TAGGED)
+LIVE = _tagged(_TAGGED | {"Retry-After": _RETRY})
+ACCEPTED: Responses = {202: {"headers": {"Location": header("Where to follow it."), "Retry-After": _RETRY}}}

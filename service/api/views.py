@@ -5,7 +5,7 @@ from risk_sac.types import Outcome
 from service import records
 from service.errors import StorageError
 from service.progress import progress
-from service.schemas import Campaign, CampaignSummary, Episode, Failure, Run
+from service.schemas import Campaign, CampaignSummary, Episode, Failure, Run, StateChange
 from service.series import load_series
 from service.settings import ServiceSettings
 
@@ -24,7 +24,7 @@ def summary_body(campaign: records.Campaign, settings: ServiceSettings) -> Campa
     return CampaignSummary.model_validate(
         {
             "id": campaign.id,
-            "label": campaign.spec.label,
+            "label": campaign.label,
             "state": campaign.state,
             "reason": campaign.reason,
             "created_at": campaign.created_at,
@@ -47,10 +47,15 @@ def failure_body(campaign_id: str, episode: records.Episode, settings: ServiceSe
         if episode.series is None:
             raise StorageError("no time series was recorded")
         folder = settings.run_folder(campaign_id, episode.run_id) / FAILURES
-        body |= {"series": load_series(folder / episode.series), "series_problem": None}
+        body |= {"series": load_series(folder / episode.series, episode.series_sha256), "series_problem": None}
     except StorageError as error:
         body |= {"series": None, "series_problem": str(error)}
     return Failure.model_validate(body)
+
+
+def change_body(change: records.Change) -> StateChange:
+    """A change of state in a stream of events."""
+    return StateChange.model_validate(change)
 
 
 def tier_outcomes(tier: str) -> tuple[Outcome, ...]:

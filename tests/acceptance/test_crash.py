@@ -7,20 +7,20 @@ from pathlib import Path
 
 from risk_sac.crashes import FATAL
 
-# The second episode reads address 0 inside libsumo's process, as a crash in libsumo does.
+# The second episode reads address 0 in its eighth step, in libsumo's process, as a crash in libsumo does.
 RISK_SAC = """
 import ctypes, sys
 from risk_sac import cli
-from risk_sac.train import Run
+from risk_sac.crashes import CrashGuard
 
-play = Run.episode
+note = CrashGuard.step
 
-def episode(self, index, playable=True):
-    if index == 1 and playable:
+def step(self, step):
+    note(self, step)
+    if (self._playing, step) == (1, 7):
         ctypes.string_at(0)
-    return play(self, index, playable)
 
-Run.episode = episode
+CrashGuard.step = step
 sys.exit(cli.main(sys.argv[1:]))
 """
 
@@ -34,6 +34,6 @@ def test_the_episode_is_left_out_and_counted(tmp_path: Path) -> None:
     assert ends == [*FATAL * [-11], 0]
     records = [json.loads(line) for line in (tmp_path / "run" / "episodes.jsonl").read_text().splitlines()]
     assert [record["index"] for record in records] == [0, 1, 2]
-    assert (records[1]["outcome"], records[1]["reason"], records[1]["steps"]) == ("rejected", "simulator_crash", 0)
+    assert (records[1]["outcome"], records[1]["reason"], records[1]["steps"]) == ("rejected", "sim_crash", 0)
     assert records[2]["steps"] > 0
     assert "Segmentation fault" not in (tmp_path / "run" / "crash.log").read_text()  # the last process went well

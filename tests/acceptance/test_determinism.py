@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from risk_sac.checkpoint import previous
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, ReplayConfig, RunSpec, SceneOptimizerConfig
 from risk_sac.records import records_to_json
-from risk_sac.train import RunSummary, train
-from risk_sac.types import EpisodeRecord, RunMetrics
+from risk_sac.results import FAILURES
+from risk_sac.train import CHECKPOINT, RunSummary, train
+from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 
 EPISODES, EVALUATION = 6, 1
 # Small enough for seconds, and still learning, modelling and replaying by priority before the run is over.
@@ -34,9 +36,9 @@ class Listener:
 
     limit: int = 10**9
     records: list[EpisodeRecord] = field(default_factory=list)
-    series: list[str | None] = field(default_factory=list)
+    series: list[SeriesFile | None] = field(default_factory=list)
 
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         self.records.append(record)
         self.series.append(series)
 
@@ -115,6 +117,35 @@ def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
     assert resumed.digest == expected.digest
     assert resumed.metrics == expected.metrics
     assert resumed.evaluation == expected.evaluation
+
+
+@pytest.mark.parametrize("damaged", ["newest", "both"])
+def test_a_run_with_damaged_checkpoints_equals_one_never_interrupted(
+    uninterrupted: tuple[RunSummary, Listener], tmp_path: Path, damaged: str
+) -> None:
+    expected, whole = uninterrupted
+    run(tmp_path, limit=4)
+    files = [tmp_path / CHECKPOINT, previous(tmp_path / CHECKPOINT)]
+    for file in files[:1] if damaged == "newest" else files:
+        content = bytearray(file.read_bytes())
+        content[len(content) // 2] ^= 1
+        file.write_bytes(content)
+    for file in (tmp_path / FAILURES).glob("*.npz"):
+        file.unlink()  # what is played again is also recorded again
+    resumed, after = run(tmp_path)
+    assert resumed.digest == expected.digest
+    assert records_to_json(after.records) == records_to_json(whole.records)
+    assert after.series == whole.series
+
+
+def test_a_damaged_series_is_reported_as_it_was_written(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    _, told = run(tmp_path, seed=1, method="random")
+    lost, changed = [file for file in told.series if file is not None]
+    (tmp_path / FAILURES / lost.name).unlink()
+    (tmp_path / FAILURES / changed.name).write_bytes(b"PK")
+    _, again = run(tmp_path, seed=1, method="random")
+    assert again.series == told.series
+    assert {lost.name, changed.name} == {Path(record.args[0]).name for record in caplog.records if record.args}
 
 
 def test_a_finished_run_tells_of_its_episodes_and_repeats_none(tmp_path: Path) -> None:

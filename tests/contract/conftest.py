@@ -26,7 +26,7 @@ class IdleExecutor:
     def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
         pass
 
-    def cancel(self, number: int) -> None:
+    def cancel(self, number: int, grace_s: float) -> None:
         self._cancelled.append(number)
         self.wake()
 

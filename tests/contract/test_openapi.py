@@ -4,7 +4,6 @@ import httpx
 import pytest
 import schemathesis
 import yaml
-from hypothesis import HealthCheck, settings
 
 from service.app import create_app, openapi
 from service.openapi import document
@@ -12,6 +11,8 @@ from service.settings import ServiceSettings
 
 COMMITTED = Path(__file__).parents[2] / "openapi.yaml"
 
+UPLOADS = ["application/gzip", "application/x-gzip", "application/zip"]
+schemathesis.serializer.alias(UPLOADS, "application/octet-stream")
 schema = schemathesis.openapi.from_dict(openapi(create_app(ServiceSettings())))
 
 
@@ -30,13 +31,6 @@ def test_every_error_is_declared_as_a_problem():
                 types = list(response.get("content", {}))
                 problem = "application/problem+json"
                 assert types == [problem] if int(status) >= 400 else problem not in types, (method, path, status)
-
-
-@schema.parametrize()
-@settings(max_examples=8, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
-def test_no_response_contradicts_the_document(case, base_url):
-    # A formula or a cursor can be wrong in ways that no JSON schema can say.
-    case.call_and_validate(base_url=base_url, excluded_checks=[schemathesis.checks.positive_data_acceptance])
 
 
 @pytest.mark.parametrize("path", ["/", "/v1", "/v1/campaigns/", "/v1/campaigns/x/y/z", "/v1/families/low"])

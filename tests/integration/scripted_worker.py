@@ -1,6 +1,6 @@
 """A worker that speaks the real protocol and does what its run's seed says.
 
-Runs as `python -m scripted_worker FOLDER` in place of `service.worker`.
+Runs as `python -m scripted_worker FOLDER NICENESS` in place of `service.worker`.
 """
 
 import errno
@@ -13,10 +13,12 @@ from pathlib import Path
 
 from risk_sac.config import RunSpec
 from risk_sac.types import EpisodeRecord, Outcome, RunMetrics
-from service.events import EpisodeDone, Event, Failed, Finished, encode
+from service.events import EpisodeDone, Event, Failed, Finished, Heartbeat, encode
 
-WELL_BEHAVED, DIES, HANGS, BABBLES, DISK_FULL, EXITS = 0, 9, 15, 7, 28, 3
+WELL_BEHAVED, DIES, HANGS, BABBLES, DISK_FULL, EXITS, SEGFAULTS, FREEZES = 0, 9, 15, 7, 28, 3, 11, 19
+ONCE = 100  # added to one of them: the run's second worker behaves well
 EPISODE_S = 0.05
+BEAT_S = 1.0
 
 
 def main() -> None:
@@ -25,6 +27,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: stopping.set())
     spec = RunSpec.model_validate_json(sys.stdin.buffer.readline())
     threading.Thread(target=leave_with_server, daemon=True).start()
+    threading.Thread(target=beat, daemon=True).start()
     checkpoint = folder / "checkpoint"
     done = int(checkpoint.read_text()) if checkpoint.exists() else 0
     for index in range(done):  # as the real worker: the last of them may never have been heard
@@ -33,14 +36,21 @@ def main() -> None:
         if stopping.is_set() and spec.seed != HANGS:
             break
         if index == 2:
-            misbehave(spec.seed)
+            misbehave(fault(spec.seed, folder))
         time.sleep(EPISODE_S)
         send(EpisodeDone(record=record(index), metrics=metrics(index + 1), series=None, wall_s=EPISODE_S))
         done = index + 1
         if done % 3 == 0:
-            checkpoint.write_text(str(done))
+            keep(checkpoint, done)
     finished = done == spec.budget.episodes
     send(Finished(finished=finished, metrics=metrics(done), evaluation=None, digest="d", versions={}, wall_s=1.0))
+
+
+def keep(checkpoint: Path, done: int) -> None:
+    """In one step, as the real worker: it may be killed at any moment."""
+    new = checkpoint.with_suffix(".new")
+    new.write_text(str(done))
+    new.replace(checkpoint)
 
 
 def leave_with_server() -> None:
@@ -49,21 +59,40 @@ def leave_with_server() -> None:
     os._exit(0)
 
 
+def beat() -> None:
+    while True:
+        send(Heartbeat())
+        time.sleep(BEAT_S)
+
+
+def fault(seed: int, folder: Path) -> int:
+    """What this worker does in its third episode."""
+    if seed < ONCE:
+        return seed
+    first = not (folder / "misbehaved").exists()
+    (folder / "misbehaved").touch()
+    return seed - ONCE if first else WELL_BEHAVED
+
+
 def misbehave(seed: int) -> None:
     if seed == DIES:
         os.kill(os.getpid(), signal.SIGKILL)
+    if seed == SEGFAULTS:
+        os.kill(os.getpid(), signal.SIGSEGV)
+    if seed == FREEZES:
+        os.kill(os.getpid(), signal.SIGSTOP)
     if seed == BABBLES:
         os.write(1, b"Loading net-file from 'low.net.xml' ... done (3ms).\n")
         time.sleep(60)
-    if seed == DISK_FULL:
+    if seed == DISK_FULL and not (Path(sys.argv[1]).parent / "room").exists():
         send(Failed(reason=f"storage failed: {os.strerror(errno.ENOSPC)}", storage=True))
         sys.exit(1)
     if seed == EXITS:
         sys.exit("Traceback: the policy is NaN")
 
 
-def send(event: Event) -> None:
-    os.write(1, encode(event))
+def send(word: Event | Heartbeat) -> None:
+    os.write(1, encode(word))  # at once, so that two threads cannot mix their lines
 
 
 def record(index: int) -> EpisodeRecord:

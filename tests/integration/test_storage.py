@@ -2,50 +2,92 @@
 
 import os
 import resource
+import signal
 import subprocess
 import sys
 
+import pytest
 
-def test_a_database_that_cannot_grow_fails_the_campaign_and_stays_readable(serve):
+from tests.postgresql import binaries, running
+from tests.server import servers
+
+EACH_DATABASE = pytest.mark.parametrize("serve", ["sqlite", "postgresql"], indirect=True)
+
+
+def test_a_database_that_cannot_grow_pauses_the_campaign_until_it_can(serve):
     service = serve()
     earlier = service.post(label="earlier", budget={"episodes": 5})
     service.wait(earlier)
-    campaign_id = service.post(seeds=[0, 1], budget={"episodes": 1000})
+    campaign_id = service.post(seeds=[0, 1], budget={"episodes": 60})
     service.wait_for(campaign_id, lambda seen: seen["progress"]["episodes_done"] > 3)
     # To a process that may not let any file grow, every write looks like one to a full disk.
     unlimited = resource.prlimit(service.process.pid, resource.RLIMIT_FSIZE, (1, resource.RLIM_INFINITY))
-    campaign = service.wait(campaign_id)
-    assert campaign["state"] == "failed"
+    campaign = service.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
     assert campaign["reason"].startswith("storage failed while storing an episode: ")
-    assert {run["state"] for run in campaign["runs"]} == {"failed"}
+    assert {run["state"] for run in campaign["runs"]} == {"paused"}
+    service.wait_until(lambda: service.workers() == [])
     assert len(service.get(campaign_id, "/episodes")["items"]) > 3
     assert service.get(earlier, "/results")["complete"]
     refused = service.client.post("/v1/campaigns", json={"families": ["low"]})
     assert refused.status_code == 503
     assert refused.json()["detail"].startswith("storage failed while creating a campaign: ")
     assert service.client.get("/healthz").status_code == 200
+    assert service.client.get("/readyz").status_code == 503
 
     resource.prlimit(service.process.pid, resource.RLIMIT_FSIZE, unlimited)
-    assert service.wait(service.post(budget={"episodes": 2}))["state"] == "succeeded"
-    service.wait_until(lambda: service.workers() == [])
-    service.stop()
+    campaign = service.wait(campaign_id)
+    assert (campaign["state"], campaign["progress"]["episodes_done"]) == ("succeeded", 120)
+    for run in campaign["runs"]:
+        assert sorted(service.episodes(campaign_id, run["id"])) == list(range(60))
+    assert service.client.get("/readyz").status_code == 200
+
+
+@EACH_DATABASE
+def test_a_disk_that_is_full_for_a_worker_pauses_its_campaign_until_there_is_room(serve, scripted):
+    service = serve()
+    campaign_id = service.post(seeds=[scripted.DISK_FULL, scripted.WELL_BEHAVED], budget={"episodes": 40})
+    campaign = service.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
+    assert campaign["reason"].endswith("storage failed: No space left on device")
+    assert service.get(campaign["id"], "/episodes")["items"]
+    (service.data_dir / "campaigns" / campaign_id / "room").touch()
+    campaign = service.wait(campaign_id)
+    assert (campaign["state"], campaign["progress"]["episodes_done"]) == ("succeeded", 80)
+
+
+@EACH_DATABASE
+def test_a_paused_campaign_can_be_cancelled(serve, scripted):
+    service = serve()
+    campaign_id = service.post(seeds=[scripted.DISK_FULL], budget={"episodes": 40})
+    service.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
+    service.client.post(f"/v1/campaigns/{campaign_id}/cancel")
+    campaign = service.wait(campaign_id)
+    assert (campaign["state"], campaign["progress"]["episodes_done"]) == ("cancelled", 2)
+
+
+@EACH_DATABASE
+def test_a_pause_outlives_the_server(serve, scripted):
+    service = serve()
+    campaign_id = service.post(seeds=[scripted.DISK_FULL], budget={"episodes": 10})
+    service.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
+    service.stop(signal.SIGKILL)
+    (service.data_dir / "campaigns" / campaign_id / "room").touch()
     service.start()
-    assert service.get(campaign_id)["reason"] == campaign["reason"]
+    assert service.wait(campaign_id)["state"] == "succeeded"
 
 
-def test_a_data_folder_that_refuses_fails_the_campaign_and_not_the_server(serve):
+def test_a_data_folder_that_refuses_pauses_the_campaign_and_not_the_server(serve):
     service = serve()
     earlier = service.post(budget={"episodes": 3})
     service.wait(earlier)
     folder = service.data_dir / "campaigns"
     folder.rename(service.data_dir / "kept")
     folder.write_text("in the way")
-    campaign = service.wait(service.post())
-    assert campaign["state"] == "failed"
-    assert campaign["reason"].startswith("storage failed while starting a run: ")
+    campaign_id = service.post(budget={"episodes": 2})
+    campaign = service.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
+    assert "storage failed while starting a run: " in campaign["reason"]
     assert service.get(earlier, "/episodes")["items"]
     folder.unlink()
-    assert service.wait(service.post(budget={"episodes": 2}))["state"] == "succeeded"
+    assert service.wait(campaign_id)["state"] == "succeeded"
 
 
 def test_a_server_without_a_usable_data_folder_says_so(tmp_path):
@@ -59,4 +101,29 @@ def test_a_server_without_a_usable_data_folder_says_so(tmp_path):
         check=False,
     )
     assert server.returncode != 0
-    assert "wanted a folder that can be written (Not a directory)" in server.stderr
+    assert "Not a directory" in server.stderr
+
+
+def test_a_database_server_that_goes_away_pauses_what_runs_until_it_is_back(tmp_path):
+    bin_ = binaries()
+    if bin_ is None:
+        pytest.skip("PostgreSQL is not installed")
+    with running(bin_, tmp_path) as server, servers(tmp_path, database_url=server.new_database()) as serve:
+        service = serve()
+        campaign_id = service.post(budget={"episodes": 60})
+        service.wait_for(campaign_id, lambda seen: seen["progress"]["episodes_done"] > 3)
+        server.stop()
+        service.wait_until(lambda: service.client.get("/readyz").status_code == 503)
+        assert service.client.get(f"/v1/campaigns/{campaign_id}").status_code == 503
+        assert service.client.get("/healthz").status_code == 200
+        server.start()
+        campaign = service.wait(campaign_id)
+        assert (campaign["state"], campaign["progress"]["episodes_done"]) == ("succeeded", 60)
+
+
+def test_two_servers_never_share_a_postgresql_database(serve, postgresql, tmp_path):
+    url = postgresql.new_database()
+    serve(database_url=url)
+    second = serve(database_url=url, data_dir=tmp_path / "other", started=False)
+    assert not second.launch()
+    assert "is in use by another server" in second.log.read_text()

@@ -1,5 +1,6 @@
 import errno
 import io
+import logging
 import os
 import pickle
 from collections import namedtuple
@@ -10,9 +11,10 @@ import pytest
 import torch
 
 from risk_sac import checkpoint
-from risk_sac.errors import CheckpointError
+from risk_sac.errors import CheckpointError, DamagedCheckpoint
 
 RUN = "a" * 64
+CASES = 60
 
 
 def example_state():
@@ -134,11 +136,84 @@ def test_every_flipped_bit_is_noticed(path):
     content = path.read_bytes()
     positions = np.random.default_rng(0).integers(len(content) * 8, size=50)
     for position in (0, 70, *positions):
-        damaged = bytearray(content)
-        damaged[position // 8] ^= 1 << (position % 8)
-        path.write_bytes(damaged)
-        with pytest.raises(CheckpointError, match="damaged"):
+        path.write_bytes(flipped(content, position))
+        with pytest.raises(DamagedCheckpoint, match="damaged"):
             checkpoint.load(path, RUN)
+
+
+def flipped(content, position):
+    damaged = bytearray(content)
+    damaged[position // 8] ^= 1 << (position % 8)
+    return bytes(damaged)
+
+
+@pytest.fixture
+def two(path):
+    """A checkpoint of episode 40 whose predecessor is that of episode 20."""
+    checkpoint.save(path, example_state() | {"episode": 40}, RUN)
+    return path
+
+
+def damages(content, cases):
+    """So many contents with a flipped bit or a lost end, from the first byte to the last."""
+    random = np.random.default_rng(1)
+    flips = [flipped(content, position) for position in random.integers(len(content) * 8, size=cases // 2)]
+    return flips + [content[:length] for length in random.integers(len(content), size=cases - len(flips))]
+
+
+def test_a_damaged_checkpoint_is_replaced_by_the_one_before_it(two, caplog):
+    newest, before = two.read_bytes(), checkpoint.previous(two).read_bytes()
+    cases = damages(newest, CASES)
+    for case in cases:
+        two.write_bytes(case)
+        caplog.clear()
+        assert checkpoint.load_newest(two, RUN)["episode"] == 20
+        (record,) = caplog.records
+        assert record.levelno == logging.WARNING
+        assert str(two) in record.message
+        assert "damaged" in record.message
+        assert checkpoint.previous(two).read_bytes() == before
+        assert (two.parent / "run.ckpt.damaged").read_bytes() == case
+    assert len(cases) == CASES
+
+
+def test_a_missing_newest_checkpoint_is_replaced_by_the_one_before_it(two):
+    two.unlink()  # a crash between the two renames of `save`
+    assert checkpoint.load_newest(two, RUN)["episode"] == 20
+    assert checkpoint.exists(two)
+
+
+def test_a_damaged_older_checkpoint_is_never_looked_at_while_the_newest_is_good(two, caplog):
+    checkpoint.previous(two).write_bytes(b"")
+    assert checkpoint.load_newest(two, RUN)["episode"] == 40
+    assert not caplog.records
+
+
+def test_two_damaged_checkpoints_mean_the_first_episode_and_both_are_named(two, caplog):
+    for path in (two, checkpoint.previous(two)):
+        path.write_bytes(flipped(path.read_bytes(), 999))
+    assert checkpoint.load_newest(two, RUN) is None
+    named = zip((two, checkpoint.previous(two)), caplog.records, strict=True)
+    assert all(str(path) in record.message for path, record in named)
+    assert not checkpoint.exists(two)
+
+
+def test_a_damaged_checkpoint_never_takes_the_place_of_the_good_one_before_it(two):
+    two.write_bytes(b"damaged")
+    checkpoint.load_newest(two, RUN)
+    checkpoint.save(two, {"episode": 60}, RUN)
+    two.write_bytes(b"damaged again")
+    assert checkpoint.load_newest(two, RUN)["episode"] == 20
+
+
+def test_no_checkpoint_means_the_first_episode(tmp_path, caplog):
+    assert checkpoint.load_newest(tmp_path / "none", RUN) is None
+    assert not caplog.records
+
+
+def test_a_checkpoint_of_another_run_is_no_reason_to_begin_anew(two):
+    with pytest.raises(CheckpointError, match="belongs to the run"):
+        checkpoint.load_newest(two, "b" * 64)
 
 
 def test_missing_file_is_named(tmp_path):
@@ -218,20 +293,36 @@ def test_temporary_name_that_cannot_be_opened_leaves_the_old_checkpoint(path):
 
 
 @pytest.mark.parametrize("function", ["fsync", "replace"])
-def test_full_disk_leaves_the_old_checkpoint_and_no_litter(path, monkeypatch, function):
+def test_full_disk_leaves_both_checkpoints_and_no_litter(two, monkeypatch, function):
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(os, function, full)
     with pytest.raises(OSError, match="No space left"):
-        checkpoint.save(path, {"episode": 40}, RUN)
+        checkpoint.save(two, {"episode": 60}, RUN)
     monkeypatch.undo()
-    assert [entry.name for entry in path.parent.iterdir()] == ["run.ckpt"]
-    assert_same(checkpoint.load(path, RUN), example_state())
+    assert sorted(entry.name for entry in two.parent.iterdir()) == ["run.ckpt", "run.ckpt.previous"]
+    assert checkpoint.load(two, RUN)["episode"] == 40
+    assert checkpoint.load(checkpoint.previous(two), RUN)["episode"] == 20
+
+
+def test_a_disk_that_refuses_the_second_rename_leaves_the_newest_checkpoint(two, monkeypatch):
+    renames = []
+
+    def once(*paths, replace=os.replace):
+        renames.append(paths)
+        if len(renames) == 2:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        replace(*paths)
+
+    monkeypatch.setattr(os, "replace", once)
+    with pytest.raises(OSError, match="Input/output error"):
+        checkpoint.save(two, {"episode": 60}, RUN)
+    assert checkpoint.load_newest(two, RUN)["episode"] == 40
 
 
 def test_leftover_of_a_killed_writer_is_overwritten(path):
     (path.parent / ".run.ckpt.tmp").write_bytes(b"half a checkpoint")
     checkpoint.save(path, {"episode": 40}, RUN)
     assert checkpoint.load(path, RUN) == {"episode": 40}
-    assert [entry.name for entry in path.parent.iterdir()] == ["run.ckpt"]
+    assert sorted(entry.name for entry in path.parent.iterdir()) == ["run.ckpt", "run.ckpt.previous"]

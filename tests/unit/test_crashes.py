@@ -1,43 +1,105 @@
-import json
+import os
 import subprocess
 import sys
 from pathlib import Path
 
-from risk_sac.crashes import COUNTS, FATAL, CrashGuard
+import pytest
 
+from risk_sac.crashes import COUNTS, CURRENT, FATAL, LOG, PATIENCE, CrashGuard
+
+# Episode 3 ends the process in its fifth step, by what the second argument says.
 CRASH = """
-import ctypes, sys
+import ctypes, os, sys
 from pathlib import Path
 from risk_sac.crashes import CrashGuard
 with CrashGuard(Path(sys.argv[1])) as guard:
     for episode in range(10):
-        if guard.begin(episode) and episode == 3:
-            ctypes.string_at(0)  # reads address 0: a real segmentation fault, which no handler can survive
+        for step in range(20) if guard.begin(episode) else ():
+            guard.step(step)
+            if (episode, step) == (3, int(sys.argv[3])):
+                exec(sys.argv[2])
 """
+SEGFAULT = "ctypes.string_at(0)"  # reads address 0: a real segmentation fault, which no handler can survive
+KILL = "os.kill(os.getpid(), 9)"
 
 
-def play(folder: Path) -> int:
-    return subprocess.run([sys.executable, "-c", CRASH, str(folder)], capture_output=True, timeout=60).returncode
+def play(folder: Path, what: str = SEGFAULT, step: int = 5) -> int:
+    command = [sys.executable, "-c", CRASH, str(folder), what, str(step)]
+    return subprocess.run(command, capture_output=True, timeout=60).returncode
 
 
-def test_an_episode_that_crashes_again_is_left_out_and_no_other(tmp_path: Path) -> None:
+def playable(folder: Path) -> list[int]:
+    with CrashGuard(folder) as guard:
+        return [episode for episode in range(6) if guard.begin(episode)]
+
+
+def test_an_episode_that_crashes_again_at_the_same_place_is_left_out_and_no_other(tmp_path: Path) -> None:
     assert [play(tmp_path) for _ in range(FATAL)] == FATAL * [-11]
     assert play(tmp_path) == 0
-    assert json.loads((tmp_path / COUNTS).read_text()) == {"3": FATAL}
-    with CrashGuard(tmp_path) as guard:
-        assert [guard.begin(episode) for episode in (2, 3, 4)] == [True, False, True]
+    assert playable(tmp_path) == [0, 1, 2, 4, 5]
+
+
+def test_crashes_at_several_places_take_longer_to_convince(tmp_path: Path) -> None:
+    for step in range(PATIENCE):
+        assert play(tmp_path, step=step) == -11
+    assert play(tmp_path) == 0
+
+
+def test_an_episode_that_was_played_to_its_end_was_not_to_blame(tmp_path: Path) -> None:
+    assert play(tmp_path) == -11
+    assert play(tmp_path, "pass") == 0
+    assert play(tmp_path) == -11
+    assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
 
 
 def test_a_run_that_was_killed_from_outside_has_not_crashed(tmp_path: Path) -> None:
-    kill = CRASH.replace("ctypes.string_at(0)", "import os; os.kill(os.getpid(), 9)")
-    for _ in range(FATAL + 1):
-        assert subprocess.run([sys.executable, "-c", kill, str(tmp_path)], timeout=60).returncode == -9
+    for _ in range(PATIENCE):
+        assert play(tmp_path, KILL) == -9
     assert not (tmp_path / COUNTS).exists()
-    with CrashGuard(tmp_path) as guard:
-        assert guard.begin(3)
+    assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
 
 
 def test_a_run_that_went_well_leaves_nothing_to_count(tmp_path: Path) -> None:
-    for _ in range(FATAL + 1):
-        with CrashGuard(tmp_path) as guard:
-            assert guard.begin(0)
+    for _ in range(PATIENCE):
+        assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
+    assert not (tmp_path / COUNTS).exists()
+
+
+def test_a_crash_counts_once_and_its_traceback_goes_to_the_log(tmp_path, caplog) -> None:
+    play(tmp_path)
+    assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
+    assert "crashed in episode 3, step 5, which makes 1 times:\nFatal Python error: Segmentation fault" in caplog.text
+    caplog.clear()
+    assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
+    assert not caplog.records
+
+
+@pytest.fixture
+def crashed(tmp_path: Path) -> Path:
+    """The folder of a run that knows of one crash, and whose last process has crashed too."""
+    play(tmp_path)
+    play(tmp_path)
+    assert (tmp_path / COUNTS).exists()
+    assert (tmp_path / LOG).read_bytes()
+    return tmp_path
+
+
+@pytest.mark.parametrize("name", [COUNTS, CURRENT])
+def test_damage_is_noticed_and_blames_no_episode(crashed: Path, caplog, name: str) -> None:
+    content, log, other = ((crashed / part).read_bytes() for part in (name, LOG, CURRENT if name == COUNTS else COUNTS))
+    bits = range(0, 8 * len(content), 7)
+    cases = [content[: bit // 8] + bytes([content[bit // 8] ^ 1 << bit % 8]) + content[bit // 8 + 1 :] for bit in bits]
+    for damaged in [*cases, *(content[:length] for length in range(len(content)))]:
+        (crashed / name).write_bytes(damaged)
+        (crashed / LOG).write_bytes(log)
+        (crashed / (CURRENT if name == COUNTS else COUNTS)).write_bytes(other)
+        caplog.clear()
+        assert playable(crashed) == [0, 1, 2, 3, 4, 5]
+        assert any(str(crashed / name) in record.message for record in caplog.records), damaged
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root writes anywhere")
+def test_a_folder_that_cannot_be_written_is_an_os_error(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(PermissionError):
+        CrashGuard(tmp_path)

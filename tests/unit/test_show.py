@@ -14,7 +14,7 @@ from risk_sac.scenario.space import SceneSpace
 from risk_sac.show import Recording, draw, draw_recording
 from risk_sac.trace import write_series
 from risk_sac.train import train
-from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
+from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
 
 
 def png_size(file: Path) -> tuple[int, int]:
@@ -147,10 +147,11 @@ def test_picture_of_an_unknown_format_is_refused(tmp_path: Path) -> None:
 class UntilContact:
     contact: Contact | None = None
 
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: str | None) -> None:
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         if record.collision is not None:
             self.contact = Contact.of(record)
-            assert self.contact.series == f"failures/{series}"
+            assert series is not None
+            assert self.contact.series == f"failures/{series.name}"
 
     def should_stop(self) -> bool:
         return self.contact is not None

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from service.campaigns import TRANSITIONS, State, advance, campaign_state
 from service.errors import TransitionError
 
-Q, R, X, C, S, F = State
+Q, R, P, X, C, S, F = State
 states = st.sampled_from(State)
 
 
@@ -33,6 +33,10 @@ def test_advance_follows_the_table(current, new):
         (R, [S, S], S),
         (R, [S, F], F),
         (R, [Q, Q], Q),  # the server stopped
+        (R, [P, Q], P),
+        (P, [Q, Q], Q),
+        (P, [P, S], P),
+        (X, [P, C], X),
         (X, [X, C], X),
         (X, [C, S], C),
         (X, [S, S], S),

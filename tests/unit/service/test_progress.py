@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from risk_sac.config import CampaignSpec
 from service.campaigns import State
-from service.progress import eta_s, progress
+from service.progress import eta_s, progress, retry_after_s
 from service.records import Run
 
 RUN = Run(
@@ -27,6 +27,7 @@ RUN = Run(
     raw_collisions=0,
     failures=0,
     busy_s=0.0,
+    attempts=1,
     metrics=None,
     evaluation=None,
     digest=None,
@@ -73,3 +74,19 @@ def test_progress_counts_all_runs_and_shows_those_at_work(ledger, metrics):
     assert (shown.dual_variable, shown.window_ecr) == (0.9, 0.1)
     final = progress(replace(campaign, state=State.SUCCEEDED, runs=(ended, ended)), workers=1)
     assert (final.dual_variable, final.eta_s) == (0.3, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("done", "busy_s", "wanted"),
+    [(0, 0.0, 1), (50, 1.0, 1), (50, 100.0, 5), (50, 101.0, 6), (50, 10_000.0, 30)],  # as long again as it took
+)
+def test_a_look_pays_after_a_twentieth_of_the_time_left(ledger, done, busy_s, wanted):
+    campaign = ledger.create(CampaignSpec(families=("low",)))
+    runs = (replace(RUN, episodes_done=done, busy_s=busy_s),)
+    assert retry_after_s(replace(campaign, state=State.RUNNING, runs=runs), workers=1) == wanted
+
+
+@pytest.mark.parametrize("state", [State.SUCCEEDED, State.FAILED, State.CANCELLED])
+def test_no_look_pays_at_what_has_ended(ledger, state):
+    campaign = ledger.create(CampaignSpec(families=("low",)))
+    assert retry_after_s(replace(campaign, state=state), workers=1) is None

@@ -1,7 +1,7 @@
 import pytest
-from fastapi import HTTPException
+from fastapi import HTTPException, Request
 
-from service.api.representations import accepted, caching, entity_tag
+from service.api.representations import accepted, caching, entity_tag, has
 
 OFFERED = ("application/json", "text/markdown", "text/csv")
 BROWSER = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,*/*;q=0.8"
@@ -39,3 +39,21 @@ def test_what_has_no_tag_is_not_to_be_kept_by_one():
     assert caching(None) == {"Cache-Control": "no-cache"}
     tag = entity_tag("abc", "csv")
     assert caching(tag, "Accept") == {"Cache-Control": "no-cache", "ETag": 'W/"abc-csv"', "Vary": "Accept"}
+
+
+@pytest.mark.parametrize(
+    ("sent", "there"),
+    [
+        ('W/"7"', True),
+        ('"7"', True),  # a weak comparison
+        ('W/"6", W/"7"', True),
+        ("*", True),
+        ('W/"77"', False),
+        ("7", False),
+        ("", False),
+        (None, False),
+    ],
+)
+def test_a_tag_is_among_those_that_the_client_has(sent, there):
+    headers = [] if sent is None else [(b"if-none-match", sent.encode())]
+    assert has(Request({"type": "http", "headers": headers}), entity_tag("7")) is there

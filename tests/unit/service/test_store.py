@@ -1,23 +1,27 @@
 import math
 import sqlite3
-from dataclasses import replace
 
 import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
 
 from risk_sac.config import CampaignSpec
 from risk_sac.types import Outcome
+from service import database
 from service.campaigns import State
-from service.errors import NotFoundError, StorageError, TransitionError
+from service.errors import ConflictError, NotFoundError, StorageError, TransitionError
 from service.events import Finished
+from service.ledger import Ledger
 from service.store import Store
+from service.tables import Base
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
 
 
 def start(store, ledger):
-    run = store.next_queued()
-    ledger.start_run(run.number)
-    return run.number
+    number = store.waiting()["default"]
+    ledger.start_run(number)
+    return number
 
 
 def test_a_campaign_comes_back_as_it_was_posted(store, ledger):
@@ -33,18 +37,29 @@ def test_runs_leave_the_queue_in_the_order_they_came(store, ledger):
     first, second = ledger.create(SPEC), ledger.create(SPEC)
     left = [start(store, ledger) for _ in range(8)]
     assert left == [run.number for run in first.runs + second.runs]
-    assert store.next_queued() is None
+    assert store.waiting() == {}
 
 
 def test_an_episode_reported_twice_is_stored_and_counted_once(store, ledger, episode):
     campaign = ledger.create(SPEC)
     number = start(store, ledger)
-    for report in (episode(0), episode(1, Outcome.FAILURE), episode(1, Outcome.FAILURE), episode(0)):
-        ledger.add_episode(number, report)
+    reports = (episode(0), episode(1, Outcome.FAILURE), episode(1, Outcome.FAILURE), episode(0), episode(2))
+    assert [ledger.add_episode(number, report) for report in reports] == [True, True, False, False, True]
     run = store.campaign(campaign.id).runs[0]
-    assert (run.episodes_done, run.failures, run.raw_collisions, run.rejected) == (2, 1, 1, 0)
-    assert [item.record.index for item in store.episodes(campaign.id, limit=10).items] == [0, 1]
-    assert run.busy_s == 2.0  # the time was spent twice
+    assert (run.episodes_done, run.failures, run.raw_collisions, run.rejected) == (3, 1, 1, 0)
+    assert [item.record.index for item in store.episodes(campaign.id, limit=10).items] == [0, 1, 2]
+    assert run.busy_s == 2.5  # the time was spent twice
+    assert store.usage("default").cpu_s == 2.5
+
+
+def test_an_episode_that_comes_out_otherwise_replaces_the_first(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    assert ledger.add_episode(number, episode(0, Outcome.FAILURE))
+    assert not ledger.add_episode(number, episode(0))
+    (stored,) = store.episodes(campaign.id, limit=10).items
+    assert stored.record.outcome is Outcome.SAFE
+    assert (store.campaign(campaign.id).runs[0].failures, store.campaign(campaign.id).runs[0].episodes_done) == (0, 1)
 
 
 def test_search_and_evaluation_episodes_of_one_index_are_two(store, ledger, episode):
@@ -150,58 +165,253 @@ def test_a_state_outside_the_table_is_refused_and_changes_nothing(store, ledger)
     assert store.campaign(campaign.id) == campaign
 
 
-def test_recovery_puts_interrupted_runs_back_and_ends_cancelled_ones(store, ledger):
+def test_what_has_no_worker_any_more_waits_again_or_ends_cancelled(store, ledger):
     kept, dropped = ledger.create(SPEC), ledger.create(SPEC)
     for _ in range(5):
         start(store, ledger)
     ledger.cancel(dropped.id)
-    assert ledger.recover() == 4
+    ledger.pause([kept.runs[0].number], "no room")
+    assert ledger.resume() == 4
     assert store.campaign(kept.id).state is State.QUEUED
     assert store.campaign(dropped.id).state is State.CANCELLED
-    assert ledger.recover() == 0
+    assert ledger.resume() == 0
 
 
-def test_a_failure_that_the_disk_refuses_is_told_and_written_later(store, ledger, episode, monkeypatch):
-    campaign, other = ledger.create(SPEC), ledger.create(SPEC)
+def test_a_pause_is_written_with_its_reason_and_can_be_cancelled(store, ledger):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    ledger.pause([number], "no room")
+    paused = store.campaign(campaign.id)
+    assert (paused.state, paused.reason) == (State.PAUSED, "run low-risk-sac-3: no room")
+    assert (paused.runs[0].state, paused.runs[0].reason) == (State.PAUSED, "no room")
+    assert ledger.cancel(campaign.id) == []
+    assert store.campaign(campaign.id).state is State.CANCELLED
+
+
+def test_a_pause_that_the_disk_refuses_to_note_is_shown_all_the_same(store, ledger):
+    campaign, waiting = ledger.create(SPEC), ledger.create(SPEC)
+    start(store, ledger)
+    before = store.revision(campaign.id)
+    store.refusal = "no room"
+    shown = store.campaign(campaign.id)
+    assert (shown.state, shown.reason) == (State.PAUSED, "no room")
+    assert [run.state for run in shown.runs] == [State.PAUSED, State.QUEUED, State.QUEUED, State.QUEUED]
+    assert shown.revision == store.revision(campaign.id) != before
+    assert store.campaign(waiting.id).state is State.QUEUED
+    store.refusal = None
+    assert store.campaign(campaign.id).state is State.RUNNING
+    assert store.revision(campaign.id) == before
+
+
+def test_every_stored_change_has_another_revision(store, ledger, episode, metrics):
+    campaign = ledger.create(SPEC)
+    seen = [store.revision(campaign.id)]
+    number = start(store, ledger)
+    seen.append(store.revision(campaign.id))
+    ledger.add_episode(number, episode(0))
+    seen.append(store.revision(campaign.id))
+    ledger.requeue_run(number, "worker was killed by SIGKILL")
+    seen.append(store.revision(campaign.id))
+    ledger.cancel(campaign.id)
+    seen.append(store.revision(campaign.id))
+    assert len(set(seen)) == len(seen)
+    assert store.campaign(campaign.id).revision == seen[-1]
+
+
+def test_changes_of_state_come_in_their_order(store, ledger):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    ledger.requeue_run(number, "worker was killed by SIGKILL")
+    ledger.cancel(campaign.id)
+    changes = store.changes(campaign.id)
+    assert [(change.run_id, change.state) for change in changes[:4]] == [
+        ("low-risk-sac-3", State.RUNNING),
+        (None, State.RUNNING),
+        ("low-risk-sac-3", State.QUEUED),
+        (None, State.QUEUED),
+    ]
+    assert changes[2].reason == "worker was killed by SIGKILL"
+    assert (changes[-1].run_id, changes[-1].state) == (None, State.CANCELLED)
+    assert store.changes(campaign.id, after=changes[3].number) == changes[4:]
+
+
+def test_another_project_sees_nothing(store, ledger, episode):
+    ours, theirs = ledger.create(SPEC, "ours"), ledger.create(SPEC, "theirs")
+    assert [item.id for item in store.campaigns(limit=5, project="ours").items] == [ours.id]
+    assert store.revision(ours.id, "ours") == ours.revision
+    for read in (
+        store.campaign,
+        store.revision,
+        lambda id_, project: store.episodes(id_, limit=1, project=project),
+        lambda id_, project: store.failure(id_, "x", project),
+        ledger.cancel,
+    ):
+        with pytest.raises(NotFoundError) as foreign:
+            read(theirs.id, "ours")
+        with pytest.raises(NotFoundError) as unknown:
+            read("c123", "ours")
+        assert str(foreign.value).replace(theirs.id, "c123") == str(unknown.value)
+
+
+def test_lists_are_filtered_by_state_family_method_and_label(store, ledger):
+    low = ledger.create(SPEC)
+    mixed = ledger.create(CampaignSpec(label="night", families=("low", "mixed"), methods=("sac",)))
+    ledger.cancel(low.id)
+
+    def found(**wanted):
+        return [item.id for item in store.campaigns(limit=5, **wanted).items]
+
+    assert found() == found(family="low") == [mixed.id, low.id]
+    assert found(state=State.CANCELLED) == found(method="random") == [low.id]
+    assert found(label="night") == found(family="mixed", method="sac") == [mixed.id]
+    assert found(label="") == [low.id]
+    assert found(family="mixed", method="random") == found(state=State.FAILED) == []
+
+
+def test_the_same_idempotency_key_finds_the_campaign_or_conflicts(store, ledger):
+    campaign = ledger.create(SPEC, "ours", "k1")
+    assert ledger.find("ours", "k1", SPEC).id == campaign.id
+    assert ledger.find("ours", "k2", SPEC) is None
+    assert ledger.find("theirs", "k1", SPEC) is None
+    with pytest.raises(ConflictError, match="belongs to campaign"):
+        ledger.find("ours", "k1", SPEC.model_copy(update={"label": "other"}))
+
+
+def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):
+    campaign, kept = ledger.create(SPEC), ledger.create(SPEC)
+    for _ in range(5):
+        ledger.add_episode(start(store, ledger), episode(0))
+    ledger.delete(campaign.id)
+    with pytest.raises(NotFoundError):
+        store.revision(campaign.id)
+    assert store.episodes(kept.id, limit=5).items
+    with store.engine.connect() as connection:
+        for table in ("campaigns", "runs", "episodes", "changes"):
+            column = "number" if table == "campaigns" else "campaign_number"
+            numbers = connection.exec_driver_sql(f"SELECT DISTINCT {column} FROM {table}").scalars().all()
+            assert numbers == [kept.number]
+
+
+def test_a_value_that_changed_on_the_disk_is_noticed(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    ledger.add_episode(start(store, ledger), episode(0, Outcome.FAILURE))
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE episodes SET wall_s = 0.5000001")
+    with pytest.raises(StorageError, match="row 1 of the table 'episodes' is damaged"):
+        store.episodes(campaign.id, limit=1)
+    assert store.campaign(campaign.id).runs[0].failures == 1
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE runs SET failures = 3")
+    with pytest.raises(StorageError, match="row low-risk-sac-3 of the table 'runs' is damaged"):
+        store.campaign(campaign.id)
+
+
+def test_a_database_that_lost_an_episode_is_not_opened(store, ledger, episode, database_url):
+    ledger.create(SPEC)
     ledger.add_episode(start(store, ledger), episode(0))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ledger, "_fail", _full_disk)
-        ledger.fail(campaign.id, "the disk is full")
-        ledger.save_failures()
-        told = store.campaign(campaign.id)
-        assert store.campaigns(limit=5).items[1] == told
-        assert store.next_queued().campaign_id == other.id
-        assert store.episodes(campaign.id, limit=5).items
-    ledger.save_failures()
-    assert not store.unsaved
-    for snapshot in (told, store.campaign(campaign.id)):
-        assert (snapshot.state, snapshot.reason) == (State.FAILED, "the disk is full")
-        assert {run.state for run in snapshot.runs} == {State.FAILED}
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("DELETE FROM episodes")
+    with pytest.raises(StorageError, match="run 'low-risk-sac-3' lacks episodes"):
+        Store(database_url)
 
 
-def _full_disk(*_):
-    raise StorageError("still full")
+def test_the_migrations_lead_to_the_tables(store):
+    with store.engine.connect() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": False})  # SQLite forgets them
+        assert compare_metadata(context, Base.metadata) == []
 
 
 def test_a_file_that_is_no_database_is_a_storage_error(tmp_path):
     (tmp_path / "x.db").write_bytes(b"not a database, but long enough to look at" * 100)
     with pytest.raises(StorageError, match="storage failed while opening the database: file is not a database"):
-        Store(tmp_path / "x.db")
+        Store(f"sqlite:///{tmp_path}/x.db")
 
 
-def test_what_is_written_is_on_the_disk_before_the_answer(store, ledger, tmp_path):
-    ledger.create(SPEC)
+@pytest.mark.parametrize("url", ["mysql://x/y", "nonsense", "postgresql+nodriver://x/y"])
+def test_a_url_that_names_no_database_we_know_is_refused(url):
+    with pytest.raises(StorageError, match="database_url"):
+        Store(url)
+
+
+def test_what_is_written_is_on_the_disk_before_the_answer(tmp_path):
+    store = Store(f"sqlite:///{tmp_path}/test.db")
+    Ledger(store).create(SPEC)
     with store.engine.connect() as connection:
         assert connection.exec_driver_sql("PRAGMA journal_mode").scalar() == "wal"
         assert connection.exec_driver_sql("PRAGMA synchronous").scalar() == 2  # FULL
     other = sqlite3.connect(tmp_path / "test.db")
     assert other.execute("SELECT count(*) FROM runs").fetchone() == (4,)
     other.close()
+    store.close()
 
 
-def test_failed_marks_only_what_has_not_ended(ledger):
+def test_a_database_from_before_there_were_versions_is_brought_up_to_date(tmp_path):
+    old = sqlite3.connect(tmp_path / "test.db")
+    old.executescript(BEFORE_VERSIONS)
+    spec = SPEC.model_copy(update={"label": "old"})
+    old.execute("INSERT INTO campaigns VALUES (7, 'c1', ?, 'running', NULL, 1.0, 2.0, NULL)", [spec.model_dump_json()])
+    old.execute(
+        "INSERT INTO runs VALUES (9, 7, 'low-sac-0', 'low', 'sac', 0, 'd', 'running', NULL, 2.0, NULL, 5, 0, 0, 0, 0,"
+        " 0.0, NULL, NULL, NULL, '{}')"
+    )
+    old.commit()
+    old.close()
+    store = Store(f"sqlite:///{tmp_path}/test.db")
+    assert Ledger(store).resume() == 1
+    campaign = store.campaign("c1", "default")
+    assert (campaign.spec.label, campaign.state, campaign.runs[0].id) == ("old", State.QUEUED, "low-sac-0")
+    assert [item.id for item in store.campaigns(limit=2, label="old").items] == ["c1"]
+    store.close()
+
+
+def test_a_database_is_brought_up_to_date_in_one_step_or_not_at_all(tmp_path):
+    full = "PRAGMA max_page_count = 20"  # room for some of the tables only
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(database, "PRAGMAS", (*database.PRAGMAS, full.removeprefix("PRAGMA ")))
+        with pytest.raises(StorageError, match="full"):
+            Store(f"sqlite:///{tmp_path}/test.db")
+    with sqlite3.connect(tmp_path / "test.db") as found:
+        assert found.execute("SELECT name FROM sqlite_master").fetchall() == []
+    found.close()
+    Store(f"sqlite:///{tmp_path}/test.db").close()
+
+
+def test_a_database_of_a_newer_version_is_refused(tmp_path):
+    Store(f"sqlite:///{tmp_path}/test.db").close()
+    with sqlite3.connect(tmp_path / "test.db") as newer:
+        newer.execute("UPDATE alembic_version SET version_num = '9999'")
+    newer.close()
+    with pytest.raises(StorageError, match="a newer version wrote it"):
+        Store(f"sqlite:///{tmp_path}/test.db")
+
+
+BEFORE_VERSIONS = """
+CREATE TABLE campaigns (number INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT, id VARCHAR NOT NULL, spec TEXT NOT NULL,
+  state VARCHAR NOT NULL, reason VARCHAR, created_at FLOAT NOT NULL, started_at FLOAT, finished_at FLOAT, UNIQUE (id));
+CREATE TABLE runs (number INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT, campaign_number INTEGER NOT NULL,
+  id VARCHAR NOT NULL, family VARCHAR NOT NULL, method VARCHAR NOT NULL, seed INTEGER NOT NULL,
+  spec_digest VARCHAR NOT NULL, state VARCHAR NOT NULL, reason VARCHAR, started_at FLOAT, finished_at FLOAT,
+  episodes_total INTEGER NOT NULL,
+  episodes_done INTEGER NOT NULL, rejected INTEGER NOT NULL, raw_collisions INTEGER NOT NULL, failures INTEGER NOT NULL,
+  busy_s FLOAT NOT NULL, metrics TEXT, evaluation TEXT, digest VARCHAR, versions TEXT NOT NULL,
+  UNIQUE (campaign_number, id),
+  FOREIGN KEY(campaign_number) REFERENCES campaigns (number));
+CREATE INDEX runs_queue ON runs (state, number);
+CREATE TABLE episodes (number INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT, campaign_number INTEGER NOT NULL,
+  run_number INTEGER NOT NULL, phase VARCHAR NOT NULL, "index" INTEGER NOT NULL, outcome VARCHAR NOT NULL,
+  record TEXT NOT NULL, series VARCHAR, wall_s FLOAT NOT NULL, UNIQUE (run_number, phase, "index"),
+  FOREIGN KEY(campaign_number) REFERENCES campaigns (number), FOREIGN KEY(run_number) REFERENCES runs (number));
+CREATE INDEX episodes_pages ON episodes (campaign_number, number);
+CREATE INDEX episodes_outcomes ON episodes (campaign_number, outcome, number);
+"""
+
+
+def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):
     campaign = ledger.create(SPEC)
-    done = replace(campaign.runs[0], state=State.SUCCEEDED)
-    failed = replace(campaign, runs=(done, *campaign.runs[1:])).failed("no")
-    assert failed.runs[0] == done
-    assert {(run.state, run.reason) for run in failed.runs[1:]} == {(State.FAILED, "no")}
+    for wrong in ("\0", f"{campaign.id}\0"):
+        with pytest.raises(NotFoundError):
+            store.campaign(wrong)
+        with pytest.raises(NotFoundError):
+            store.episodes(campaign.id, limit=1, run_id=wrong)
+        with pytest.raises(NotFoundError):
+            store.failure(campaign.id, f"{wrong}-train-0")

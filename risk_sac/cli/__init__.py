@@ -1,0 +1,48 @@
+"""`risk-sac`: one run or a comparison of methods without a server, pictures of failures, the server, its campaigns."""
+
+import argparse
+import shlex
+import sys
+from collections.abc import Sequence
+
+from risk_sac.cli.campaigns import add_campaigns
+from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
+from risk_sac.cli.evaluate import add_evaluate
+from risk_sac.cli.keys import add_keys
+from risk_sac.cli.run import add_run
+from risk_sac.cli.serve import add_serve
+from risk_sac.cli.show import add_show
+from risk_sac.errors import ConfigError, RiskSacError
+
+COMMANDS = (add_run, add_evaluate, add_show, add_serve, add_campaigns, add_keys)
+EPILOG = """exit status, but of `campaigns`, which says its own: 0 done; 1 failed; 2 a wrong setting or argument;
+130 interrupted, and the same command goes on."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    options.typed = shlex.join(["risk-sac", *(sys.argv[1:] if arguments is None else arguments)])
+    try:
+        status: int = options.command(options)
+    except ConfigError as error:
+        complain(f"{error.field}: {error}" if error.field else str(error))
+        return MISUSED
+    except (RiskSacError, OSError) as error:
+        complain(str(error))
+        status = options.on_error
+    except KeyboardInterrupt:
+        complain("interrupted")
+        return INTERRUPTED
+    return status
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="risk-sac", description="Finds scenes and adversaries that make an ego crash.", epilog=EPILOG
+    )
+    parser.set_defaults(on_error=FAILED)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    for add in COMMANDS:
+        add(commands)
+    return parser

@@ -1,0 +1,48 @@
+"""Flags that describe a campaign, with or without a file of settings."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from risk_sac.config import METHODS
+from risk_sac.errors import ConfigError
+
+
+def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, methods: str, seeds: int) -> None:
+    """Adds the flags.
+
+    Args:
+      parser: of the command.
+      families: what the help says about its default.
+      methods: the same.
+      seeds: how many there are by default.
+    """
+    parser.add_argument("--families", nargs="+", metavar="low|mixed|dense", help=f"(default: {families})")
+    parser.add_argument("--methods", nargs="+", metavar="NAME", help=f"of {', '.join(METHODS)} (default: {methods})")
+    parser.add_argument("--seeds", type=int, metavar="N", help=f"how many (default: {seeds})")
+    parser.add_argument("--first-seed", type=int, metavar="S", help="the N seeds begin here (default: 0)")
+    parser.add_argument("--episodes", type=int, metavar="N", help="search episodes of each run (default: 300)")
+    parser.add_argument(
+        "--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)"
+    )
+    parser.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags go first")
+
+
+def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:
+    """Fields of a campaign; None where a flag was not given.
+
+    Raises:
+      ConfigError: so many seeds are too many.
+    """
+    flags = {name: getattr(options, name) for name in ("families", "methods", "episodes", "evaluation_episodes")}
+    return flags | {"seeds": _seeds(options, seeds)}
+
+
+def _seeds(options: argparse.Namespace, default: int) -> list[int] | None:
+    if options.seeds is None and options.first_seed is None:
+        return None
+    count = default if options.seeds is None else options.seeds
+    if not 1 <= count <= 100:
+        raise ConfigError(f"got {count}; wanted 1 to 100 seeds", field="seeds")
+    first = options.first_seed or 0
+    return list(range(first, first + count))

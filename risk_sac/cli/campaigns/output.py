@@ -1,0 +1,90 @@
+"""Campaigns and results as one line, a table, or JSON. What others wrote is shown without control characters."""
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+from rich.text import Text
+
+from risk_sac.cli.campaigns.gate import exceeds
+from risk_sac.cli.console import console, or_dash
+from risk_sac.cli.text import on_one_line
+from risk_sac.client import CampaignSummary, Results
+
+Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]
+
+
+def print_answer(options: argparse.Namespace, answer: Answer, text: Table | str) -> None:
+    """Prints the answer as JSON where that is wanted, and the text otherwise."""
+    if not options.json:
+        console.print(text, markup=False, soft_wrap=isinstance(text, str))
+    else:
+        console.out(json.dumps(_plain(answer), allow_nan=False), highlight=False)
+
+
+def line(campaign: CampaignSummary) -> str:
+    """Where a campaign stands."""
+    episodes = f"{campaign.progress.episodes_done}/{campaign.progress.episodes_total} episodes"
+    return f"{campaign.id} {campaign.state}: {episodes}, {figures(campaign)}"
+
+
+def figures(campaign: CampaignSummary) -> str:
+    """What a campaign has found lately, and what holds it up."""
+    progress = campaign.progress
+    eta = "?" if progress.eta_s is None else f"{progress.eta_s:.0f} s"
+    reason = f"; {campaign.state}, {on_one_line(campaign.reason)}" if campaign.reason else ""
+    return f"{progress.failures} failures, ECR {or_dash(progress.window_ecr, '.2f')}, ETA {eta}{reason}"
+
+
+def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
+    """One row per campaign."""
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in ("id", "state", "episodes", "failures", "posted"):
+        table.add_column(name, no_wrap=True, justify="right" if name in ("episodes", "failures") else "left")
+    table.add_column("label")
+    for campaign in campaigns:
+        progress = campaign.progress
+        table.add_row(
+            campaign.id,
+            campaign.state,
+            f"{progress.episodes_done}/{progress.episodes_total}",
+            str(progress.failures),
+            f"{campaign.created_at.astimezone():%Y-%m-%d %H:%M}",
+            Text(on_one_line(campaign.label)),
+        )
+    return table
+
+
+def results_table(results: Results, max_ecr: float | None) -> Table:
+    """One row per family and method; those with an ECR above the bound are red and say so. 80 columns hold it."""
+    partial = "" if results.complete else ", so far"
+    table = Table(title=f"{results.campaign_id} {results.state}{partial}", box=SIMPLE_HEAD, padding=0)
+    for name in ("family", "method"):
+        table.add_column(name, no_wrap=True)
+    for name in ("runs", "episodes", "failures", "distinct", "ECR", "95 %", ""):
+        table.add_column(name, no_wrap=True, justify="right")
+    for total in results.totals:
+        above = exceeds(total, max_ecr)
+        table.add_row(
+            total.family,
+            total.method,
+            str(total.runs),
+            str(total.episodes),
+            str(total.failures),
+            str(total.distinct_failures),
+            or_dash(total.ecr, ".2f"),
+            f"{or_dash(total.ecr_low, '.2f')}-{or_dash(total.ecr_high, '.2f')}",
+            "above" if above else "",
+            style="red" if above else None,
+        )
+    return table
+
+
+def _plain(answer: Answer) -> Any:
+    if isinstance(answer, BaseModel):
+        return answer.model_dump(mode="json")
+    return answer if isinstance(answer, Mapping) else [_plain(each) for each in answer]

@@ -1,0 +1,108 @@
+"""`risk-sac campaigns watch` and `results`: what a campaign found, and whether that is more than it may."""
+
+import argparse
+import itertools
+import math
+from pathlib import Path
+
+from risk_sac.cli.campaigns.gate import exceeds, rate, verdict
+from risk_sac.cli.campaigns.junit import junit
+from risk_sac.cli.campaigns.output import print_answer, results_table
+from risk_sac.cli.campaigns.progress import shown
+from risk_sac.cli.console import Commands, complain
+from risk_sac.client import Client, Results
+
+NAMED_FAILURES = 5  # of a run, in a JUnit report
+
+
+def add_watch(campaigns: Commands) -> None:
+    """Adds the command."""
+    parser = campaigns.add_parser("watch", help="follow a campaign to its end, then show its results")
+    parser.set_defaults(command=_watch)
+    parser.add_argument("id", metavar="ID", help="of the campaign")
+    add_watch_flags(parser)
+
+
+def add_results(campaigns: Commands) -> None:
+    """Adds the command."""
+    parser = campaigns.add_parser("results", help="what a campaign has found so far")
+    parser.set_defaults(command=_results)
+    parser.add_argument("id", metavar="ID", help="of the campaign")
+    _add_gate_flags(parser)
+
+
+def add_watch_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of `watch` to a command that goes on as it does."""
+    _add_gate_flags(parser)
+    parser.add_argument("--timeout", type=_seconds, metavar="S", help="give up after so many seconds")
+
+
+def prepare(options: argparse.Namespace) -> None:
+    """Makes the folder of the report, so that nothing is waited for in vain.
+
+    Raises:
+      OSError: it cannot be made.
+    """
+    if options.junit is not None:
+        options.junit.parent.mkdir(parents=True, exist_ok=True)
+
+
+def watch(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
+    """Follows a campaign to its end, shows what it found and judges it."""
+    try:
+        with shown() as show:
+            client.wait(campaign_id, show, timeout_s=options.timeout)
+    except KeyboardInterrupt:
+        complain(f"the campaign goes on; `risk-sac campaigns cancel {campaign_id}` stops it")
+        raise
+    return _conclude(client, campaign_id, options)
+
+
+def _watch(options: argparse.Namespace) -> int:
+    prepare(options)
+    with Client.from_environment(options.url) as client:
+        return watch(client, options.id, options)
+
+
+def _results(options: argparse.Namespace) -> int:
+    prepare(options)
+    with Client.from_environment(options.url) as client:
+        return _conclude(client, options.id, options)
+
+
+def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
+    results = client.results(campaign_id)
+    if options.junit is not None:
+        _report(client, results, options)
+    print_answer(options, results, results_table(results, options.max_ecr))
+    for run in results.runs:
+        if run.state == "failed":
+            complain(f"{run.id}: {run.reason}")
+    status, reason = verdict(results, options.max_ecr)
+    if reason:
+        complain(reason)
+    return status
+
+
+def _report(client: Client, results: Results, options: argparse.Namespace) -> None:
+    url = client.url_of(results.campaign_id)
+    failures = {
+        run.id: [each.id for each in itertools.islice(client.failures(results.campaign_id, run=run.id), NAMED_FAILURES)]
+        for run in results.runs
+        if exceeds(run.metrics, options.max_ecr)
+    }
+    junit(results, url, options.max_ecr, failures).write(str(options.junit), pretty=True)
+
+
+def _add_gate_flags(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--max-ecr", type=rate, metavar="X", help="exit with 1 where an ECR is above it")
+    parser.add_argument(
+        "--junit", type=Path, metavar="FILE.xml", help="report for CI: a suite per family, a case per run"
+    )
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not math.isfinite(seconds) or seconds <= 0:
+        raise argparse.ArgumentTypeError(f"got {text}; wanted a time above 0")
+    return seconds

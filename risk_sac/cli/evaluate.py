@@ -1,0 +1,58 @@
+"""`risk-sac evaluate`: methods compared over seeds without a server."""
+
+import argparse
+import os
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, get_args
+
+from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
+from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, complain, console, progress_bar
+from risk_sac.config import METHODS, FamilyName
+from risk_sac.spec_file import read_campaign
+
+if TYPE_CHECKING:
+    from risk_sac.processes import Job
+
+SEEDS = 5  # of a comparison that names none
+
+
+def add_evaluate(commands: Commands) -> None:
+    """Adds the command."""
+    evaluate = commands.add_parser(
+        "evaluate", help="compare methods over seeds, with tables and figures; the same command again goes on with it"
+    )
+    evaluate.set_defaults(command=_evaluate)
+    add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
+    evaluate.add_argument("--jobs", type=int, metavar="N", help="runs at a time (default: one per core)")
+    evaluate.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of runs, tables and figures")
+
+
+def _evaluate(options: argparse.Namespace) -> int:
+    defaults = {"families": get_args(FamilyName), "methods": tuple(METHODS), "seeds": range(SEEDS)}
+    defaults = {name: list(values) for name, values in defaults.items()}
+    spec = read_campaign(options.spec, campaign_flags(options, SEEDS), defaults)
+    from risk_sac.evaluate import evaluate  # here, because loading what checks the settings takes seconds
+
+    with progress_bar() as bar:
+        jobs = options.jobs if options.jobs is not None else os.cpu_count() or 1
+        evaluation = evaluate(spec, options.out, options.typed, jobs, partial(_drawn, Board(bar)))
+    for job in evaluation.failed:
+        complain(f"{job.name}: {job.reason}")
+    comparison = evaluation.comparison
+    runs = f"{len(comparison.runs)} of {len(comparison.runs) + len(comparison.missing)} runs"
+    console.print(f"Report of {runs}: {options.out}/table.md, table.json, table.csv, figures/", soft_wrap=True)
+    if evaluation.stopped:
+        console.print("Stopped. The same command again goes on from there.")
+        return INTERRUPTED
+    return FAILED if comparison.missing else OK
+
+
+def _drawn(board: Board, jobs: "Sequence[Job]") -> None:
+    done = {job.name: job.total if job.state == "finished" else job.done() for job in jobs}
+    finished = sum(job.state == "finished" for job in jobs)
+    failed = sum(job.state == "failed" for job in jobs)
+    found = f"{finished}/{len(jobs)} runs" + (f", {failed} failed" if failed else "")
+    at_work = {job.name: (done[job.name], job.total) for job in jobs if job.state == "running"}
+    board.show(sum(done.values()), sum(job.total for job in jobs), found, at_work)

@@ -1,0 +1,85 @@
+"""`risk-sac run`: one run without a server."""
+
+import argparse
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.table import Table
+
+from risk_sac.cli.console import INTERRUPTED, OK, Commands, console, or_dash, progress_bar
+from risk_sac.config import METHODS, RunSpec
+from risk_sac.results import Results
+from risk_sac.spec_file import read_spec
+from risk_sac.types import RunMetrics
+
+
+def add_run(commands: Commands) -> None:
+    """Adds the command."""
+    run = commands.add_parser("run", help="one run without a server; the same command again goes on with it")
+    run.set_defaults(command=_run)
+    run.add_argument("--family", metavar="low|mixed|dense", help="scenario family")
+    run.add_argument("--method", metavar="NAME", help=f"one of {', '.join(METHODS)} (default: risk-sac)")
+    run.add_argument("--episodes", type=int, metavar="N", help="search episodes (default: 300)")
+    run.add_argument("--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)")
+    run.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
+    run.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags go first")
+    run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
+
+
+def _run(options: argparse.Namespace) -> int:
+    names = ("family", "method", "seed", "episodes", "evaluation_episodes")
+    spec = read_spec(options.spec, {name: getattr(options, name) for name in names})
+    from risk_sac.local_run import run  # here, because loading torch takes seconds
+
+    total = spec.budget.episodes + spec.budget.evaluation_episodes
+    with progress_bar() as bar:
+        task = bar.add_task(f"{spec.family} {spec.method}", total=total, found="")
+
+        def advance(done: int, metrics: RunMetrics | None) -> None:
+            bar.update(task, completed=done, found=_found(metrics))
+
+        results = run(spec, options.out, advance)
+    if not results.finished:
+        done = (results.metrics.episodes if results.metrics else 0) + (
+            results.evaluation.episodes if results.evaluation else 0
+        )
+        console.print(f"Stopped after {done} of {total} episodes. The same command again goes on from there.")
+        return INTERRUPTED
+    console.print(_summary(spec, results))
+    console.print(f"Results: {options.out}/results.json")
+    return OK
+
+
+def _found(metrics: RunMetrics | None) -> str:
+    if metrics is None:
+        return ""
+    return (
+        f"failures {metrics.failures}  contacts {metrics.raw_collisions}  "
+        f"window ECR {metrics.window_ecr:.2f}  λ {metrics.dual_variable:.3f}"
+    )
+
+
+def _summary(spec: RunSpec, results: Results) -> Table:
+    """One column per phase."""
+    phases = {"search": results.metrics, "evaluation": results.evaluation}
+    columns = {name: _figures(metrics) for name, metrics in phases.items() if metrics is not None}
+    title = f"{spec.family} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}"
+    table = Table("", *columns, title=title)
+    for figure in next(iter(columns.values()), {}):
+        table.add_row(figure, *(column[figure] for column in columns.values()))
+    return table
+
+
+def _figures(metrics: RunMetrics) -> dict[str, str]:
+    values = asdict(metrics)
+    return {
+        "episodes": f"{metrics.episodes} ({metrics.rejected} rejected)",
+        "contacts": f"{metrics.raw_collisions}",
+        "valid failures": f"{metrics.failures}",
+        "ECR (95 %)": "{ecr:.3f} ({ecr_low:.3f} to {ecr_high:.3f})".format(**values),
+        "efficiency ES": f"{metrics.efficiency:.3f}",
+        "realism cost per step": f"{metrics.cost_rate:.3f}",
+        "dispersion OFD": or_dash(metrics.dispersion, ".3f"),
+        "distinct failures": f"{metrics.distinct_failures}",
+        "steps per distinct failure": or_dash(metrics.steps_per_distinct_failure, ".0f"),
+    }

@@ -1,0 +1,24 @@
+"""`risk-sac serve`: the service in the foreground."""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from risk_sac.cli.console import Commands
+
+
+def add_serve(commands: Commands) -> None:
+    """Adds the command."""
+    serve = commands.add_parser("serve", help="run the service in the foreground")
+    serve.set_defaults(command=_serve)
+    serve.add_argument("--host", metavar="ADDRESS", help="(default: 127.0.0.1)")
+    serve.add_argument("--port", type=int, help="(default: 8000)")
+    serve.add_argument("--data-dir", type=Path, metavar="DIR", help="(default: data)")
+
+
+def _serve(options: argparse.Namespace) -> int:
+    """Replaces this process: the method's code never imports the service."""
+    given = {"HOST": options.host, "PORT": options.port, "DATA_DIR": options.data_dir}
+    settings = {f"RISK_SAC_{name}": str(value) for name, value in given.items() if value is not None}
+    os.execve(sys.executable, [sys.executable, "-m", "service"], os.environ | settings)

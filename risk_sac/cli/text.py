@@ -1,0 +1,16 @@
+"""Text of others, before it meets a terminal or an XML file."""
+
+import re
+
+# What XML 1.0 forbids, the other control characters, which a terminal would obey, and unpaired surrogates.
+_UNPRINTABLE = re.compile("[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def printable(text: str) -> str:
+    """The text without control characters, tabs and line breaks apart."""
+    return _UNPRINTABLE.sub("", text)
+
+
+def on_one_line(text: str) -> str:
+    """The text without control characters, every run of white space a single space."""
+    return " ".join(printable(text).split())

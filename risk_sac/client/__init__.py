@@ -1,0 +1,56 @@
+"""A client of the service: HTTP alone, without the method and without the simulator.
+
+from risk_sac.client import Client
+
+with Client("http://127.0.0.1:8000") as client:
+    campaign = client.submit({"families": ["low"], "methods": ["risk-sac", "random"], "budget": {"episodes": 40}})
+    client.wait(campaign.id)
+    for total in client.results(campaign.id).totals:
+        ...
+"""
+
+from risk_sac.client.client import Client
+from risk_sac.client.errors import (
+    ClientError,
+    FieldProblem,
+    Overdue,
+    Refused,
+    StreamLost,
+    UnexpectedAnswer,
+    Unreachable,
+)
+from risk_sac.client.records import (
+    Campaign,
+    CampaignSummary,
+    Episode,
+    Event,
+    Failure,
+    Metrics,
+    Progress,
+    Results,
+    Run,
+    RunResult,
+    Total,
+)
+
+__all__ = [
+    "Campaign",
+    "CampaignSummary",
+    "Client",
+    "ClientError",
+    "Episode",
+    "Event",
+    "Failure",
+    "FieldProblem",
+    "Metrics",
+    "Overdue",
+    "Progress",
+    "Refused",
+    "Results",
+    "Run",
+    "RunResult",
+    "StreamLost",
+    "Total",
+    "UnexpectedAnswer",
+    "Unreachable",
+]

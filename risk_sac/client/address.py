@@ -1,0 +1,56 @@
+"""Where the service is and which key opens it, checked before anything is sent."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from pydantic import HttpUrl, TypeAdapter, ValidationError
+
+from risk_sac.errors import ConfigError
+
+DEFAULT_URL = "http://127.0.0.1:8000"
+
+_URL = TypeAdapter(HttpUrl)
+
+
+def checked_url(url: str) -> str:
+    """The URL of a service.
+
+    Raises:
+      ConfigError: it is none, or holds a password, which would show in messages and reports.
+    """
+    try:
+        parsed = _URL.validate_python(url)
+    except ValidationError as error:
+        message = f"got {url!r}; wanted http(s)://host[:port]: {error.errors()[0]['msg']}"
+        raise ConfigError(message, field="url") from error
+    if parsed.username or parsed.password:
+        raise ConfigError("the URL holds a user or a password; wanted the key in RISK_SAC_API_KEY", field="url")
+    return str(parsed).rstrip("/")
+
+
+def api_key(environment: Mapping[str, str]) -> str | None:
+    """The key in RISK_SAC_API_KEY, or in the file that RISK_SAC_API_KEY_FILE names; None where there is neither.
+
+    Raises:
+      ConfigError: the file cannot be read.
+    """
+    key, file = environment.get("RISK_SAC_API_KEY"), environment.get("RISK_SAC_API_KEY_FILE")
+    if key or not file:
+        return key or None
+    try:
+        return Path(file).read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise ConfigError(f"{file} cannot be read: {reason}", field="RISK_SAC_API_KEY_FILE") from error
+
+
+def checked_key(key: str) -> str:
+    """A key that a header can hold.
+
+    Raises:
+      ConfigError: it cannot; the message does not show it.
+    """
+    if not key or not all("!" <= character <= "~" for character in key):
+        message = "the key is empty or holds a space, a control character or a letter outside of ASCII"
+        raise ConfigError(f"{message}; wanted it as `risk-sac keys` printed it", field="API key")
+    return key

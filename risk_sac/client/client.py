@@ -1,0 +1,226 @@
+"""One RISK-SAC service, as Python methods."""
+
+import json
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from types import TracebackType
+from typing import Any, Literal, Self, TypeVar
+from urllib.parse import quote
+from uuid import uuid4
+
+from risk_sac.client.address import DEFAULT_URL, api_key, checked_key, checked_url
+from risk_sac.client.errors import StreamLost
+from risk_sac.client.follow import AWAY_S, SILENCE_S, Follower
+from risk_sac.client.records import (
+    Campaign,
+    CampaignSummary,
+    Episode,
+    Event,
+    Failure,
+    Page,
+    Record,
+    Results,
+)
+from risk_sac.client.transport import Transport
+from risk_sac.config import CampaignSpec
+
+TIMEOUT_S = 30.0  # of silence within one answer
+PATIENCE_S = 10.0  # with a service that does not answer
+PAGE = 100  # items that are asked for at a time
+RECONNECT_S = 1.0  # between two streams of events
+
+Query = dict[str, str | int | None]
+R = TypeVar("R", bound=Record)
+
+
+class Client:
+    """Posts campaigns, follows them and reads what they found; may be shared by threads.
+
+    Every method raises a `ClientError`: `Refused` with the service's reason, `Unreachable`, or `UnexpectedAnswer`. What
+    may pass by itself (a connection refused or broken, 429, 502, 503, 504) is asked again where that can do no harm.
+    """
+
+    def __init__(
+        self,
+        url: str = DEFAULT_URL,
+        key: str | None = None,
+        *,
+        timeout_s: float = TIMEOUT_S,
+        patience_s: float = PATIENCE_S,
+    ) -> None:
+        """Connects to nothing yet.
+
+        Args:
+          url: of the service, with the path it is mounted at, if any.
+          key: API key; none is needed where the service listens on loopback only.
+          timeout_s: how long the service may be silent within one answer.
+          patience_s: how long a call is tried again, unless the service was there before and follows a campaign.
+
+        Raises:
+          ConfigError: the URL or the key cannot be one.
+        """
+        self.url = checked_url(url)
+        self._transport = Transport(self.url, None if key is None else checked_key(key), timeout_s)
+        self._patience_s = patience_s
+
+    @classmethod
+    def from_environment(cls, url: str | None = None) -> Self:
+        """The client that RISK_SAC_URL and RISK_SAC_API_KEY, or the file RISK_SAC_API_KEY_FILE, describe.
+
+        Args:
+          url: instead of RISK_SAC_URL.
+
+        Raises:
+          ConfigError: one of them cannot be used.
+        """
+        return cls(url or os.environ.get("RISK_SAC_URL") or DEFAULT_URL, api_key(os.environ))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, type_: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the connections."""
+        self._transport.close()
+
+    def url_of(self, campaign_id: str) -> str:
+        """Where a campaign is."""
+        return f"{self.url}/{_path(campaign_id)}"
+
+    def submit(self, spec: CampaignSpec | Mapping[str, Any], idempotency_key: str | None = None) -> Campaign:
+        """Queues a campaign.
+
+        Args:
+          spec: what to search. Only what it was given is sent; the service fills in the rest.
+          idempotency_key: the same key with the same spec gives the same campaign, whenever and however often it is
+            posted; by default a new one, so that a lost answer makes no second campaign.
+        """
+        body = spec.model_dump_json(exclude_unset=True) if isinstance(spec, CampaignSpec) else json.dumps(spec)
+        key = uuid4().hex if idempotency_key is None else idempotency_key
+        headers = {"Content-Type": "application/json", "Idempotency-Key": key}
+        answer = self._transport.ask("POST", "v1/campaigns", patience_s=self._patience_s, headers=headers, body=body)
+        return Campaign.of(answer)
+
+    def campaigns(
+        self,
+        *,
+        state: str | None = None,
+        family: str | None = None,
+        method: str | None = None,
+        label: str | None = None,
+        page: int = PAGE,
+    ) -> Iterator[CampaignSummary]:
+        """Campaigns, newest first; read page by page as far as they are asked for."""
+        query: Query = {"state": state, "family": family, "method": method, "label": label, "limit": page}
+        return self._items(Page[CampaignSummary], "v1/campaigns", query)
+
+    def campaign(self, campaign_id: str) -> Campaign:
+        """State, progress and runs of a campaign."""
+        return self._get(Campaign, _path(campaign_id))
+
+    def results(self, campaign_id: str) -> Results:
+        """What a campaign has found so far."""
+        return self._get(Results, f"{_path(campaign_id)}/results")
+
+    def failures(
+        self, campaign_id: str, *, run: str | None = None, tier: Literal["valid", "raw"] = "valid", page: int = PAGE
+    ) -> Iterator[Episode]:
+        """Collisions of the ego in the order of their arrival; read page by page as far as they are asked for."""
+        return self._items(Page[Episode], f"{_path(campaign_id)}/failures", {"run": run, "tier": tier, "limit": page})
+
+    def failure(self, campaign_id: str, failure_id: str) -> Failure:
+        """One collision with its full time series."""
+        return self._get(Failure, f"{_path(campaign_id)}/failures/{_part(failure_id)}")
+
+    def table(self, campaign_id: str, format_: Literal["json", "md", "csv"] = "md") -> str:
+        """The methods compared over seeds by the runs that have finished."""
+        path, query = f"{_path(campaign_id)}/table", {"format": format_}
+        return self._transport.ask("GET", path, patience_s=self._patience_s, query=query).text
+
+    def cancel(self, campaign_id: str) -> Campaign:
+        """Stops a campaign, which takes a while, and keeps what it found; changes nothing once it has ended."""
+        path = f"{_path(campaign_id)}/cancel"
+        return Campaign.of(self._transport.ask("POST", path, patience_s=self._patience_s))
+
+    def delete(self, campaign_id: str) -> None:
+        """Deletes a campaign that has ended, with all its files."""
+        self._transport.ask("DELETE", _path(campaign_id), patience_s=self._patience_s, repeatable=False)
+
+    def events(self, campaign_id: str, last_event_id: str | None = None, *, away_s: float = AWAY_S) -> Iterator[Event]:
+        """Finished episodes, failures and changes of state, until the campaign has ended.
+
+        A stream that breaks is taken up after the last event that was heard.
+
+        Args:
+          campaign_id: whose events.
+          last_event_id: the `id` of an event, to go on after it.
+          away_s: how long the service may be away in between, as when it is restarted.
+        """
+        path, patience_s = f"{_path(campaign_id)}/events", self._patience_s
+        while True:
+            told = False
+            try:
+                for message in self._transport.listen(path, last_event_id, silence_s=SILENCE_S, patience_s=patience_s):
+                    event = Event(id=message.id, name=message.event, data=json.loads(message.data))
+                    told, last_event_id = True, event.id or last_event_id
+                    yield event
+                    if event.last:
+                        return
+                # A stream also ends when the service is being stopped, and what it left out is told by the next one.
+                if not told and self._get(Campaign, _path(campaign_id), away_s).ended:
+                    return
+            except StreamLost:
+                pass
+            patience_s = away_s
+            time.sleep(RECONNECT_S)
+
+    def follow(self, campaign_id: str, *, timeout_s: float | None = None, away_s: float = AWAY_S) -> Iterator[Campaign]:
+        """A campaign now, and whenever it has changed, until it has ended.
+
+        Args:
+          campaign_id: which one.
+          timeout_s: `Overdue` is raised after it.
+          away_s: how long the service may be away in between, as when it is restarted.
+        """
+        return Follower(
+            self._transport, _path(campaign_id), timeout_s=timeout_s, patience_s=self._patience_s, away_s=away_s
+        ).changes()
+
+    def wait(
+        self,
+        campaign_id: str,
+        on_change: Callable[[Campaign], None] | None = None,
+        *,
+        timeout_s: float | None = None,
+        away_s: float = AWAY_S,
+    ) -> Campaign:
+        """The campaign once it has ended; `on_change` sees it before, whenever it has changed."""
+        for campaign in self.follow(campaign_id, timeout_s=timeout_s, away_s=away_s):
+            if on_change is not None:
+                on_change(campaign)
+        return campaign
+
+    def _get(self, record: type[R], path: str, patience_s: float | None = None) -> R:
+        return record.of(self._transport.ask("GET", path, patience_s=patience_s or self._patience_s))
+
+    def _items(self, page: type[Page[R]], path: str, query: Query) -> Iterator[R]:
+        while True:
+            found = page.of(self._transport.ask("GET", path, patience_s=self._patience_s, query=query))
+            yield from found.items
+            if found.next is None:
+                return
+            query = query | {"cursor": found.next}
+
+
+def _path(campaign_id: str) -> str:
+    return f"v1/campaigns/{_part(campaign_id)}"
+
+
+def _part(id_: str) -> str:
+    """One part of a path: a slash or a question mark in the id leads nowhere else."""
+    return quote(id_, safe="", errors="replace")

@@ -1,0 +1,111 @@
+"""Why a call did not give what was asked for.
+
+RiskSacError
+└── ClientError
+    ├── Unreachable        nothing answered, or the connection broke
+    │   └── StreamLost     the stream of events broke after it had begun
+    ├── Refused            the service answered with a problem (RFC 9457)
+    ├── UnexpectedAnswer   something answered that is no RISK-SAC service, or another version of it
+    └── Overdue            the campaign did not end within the time that the caller gave it
+"""
+
+import math
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+
+import httpx
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from risk_sac.errors import RiskSacError
+
+
+class ClientError(RiskSacError):
+    """Root of the client's errors."""
+
+    passing: bool = False  # asking again may help, and can do no harm
+    retry_after_s: float | None = None  # when the service says that it may
+
+
+class Unreachable(ClientError):
+    """Nothing answered, or the connection broke before the answer was complete."""
+
+    def __init__(self, url: str, error: httpx.RequestError, *, passing: bool) -> None:
+        super().__init__(f"{url} does not answer: {str(error) or type(error).__name__}")
+        self.passing = passing
+
+
+class StreamLost(Unreachable):
+    """The stream of events broke after it had begun; it goes on after the last event that was heard."""
+
+
+class FieldProblem(BaseModel):
+    """What is wrong with one field."""
+
+    model_config = ConfigDict(frozen=True)
+
+    field: str  # dotted path as it was written, such as `budget.episodes`
+    message: str
+    got: str = ""
+    wanted: str = ""
+
+
+class _Problem(BaseModel):
+    detail: str
+    reason: str = ""
+    errors: tuple[FieldProblem, ...] = ()
+
+
+class Refused(ClientError):
+    """The service answered with a problem."""
+
+    def __init__(self, message: str, *, status: int, reason: str, detail: str, fields: Sequence[FieldProblem]) -> None:
+        super().__init__(message)
+        self.status = status  # of HTTP
+        self.reason = reason  # one word that is stable for each cause, such as `unknown_id`; empty if a proxy answered
+        self.detail = detail  # what was got and wanted, for people
+        self.fields = tuple(fields)  # to blame; may be none
+
+    @classmethod
+    def by(cls, response: httpx.Response, *, passing: bool) -> "Refused":
+        """The problem in an answer that has been read; a proxy's own page has nothing but its status."""
+        try:
+            problem = _Problem.model_validate_json(response.content)
+        except ValidationError:
+            problem = _Problem(detail=response.reason_phrase)
+        message = f"{response.url} answered {response.status_code}: {problem.detail}"
+        error = cls(
+            message, status=response.status_code, reason=problem.reason, detail=problem.detail, fields=problem.errors
+        )
+        error.passing = passing
+        error.retry_after_s = retry_after_s(response)
+        return error
+
+
+class UnexpectedAnswer(ClientError):
+    """The answer is not what this version of the service says."""
+
+    def __init__(self, response: httpx.Response, wanted: str) -> None:
+        type_ = response.headers.get("content-type", "no content-type")
+        super().__init__(
+            f"{response.url} answered {response.status_code} with {type_}; wanted {wanted}: "
+            "is it a RISK-SAC service, and not much older or newer than this client?"
+        )
+
+
+class Overdue(ClientError):
+    """The campaign did not end within the time that the caller gave it; it goes on."""
+
+
+def retry_after_s(response: httpx.Response) -> float | None:
+    """Seconds until the service wants to be asked again, from a number or a date; None where it does not say."""
+    value = response.headers.get("retry-after", "")
+    try:
+        seconds = float(value)
+    except ValueError:
+        try:
+            at = parsedate_to_datetime(value)
+        except ValueError:
+            return None
+        seconds = (at.replace(tzinfo=at.tzinfo or UTC) - datetime.now(UTC)).total_seconds()
+    return max(0.0, seconds) if math.isfinite(seconds) else None

@@ -1,0 +1,145 @@
+"""HTTP with patience: what may pass is asked again, for a bounded time, and only where that can do no harm."""
+
+import logging
+from collections.abc import Generator, Mapping
+from contextlib import closing
+
+import httpx
+from httpx_sse import EventSource, ServerSentEvent, SSEError
+from tenacity import RetryCallState, Retrying, retry_if_exception, stop_before_delay, wait_exponential_jitter
+
+from risk_sac import __version__
+from risk_sac.client.errors import ClientError, Refused, StreamLost, UnexpectedAnswer, Unreachable
+from risk_sac.errors import ConfigError
+
+logger = logging.getLogger(__name__)
+
+LONGEST_PAUSE_S = 2.0  # between two attempts, unless the service asks for more
+NOT_BEGUN = frozenset({429, 503})  # the service has done nothing, whatever was asked
+PASSING = NOT_BEGUN | {502, 504}
+NEVER_SENT = (httpx.ConnectError, httpx.ConnectTimeout)
+
+_backoff = wait_exponential_jitter(multiplier=0.1, max=LONGEST_PAUSE_S, jitter=0.1)
+
+
+class Transport:
+    """One service, under one key."""
+
+    def __init__(self, url: str, key: str | None, timeout_s: float) -> None:
+        headers = {"User-Agent": f"risk-sac/{__version__}"}
+        if key is not None:
+            headers["Authorization"] = f"Bearer {key}"
+        self.url = url
+        self._http = httpx.Client(base_url=url, headers=headers, timeout=timeout_s)
+        self._timeout_s = timeout_s
+
+    def close(self) -> None:
+        """Closes the connections."""
+        self._http.close()
+
+    def ask(
+        self,
+        method: str,
+        path: str,
+        *,
+        patience_s: float,
+        query: Mapping[str, str | int | None] | None = None,
+        headers: Mapping[str, str] | None = None,
+        body: str | None = None,
+        repeatable: bool = True,
+    ) -> httpx.Response:
+        """The answer to a request, once there is one: what was asked for, or 304.
+
+        Args:
+          method: of HTTP.
+          path: below the service's URL.
+          patience_s: after this time no further attempt begins.
+          query: None stands for what is not given.
+          headers: of the request.
+          body: JSON.
+          repeatable: whether to have it done twice does no harm.
+
+        Raises:
+          ClientError: the last attempt's.
+          ConfigError: HTTP has no way to say this.
+        """
+        given = {name: value for name, value in (query or {}).items() if value is not None}
+        try:
+            request = self._http.build_request(method, path, params=given, headers=headers, content=body)
+        except UnicodeEncodeError as error:
+            raise ConfigError(f"got {error.object!r}; wanted text in {error.encoding}") from error
+        return self._answer(request, patience_s, repeatable=repeatable)
+
+    def listen(
+        self, path: str, last_event_id: str | None, *, silence_s: float, patience_s: float
+    ) -> Generator[ServerSentEvent, None, None]:
+        """Events as they come, until the service ends the stream.
+
+        Args:
+          path: of the stream.
+          last_event_id: where an earlier stream stopped.
+          silence_s: a stream without even a sign of life for so long is lost.
+          patience_s: within this time it has to begin.
+
+        Raises:
+          StreamLost: the connection broke; what was heard so far holds.
+          ClientError: there is no such stream.
+        """
+        headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
+        if last_event_id is not None:
+            headers["Last-Event-ID"] = last_event_id
+        timeout = httpx.Timeout(self._timeout_s, read=silence_s)
+        request = self._http.build_request("GET", path, headers=headers, timeout=timeout)
+        with closing(self._answer(request, patience_s, stream=True)) as response:
+            if response.status_code == httpx.codes.NO_CONTENT:
+                return
+            try:
+                yield from (message for message in EventSource(response).iter_sse() if message.data)
+            except SSEError as error:
+                raise UnexpectedAnswer(response, "a stream of events") from error
+            except httpx.RequestError as error:
+                raise StreamLost(self.url, error, passing=True) from error
+
+    def _answer(
+        self, request: httpx.Request, patience_s: float, *, repeatable: bool = True, stream: bool = False
+    ) -> httpx.Response:
+        attempts = Retrying(
+            retry=retry_if_exception(lambda error: isinstance(error, ClientError) and error.passing),
+            wait=_pause_s,
+            stop=stop_before_delay(patience_s),
+            before_sleep=_say,
+            reraise=True,
+        )
+        return attempts(self._attempt, request, repeatable, stream)
+
+    def _attempt(self, request: httpx.Request, repeatable: bool, stream: bool) -> httpx.Response:
+        try:
+            response = self._http.send(request, stream=stream)
+            if not response.is_success:
+                response.read()
+        except httpx.LocalProtocolError as error:
+            raise ConfigError(f"HTTP cannot send this: {error}") from error
+        except httpx.RequestError as error:
+            raise Unreachable(self.url, error, passing=repeatable or isinstance(error, NEVER_SENT)) from error
+        if response.is_success or response.status_code == httpx.codes.NOT_MODIFIED:
+            return response
+        if response.is_error:
+            raise Refused.by(response, passing=response.status_code in (PASSING if repeatable else NOT_BEGUN))
+        raise UnexpectedAnswer(response, "an answer")
+
+
+def _pause_s(state: RetryCallState) -> float:
+    """As long as the service asks for, if that is longer than what the number of attempts asks for."""
+    return max(_backoff(state), _error(state).retry_after_s or 0.0)
+
+
+def _say(state: RetryCallState) -> None:
+    if state.attempt_number == 2:  # what the second attempt mends is not worth a word
+        logger.warning("%s; trying again", _error(state))
+
+
+def _error(state: RetryCallState) -> ClientError:
+    assert state.outcome is not None
+    error = state.outcome.exception()
+    assert isinstance(error, ClientError)
+    return error

@@ -1,0 +1,42 @@
+"""The API's description, as OpenAPI."""
+
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.openapi.utils import get_openapi
+from pydantic import TypeAdapter
+
+from service.api.body import body_schemas
+from service.api.guards.description import describe_guards
+from service.schemas import StateChange
+
+DESCRIPTION = """Finds scenarios in which an automated driving system fails.
+
+Post a campaign, follow it, read what it found. All errors are problem details (RFC 9457) that name the field, with a
+`reason` that does not change when messages do."""
+
+
+def openapi(app: FastAPI) -> dict[str, Any]:
+    """The app's OpenAPI document, with every error response declared as a problem."""
+    if app.openapi_schema is None:
+        app.openapi_schema = _document(app)
+    return app.openapi_schema
+
+
+def _document(app: FastAPI) -> dict[str, Any]:
+    document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
+    document["components"]["schemas"] |= body_schemas() | _event_schemas()
+    for operations in document["paths"].values():
+        for operation in operations.values():
+            for status, response in operation["responses"].items():
+                if int(status) >= 400:
+                    response["content"] = {"application/problem+json": response["content"]["application/json"]}
+    describe_guards(document)
+    return document
+
+
+def _event_schemas() -> dict[str, Any]:
+    """What no response declares, because it travels within a stream."""
+    schema = TypeAdapter(StateChange).json_schema(ref_template="#/components/schemas/{model}")
+    schema.pop("$defs")
+    return {"StateChange": schema}

@@ -1,0 +1,120 @@
+"""Events as text: rendered once however many follow a campaign, and followed without asking the database in vain."""
+
+import asyncio
+import base64
+import binascii
+import logging
+import re
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+
+import anyio
+from async_lru import alru_cache
+from sse_starlette import ServerSentEvent
+from starlette.concurrency import run_in_threadpool
+
+from risk_sac.types import Outcome
+from service.api.live import Live
+from service.api.views import change_body, episode_body
+from service.errors import NotFoundError, StorageError
+from service.feed import Happening, Position, read_batch
+from service.records import Episode
+from service.store import Store
+
+logger = logging.getLogger(__name__)
+
+TICK_S = 0.5  # between two looks at a campaign's revision
+RETRY_MS = 1000  # after which a client whose connection broke comes back
+KEPT = 64  # batches
+LARGEST = 2**63 - 1  # of a database key
+_NUMBERS = re.compile(r"(\d{1,19})\.(\d{1,19})", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """A batch of happenings as it is sent."""
+
+    data: bytes
+    position: Position
+    more: bool
+    ended: bool
+
+
+class Streams:
+    """All who follow campaigns. They look at the same moments, so that they ask for the same batches."""
+
+    def __init__(self, store: Store, live: Live) -> None:
+        self._store = store
+        self._live = live
+        self._chunks = alru_cache(maxsize=KEPT)(self._chunk)
+
+    async def follow(
+        self, campaign_id: str, position: Position, stopping: anyio.Event, *, ended: bool
+    ) -> AsyncIterator[bytes]:
+        """What happens after a position, until the campaign's final state, its deletion, or the server's end.
+
+        No more than one batch is held for a client that reads slowly.
+
+        Args:
+          campaign_id: of the campaign.
+          position: what has been told.
+          stopping: set when the server stops.
+          ended: whether the campaign had already ended; its final state itself may be older than the record of changes.
+        """
+        yield ServerSentEvent(retry=RETRY_MS, sep="\n").encode()
+        try:
+            while not stopping.is_set():
+                revision = await self._live.revision(campaign_id, None)
+                chunk = await self._chunks(campaign_id, position, revision)
+                if chunk.ended:
+                    self._live.expire(campaign_id)  # who is told that it has ended will ask for its results
+                if chunk.data:
+                    yield chunk.data
+                if chunk.ended or (ended and not chunk.more):
+                    return
+                position = chunk.position
+                if not chunk.more:
+                    await self._change(campaign_id, revision, stopping)
+        except NotFoundError:
+            return
+        except StorageError as error:
+            logger.warning("a stream of events ends: %s", error, extra={"campaign": campaign_id})
+
+    async def _change(self, campaign_id: str, revision: str, stopping: anyio.Event) -> None:
+        loop = asyncio.get_running_loop()
+        while not stopping.is_set() and self._store.known_revision(campaign_id) == revision:
+            await asyncio.sleep(TICK_S - loop.time() % TICK_S)
+
+    async def _chunk(self, campaign_id: str, position: Position, revision: str) -> Chunk:
+        return await run_in_threadpool(self._render, campaign_id, position)
+
+    def _render(self, campaign_id: str, position: Position) -> Chunk:
+        batch = read_batch(self._store, campaign_id, position)
+        data = b"".join(_event(happening) for happening in batch.happenings)
+        return Chunk(data, batch.position, batch.more, batch.ended)
+
+
+def encode_position(position: Position) -> str:
+    """An opaque id for an event."""
+    return base64.urlsafe_b64encode(f"{position.episode}.{position.change}".encode()).decode()
+
+
+def decode_position(event_id: str) -> Position | None:
+    """The position that an id was made of; None if it never was."""
+    try:
+        text = base64.b64decode(event_id.encode("ascii"), altchars=b"-_", validate=True).decode("ascii")
+    except (UnicodeError, binascii.Error):
+        return None
+    match = _NUMBERS.fullmatch(text)
+    position = match and Position(int(match[1]), int(match[2]))
+    return position if position and max(position.episode, position.change) <= LARGEST else None
+
+
+def _event(happening: Happening) -> bytes:
+    what = happening.what
+    if isinstance(what, Episode):
+        name = "failure" if what.record.outcome is Outcome.FAILURE else "episode"
+        data = episode_body(what).model_dump_json()
+    else:
+        name, data = "state", change_body(what).model_dump_json()
+    return ServerSentEvent(data, event=name, id=encode_position(happening.position), sep="\n").encode()

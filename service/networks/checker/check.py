@@ -1,0 +1,73 @@
+"""From an upload to a report: read, write anew, load."""
+
+import hashlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from service.networks.checker import simulator
+from service.networks.checker.archive import documents
+from service.networks.checker.bounds import bind_simulator
+from service.networks.checker.document import Count, Observer, read, root_of
+from service.networks.checker.roads import Demand, Net
+from service.networks.errors import UploadError
+from service.networks.packaging import Packaging
+from service.networks.report import CheckedFile, Kind, Report, Summary
+
+
+def check(upload: Path, packaging: Packaging) -> Report:
+    """Read the upload, write anew what it says, and let the simulator load that.
+
+    Raises:
+      UploadError: it breaks a rule, or the simulator refuses it.
+    """
+    files, summary = rewrite(documents(upload, packaging))
+    bind_simulator()
+    names = {kind: [file.name for file in files if file.kind is kind] for kind in Kind}
+    warnings = simulator.load(names[Kind.NET][0], names[Kind.ADDITIONAL], names[Kind.ROUTES])
+    return Report(summary=summary, files=tuple(files), warnings=tuple(warnings))
+
+
+def rewrite(found: Sequence[bytes]) -> tuple[list[CheckedFile], Summary]:
+    """Write each document anew in the current folder, under a name of ours; the net is the first.
+
+    Raises:
+      UploadError: a document breaks a rule; the message says which and where.
+    """
+    kinds = [_kind(number, data) for number, data in enumerate(found)]
+    if kinds.count(Kind.NET) != 1:
+        raise UploadError(f"there are {kinds.count(Kind.NET)} nets in the upload; wanted one")
+    elements, net = Count(), Net()
+    first = kinds.index(Kind.NET)
+    files = [_rewrite_one(first, Kind.NET, found[first], elements, net)]
+    summary = net.finish()
+    demand = Demand(net)
+    for number, (kind, data) in enumerate(zip(kinds, found, strict=True)):
+        if number != first:
+            files.append(_rewrite_one(number, kind, data, elements, demand))
+    return files, summary
+
+
+def _kind(number: int, data: bytes) -> Kind:
+    with _naming(number, "unknown"):
+        root = root_of(data)
+        if root not in list(Kind):
+            raise UploadError(f"its root is <{root[:80]}>; wanted <net>, <routes> or <additional>")
+        return Kind(root)
+
+
+def _rewrite_one(number: int, kind: Kind, data: bytes, elements: Count, observer: Observer) -> CheckedFile:
+    with _naming(number, kind):
+        document = read(data, kind, elements, observer)
+    text = document.text.encode()
+    name = f"{kind}.xml" if kind is Kind.NET else f"{kind}-{number}.xml"
+    Path(name).write_bytes(text)
+    return CheckedFile(name, kind, len(text), document.elements, hashlib.sha256(text).hexdigest())
+
+
+@contextmanager
+def _naming(number: int, kind: str) -> Iterator[None]:
+    try:
+        yield
+    except UploadError as error:
+        raise UploadError(f"file {number} ({kind}): {error}") from error

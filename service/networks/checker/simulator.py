@@ -1,0 +1,53 @@
+"""Whether libsumo can load a network."""
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from service.networks.errors import UploadError
+from service.networks.limits import MAX_VEHICLES, STEP_S, STEPS
+
+LOG = Path("log")  # where the file descriptors 1 and 2 lead to
+_MOST_WARNINGS = 20
+_LONGEST = 300
+_OPTIONS = (
+    "--xml-validation never --xml-validation.net never --xml-validation.routes never --route-steps 0 "
+    f"--step-length {STEP_S} --max-num-vehicles {MAX_VEHICLES} --no-step-log --duration-log.disable"
+).split()
+
+
+def load(net: str, additionals: Sequence[str], routes: Sequence[str]) -> list[str]:
+    """Load a network and run a few steps, with no output on and no option of the user's.
+
+    Args:
+      net: file of the net; all files lie in the current folder, under names of ours.
+      additionals: additional files.
+      routes: route files.
+
+    Returns:
+      What SUMO warned of.
+
+    Raises:
+      UploadError: SUMO refuses; the message is SUMO's.
+    """
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # libsumo imports numpy, which reserves memory for each thread
+    import libsumo  # here, so that most uploads are refused without it
+
+    command = ["sumo", "-n", net, *_OPTIONS]
+    command += ["-a", ",".join(additionals)] if additionals else []
+    command += ["-r", ",".join(routes)] if routes else []
+    try:
+        libsumo.start(command)
+        for _ in range(STEPS):
+            libsumo.simulationStep()
+    except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+        raise UploadError(f"the simulator cannot load it: {'; '.join(said('Error')[:5]) or error}") from error
+    return said("Warning")[:_MOST_WARNINGS]
+
+
+def said(severity: str, log: Path = LOG) -> list[str]:
+    """SUMO's messages of a severity, `Error` or `Warning`, so far."""
+    text = log.read_bytes().decode("utf-8", "replace")
+    lines = re.findall(rf"^{severity}: (.*)$", text, re.MULTILINE)
+    return ["".join(filter(str.isprintable, line))[:_LONGEST] for line in lines]

@@ -1,0 +1,68 @@
+"""Bodies of the responses about networks; what is stored is the same body."""
+
+from datetime import datetime
+
+from pydantic import BaseModel, ConfigDict
+
+from service.networks.report import Kind
+from service.schemas import Body
+
+
+class NetworkFile(Body):
+    """One of the files of a network, as the service has written it anew."""
+
+    name: str
+    """Given by the service; the names in an archive are not kept."""
+    kind: Kind
+    """Told by its root element."""
+    bytes: int
+    elements: int
+    sha256: str
+
+
+class BoundingBox(Body):
+    """What all lanes lie in, m in the net's own coordinates."""
+
+    west: float
+    south: float
+    east: float
+    north: float
+
+
+class Network(Body):
+    """A road network that was checked, loaded by the simulator once, and kept."""
+
+    id: str
+    label: str
+    created_at: datetime
+    sha256: str
+    """Of the body that was sent."""
+    bytes: int
+    """Of the body that was sent."""
+    files: list[NetworkFile]
+    edges: int
+    """Roads from junction to junction, one per direction; those inside junctions are not counted."""
+    junctions: int
+    lanes: int
+    """Of those edges, sidewalks included."""
+    length_m: float
+    """Of those edges, each counted once however many lanes it has."""
+    bounding_box: BoundingBox
+    warnings: list[str]
+    """What the simulator remarked when it loaded the network; at most 20."""
+
+
+class NetworkPage(Body):
+    """Networks, newest first."""
+
+    items: list[Network]
+    next: str | None
+    """Pass as `cursor` to continue; null at the end."""
+
+
+class Record(BaseModel):
+    """A network as it is stored; closed, so that a damaged seal is not taken for one more field."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    network: Network

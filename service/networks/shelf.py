@@ -1,0 +1,235 @@
+"""Uploaded networks on disk: `PROJECT/ID/` with the files of a network and its record.
+
+Whatever is there is whole: an upload is checked in a folder beside them and moved into place at the end. No name
+comes from a user, and what was sent is not kept, only what the checker wrote anew.
+"""
+
+import logging
+import re
+import secrets
+import shutil
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from risk_sac.durable import sync_folder
+from risk_sac.errors import DamagedError
+from risk_sac.seal import seal, unseal
+from service.errors import ConflictError, NotFoundError, StorageError
+from service.networks.errors import BusyError
+from service.networks.incoming import Incoming
+from service.networks.packaging import Packaging
+from service.networks.report import Report
+from service.networks.sandbox import CHECKER, inspect
+from service.networks.schemas import BoundingBox, Network, NetworkFile, Record
+from service.records import Page
+
+logger = logging.getLogger(__name__)
+
+UPLOADS_AT_ONCE = 4  # being received or checked
+MOST = 200  # networks of one project
+RETRY_AFTER_S = 5
+INCOMING = ".incoming"  # no project's name starts with a dot
+RECORD = "network.json"
+_ID = re.compile("n[0-9a-f]{16}")
+_RANDOM_BITS = 19  # with the time in ms, an id has 63 bits: enough for a cursor, until the year 2527
+
+
+class Shelf:
+    """Adds, lists, finds and deletes networks; used by many threads."""
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        most: int = MOST,
+        at_once: int = UPLOADS_AT_ONCE,
+        checker: Sequence[str] = CHECKER,
+    ) -> None:
+        """Remove what an earlier server left unfinished.
+
+        Args:
+          folder: of all projects' networks; made when the first one comes.
+          most: networks that one project may have.
+          at_once: uploads that may be received or checked at the same time.
+          checker: command that checks an upload.
+        """
+        self._folder = folder
+        self._most = most
+        self._checker = checker
+        self._at_once = at_once
+        self._slots = threading.BoundedSemaphore(at_once)
+        self._adding = threading.Lock()
+        shutil.rmtree(folder / INCOMING, ignore_errors=True)
+
+    @contextmanager
+    def receive(self) -> Iterator[Incoming]:
+        """A place for one upload, which is removed again unless `add` made a network of it.
+
+        Raises:
+          BusyError: there are too many at once.
+          StorageError: the disk refuses.
+        """
+        if not self._slots.acquire(blocking=False):
+            raise BusyError(
+                f"{self._at_once} uploads are at work; wanted fewer: try again in {RETRY_AFTER_S} s", RETRY_AFTER_S
+            )
+        try:
+            with _refusals("an upload cannot be received"):
+                (self._folder / INCOMING).mkdir(parents=True, exist_ok=True)
+                incoming = Incoming(Path(tempfile.mkdtemp(dir=self._folder / INCOMING)))
+            try:
+                yield incoming
+            finally:
+                incoming.discard()
+        finally:
+            self._slots.release()
+
+    def add(self, incoming: Incoming, packaging: Packaging, project: str, label: str) -> Network:
+        """Check an upload that has arrived, and keep it.
+
+        Raises:
+          UploadError: it is refused.
+          ConflictError: the project has as many networks as it may.
+          StorageError: the disk refuses.
+        """
+        self._check_room(project)
+        with _refusals("a network cannot be stored"):
+            sha256 = incoming.complete(packaging)
+            report = inspect(incoming.folder, packaging, self._checker)
+            network = _network(report, label, sha256, incoming.bytes)
+            incoming.strip()
+            (incoming.folder / RECORD).write_bytes(seal(Record(network=network).model_dump_json(indent=2).encode()))
+            _sync(incoming.folder)
+            with self._adding:
+                self._check_room(project)
+                home = self._folder / project
+                home.mkdir(exist_ok=True)
+                incoming.folder.rename(home / network.id)
+                sync_folder(home)
+                sync_folder(self._folder)
+        logger.info("network %s of project %s: %d edges", network.id, project, network.edges)
+        return network
+
+    def list(self, limit: int, before: int | None, project: str | None) -> Page[Network]:
+        """Networks, newest first; a damaged one is left out and logged.
+
+        Args:
+          limit: most items.
+          before: the `last` of an earlier page.
+          project: whose; None: everybody's.
+
+        Raises:
+          StorageError: the disk refuses.
+        """
+        with _refusals("the networks cannot be read"):
+            found = sorted((_number(path), path) for path in self._paths(project))
+            older = [(number, path) for number, path in reversed(found) if before is None or number < before]
+            page = older[:limit]
+            items = [network for _, path in page if (network := _readable(path)) is not None]
+        return Page(items=tuple(items), last=page[-1][0] if len(older) > limit else None)
+
+    def get(self, network_id: str, project: str | None) -> Network:
+        """One network.
+
+        Raises:
+          NotFoundError: there is none with this id, or it is another project's.
+          StorageError: its record is damaged or cannot be read.
+        """
+        path = self._path(network_id, project)
+        with _refusals("a network cannot be read"):
+            return _read(path)
+
+    def delete(self, network_id: str, project: str | None) -> None:
+        """Remove a network; at once for those who look, then from the disk.
+
+        Raises:
+          NotFoundError: there is none with this id, or it is another project's.
+          StorageError: the disk refuses.
+        """
+        path = self._path(network_id, project)
+        grave = self._folder / INCOMING / f"deleted-{network_id}-{secrets.token_hex(4)}"
+        with _refusals("a network cannot be deleted"):
+            grave.parent.mkdir(exist_ok=True)
+            path.rename(grave)
+            sync_folder(path.parent)
+            shutil.rmtree(grave)
+
+    def _paths(self, project: str | None) -> Iterator[Path]:
+        homes = self._folder.glob("[!.]*") if project is None else [self._folder / project]
+        return (path for home in homes if home.is_dir() for path in home.iterdir() if _ID.fullmatch(path.name))
+
+    def _path(self, network_id: str, project: str | None) -> Path:
+        with _refusals("the networks cannot be read"):
+            for path in self._paths(project):
+                if path.name == network_id:
+                    return path
+        raise NotFoundError(f"there is no network {network_id!r}", field="network_id", got=network_id)
+
+    def _check_room(self, project: str) -> None:
+        count = sum(1 for _ in self._paths(project))
+        if count >= self._most:
+            raise ConflictError(
+                f"project {project!r} has {count} networks; wanted fewer than {self._most}: delete one first",
+                reason="too_many_networks",
+            )
+
+
+def _network(report: Report, label: str, sha256: str, size: int) -> Network:
+    now = time.time()
+    number = int(now * 1000) << _RANDOM_BITS | secrets.randbits(_RANDOM_BITS)
+    summary = report.summary
+    assert summary is not None
+    return Network(
+        id=f"n{number:016x}",
+        label=label,
+        created_at=datetime.fromtimestamp(now, UTC),
+        sha256=sha256,
+        bytes=size,
+        files=[NetworkFile.model_validate(file) for file in report.files],
+        edges=summary.edges,
+        junctions=summary.junctions,
+        lanes=summary.lanes,
+        length_m=summary.length_m,
+        bounding_box=BoundingBox(**dict(zip(BoundingBox.model_fields, summary.bounding_box, strict=True))),
+        warnings=list(report.warnings),
+    )
+
+
+def _number(path: Path) -> int:
+    return int(path.name[1:], 16)
+
+
+def _read(folder: Path) -> Network:
+    try:
+        return Record.model_validate_json(unseal((folder / RECORD).read_bytes())).network
+    except (DamagedError, ValidationError) as error:
+        raise StorageError(f"network {folder.name} is damaged: {error}") from error
+
+
+def _readable(folder: Path) -> Network | None:
+    try:
+        return _read(folder)
+    except (StorageError, FileNotFoundError) as error:  # not there any more: deleted meanwhile
+        logger.warning("%s", error)
+        return None
+
+
+def _sync(folder: Path) -> None:
+    for path in folder.iterdir():
+        sync_folder(path)  # a file's descriptor, too, writes down the file
+    sync_folder(folder)
+
+
+@contextmanager
+def _refusals(what: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise StorageError(f"{what} ({error.strerror})") from error

@@ -1,0 +1,41 @@
+"""Bodies of the responses."""
+
+from service.schemas.base import Body, Real
+from service.schemas.campaigns import Campaign, CampaignPage, CampaignSummary, Metrics, Progress, Run
+from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter
+from service.schemas.episodes import Collision, Episode, EpisodePage
+from service.schemas.events import StateChange
+from service.schemas.failures import Failure, Series
+from service.schemas.health import Health, Ready
+from service.schemas.problems import FieldProblem, Problem, Reason
+from service.schemas.results import Results, RunResult, Total
+
+__all__ = [
+    "Body",
+    "Campaign",
+    "CampaignPage",
+    "CampaignSummary",
+    "Collision",
+    "Episode",
+    "EpisodePage",
+    "Failure",
+    "Families",
+    "Family",
+    "FieldProblem",
+    "Health",
+    "Methods",
+    "Metrics",
+    "NamedMethod",
+    "Problem",
+    "Progress",
+    "Ready",
+    "Real",
+    "Reason",
+    "Results",
+    "Run",
+    "RunResult",
+    "SceneParameter",
+    "Series",
+    "StateChange",
+    "Total",
+]

@@ -1,0 +1,67 @@
+"""One contact with its full time series."""
+
+from service.schemas.base import Body, Real
+from service.schemas.episodes import Episode
+
+Reals = list[Real]
+RealRows = list[list[Real]]
+
+
+class Series(Body):
+    """Time series of an episode: `T` steps, `n` actors (the ego first), `M` requirements, `a` actions.
+
+    Entries of an actor that is absent are null.
+    """
+
+    time_s: Reals
+    """T."""
+    ids: list[str]
+    """n."""
+    kind: list[str]
+    """n; vehicle | pedestrian."""
+    role: list[str]
+    """n; ego | adversary | background."""
+    length_m: Reals
+    """n."""
+    width_m: Reals
+    """n."""
+    x_m: RealRows
+    """T x n, centre of the body."""
+    y_m: RealRows
+    """T x n."""
+    heading_rad: RealRows
+    """T x n; 0 = east, counter-clockwise."""
+    speed_mps: RealRows
+    """T x n."""
+    lateral_mps: RealRows
+    """T x n; positive to the left."""
+    accel_mps2: RealRows
+    """T x n."""
+    visible: list[list[bool | None]]
+    """T x n; to the ego's sensor. Null for the ego itself, here and in what follows."""
+    distance_m: RealRows
+    """T x n, to the ego."""
+    ttc_s: RealRows
+    """T x n; null where not on a collision course."""
+    rss_longitudinal_m: RealRows
+    """T x n, margin; negative where violated."""
+    rss_lateral_m: RealRows
+    """T x n, margin; negative where violated."""
+    requirements: list[str]
+    """M."""
+    robustness: RealRows
+    """T x M, scaled; negative where violated."""
+    soft_min: Reals
+    """T."""
+    actions: RealRows
+    """T x a, of the adversaries, normalised: what led to the step."""
+    signal: list[str]
+    """T; colour ahead of the ego: none | green | yellow | red."""
+
+
+class Failure(Episode):
+    """A contact of the ego with its full time series."""
+
+    series: Series | None
+    """Null when the record is lost; `series_problem` says why."""
+    series_problem: str | None

@@ -1,0 +1,87 @@
+"""What the service has done and does now, for its monitoring: sums over runs, never over episodes."""
+
+from dataclasses import dataclass
+
+from pydantic_core import from_json
+from sqlalchemy import Engine, func, select
+
+from service.campaigns import State
+from service.database import storage_errors
+from service.tables import CampaignRow, RunRow
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """All runs of one family and method in one state."""
+
+    family: str
+    method: str
+    state: State
+    runs: int
+    episodes: int
+    failures: int
+
+
+@dataclass(frozen=True, slots=True)
+class AtWork:
+    """A run that has a worker."""
+
+    campaign_id: str
+    id: str
+    family: str
+    method: str
+    ecr: float | None  # None before its first episode
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """The whole of it."""
+
+    campaigns: dict[State, int]
+    tallies: tuple[Tally, ...]
+    at_work: tuple[AtWork, ...]
+
+
+def read_statistics(engine: Engine) -> Statistics:
+    """What the database says now.
+
+    Raises:
+      StorageError: it cannot be read.
+    """
+    campaigns = select(CampaignRow.state, func.count()).group_by(CampaignRow.state)
+    sums = (func.count(), func.sum(RunRow.episodes_done), func.sum(RunRow.failures))
+    tallies = select(RunRow.family, RunRow.method, RunRow.state, *sums)
+    at_work = (
+        select(CampaignRow.id, RunRow.id, RunRow.family, RunRow.method, RunRow.metrics)
+        .join(RunRow.campaign)
+        .where(RunRow.state.in_([State.RUNNING, State.CANCELLING]))
+        .order_by(RunRow.number)
+    )
+    with storage_errors("reading"), engine.connect() as connection:
+        return Statistics(
+            campaigns={State(state): count for state, count in connection.execute(campaigns)},
+            tallies=tuple(
+                Tally(family, method, State(state), runs, episodes, failures)
+                for family, method, state, runs, episodes, failures in connection.execute(
+                    tallies.group_by(RunRow.family, RunRow.method, RunRow.state)
+                )
+            ),
+            at_work=tuple(
+                AtWork(campaign_id, run_id, family, method, _ecr(metrics))
+                for campaign_id, run_id, family, method, metrics in connection.execute(at_work)
+            ),
+        )
+
+
+def check_readable(engine: Engine) -> None:
+    """Ask the database for as little as it can be asked for.
+
+    Raises:
+      StorageError: it cannot be read.
+    """
+    with storage_errors("reading"), engine.connect() as connection:
+        connection.execute(select(CampaignRow.number).limit(1)).first()
+
+
+def _ecr(metrics: str | None) -> float | None:
+    return None if metrics is None else float(from_json(metrics)["ecr"])

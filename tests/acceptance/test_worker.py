@@ -1,0 +1,128 @@
+"""The real worker, told to stop, killed, stopped and refused by the disk: its run comes to the same results."""
+
+import resource
+import signal
+import time
+from collections.abc import Callable
+from operator import methodcaller
+from pathlib import Path
+
+import psutil
+import pytest
+
+from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunSpec
+from service.events import EpisodeDone, Event, Failed, Finished, Started
+from service.executor import Cause, Exited
+from service.local_executor import LocalExecutor
+from service.settings import ServiceSettings
+
+EPISODES = 20
+SPEC = RunSpec(
+    family="low",
+    method="risk-sac",
+    seed=3,
+    budget=Budget(episodes=EPISODES, evaluation_episodes=2),
+    learner=LearnerConfig(
+        agent=AgentConfig(hidden_sizes=(16, 16), batch_size=16, warmup_steps=500), checkpoint_every=3
+    ),
+)
+LONG_S = 200
+Do = Callable[[psutil.Process], None]
+
+
+class Launcher:
+    """Executes one worker after the other on the same run."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.executor = LocalExecutor(ServiceSettings())
+
+    def work(self, until: int | None = None, then: Do | None = None) -> tuple[list[Event], Exited, float]:
+        """What one worker says, why it is gone, and how long that took after something was done to it.
+
+        Args:
+          until: episodes that it tells of before something is done to it.
+          then: what is done.
+        """
+        said: list[Event] = []
+        done_at = deadline = time.monotonic() + LONG_S
+        self.executor.submit(1, SPEC, self.folder)
+        while time.monotonic() < deadline:
+            for _, message in self.executor.events(0.01):
+                if isinstance(message, Exited):
+                    return said, message, time.monotonic() - done_at
+                said.append(message)
+                if isinstance(message, Started):
+                    process = psutil.Process(message.pid)
+                if then is not None and sum(isinstance(word, EpisodeDone) for word in said) == until:
+                    then(process)
+                    then, done_at = None, time.monotonic()
+        raise AssertionError(f"the worker is still there after {LONG_S} s")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Digest of the run if nothing happens to it."""
+    return digest(Launcher(tmp_path_factory.mktemp("undisturbed")))
+
+
+@pytest.fixture
+def launcher(tmp_path: Path) -> Launcher:
+    return Launcher(tmp_path / "run")
+
+
+def digest(launcher: Launcher) -> str:
+    """What the run comes to if it is left alone from here on."""
+    said, exited, _ = launcher.work()
+    assert exited == Exited(None, Cause.ENDED), exited
+    assert isinstance(said[-1], Finished)
+    assert said[-1].finished
+    assert [word.record.index for word in said if isinstance(word, EpisodeDone)] == list(range(EPISODES + 2))
+    return said[-1].digest
+
+
+def test_a_worker_told_to_stop_leaves_a_checkpoint_and_goes_on_from_there(launcher: Launcher, undisturbed: str) -> None:
+    said, exited, left_after_s = launcher.work(7, lambda _: launcher.executor.cancel(1, 30))
+    assert exited == Exited(None, Cause.ENDED)
+    assert isinstance(said[-1], Finished)
+    assert not said[-1].finished
+    done = [word.record.index for word in said if isinstance(word, EpisodeDone)]
+    assert done == list(range(len(done)))
+    assert len(done) < EPISODES
+    assert left_after_s < 20
+    said, _, _ = launcher.work(len(done), lambda process: process.kill())
+    assert [word.record.index for word in said if isinstance(word, EpisodeDone)][: len(done)] == done
+    assert digest(launcher) == undisturbed
+
+
+@pytest.mark.parametrize("moment_s", [0.2, 1.5, 4.0])
+def test_a_worker_with_nothing_to_keep_leaves_at_once(launcher: Launcher, moment_s: float) -> None:
+    launcher.executor.submit(1, SPEC, launcher.folder)
+    time.sleep(moment_s)  # into the start of Python, an import, or the first episode's compilation
+    launcher.executor.cancel(1, 30)
+    told_at = time.monotonic()
+    while not any(isinstance(message, Exited) for _, message in launcher.executor.events(0.01)):
+        assert time.monotonic() - told_at < 20
+
+
+def test_workers_killed_crashed_and_stopped_come_to_the_same_results(launcher: Launcher, undisturbed: str) -> None:
+    causes = {signal.SIGKILL: Cause.KILLED, signal.SIGSEGV: Cause.CRASHED, signal.SIGSTOP: Cause.STOPPED}
+    for until, (number, cause) in zip((4, 9, 15), causes.items(), strict=True):
+        _, exited, gone_after_s = launcher.work(until, methodcaller("send_signal", number))
+        assert exited.cause is cause
+        assert gone_after_s < 5
+    assert digest(launcher) == undisturbed
+
+
+@pytest.mark.parametrize("size", [0, 20_000])
+def test_a_disk_that_is_full_is_told_and_leaves_a_run_that_goes_on(
+    launcher: Launcher, undisturbed: str, size: int
+) -> None:
+    # To a process that may not let a file grow beyond this, every longer one is on a full disk; its log is too.
+    full = (size, size)
+    said, exited, _ = launcher.work(3, lambda process: resource.prlimit(process.pid, resource.RLIMIT_FSIZE, full))
+    assert isinstance(said[-1], Failed)
+    assert said[-1].storage
+    assert said[-1].reason.startswith("storage failed: File too large")
+    assert exited.cause is Cause.ENDED
+    assert digest(launcher) == undisturbed

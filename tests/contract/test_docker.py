@@ -1,0 +1,110 @@
+import re
+import shlex
+import subprocess
+from pathlib import Path
+
+import pytest
+import yaml
+from smoke_test import chroot_engine
+from smoke_test.workflow import Workflow
+
+from risk_sac.config import CampaignSpec
+from service.settings import ServiceSettings
+from service.settings_table import BEGIN, END, with_table
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+DOCKERFILE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
+COMPOSE = (ROOT / "docker" / "compose.yaml").read_text(encoding="utf-8")
+# A shell's own, which name the image, what is published and where secrets lie.
+OTHERS = {
+    "RISK_SAC_SECRETS_DIR",
+    "RISK_SAC_API_KEY_FILE",
+    "RISK_SAC_IMAGE",
+    "RISK_SAC_MEMORY",
+    "RISK_SAC_PUBLISHED_PORT",
+}
+
+
+@pytest.fixture
+def workflow():
+    return Workflow.load(ROOT / "docker" / "workflow.yaml")
+
+
+@pytest.fixture
+def compose():
+    return yaml.safe_load(COMPOSE)["services"]
+
+
+def test_table_of_settings_in_the_readme_is_what_the_settings_generate():
+    assert with_table(README) == README, "run `make settings`"
+
+
+def test_table_has_a_row_for_each_setting():
+    rows = with_table(f"{BEGIN}{END}").splitlines()
+    named = [row.split("`")[1] for row in rows if row.startswith("| `")]
+    assert named == [f"RISK_SAC_{name.upper()}" for name in ServiceSettings.model_fields]
+
+
+def test_text_without_the_marks_of_the_table_is_refused():
+    with pytest.raises(ValueError, match="lacks"):
+        with_table("# Settings\n")
+
+
+def test_containers_set_no_variable_that_is_none():
+    known = {f"RISK_SAC_{name.upper()}" for name in ServiceSettings.model_fields} | OTHERS
+    workflow = (ROOT / "docker" / "workflow.yaml").read_text(encoding="utf-8")
+    assert set(re.findall(r"RISK_SAC_\w+", DOCKERFILE + COMPOSE + workflow)) <= known
+
+
+def test_service_of_the_compose_file_gets_its_secrets_as_settings(compose):
+    for secret in compose["service-postgres"]["secrets"]:
+        assert secret.removeprefix("risk_sac_") in ServiceSettings.model_fields
+
+
+@pytest.mark.parametrize("name", ["service", "service-postgres"])
+def test_service_of_the_compose_file_is_confined(compose, name):
+    service = compose[name]
+    assert service["read_only"] is True
+    assert service["cap_drop"] == ["ALL"]
+    assert service["security_opt"] == ["no-new-privileges:true"]
+    assert service["deploy"]["resources"]["limits"].keys() == {"cpus", "memory", "pids"}
+    assert all(port.startswith("127.0.0.1:") for port in service["ports"])
+
+
+def test_compose_file_waits_longer_than_the_server_takes_to_stop(compose):
+    stop_s = ServiceSettings.model_fields["stop_s"].default
+    assert float(compose["service"]["stop_grace_period"].removesuffix("s")) > stop_s
+
+
+def test_build_context_has_all_that_the_image_is_built_of():
+    ignored = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    allowed = {line.removeprefix("!") for line in ignored if line.startswith("!")}
+    copied = {
+        source for line in re.findall(r"^COPY (?!--from)(.+)$", DOCKERFILE, re.M) for source in shlex.split(line)[:-1]
+    }
+    assert copied == allowed
+    assert all((ROOT / source).exists() for source in copied)
+
+
+def test_example_of_a_campaign_is_one():
+    CampaignSpec.model_validate(yaml.safe_load((ROOT / "docker" / "campaign.yaml").read_text(encoding="utf-8")))
+
+
+def test_workflow_cleans_up_whatever_came_of_the_campaign(workflow):
+    assert [step.name for step in workflow.afterwards] == ["Keep what was found", "Stop the service"]
+
+
+def test_engine_without_an_engine_understands_each_command_of_the_workflow(workflow):
+    steps = (*workflow.before, workflow.campaign, *workflow.afterwards)
+    lines = [line for step in steps for line in step.script.replace("\\\n", " ").splitlines() if '"$ENGINE"' in line]
+    assert len(lines) > len(steps)
+    for line in lines:
+        words = shlex.split(line.partition(" > ")[0])
+        chroot_engine.parser().parse_args(words[1:])
+
+
+@pytest.mark.parametrize("script", ["docker/smoke", ".ci/run"])
+def test_script_is_executable_bash(script):
+    assert (ROOT / script).stat().st_mode & 0o111 or script == ".ci/run"
+    subprocess.run(["bash", "-n", ROOT / script], check=True)

@@ -1,0 +1,14 @@
+import json
+import subprocess
+import sys
+
+
+def test_the_server_process_loads_neither_torch_nor_libsumo():
+    code = (
+        "import json, sys; from service.app import create_app; from service.settings import ServiceSettings;"
+        "create_app(ServiceSettings()).openapi(); print(json.dumps(sorted(sys.modules)))"
+    )
+    loaded = json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout)
+    assert "service.manager" in loaded
+    assert "risk_sac.report" in loaded
+    assert not {"torch", "libsumo", "botorch", "gpytorch", "matplotlib.pyplot", "service.worker"} & set(loaded)

@@ -1,0 +1,446 @@
+"""Who may do what, on real servers: every route against every way of not being allowed."""
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+
+import httpx
+import pytest
+from fastapi.routing import iter_route_contexts
+
+from service.app import create_app
+from service.keys.file import KeyFile
+from service.keys.key import Scope
+from service.settings import ServiceSettings
+
+UNKNOWN = "x0000000000000000"
+PROBLEM = "application/problem+json"
+FRIEND = "http://friend.example"
+ROADS = Path(__file__).parents[2] / "sumo_nets" / "low" / "low.net.xml"
+SPEC = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 4}}
+CAMPAIGN, NETWORK = "/v1/campaigns/{campaign_id}", "/v1/networks/{network_id}"
+
+# What each route wants, and what it answers the project's own key.
+ROUTES = {
+    ("GET", "/healthz"): ("nothing", 200),
+    ("GET", "/readyz"): ("nothing", 200),
+    ("GET", "/docs"): ("nothing", 200),
+    ("GET", "/docs/oauth2-redirect"): ("nothing", 200),
+    ("GET", "/redoc"): ("nothing", 200),
+    ("GET", "/openapi.json"): ("nothing", 200),
+    ("GET", "/metrics"): ("admin", 200),
+    ("GET", "/v1/families"): ("read", 200),
+    ("GET", "/v1/methods"): ("read", 200),
+    ("GET", "/v1/campaigns"): ("read", 200),
+    ("POST", "/v1/campaigns"): ("run", 202),
+    ("GET", CAMPAIGN): ("read", 200),
+    ("DELETE", CAMPAIGN): ("run", 409),  # it runs
+    ("POST", f"{CAMPAIGN}/cancel"): ("run", 202),
+    ("GET", f"{CAMPAIGN}/results"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/events"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/episodes"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/failures"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/failures/{{failure_id}}"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/table"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/figures"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/figures/{{name}}.{{format}}"): ("read", 404),  # no run has finished
+    ("GET", f"{CAMPAIGN}/spec"): ("read", 200),
+    ("GET", "/v1/networks"): ("read", 200),
+    ("POST", "/v1/networks"): ("run", 422),  # what is uploaded is no network
+    ("GET", NETWORK): ("read", 200),
+    ("DELETE", NETWORK): ("run", 204),
+}
+every_route = pytest.mark.parametrize(("method", "path"), ROUTES, ids=lambda part: part.strip("/"))
+
+
+@pytest.fixture(scope="module")
+def world(serve_shared, tmp_path_factory):
+    """A server that other machines may reach, with keys of two projects and a campaign that goes on and on."""
+    folder = tmp_path_factory.mktemp("world")
+    file = KeyFile(folder / "keys.json")
+    holders = {
+        "admin": ("ops", Scope.ADMIN),
+        "own": ("maps", Scope.RUN),
+        "reader": ("maps", Scope.READ),
+        "other": ("rivals", Scope.RUN),
+        "revoked": ("maps", Scope.ADMIN),
+    }
+    made = {name: file.create(project, name, scope) for name, (project, scope) in holders.items()}
+    file.revoke(made["revoked"][0].id)
+    settings = {"host": "0.0.0.0", "cors_origins": json.dumps([FRIEND]), "rate_limit": "100000"}
+    service = serve_shared("striking_worker", data_dir=folder, **settings)
+    tokens = {name: token for name, (_, token) in made.items()}
+    service.client.headers["authorization"] = f"Bearer {tokens['own']}"
+    campaign = service.post(budget={"episodes": 100_000})
+    service.wait_until(lambda: service.get(campaign)["progress"]["failures"] > 0)
+    failure = service.get(campaign, "/failures")["items"][0]["id"]
+    with httpx.Client(base_url=service.client.base_url, timeout=30) as nobody:
+        yield SimpleNamespace(
+            service=service,
+            file=file,
+            tokens=tokens,
+            campaign=campaign,
+            failure=failure,
+            network=upload(service),
+            nobody=nobody,
+        )
+
+
+def upload(service):
+    content, headers = ROADS.read_bytes(), {"content-type": "application/xml"}
+    return service.client.post("/v1/networks", content=content, headers=headers).raise_for_status().json()["id"]
+
+
+def ask(world, method, path, key=None, known=True, **headers):
+    """What a route answers whoever holds the key; of a stream, its beginning."""
+    ids = (world.campaign, world.network) if known else (UNKNOWN, UNKNOWN)
+    parts = {"campaign_id": ids[0], "network_id": ids[1], "failure_id": world.failure}
+    url = path.format(**parts, name="ecr_low", format="png")
+    if key is not None:
+        headers["authorization"] = f"Bearer {world.tokens.get(key, key)}"
+    content = b""
+    if (method, path) == ("POST", "/v1/campaigns"):
+        content, headers["content-type"] = json.dumps(SPEC).encode(), "application/json"
+    elif (method, path) == ("POST", "/v1/networks"):
+        content, headers["content-type"] = b"<roads/>", "application/xml"
+    with world.nobody.stream(method, url, content=content, headers=headers) as response:
+        streams = response.headers.get("content-type", "").startswith("text/event-stream")
+        text = next(response.iter_text()) if streams else response.read().decode("latin-1")
+    return SimpleNamespace(status=response.status_code, headers=response.headers, text=text)
+
+
+def assert_refused(answer, status, reason):
+    assert answer.status == status, answer.text
+    assert answer.headers["content-type"] == PROBLEM
+    assert json.loads(answer.text)["reason"] == reason
+
+
+def assert_alike(world, known, unknown):
+    """Whether answers differ by nothing but the id that was asked for."""
+    assert known.status == unknown.status
+    assert known.text.replace(world.campaign, UNKNOWN).replace(world.network, UNKNOWN) == unknown.text
+    changing = ("date", "x-request-id")
+    first, second = ({k: v for k, v in each.headers.items() if k not in changing} for each in (known, unknown))
+    assert first == second
+
+
+@pytest.fixture
+def unchanged(world):
+    """Whatever the test does, it changes nothing of the project."""
+
+    def seen():
+        campaigns = json.loads(ask(world, "GET", "/v1/campaigns", "own").text)["items"]
+        states = [(each["id"], each["state"]) for each in campaigns]
+        return states, ask(world, "GET", "/v1/networks", "own").text, world.file.path.read_bytes()
+
+    before = seen()
+    yield
+    assert seen() == before
+
+
+def test_every_route_of_the_app_has_a_row():
+    contexts = iter_route_contexts(create_app(ServiceSettings()).routes)
+    assert {(method, route.path) for route in contexts for method in route.methods - {"HEAD"}} == set(ROUTES)
+
+
+@every_route
+def test_nobody_gets_in_without_a_key_that_counts(world, unchanged, method, path):
+    wanted, status = ROUTES[method, path]
+    for key in (None, "revoked", world.tokens["own"][:-1], f"rsk_00000000_{'A' * 43}", "nonsense"):
+        answer = ask(world, method, path, key)
+        if wanted == "nothing":
+            assert answer.status == status
+        else:
+            assert_refused(answer, 401, "unauthorized")
+            assert answer.headers["www-authenticate"] == "Bearer"
+            assert_alike(world, answer, ask(world, method, path, key, known=False))
+
+
+@every_route
+def test_a_reader_changes_nothing(world, unchanged, method, path):
+    wanted, status = ROUTES[method, path]
+    answer = ask(world, method, path, "reader")
+    if wanted in ("nothing", "read"):
+        assert answer.status == status
+    else:
+        assert_refused(answer, 403, "forbidden")
+        assert_alike(world, answer, ask(world, method, path, "reader", known=False))
+
+
+@every_route
+def test_another_project_finds_nothing(world, unchanged, method, path):
+    wanted, status = ROUTES[method, path]
+    answer = ask(world, method, path, "other")
+    if wanted == "admin":
+        assert_refused(answer, 403, "forbidden")
+    elif path.startswith((CAMPAIGN, NETWORK)):
+        assert_refused(answer, 404, "unknown_id")
+        assert_alike(world, answer, ask(world, method, path, "other", known=False))
+    else:
+        assert answer.status == status
+        assert world.campaign not in answer.text
+        assert world.network not in answer.text
+
+
+@every_route
+def test_a_forged_host_gets_no_answer(world, unchanged, method, path):
+    for host in ("evil.example", "127.0.0.1.evil.example", "localhost.evil.example:80", "0.0.0.0.evil.example"):
+        assert_refused(ask(world, method, path, "own", host=host), 421, "unknown_host")
+
+
+@every_route
+def test_a_foreign_page_changes_nothing(world, unchanged, method, path):
+    _, status = ROUTES[method, path]
+    for origin in ("http://evil.example", "null", "http://127.0.0.1", f"{FRIEND}.evil.example"):
+        answer = ask(world, method, path, "admin", origin=origin)
+        assert "access-control-allow-origin" not in answer.headers
+        if method == "GET":
+            assert answer.status == status
+        else:
+            assert_refused(answer, 403, "foreign_origin")
+
+
+@every_route
+def test_whoever_may_can(world, method, path):
+    wanted, status = ROUTES[method, path]
+    holder = "admin" if wanted == "admin" else "own"
+    for origin in (FRIEND, f"http://127.0.0.1:{world.service.port}", None):
+        own = world
+        if method != "GET":  # not the ones that the other tests look at
+            own = SimpleNamespace(**vars(world) | {"campaign": world.service.post(budget={"episodes": 100_000})})
+            own.network = upload(world.service) if path == NETWORK else None
+        answer = ask(own, method, path, holder, **({} if origin is None else {"origin": origin}))
+        assert answer.status == status, answer.text
+        if method != "GET":
+            ask(own, "POST", f"{CAMPAIGN}/cancel", "own")
+
+
+@every_route
+def test_every_answer_is_for_its_reader_alone(world, method, path):
+    for key in (None, "own"):
+        answer = ask(world, method, path, key, known=False)
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        assert answer.headers["cache-control"] in ("no-store", "no-cache")
+        assert "server" not in answer.headers
+        assert "Traceback" not in answer.text
+
+
+def test_an_admin_sees_all_projects_and_others_their_own(world):
+    def labels(key):
+        return {item["label"] for item in json.loads(ask(world, "GET", "/v1/campaigns", key).text)["items"]}
+
+    headers = {"authorization": f"Bearer {world.tokens['other']}"}
+    world.service.client.post("/v1/campaigns", json=SPEC | {"label": "rival"}, headers=headers)
+    assert "rival" in labels("admin")
+    assert "rival" in labels("other")
+    assert "rival" not in labels("own")
+    assert ask(world, "GET", CAMPAIGN, "admin").status == 200
+
+
+def test_a_key_counts_from_its_creation_until_its_revocation(world):
+    key, token = world.file.create("maps", "", Scope.READ)
+    assert ask(world, "GET", CAMPAIGN, token).status == 200
+    world.file.revoke(key.id)
+    assert_refused(ask(world, "GET", CAMPAIGN, token), 401, "unauthorized")
+
+
+def test_a_stream_ends_with_its_key(world):
+    key, token = world.file.create("maps", "", Scope.READ)
+    headers = {"authorization": f"Bearer {token}"}
+    with world.nobody.stream("GET", f"/v1/campaigns/{world.campaign}/events", headers=headers) as response:
+        received = response.iter_text()
+        next(received)
+        world.file.revoke(key.id)
+        began = time.monotonic()
+        for _ in received:  # what was on its way already
+            pass
+    assert time.monotonic() - began < 10
+    assert ask(world, "GET", f"{CAMPAIGN}/events", token).status == 401
+
+
+@contextmanager
+def keys(world, content):
+    """The keys file, with something else in it for a while."""
+    whole = world.file.path.read_bytes()
+    world.file.path.unlink()
+    if content is not None:
+        world.file.path.write_bytes(content)
+    try:
+        yield
+    finally:
+        world.file.path.write_bytes(whole)
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b'{"keys": [], "sha256": ""}', b"\x00" * 100], ids=len)
+def test_damaged_keys_let_nobody_in(world, content):
+    with keys(world, content):
+        for key in (None, "own", "admin"):
+            assert_refused(ask(world, "GET", CAMPAIGN, key), 503, "keys_unavailable")
+            assert_refused(ask(world, "POST", "/v1/campaigns", key), 503, "keys_unavailable")
+        assert ask(world, "GET", "/healthz").status == 200
+    assert ask(world, "GET", CAMPAIGN, "own").status == 200
+
+
+def test_without_keys_a_public_address_lets_nobody_in(world):
+    with keys(world, None):
+        for key in (None, "own", "admin"):
+            assert_refused(ask(world, "GET", CAMPAIGN, key), 401, "unauthorized")
+    assert ask(world, "GET", CAMPAIGN, "own").status == 200
+
+
+def test_with_all_keys_revoked_nobody_gets_in(world, tmp_path):
+    file = KeyFile(tmp_path / "keys.json")
+    key, token = file.create("maps", "", Scope.ADMIN)
+    file.revoke(key.id)
+    with keys(world, file.path.read_bytes()):
+        for given in (None, "own", token):
+            assert_refused(ask(world, "GET", CAMPAIGN, given), 401, "unauthorized")
+
+
+def preflight(world, origin, method="POST", headers="authorization,content-type,idempotency-key"):
+    asked = {"access-control-request-method": method, "access-control-request-headers": headers}
+    return ask(world, "OPTIONS", "/v1/campaigns", origin=origin, **asked)
+
+
+def test_a_page_of_a_named_origin_may_call(world):
+    answer = preflight(world, FRIEND)
+    assert answer.status == 204
+    assert answer.headers["access-control-allow-origin"] == FRIEND
+    assert "POST" in answer.headers["access-control-allow-methods"]
+    assert "Authorization" in answer.headers["access-control-allow-headers"]
+    for key, status in (("own", 200), (None, 401)):
+        answer = ask(world, "GET", CAMPAIGN, key, origin=FRIEND)
+        assert (answer.status, answer.headers["access-control-allow-origin"]) == (status, FRIEND)
+        assert "ETag" in answer.headers["access-control-expose-headers"]
+
+
+def test_a_page_of_another_origin_may_not_call(world):
+    answer = preflight(world, "http://evil.example")
+    assert answer.status == 403
+    assert "access-control-allow-origin" not in answer.headers
+    assert preflight(world, FRIEND, method="PUT").status == 403
+    assert preflight(world, FRIEND, headers="x-secret").status == 403
+
+
+@pytest.fixture(scope="module")
+def strict(serve_shared, tmp_path_factory):
+    """A server of this machine alone, with low limits and no keys."""
+    folder = tmp_path_factory.mktemp("strict")
+    limits = {"max_body_bytes": "2048", "max_upload_bytes": "4096", "rate_limit": "20"}
+    return serve_shared(data_dir=folder, **limits)
+
+
+@pytest.fixture
+def calm(strict):
+    """A client of the strict server, in a second of its own."""
+    time.sleep(1.1)
+    return strict.client
+
+
+def test_on_loopback_nobody_needs_a_key_until_there_is_one(strict, calm):
+    campaign = strict.post(budget={"episodes": 1})
+    assert calm.get("/metrics").status_code == 200
+    file = KeyFile(strict.data_dir / "keys.json")
+    key, token = file.create("maps", "", Scope.ADMIN)
+    assert calm.get("/v1/campaigns").status_code == 401
+    with_key = {"authorization": f"Bearer {token}"}
+    assert calm.get(f"/v1/campaigns/{campaign}", headers=with_key).json()["id"] == campaign
+    file.revoke(key.id)
+    assert calm.get("/v1/campaigns").status_code == 401, "revoking the last key opens nothing"
+    file.path.unlink()
+    assert calm.get("/v1/campaigns").status_code == 200
+
+
+def test_without_keys_hosts_and_origins_are_checked_too(calm):
+    assert calm.get("/v1/campaigns", headers={"host": "rebound.example"}).status_code == 421
+    assert calm.post("/v1/campaigns", json=SPEC, headers={"origin": "http://evil.example"}).status_code == 403
+    assert calm.options("/v1/campaigns", headers={"origin": "http://evil.example"}).status_code == 405
+
+
+def test_who_asks_too_often_waits(calm):
+    answers = [calm.get("/v1/methods") for _ in range(60)]
+    late = [answer for answer in answers if answer.status_code == 429]
+    assert 20 <= len(late) <= 40, "20 of each second get through"
+    assert late[0].json()["reason"] == "rate_limited"
+    assert late[0].headers["retry-after"] == "1"
+    assert calm.get("/healthz").status_code == 200, "health is not for the rate to hide"
+    time.sleep(1)
+    assert calm.get("/v1/methods").status_code == 200
+
+
+def test_keys_are_counted_apart_and_guesses_by_address(strict, calm):
+    file = KeyFile(strict.data_dir / "keys.json")
+    tokens = [file.create("maps", "", Scope.READ)[1] for _ in range(2)]
+    busy, idle = ({"authorization": f"Bearer {token}"} for token in tokens)
+    try:
+        assert 429 in {calm.get("/v1/methods", headers=busy).status_code for _ in range(30)}
+        assert calm.get("/v1/methods", headers=idle).status_code == 200
+        guess = {"authorization": f"Bearer {tokens[0][:-1]}!"}
+        assert {calm.get("/v1/methods", headers=guess).status_code for _ in range(50)} == {401, 429}
+        assert calm.get("/v1/methods", headers=idle).status_code == 200
+    finally:
+        file.path.unlink()
+
+
+def parts(size):
+    """A body that does not say how large it is."""
+    for _ in range(0, size, 512):
+        yield b" " * 512
+
+
+@pytest.mark.parametrize(
+    ("path", "content_type", "limit"),
+    [("/v1/campaigns", "application/json", 2048), ("/v1/networks", "application/xml", 4096)],
+)
+def test_too_large_a_body_is_refused_and_the_connection_goes_on(strict, path, content_type, limit):
+    time.sleep(1.1)
+    headers = {"content-type": content_type}
+    with httpx.Client(base_url=strict.client.base_url, limits=httpx.Limits(max_connections=1)) as one:
+        for body in (b" " * (limit + 1), b" " * (1 << 20), parts(limit + 512), parts(1 << 20)):
+            response = one.post(path, content=body, headers=headers)
+            assert response.status_code == 413, response.text
+            assert response.headers["content-type"] == PROBLEM
+            assert response.json()["reason"] == "too_large"
+            assert str(limit) in response.json()["detail"]
+            assert one.get("/v1/methods").status_code == 200
+        for body in (b" " * limit, parts(limit)):
+            assert one.post(path, content=body, headers=headers).status_code in (400, 422), "just not too large"
+
+
+def test_an_endless_body_is_refused_before_it_ends(strict):
+    time.sleep(1.1)
+    with socket.create_connection(("127.0.0.1", strict.port), timeout=10) as connection:
+        connection.sendall(
+            b"POST /v1/campaigns HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+            b"Transfer-Encoding: chunked\r\n\r\n"
+        )
+        for _ in range(100):
+            connection.sendall(b"200\r\n" + b" " * 512 + b"\r\n")
+        assert connection.recv(1000).startswith(b"HTTP/1.1 413")
+
+
+def test_server_refuses_to_start_where_it_could_not_keep_anybody_out(tmp_path):
+    environment = os.environ | {"RISK_SAC_DATA_DIR": str(tmp_path), "RISK_SAC_HOST": "0.0.0.0", "RISK_SAC_PORT": "1"}
+    started = subprocess.run(
+        [sys.executable, "-m", "service"], env=environment, capture_output=True, text=True, timeout=60
+    )
+    assert started.returncode == 1
+    wanted = "wanted a loopback address, or API keys: create one with `risk-sac keys create`"
+    assert started.stderr == f"host is '0.0.0.0'; {wanted}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_command_line_makes_a_key_that_the_server_takes(world):
+    command = [sys.executable, "-c", "from risk_sac.cli import main; main()", "keys"]
+    create = [*command, "create", "--data-dir", str(world.service.data_dir), "--project", "maps", "--scope", "read"]
+    token = subprocess.run(create, capture_output=True, check=True, text=True).stdout.strip()
+    assert ask(world, "GET", CAMPAIGN, token).status == 200
+    revoke = [*command, "revoke", token[4:12], "--data-dir", str(world.service.data_dir)]
+    subprocess.run(revoke, capture_output=True, check=True)
+    assert ask(world, "GET", CAMPAIGN, token).status == 401

@@ -1,0 +1,197 @@
+"""Calling a real server: retries, lists, what is polled, and the reasons of refusals."""
+
+import asyncio
+import json
+import time
+from collections import Counter
+
+import pytest
+
+SPEC = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 3}}
+
+
+async def post_at_once(port, keys, spec=SPEC):
+    """Post the same campaign with each key, all on connections that are open at the same time: statuses and bodies."""
+    body = json.dumps(spec).encode()
+
+    async def post(key):
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        await opened.wait()
+        head = (
+            "POST /v1/campaigns HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nConnection: close\r\n"
+        )
+        writer.write(f"{head}Idempotency-Key: {key}\r\nContent-Length: {len(body)}\r\n\r\n".encode() + body)
+        answer = await reader.read()
+        writer.close()
+        head, _, content = answer.partition(b"\r\n\r\n")
+        return int(head.split()[1]), head.lower(), json.loads(content)
+
+    opened = asyncio.Event()
+    posts = [asyncio.create_task(post(key)) for key in keys]
+    await asyncio.sleep(1)
+    opened.set()
+    return await asyncio.gather(*posts)
+
+
+@pytest.mark.parametrize(("posts", "keys"), [(1000, 1), (500, 50)])
+def test_duplicates_at_once_make_one_campaign_for_each_key(serve, posts, keys):
+    service = serve(rate_limit=100_000)
+    answers = asyncio.run(post_at_once(service.port, [f"retry-{index % keys}" for index in range(posts)]))
+    assert Counter(status for status, _, _ in answers) == {202: posts}
+    made = {body["id"] for _, _, body in answers}
+    assert len(made) == keys
+    assert all(f"location: /v1/campaigns/{body['id']}".encode() in head for _, head, body in answers)
+    listed = service.client.get("/v1/campaigns", params={"limit": 500}).json()["items"]
+    assert {item["id"] for item in listed} == made
+    assert len(listed) == keys
+
+
+def test_a_key_stands_for_one_body_even_after_a_restart(serve):
+    service = serve()
+    header = {"Idempotency-Key": "nightly-2026-11-21"}
+    first = service.client.post("/v1/campaigns", json=SPEC, headers=header)
+    service.stop()
+    service.start()
+    again = service.client.post("/v1/campaigns", json=SPEC | {"seeds": [0]}, headers=header)  # the default, spelt out
+    assert (again.status_code, again.headers["location"]) == (202, first.headers["location"])
+    other = service.client.post("/v1/campaigns", json=SPEC | {"seeds": [1]}, headers=header)
+    assert other.status_code == 409
+    assert other.json()["reason"] == "idempotency_key_reused"
+    assert first.json()["id"] in other.json()["detail"]
+
+
+@pytest.mark.parametrize("key", ["", "x" * 201, "two words", "tab\there", "caf\u00e9"])
+def test_a_key_of_another_shape_is_refused(client, key):
+    headers = [(b"Idempotency-Key", key.encode("latin-1"))]
+    response = client.post("/v1/campaigns", json=SPEC, headers=headers)
+    assert response.status_code == 422, key
+    assert response.json()["reason"] == "invalid_field"
+    assert [error["field"] for error in response.json()["errors"]] == ["Idempotency-Key"]
+
+
+def test_a_list_is_filtered_by_state_family_method_and_label(serve):
+    service = serve()
+    by_label = {
+        "a": service.post(label="a", methods=["random", "sac"], budget={"episodes": 1}),
+        "b": service.post(label="b", families=["low", "dense"], budget={"episodes": 1}),
+        "A": service.post(label="A", families=["dense"], methods=["sac"], budget={"episodes": 1}),
+    }
+    for campaign_id in by_label.values():
+        service.wait(campaign_id)
+
+    def listed(**query):
+        return [item["label"] for item in service.client.get("/v1/campaigns", params=query).json()["items"]]
+
+    assert listed() == ["A", "b", "a"]
+    assert listed(label="a") == ["a"]
+    assert listed(family="dense") == ["A", "b"]
+    assert listed(method="sac") == ["A", "a"]
+    assert listed(method="sac", family="low") == ["a"]
+    assert listed(state="succeeded", limit=2) == ["A", "b"]
+    assert listed(state="queued") == []
+    assert listed(label="") == []
+
+
+def test_pages_neither_repeat_nor_miss_what_was_there_while_more_is_posted(serve):
+    service = serve()
+    there = [service.post(budget={"episodes": 1}) for _ in range(12)]
+    seen, cursor = [], {}
+    while True:
+        page = service.client.get("/v1/campaigns", params={"limit": 5} | cursor).json()
+        seen += [item["id"] for item in page["items"]]
+        if page["next"] is None:
+            break
+        cursor = {"cursor": page["next"]}
+        for _ in range(3):
+            service.post(budget={"episodes": 1})
+    assert seen == there[::-1]
+
+
+@pytest.mark.parametrize("part", ["", "/results"])
+def test_a_tag_changes_exactly_when_the_body_does(serve, part):
+    service = serve()
+    path = f"/v1/campaigns/{service.post(budget={'episodes': 20})}{part}"
+    bodies: dict[str, set[bytes]] = {}
+    states = []
+    while states[-1:] != ["succeeded"]:
+        response = service.client.get(path)
+        bodies.setdefault(response.headers["etag"], set()).add(response.content)
+        states.append(response.json()["state"])
+        assert ("retry-after" in response.headers) is (states[-1] != "succeeded")
+        time.sleep(0.01)  # there is a limit to the rate of requests
+    assert len(bodies) > 3
+    assert all(len(same) == 1 for same in bodies.values())
+    final = response.headers["etag"]
+    for sent, status in ((final, 304), (f'"x", {final}', 304), ("*", 304), (next(iter(bodies)), 200)):
+        answer = service.client.get(path, headers={"If-None-Match": sent})
+        assert answer.status_code == status, sent
+        assert answer.headers["etag"] == final
+        assert answer.content == (b"" if status == 304 else response.content)
+    service.stop()
+    service.start()
+    after = service.client.get(path, headers={"If-None-Match": final})
+    assert after.status_code == 304
+
+
+def test_retry_after_is_a_twentieth_of_the_eta_within_limits(serve):
+    service = serve()
+    long = service.post(budget={"episodes": 10_000})
+    service.wait_for(long, lambda seen: seen["progress"]["eta_s"] is not None)
+    response = service.client.get(f"/v1/campaigns/{long}")
+    wanted = min(max(response.json()["progress"]["eta_s"] / 20, 1), 30)
+    assert wanted <= int(response.headers["retry-after"]) < wanted + 1
+    assert service.client.post(f"/v1/campaigns/{long}/cancel").headers["location"] == f"/v1/campaigns/{long}"
+
+
+def test_only_what_has_ended_can_be_deleted_and_then_it_is_gone(serve):
+    service = serve()
+    campaign_id = service.post(budget={"episodes": 10_000})
+    path = f"/v1/campaigns/{campaign_id}"
+    refused = service.client.delete(path)
+    assert (refused.status_code, refused.json()["reason"]) == (409, "not_ended")
+    for _ in range(3):
+        assert service.client.post(f"{path}/cancel").status_code == 202
+    assert service.wait(campaign_id)["state"] == "cancelled"
+    assert service.client.post(f"{path}/cancel").json()["state"] == "cancelled"
+    service.wait_until(lambda: service.client.delete(path).status_code != 409, 20)
+    assert service.client.get(path).status_code == 404
+    assert service.client.delete(path).json()["reason"] == "unknown_id"
+    assert service.client.get("/v1/campaigns").json()["items"] == []
+    assert not (service.data_dir / "campaigns" / campaign_id).exists()
+
+
+def test_a_project_that_has_queued_enough_is_told_when_to_come_back(serve):
+    service = serve(quota_queued_runs=4)
+    for seed in (0, 10):
+        service.post(seeds=[seed, seed + 1], budget={"episodes": 10_000})
+    refused = service.client.post("/v1/campaigns", json=SPEC | {"seeds": [1, 2, 3, 4, 5]})
+    assert (refused.status_code, refused.json()["reason"]) == (429, "quota_exceeded")
+    assert int(refused.headers["retry-after"]) > 0
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "headers", "status", "reason"),
+    [
+        ("GET", "/v1/nothing", {}, 404, "unknown_route"),
+        ("GET", "/v1/campaigns/none", {}, 404, "unknown_id"),
+        ("GET", "/v1/campaigns/none/events", {}, 404, "unknown_id"),
+        ("DELETE", "/v1/campaigns/none", {}, 404, "unknown_id"),
+        ("PUT", "/v1/campaigns", {}, 405, "method_not_allowed"),
+        ("GET", "/v1/campaigns?limit=0", {}, 422, "invalid_field"),
+        ("GET", "/v1/campaigns?state=done", {}, 422, "invalid_field"),
+        ("GET", "/v1/campaigns?label=%00", {}, 422, "invalid_field"),
+        ("POST", "/v1/campaigns", {"content-type": "application/json"}, 400, "malformed_json"),
+        ("POST", "/v1/campaigns", {"content-type": "text/plain"}, 415, "unsupported_media_type"),
+    ],
+)
+def test_a_refusal_says_why_in_a_word_that_stays(client, method, path, headers, status, reason):
+    response = client.request(method, path, headers=headers)
+    assert (response.status_code, response.json()["reason"]) == (status, reason)
+    assert response.headers["content-type"] == "application/problem+json"
+
+
+def test_nothing_acceptable_is_a_reason_too(serve):
+    service = serve()
+    campaign_id = service.post(budget={"episodes": 1})
+    response = service.client.get(f"/v1/campaigns/{campaign_id}/table", headers={"Accept": "image/png"})
+    assert (response.status_code, response.json()["reason"]) == (406, "not_acceptable")

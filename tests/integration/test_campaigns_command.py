@@ -1,0 +1,285 @@
+"""`risk-sac campaigns` against a real server."""
+
+import contextlib
+import functools
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from risk_sac import cli
+from risk_sac.client import Client
+from tests.server import Service
+
+SUBMIT = ["submit", "--families", "low", "--methods", "random", "--seeds", "2", "--episodes", "6"]
+LONG = ["submit", "--families", "low", "--methods", "random", "--episodes", "5000"]
+FAILS = 3  # a seed with which the scripted worker ends with an error
+
+
+@pytest.fixture(scope="module")
+def service(serve_shared: Callable[..., Service]) -> Service:
+    return serve_shared("striking_worker")
+
+
+@pytest.fixture
+def call(service: Service, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
+    monkeypatch.setenv("RISK_SAC_URL", f"http://127.0.0.1:{service.port}")
+    return lambda *arguments: cli.main(["campaigns", *map(str, arguments)])
+
+
+@pytest.fixture
+def answer(call: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
+    """The JSON document that a command prints, which is all that it prints."""
+
+    def answered(*arguments: object, status: int = 0) -> Any:
+        capsys.readouterr()
+        assert call(*arguments, "--json") == status
+        return json.loads(capsys.readouterr().out)
+
+    return answered
+
+
+@pytest.fixture
+def finished(answer: Callable[..., Any]) -> str:
+    """The id of a campaign that found failures in every second episode."""
+    return answer(*SUBMIT, "--watch")["campaign_id"]
+
+
+def test_submit_watch_shows_the_way_on_one_channel_and_the_results_on_the_other(
+    call: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(*SUBMIT, "--watch") == 0
+    printed = capsys.readouterr()
+    assert "succeeded: 12/12 episodes, 6 failures" in printed.err
+    assert "\x1b" not in printed.err + printed.out
+    (row,) = (line for line in printed.out.splitlines() if "random" in line)
+    assert row.split()[:7] == ["low", "random", "2", "12", "6", "0", "0.50"]
+
+
+def test_failures_above_the_bound_are_exit_status_1(finished: str, call: Callable[..., int]) -> None:
+    assert call("results", finished, "--max-ecr", 0.5) == 0
+    assert call("results", finished, "--max-ecr", 0.49) == 1
+    assert call("watch", finished, "--max-ecr", 0.49) == 1
+
+
+def test_the_bound_holds_with_submit_too(call: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(*SUBMIT, "--watch", "--max-ecr", 0.1) == 1
+    assert "ECR above 0.1: low random 0.500" in capsys.readouterr().err
+
+
+def test_the_bound_is_no_use_without_waiting(call: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(*SUBMIT, "--max-ecr", 0.1) == 2
+    assert capsys.readouterr().err.startswith("--max-ecr: got it without --watch")
+
+
+def test_the_report_names_the_first_failures_of_runs_above_the_bound(
+    finished: str, call: Callable[..., int], service: Service, tmp_path: Path
+) -> None:
+    file = tmp_path / "deeply" / "nested" / "junit.xml"
+    assert call("results", finished, "--max-ecr", 0.1, "--junit", file) == 1
+    root = ElementTree.parse(file).getroot()
+    assert (root.attrib["tests"], root.attrib["failures"], root.attrib["errors"]) == ("2", "2", "0")
+    first = next(root.iter("failure"))
+    assert first.attrib["message"] == "ECR 0.500 > 0.1: 3 valid failures in 6 episodes"
+    assert first.text is not None
+    for url in first.text.splitlines():
+        assert service.client.get(url).json()["outcome"] == "failure"
+
+
+def test_a_campaign_that_failed_could_not_run_and_says_why(
+    answer: Callable[..., Any], call: Callable[..., int], capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "junit.xml"
+    arguments = ["submit", "--families", "low", "--methods", "random", "--first-seed", FAILS, "--episodes", 6]
+    results = answer(*arguments, "--watch", "--junit", file, status=2)
+    assert results["state"] == "failed"
+    (error,) = ElementTree.parse(file).getroot().iter("error")
+    assert error.attrib["message"].startswith("failed: ")
+    assert call("results", results["campaign_id"]) == 2
+    assert f"low-random-{FAILS}: " in capsys.readouterr().err
+
+
+def test_results_of_a_campaign_that_goes_on_are_shown_and_not_judged(
+    answer: Callable[..., Any], call: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    campaign = answer(*LONG)["id"]
+    assert call("results", campaign) == 0
+    assert "so far" in capsys.readouterr().out
+    assert call("results", campaign, "--max-ecr", 1) == 2
+    assert call("watch", campaign, "--timeout", 0.5) == 2
+    assert "did not end within 0.5 s; it goes on" in capsys.readouterr().err
+    assert answer("cancel", campaign)["state"] in ("cancelling", "cancelled")
+    assert call("watch", campaign) == 2
+    assert "was cancelled" in capsys.readouterr().err
+
+
+def test_cancel_can_wait_and_delete_removes(
+    answer: Callable[..., Any], call: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    campaign = answer(*LONG)["id"]
+    assert call("delete", campaign) == 2
+    assert "answered 409" in capsys.readouterr().err
+    assert answer("cancel", campaign, "--wait")["state"] == "cancelled"
+    assert answer("delete", campaign) == {"id": campaign, "deleted": True}
+    assert call("results", campaign) == 2
+    assert "answered 404" in capsys.readouterr().err
+
+
+def test_list_is_newest_first_filtered_and_bounded(
+    answer: Callable[..., Any], call: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    hostile = "one\x1b[31m [bold]two\n\u009b"
+    ids = [answer(*SUBMIT, "--label", label)["id"] for label in ("x", "x", hostile)]
+    assert [each["id"] for each in answer("list", "--limit", 2)] == ids[:0:-1]
+    assert [each["id"] for each in answer("list", "--label", "x", "--limit", 2)] == ids[1::-1]
+    assert answer("list", "--state", "failed", "--family", "dense") == []
+    assert answer("list", "--label", hostile)[0]["label"] == hostile
+    assert call("list") == 0
+    printed = capsys.readouterr().out
+    assert all(word in printed for word in ("one[31m", "[bold]two"))
+    assert "\x1b" not in printed
+
+
+def test_a_key_makes_submissions_one(answer: Callable[..., Any], call: Callable[..., int]) -> None:
+    first, second = (answer(*SUBMIT, "--idempotency-key", "k1")["id"] for _ in range(2))
+    assert first == second
+    assert call(*LONG, "--idempotency-key", "k1") == 2
+
+
+def test_a_file_says_what_to_search_and_flags_go_first(answer: Callable[..., Any], tmp_path: Path) -> None:
+    file = tmp_path / "spec.yaml"
+    file.write_text("label: from a file\nfamilies: [low]\nmethods: [random]\nseeds: [4]\nbudget: {episodes: 6}\n")
+    posted = answer("submit", "--spec", file, "--episodes", 7)["spec"]
+    assert (posted["label"], posted["seeds"], posted["budget"]["episodes"]) == ("from a file", [4], 7)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["submit"], "families: "),
+        (["submit", "--families", "high"], "families[0]: "),
+        (["submit", "--spec", "nowhere.yaml"], "spec: "),
+        (["watch", "c0000"], "http://"),
+        (["list", "--state", "asleep"], "http://"),
+        (["list", "--url", "nowhere"], "url: "),
+    ],
+)
+def test_what_cannot_run_is_exit_status_2_without_a_traceback(
+    arguments: list[str], complaint: str, call: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call(*arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.err.startswith(complaint)
+    assert "Traceback" not in printed.err
+    assert printed.out == ""
+
+
+@pytest.mark.parametrize("bad", [["--max-ecr", "2"], ["--max-ecr", "x"], ["--timeout", "0"], ["--timeout", "nan"]])
+def test_bad_arguments_are_exit_status_2(bad: list[str], call: Callable[..., int]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        call("watch", "c1", *bad)
+
+
+def test_a_report_that_cannot_be_written_is_known_before_anything_is_queued(
+    answer: Callable[..., Any], call: Callable[..., int], tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    before = answer("list", "--limit", 1)
+    assert call(*SUBMIT, "--watch", "--junit", tmp_path / "file" / "junit.xml") == 2
+    assert answer("list", "--limit", 1) == before
+
+
+def test_no_service_is_exit_status_2(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setitem(Client.__init__.__kwdefaults__, "patience_s", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        url = f"http://127.0.0.1:{probe.getsockname()[1]}"
+    assert cli.main(["campaigns", "list", "--url", url]) == 2
+    assert f"{url} does not answer" in capsys.readouterr().err
+
+
+def test_the_key_in_the_environment_opens_the_service(
+    serve: Callable[..., Service], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    service = serve()
+    create = [sys.executable, "-m", "service.keys", "create", "--project", "p", "--data-dir", str(service.data_dir)]
+    key = tmp_path / "key"
+    key.write_text(subprocess.run(create, capture_output=True, check=True, text=True).stdout.split()[-1])
+    monkeypatch.setenv("RISK_SAC_URL", f"http://127.0.0.1:{service.port}")
+    monkeypatch.setenv("RISK_SAC_API_KEY_FILE", str(key))
+    assert cli.main(["campaigns", *SUBMIT, "--watch"]) == 0
+    monkeypatch.setenv("RISK_SAC_API_KEY", "a-wrong-one")
+    assert cli.main(["campaigns", "list"]) == 2
+    monkeypatch.delenv("RISK_SAC_API_KEY_FILE")
+    monkeypatch.delenv("RISK_SAC_API_KEY")
+    assert cli.main(["campaigns", "list"]) == 2
+    complaints = capsys.readouterr().err
+    assert complaints.count("answered 401") == 2
+    assert key.read_text() not in complaints
+
+
+def test_watch_outlives_a_server_that_is_killed_and_restarted(
+    serve: Callable[..., Service], capsys: pytest.CaptureFixture[str]
+) -> None:
+    service = serve()
+    campaign = service.post(seeds=[0, 1], budget={"episodes": 40})
+
+    def restart() -> None:
+        service.wait_for(campaign, lambda seen: seen["progress"]["episodes_done"] >= 10)
+        service.stop(signal.SIGKILL)
+        time.sleep(1)
+        service.start()
+
+    restarting = threading.Thread(target=restart)
+    restarting.start()
+    assert cli.main(["campaigns", "watch", campaign, "--url", f"http://127.0.0.1:{service.port}"]) == 0
+    restarting.join()
+    assert "succeeded: 80/80 episodes" in capsys.readouterr().err
+
+
+def test_a_terminal_shows_a_bar_for_each_run_at_work(service: Service) -> None:
+    campaign = service.post(seeds=[0, 1], budget={"episodes": 40})
+    ours, theirs = os.openpty()
+    url = f"http://127.0.0.1:{service.port}"
+    command = [sys.executable, "-m", "risk_sac", "campaigns", "watch", campaign, "--url", url]
+    environment = os.environ | {"TERM": "xterm-256color", "COLUMNS": "120"}
+    process = subprocess.Popen(command, stderr=theirs, stdout=subprocess.DEVNULL, env=environment)
+    os.close(theirs)
+    shown = b""
+    with os.fdopen(ours, "rb", buffering=0) as terminal:
+        try:
+            while piece := terminal.read(65536):
+                shown += piece
+        except OSError:  # how Linux ends a terminal whose other side is closed
+            pass
+    assert process.wait(60) == 0
+    for name in ("all runs", "low-random-0", "low-random-1"):
+        assert name.encode() in shown
+
+
+def test_an_interrupt_says_that_the_campaign_goes_on(service: Service, answer: Callable[..., Any]) -> None:
+    campaign = answer(*LONG)["id"]
+    url = f"http://127.0.0.1:{service.port}"
+    command = [sys.executable, "-m", "risk_sac", "campaigns", "watch", campaign, "--url", url]
+    # A shell's background job ignores it, and so would what it starts.
+    heed = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heed) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline().startswith(campaign)
+        while process.poll() is None:  # Python drops an interrupt that meets a finaliser: press again
+            process.send_signal(signal.SIGINT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(5)
+        said = process.stderr.read()
+    assert process.returncode == 130
+    assert f"the campaign goes on; `risk-sac campaigns cancel {campaign}` stops it" in said
+    assert answer("cancel", campaign, "--wait")["state"] == "cancelled"

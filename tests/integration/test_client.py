@@ -1,0 +1,128 @@
+"""The client against a real server."""
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from risk_sac.client import Campaign, Client, Refused
+from risk_sac.config import Budget, CampaignSpec
+from tests.server import Service
+
+SPEC = CampaignSpec(label="a", families=("low",), methods=("random",), seeds=(0, 1), budget=Budget(episodes=6))
+
+
+@pytest.fixture(scope="module")
+def shared(serve_shared: Callable[..., Service]) -> Service:
+    return serve_shared("striking_worker")
+
+
+@pytest.fixture
+def client(shared: Service) -> Iterator[Client]:
+    with connected(shared) as client:
+        yield client
+
+
+def connected(service: Service) -> Client:
+    return Client(f"http://127.0.0.1:{service.port}")
+
+
+def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Client) -> None:
+    seen: list[Campaign] = []
+    campaign = client.wait(client.submit(SPEC).id, seen.append, timeout_s=60)
+    assert campaign.state == "succeeded"
+    assert [each.progress.episodes_done for each in seen] == sorted(each.progress.episodes_done for each in seen)
+    assert campaign.progress.episodes_done == 12
+    assert campaign.model_dump(mode="json") == shared.get(campaign.id)
+    results = client.results(campaign.id)
+    assert results.model_dump(mode="json") == shared.get(campaign.id, "/results")
+    assert [(total.method, total.failures) for total in results.totals] == [("random", 6)]
+    assert client.table(campaign.id).startswith("# Comparison of methods")
+
+
+def test_failures_are_read_page_by_page(client: Client) -> None:
+    campaign = client.wait(client.submit(SPEC).id, timeout_s=60)
+    found = list(client.failures(campaign.id, page=2))
+    assert len({failure.id for failure in found}) == 6
+    only = list(client.failures(campaign.id, run="low-random-1"))
+    assert {failure.run_id for failure in only} == {"low-random-1"}
+    assert client.failure(campaign.id, only[0].id).index == only[0].index
+
+
+def test_the_events_tell_of_every_episode_and_of_the_end(client: Client) -> None:
+    campaign = client.submit(SPEC)
+    events = list(client.events(campaign.id))
+    episodes = [event.data for event in events if event.name in ("episode", "failure")]
+    assert sorted((each["run_id"], each["index"]) for each in episodes) == [
+        (run, index) for run in ("low-random-0", "low-random-1") for index in range(6)
+    ]
+    assert (events[-1].name, events[-1].data["run_id"], events[-1].data["state"]) == ("state", None, "succeeded")
+    assert list(client.events(campaign.id, events[3].id)) == events[4:]
+    assert list(client.events(campaign.id, events[-1].id)) == []
+
+
+def test_the_same_key_gives_the_same_campaign_and_never_another_one(client: Client) -> None:
+    first, second = client.submit(SPEC, "nightly-17"), client.submit(SPEC, "nightly-17")
+    assert first.id == second.id
+    with pytest.raises(Refused) as caught:
+        client.submit(SPEC.model_copy(update={"label": "b"}), "nightly-17")
+    assert (caught.value.status, caught.value.reason) == (409, "idempotency_key_reused")
+
+
+def test_lists_are_filtered_by_the_service(client: Client) -> None:
+    other = client.submit(SPEC.model_copy(update={"label": "rare", "families": ("dense",)}))
+    client.submit(SPEC)
+    assert [each.id for each in client.campaigns(label="rare")] == [other.id]
+    assert [each.id for each in client.campaigns(family="dense", method="random")] == [other.id]
+    assert list(client.campaigns(method="sac")) == []
+    everything = [each.id for each in client.campaigns(page=2)]
+    assert other.id in everything
+    assert len(set(everything)) == len(everything)
+
+
+def test_a_campaign_is_cancelled_and_then_deleted(client: Client) -> None:
+    campaign = client.submit(SPEC.model_copy(update={"budget": Budget(episodes=10_000)}))
+    with pytest.raises(Refused) as caught:
+        client.delete(campaign.id)
+    assert (caught.value.status, caught.value.reason) == (409, "not_ended")
+    client.cancel(campaign.id)
+    assert client.wait(campaign.id, timeout_s=60).state == "cancelled"
+    assert client.cancel(campaign.id).state == "cancelled"
+    client.delete(campaign.id)
+    with pytest.raises(Refused) as caught:
+        client.campaign(campaign.id)
+    assert (caught.value.status, caught.value.reason) == (404, "unknown_id")
+
+
+def test_a_wrong_spec_is_refused_with_the_field(client: Client) -> None:
+    with pytest.raises(Refused) as caught:
+        client.submit({"families": ["low"], "budget": {"episodes": 0}})
+    assert caught.value.status == 422
+    assert [field.field for field in caught.value.fields] == ["budget.episodes"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_a_server_that_is_lost_and_restarted_is_a_pause(number: int, serve: Callable[..., Service]) -> None:
+    service = serve()
+
+    def restart(campaign_id: str) -> None:
+        service.wait_for(campaign_id, lambda seen: seen["progress"]["episodes_done"] >= 10)
+        service.stop(number)
+        time.sleep(1)
+        service.start()
+
+    with connected(service) as client:
+        campaign = client.submit(SPEC.model_copy(update={"budget": Budget(episodes=40)}))
+        heard: list[str] = []
+        listening = threading.Thread(target=lambda: heard.extend(event.id for event in client.events(campaign.id)))
+        restarting = threading.Thread(target=restart, args=[campaign.id])
+        for thread in (listening, restarting):
+            thread.start()
+        seen: list[Campaign] = []
+        assert client.wait(campaign.id, seen.append, timeout_s=100).progress.episodes_done == 80
+        for thread in (listening, restarting):
+            thread.join()
+    assert seen[0].progress.episodes_done < 80 == seen[-1].progress.episodes_done
+    assert len(set(heard)) == len(heard) >= 81

@@ -1,0 +1,41 @@
+"""The load of `make load`, small and short: nothing goes wrong and nothing leaks. How fast it is, is measured there."""
+
+import json
+import subprocess
+import sys
+
+import psutil
+
+from tests.server import ROOT
+
+POLLERS, STREAMS, SECONDS = 20, 5, 5
+
+
+def generate(service, campaigns, seconds, go_on):
+    """What a generator in a process of its own saw."""
+    options = {"port": service.port, "pollers": POLLERS, "streams": STREAMS, "seconds": seconds, "stays": 1}
+    flags = [f"--{name}={value}" for name, value in options.items()]
+    command = [sys.executable, "-m", "tests.load.generator", *flags, f"--go-on={go_on}", *campaigns]
+    return json.loads(subprocess.run(command, cwd=ROOT, check=False, stdout=subprocess.PIPE, timeout=120).stdout)
+
+
+def test_pollers_and_streams_see_all_without_an_error_and_leave_nothing_open(serve, tmp_path):
+    service = serve()
+    campaigns = [service.post(label=label, budget={"episodes": 10_000}) for label in ("one", "two")]
+    service.wait_until(lambda: all(service.get(each)["progress"]["episodes_done"] for each in campaigns))
+    server = psutil.Process(service.process.pid)
+    streams = tmp_path / "streams.json"
+    generate(service, campaigns, 2, streams)  # from now on, all connections to the database are open
+    before = server.num_fds()
+    seen = generate(service, campaigns, SECONDS, streams)
+    assert seen["errors"] == {}
+    assert (seen["repeated"], seen["missing"]) == (0, 0)
+    assert seen["episodes"] > 0
+    assert seen["connections"] > 2 * STREAMS  # they broke off and went on
+    assert {kind: len(times) for kind, times in seen["latencies_ms"].items()} == {
+        "status": 12 * SECONDS,
+        "results": 4 * SECONDS,
+        "list": 4 * SECONDS,
+    }
+    service.wait_until(lambda: len(server.net_connections(kind="tcp")) <= 2)  # that it listens on, and our own
+    assert server.num_fds() <= before + 2 * STREAMS

@@ -1,0 +1,103 @@
+"""Answers that are given again, on real servers: never to the wrong one, and never when something has happened."""
+
+import time
+
+from service.keys.file import KeyFile
+from service.keys.key import Scope
+
+POLLS = 5  # enough for an answer to be given again
+
+
+def poll(client, path, **headers):
+    """The last of several answers, all alike."""
+    answers = [client.get(path, headers=headers) for _ in range(POLLS)]
+    assert {answer.status_code for answer in answers} == {200}, answers[-1].text
+    return answers[-1]
+
+
+def listed(client, **query):
+    return [item["id"] for item in client.get("/v1/campaigns", params=query).json()["items"]]
+
+
+def test_whatever_is_not_an_episode_shows_at_once(serve):
+    service = serve()
+    seen = []
+    for label in ("one", "two", "three"):
+        seen.insert(0, service.post(label=label, budget={"episodes": 100_000}))
+        for _ in range(POLLS):
+            assert listed(service.client) == seen
+            assert listed(service.client, label=label) == seen[:1]
+    campaign = seen[0]
+    poll(service.client, f"/v1/campaigns/{campaign}")
+    accepted = service.client.post(f"/v1/campaigns/{campaign}/cancel").json()["state"]
+    assert accepted in ("cancelling", "cancelled")
+    for part in ("", "/results"):
+        assert service.get(campaign, part)["state"] in ("cancelling", "cancelled")
+    service.wait(campaign)
+    poll(service.client, f"/v1/campaigns/{campaign}")
+    assert service.client.delete(f"/v1/campaigns/{campaign}").status_code == 204
+    assert service.client.get(f"/v1/campaigns/{campaign}").status_code == 404
+    assert listed(service.client) == seen[1:]
+
+
+def test_episodes_show_within_a_moment(serve):
+    service = serve()
+    campaign = service.post(budget={"episodes": 40})
+    counts, before = set(), 0
+    while before < 40:
+        now = service.get(campaign)["progress"]["episodes_done"]
+        assert now >= before
+        time.sleep(0.01)  # there is a limit to the rate of requests
+        counts.add(now)
+        before = now
+    assert service.wait(campaign)["state"] == "succeeded"
+    assert len(counts) > 3
+
+
+def test_a_list_has_a_tag_until_something_happens(serve):
+    service = serve()
+    first = service.wait(service.post(budget={"episodes": 1}))["id"]
+    answer = poll(service.client, "/v1/campaigns")
+    headers = {"If-None-Match": answer.headers["etag"]}
+    for _ in range(POLLS):
+        unchanged = service.client.get("/v1/campaigns", headers=headers)
+        assert (unchanged.status_code, unchanged.content) == (304, b"")
+        assert unchanged.headers["etag"] == answer.headers["etag"]
+    second = service.post(budget={"episodes": 1})
+    changed = service.client.get("/v1/campaigns", headers=headers)
+    assert changed.status_code == 200
+    assert [item["id"] for item in changed.json()["items"]] == [second, first]
+
+
+def test_an_answer_is_given_again_only_to_those_who_see_the_same(serve, tmp_path):
+    (tmp_path / "data").mkdir()
+    file = KeyFile(tmp_path / "data" / "keys.json")
+    ours, theirs, admin = (
+        {"Authorization": f"Bearer {file.create(project, project, scope)[1]}"}
+        for project, scope in (("ours", Scope.RUN), ("theirs", Scope.RUN), ("ops", Scope.ADMIN))
+    )
+    service = serve()
+    service.client.headers.update(ours)
+    campaign = service.wait(service.post(budget={"episodes": 2}))["id"]
+    path = f"/v1/campaigns/{campaign}"
+    for who in (ours, admin):
+        assert poll(service.client, path, **who).json()["id"] == campaign
+        assert [item["id"] for item in poll(service.client, "/v1/campaigns", **who).json()["items"]] == [campaign]
+    for _ in range(POLLS):
+        assert service.client.get(path, headers=theirs).status_code == 404
+        assert service.client.get(f"{path}/results", headers=theirs).status_code == 404
+        assert service.client.get("/v1/campaigns", headers=theirs).json()["items"] == []
+        assert service.client.get(path, headers={"Authorization": "Bearer nobody"}).status_code == 401
+
+
+def test_each_answer_is_counted_but_only_the_first_of_several_equal_ones_is_logged(serve):
+    service = serve()
+    campaign = service.wait(service.post(budget={"episodes": 2}))["id"]
+    path, route = f"/v1/campaigns/{campaign}/results", "/v1/campaigns/{campaign_id}/results"
+    for expected in (1, 2):
+        poll(service.client, f"{path}?{expected}")
+        logged = [line for line in service.log.read_text().splitlines() if f"GET {route} 200" in line]
+        assert [f"[campaign {campaign}]" in line for line in logged] == [True] * expected
+    metrics = service.client.get("/metrics").text.splitlines()
+    counter = f'risk_sac_request_seconds_count{{method="GET",route="{route}",status="200"}}'
+    assert next(float(line.split()[-1]) for line in metrics if line.startswith(counter)) == 2 * POLLS

@@ -1,0 +1,151 @@
+"""Following campaigns by server-sent events, through broken connections and dying servers."""
+
+import base64
+import contextlib
+import json
+import random
+import signal
+import socket
+import threading
+import time
+
+import httpx
+
+
+def events(client, campaign_id, after=None):
+    """Events of one connection, as dictionaries of their fields."""
+    headers = {"Last-Event-ID": after} if after else {}
+    path = f"/v1/campaigns/{campaign_id}/events"
+    with client.stream("GET", path, headers=headers, timeout=40) as response:
+        if response.status_code == 204:
+            return
+        assert response.status_code == 200, response.read()
+        assert response.headers["content-type"].startswith("text/event-stream")
+        event = {}
+        for line in response.iter_lines():
+            if line:
+                name, _, value = line.partition(": ")
+                event[name] = value
+            else:
+                if "data" in event:
+                    yield event | {"data": json.loads(event["data"])}
+                event = {}
+
+
+def told(event):
+    """What an event is about, without when."""
+    data = event["data"]
+    return (event["event"], data["run_id"], data.get("id") or data["state"])
+
+
+def test_a_stream_tells_all_in_order_and_ends_with_the_campaign(serve):
+    service = serve("striking_worker")
+    campaign_id = service.post(seeds=[0, 1], budget={"episodes": 12})
+    seen = list(events(service.client, campaign_id))
+    episodes = [event["data"] for event in seen if event["event"] != "state"]
+    listed = service.get(campaign_id, "/episodes", limit=500)["items"]
+    assert episodes == listed
+    failures = [event["data"]["id"] for event in seen if event["event"] == "failure"]
+    assert failures == [item["id"] for item in service.get(campaign_id, "/failures", limit=500)["items"]]
+    assert len(failures) == 12
+    assert seen[-1]["event"] == "state"
+    assert (seen[-1]["data"]["run_id"], seen[-1]["data"]["state"]) == (None, "succeeded")
+    for run in ("low-random-0", "low-random-1"):
+        own = [told(event) for event in seen if event["data"]["run_id"] == run]
+        assert own[0] == ("state", run, "running")
+        assert own[-1] == ("state", run, "succeeded")
+        assert len(own) == 14
+    assert len({event["id"] for event in seen}) == len(seen)
+
+
+def test_a_stream_taken_up_after_any_event_tells_exactly_the_rest(serve):
+    service = serve("striking_worker")
+    campaign_id = service.post(budget={"episodes": 8})
+    seen = list(events(service.client, campaign_id))
+    for index, event in enumerate(seen):
+        assert [told(each) for each in events(service.client, campaign_id, event["id"])] == [
+            told(each) for each in seen[index + 1 :]
+        ]
+    path = f"/v1/campaigns/{campaign_id}/events"
+    over = service.client.get(path, headers={"Last-Event-ID": seen[-1]["id"]})
+    assert (over.status_code, over.content) == (204, b"")
+
+
+def test_streams_through_killed_servers_tell_everything_once(serve):
+    """Each client comes back with the last id it has; the server is killed under them again and again."""
+    service = serve("striking_worker")
+    campaign_id = service.post(seeds=[0, 1], budget={"episodes": 120})
+    seen = [[] for _ in range(4)]
+
+    def follow(mine):
+        with httpx.Client(base_url=service.client.base_url) as client:
+            while not (mine and told(mine[-1]) == ("state", None, "succeeded")):
+                with contextlib.suppress(httpx.TransportError):
+                    for event in events(client, campaign_id, mine[-1]["id"] if mine else None):
+                        mine.append(event)  # one by one: what arrived before the connection broke counts
+                time.sleep(0.05)
+
+    followers = [threading.Thread(target=follow, args=(mine,), daemon=True) for mine in seen]
+    for follower in followers:
+        follower.start()
+    chance = random.Random(5)
+    for _ in range(5):
+        time.sleep(chance.uniform(0.5, 2.0))
+        service.stop(signal.SIGKILL)
+        service.start()
+    service.wait(campaign_id)
+    for follower in followers:
+        follower.join(60)
+        assert not follower.is_alive()
+    listed = [item["id"] for item in service.get(campaign_id, "/episodes", limit=500)["items"]]
+    assert len(listed) == 240
+    for mine in seen:
+        assert [event["data"]["id"] for event in mine if event["event"] != "state"] == listed
+        assert len({event["id"] for event in mine}) == len(mine)
+        changes = [told(event) for event in mine if event["event"] == "state"]
+        assert changes == [told(event) for event in seen[0] if event["event"] == "state"]
+        assert ("state", "low-random-0", "queued") in changes  # a server that died put it back
+
+
+def test_an_id_that_was_never_given_is_refused(serve):
+    service = serve()
+    mine, other = (service.post(budget={"episodes": 2}) for _ in range(2))
+    theirs = list(events(service.client, other))[3]["id"]
+    service.wait(mine)
+    wrong = ["1", "-1.-1", "999999.1", "1.999999", "99999999999999999999.1", "\u0661.\u0661", "1.1.1", "1.1\n"]
+    for forged in ["0", "x" * 101, "caf%C3%A9", theirs, *(base64.b64encode(text.encode()).decode() for text in wrong)]:
+        response = service.client.get(f"/v1/campaigns/{mine}/events", headers={"Last-Event-ID": forged})
+        assert response.status_code == 422, forged
+        assert response.json()["reason"] == "invalid_field"
+        assert [error["field"] for error in response.json()["errors"]] == ["Last-Event-ID"]
+
+
+def test_a_stream_ends_when_its_campaign_is_deleted(serve):
+    service = serve()
+    campaign_id = service.post(budget={"episodes": 10_000})
+    stream = events(service.client, campaign_id)
+    next(stream)
+    with httpx.Client(base_url=service.client.base_url) as other:
+        other.post(f"/v1/campaigns/{campaign_id}/cancel")
+        assert told(list(stream)[-1]) == ("state", None, "cancelled")
+        service.wait_until(lambda: other.delete(f"/v1/campaigns/{campaign_id}").status_code == 204)
+    assert service.client.get(f"/v1/campaigns/{campaign_id}/events").status_code == 404
+
+
+def test_a_server_with_open_streams_stops_in_time(serve):
+    """Some of them do not even read."""
+    service = serve("striking_worker")
+    campaign_id = service.post(seeds=[0, 1], budget={"episodes": 10_000})
+    request = f"GET /v1/campaigns/{campaign_id}/events HTTP/1.1\r\nHost: localhost\r\n\r\n".encode()
+    with contextlib.ExitStack() as stack:
+        streams = [stack.enter_context(socket.create_connection(("127.0.0.1", service.port))) for _ in range(50)]
+        for stream in streams:
+            stream.sendall(request)
+            assert stream.recv(15) == b"HTTP/1.1 200 OK"
+        began = time.monotonic()
+        service.process.send_signal(signal.SIGTERM)
+        received = b"".join(iter(lambda: streams[0].recv(65536), b""))
+        service.process.wait(30)
+        assert time.monotonic() - began < 20
+    assert received.endswith(b"0\r\n\r\n")  # the last chunk: it ended, it did not break
+    assert "Traceback" not in service.log.read_text()

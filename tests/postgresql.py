@@ -1,0 +1,90 @@
+"""A real PostgreSQL server of the tests' own, on a free loopback port and in a temporary folder."""
+
+import os
+import pwd
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import psycopg
+
+DEBIAN = Path("/usr/lib/postgresql")  # its package leaves initdb off the PATH
+QUIET: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.STDOUT, "cwd": "/"}
+
+
+class PostgreSql:
+    """A server on a cluster of its own."""
+
+    def __init__(self, command: Sequence[str | Path], port: int, user: str | None) -> None:
+        self.port = port
+        self._command, self._user = command, user
+        self._numbers = count()
+        self.start()
+
+    def start(self) -> None:
+        """Start it, and wait until it answers."""
+        self._process = subprocess.Popen(self._command, user=self._user, **QUIET)
+        for _ in range(300):
+            assert self._process.poll() is None, "postgres did not start"
+            try:
+                self._connect().close()
+            except psycopg.OperationalError:
+                time.sleep(0.1)
+            else:
+                return
+        raise TimeoutError("postgres did not answer")
+
+    def stop(self) -> None:
+        """Stop it at once, whoever is connected."""
+        self._process.send_signal(signal.SIGINT)
+        self._process.wait(30)
+
+    def new_database(self) -> str:
+        """URL of an empty database."""
+        name = f"test{next(self._numbers)}"
+        with self._connect() as admin:
+            admin.execute(f"CREATE DATABASE {name}")
+        return f"postgresql+psycopg://tests@127.0.0.1:{self.port}/{name}"
+
+    def _connect(self) -> psycopg.Connection:
+        return psycopg.connect(host="127.0.0.1", port=self.port, user="tests", dbname="postgres", autocommit=True)
+
+
+def binaries() -> Path | None:
+    """Folder of initdb and postgres, if they are installed."""
+    candidates = sorted(DEBIAN.glob("*/bin"), key=lambda path: float(path.parent.name), reverse=True)
+    on_path = shutil.which("initdb")
+    candidates += [Path(on_path).resolve().parent] if on_path else []
+    return next((path for path in candidates if (path / "initdb").exists() and (path / "postgres").exists()), None)
+
+
+@contextmanager
+def running(bin_: Path, folder: Path) -> Iterator[PostgreSql]:
+    """Start a server; it refuses to run as root, who therefore lends it another user."""
+    user = "nobody" if os.geteuid() == 0 else None
+    if user:
+        for parent in (folder, *folder.parents):  # pytest's temporary folders are closed to others
+            if str(parent).startswith(f"{tempfile.gettempdir()}/"):
+                parent.chmod(0o711)
+    data = folder / "cluster"
+    data.mkdir(mode=0o700)
+    if user:
+        os.chown(data, pwd.getpwnam(user).pw_uid, -1)
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    initdb = [bin_ / "initdb", "-D", data, "-U", "tests", "-A", "trust", "-E", "UTF8", "--locale=C", "--no-sync"]
+    subprocess.run(initdb, check=True, user=user, **QUIET)
+    options = ["-D", data, "-p", str(port), "-h", "127.0.0.1", "-k", "", "-c", "fsync=off"]
+    server = PostgreSql([bin_ / "postgres", *options], port, user)
+    try:
+        yield server
+    finally:
+        server.stop()

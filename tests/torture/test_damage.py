@@ -1,0 +1,206 @@
+"""Files that lose their end or flip a bit: noticed, and gone on from the last good state, or refused with the reason.
+
+What is read afterwards is either what was read before, or an error that says what is damaged; never something else.
+"""
+
+import multiprocessing
+import shutil
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+
+from risk_sac.config import RunSpec
+from risk_sac.errors import RiskSacError
+from risk_sac.results import FAILURES, RESULTS
+from service.api.views import failure_body
+from service.campaigns import State
+from service.errors import StorageError
+from service.reports import Reports
+from service.settings import ServiceSettings
+from service.store import Store
+from tests.server import servers
+
+SPEC = {
+    "families": ["low"],
+    "methods": ["bo-only", "random"],
+    "budget": {"episodes": 12},
+    "learner": {"checkpoint_every": 2},
+}
+DATABASE = "risk-sac.db"
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A data folder with a campaign that ended and one that a kill interrupted."""
+    folder = tmp_path_factory.mktemp("damage")
+    with servers(folder) as serve:
+        service = serve("service.worker", lease_s=60)
+        assert service.wait(service.post(**SPEC))["state"] == "succeeded"
+        interrupted = service.post(**SPEC | {"budget": {"episodes": 400}})
+        service.wait_for(interrupted, lambda seen: all(run["episodes_done"] > 5 for run in seen["runs"]))
+        service.stop(signal.SIGKILL)
+        service.wait_until(lambda: service.workers() == [], timeout_s=10, alive=False)
+    return folder / "data"
+
+
+def damage(path: Path, random: Random) -> str:
+    """Cut a file short, or flip one of its bits."""
+    content = bytearray(path.read_bytes())
+    at = random.randrange(len(content))
+    if random.random() < 0.25:
+        path.write_bytes(content[:at])
+        return f"{path.name} cut to {at} of {len(content)} bytes"
+    content[at] ^= 1 << random.randrange(8)
+    path.write_bytes(content)
+    return f"{path.name} with a bit flipped at {at} of {len(content)}"
+
+
+def readings(data: Path) -> dict[str, object]:
+    """Everything the service would tell of a data folder; an error in the place of what is damaged."""
+    settings = ServiceSettings(data_dir=data)
+    try:
+        store = Store(settings.url)
+    except StorageError as error:
+        return {"": error}
+    found: dict[str, object] = {}
+
+    def read(name: str, reading: Callable[[], Any]) -> Any:
+        try:
+            found[name] = reading()
+        except RiskSacError as error:
+            found[name] = error
+        return found[name]
+
+    campaigns = read("campaigns", lambda: store.campaigns(limit=10).items)
+    for campaign in () if isinstance(campaigns, Exception) else campaigns:
+        read(f"{campaign.id} changes", lambda id_=campaign.id: store.changes(id_))
+        episodes = read(f"{campaign.id} episodes", lambda id_=campaign.id: store.episodes(id_, limit=1000).items)
+        for episode in () if isinstance(episodes, Exception) else episodes:
+            if episode.series is not None:
+                body = failure_body(campaign.id, episode, settings)
+                found[f"{campaign.id} {episode.id}"] = (
+                    StorageError(body.series_problem) if body.series_problem else body
+                )
+        if campaign.state is State.SUCCEEDED:
+            report = Reports(settings).report(campaign)
+            found[f"{campaign.id} table"] = report.comparison if report.lasting else StorageError("runs are lost")
+    store.close()
+    return found
+
+
+def told_files(data: Path) -> list[Path]:
+    """Series that an episode names (a kill may have left one that none does yet), and results that a table shows."""
+    settings = ServiceSettings(data_dir=data)
+    store = Store(settings.url)
+    found = []
+    for campaign in store.campaigns(limit=10).items:
+        for episode in store.episodes(campaign.id, limit=1000).items:
+            if episode.series is not None:
+                found.append(settings.run_folder(campaign.id, episode.run_id) / FAILURES / episode.series)
+        if campaign.state is State.SUCCEEDED:
+            found += [settings.run_folder(campaign.id, run.id) / RESULTS for run in campaign.runs]
+    store.close()
+    return sorted(found)
+
+
+def noticed(before: dict[str, object], after: dict[str, object]) -> bool:
+    """Whether anything is told to be damaged; all else must be as before."""
+    errors = {name for name, reading in after.items() if isinstance(reading, Exception)}
+    for name, reading in after.items():
+        assert name in errors or (name in before and repr(reading) == repr(before[name])), name
+    if "" not in errors and "campaigns" not in errors:
+        assert not (missing := before.keys() - after.keys()) or any("episodes" in name for name in errors), missing
+    return bool(errors)
+
+
+@pytest.mark.timeout(1800)
+def test_a_damaged_database_is_noticed_wherever_it_matters(data, tmp_path, times, chance, tell):
+    source = tmp_path / "source"
+    shutil.copytree(data, source)
+    before = readings(source)  # this also works the journal in
+    seen = 0
+    for _ in range(times(15, 100)):
+        copy = tmp_path / "copy"
+        shutil.copytree(source, copy, copy_function=shutil.copy)
+        what = damage(copy / DATABASE, chance)
+        try:
+            seen += noticed(before, readings(copy))
+        except AssertionError as error:
+            raise AssertionError(f"{what}: {error}") from error
+        shutil.rmtree(copy)
+    tell(f"database: {times(15, 100)} damaged, {seen} noticed, the others without effect on anything that is read")
+
+
+@pytest.mark.timeout(1800)
+def test_a_damaged_result_or_series_is_noticed(data, tmp_path, times, chance, tell):
+    source = tmp_path / "source"
+    shutil.copytree(data, source)
+    before = readings(source)
+    read = [path.relative_to(source) for path in told_files(source)]
+    seen = 0
+    for _ in range(times(15, 100)):
+        copy = tmp_path / "copy"
+        shutil.copytree(source, copy)
+        what = damage(copy / chance.choice(read), chance)
+        assert noticed(before, readings(copy)), what
+        seen += 1
+        shutil.rmtree(copy)
+    tell(f"artefacts: {seen} damaged, {seen} noticed")
+
+
+@pytest.mark.timeout(3600)
+def test_a_run_with_a_damaged_file_goes_on_from_the_last_good_one(data, tmp_path, times, chance, tell):
+    store = Store(ServiceSettings(data_dir=data).url)
+    campaign = store.campaigns(limit=1).items[0]
+    store.close()
+    run = chance.choice([run for run in campaign.runs if run.method == "random"])
+    spec = campaign.run_spec(run)
+    spec = spec.model_copy(update={"budget": spec.budget.model_copy(update={"episodes": 40})})
+    fresh = tmp_path / "fresh"
+    undisturbed = go_on(spec, fresh)
+    assert len(undisturbed) == 64, undisturbed
+    outcomes = {"same result": 0, "refused with the reason": 0}
+    for number in range(times(10, 100)):
+        folder = tmp_path / f"case{number}"
+        go_on(spec, folder, stop_after=chance.randrange(5, 35))
+        victims = sorted(path for path in folder.iterdir() if path.is_file() and path.stat().st_size)
+        what = damage(chance.choice(victims), chance)
+        outcome = go_on(spec, folder)
+        assert outcome == undisturbed or outcome.startswith("refused: "), (what, outcome)
+        outcomes["same result" if outcome == undisturbed else "refused with the reason"] += 1
+        shutil.rmtree(folder)
+    tell(f"run folders: {times(10, 100)} damaged, {outcomes}")
+
+
+def go_on(spec: RunSpec, folder: Path, stop_after: int | None = None) -> str:
+    """Digest of a run that is started or goes on in a process of its own, or why it cannot."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["risk_sac.local_run"])
+    receiver, sender = context.Pipe(duplex=False)
+    with receiver, sender:
+        process = context.Process(target=_run, args=(spec, folder, stop_after, sender))
+        process.start()
+        assert receiver.poll(300), "it says nothing"
+        outcome: str = receiver.recv()
+        process.join()
+        process.close()
+    return outcome
+
+
+def _run(spec: RunSpec, folder: Path, stop_after: int | None, sender: Any) -> None:
+    import os
+
+    from risk_sac.local_run import run
+
+    def progress(done: int, metrics: object) -> None:
+        if done == stop_after:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    try:
+        sender.send(run(spec, folder, progress).digest or "")
+    except (RiskSacError, OSError) as error:
+        sender.send(f"refused: {error}")

@@ -1,0 +1,52 @@
+from pathlib import Path
+
+import pytest
+
+from risk_sac.client import Client
+from risk_sac.client.address import DEFAULT_URL, api_key
+from risk_sac.errors import ConfigError
+
+
+@pytest.mark.parametrize(
+    "url", ["", "localhost:8000", "ftp://host", "http://", "http://[", "http://host:99999", "a\nb"]
+)
+def test_what_is_no_url_is_refused(url: str) -> None:
+    with pytest.raises(ConfigError, match="wanted http") as caught:
+        Client(url)
+    assert caught.value.field == "url"
+
+
+def test_a_password_in_the_url_is_refused_and_not_shown() -> None:
+    with pytest.raises(ConfigError) as caught:
+        Client("http://me:hunter2@host")
+    assert "hunter2" not in str(caught.value)
+
+
+@pytest.mark.parametrize("key", ["", "two words", "line\nbreak", "schlüssel"])
+def test_a_key_that_no_header_can_hold_is_refused_and_not_shown(key: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        Client(key=key)
+    assert not key or key not in str(caught.value)
+
+
+def test_the_key_comes_from_the_environment_or_from_a_file(tmp_path: Path) -> None:
+    file = tmp_path / "key"
+    file.write_text("from-file\n")
+    assert api_key({}) is None
+    assert api_key({"RISK_SAC_API_KEY": "", "RISK_SAC_API_KEY_FILE": ""}) is None
+    assert api_key({"RISK_SAC_API_KEY_FILE": str(file)}) == "from-file"
+    assert api_key({"RISK_SAC_API_KEY": "direct", "RISK_SAC_API_KEY_FILE": str(file)}) == "direct"
+
+
+def test_a_key_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="nowhere cannot be read: No such file") as caught:
+        api_key({"RISK_SAC_API_KEY_FILE": str(tmp_path / "nowhere")})
+    assert caught.value.field == "RISK_SAC_API_KEY_FILE"
+
+
+def test_the_url_comes_from_the_argument_the_environment_or_the_default(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("RISK_SAC_URL", raising=False)
+    assert Client.from_environment().url == DEFAULT_URL
+    monkeypatch.setenv("RISK_SAC_URL", "https://sac.example/")
+    assert Client.from_environment().url == "https://sac.example"
+    assert Client.from_environment("http://other:1").url == "http://other:1"

@@ -1,0 +1,101 @@
+import itertools
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from risk_sac.client import Client, records
+from risk_sac.config import Budget, CampaignSpec
+from tests.unit.client.scripted_server import Server, campaign
+
+DESCRIPTION = yaml.safe_load((Path(__file__).parents[3] / "openapi.yaml").read_text())["components"]["schemas"]
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        records.Campaign,
+        records.CampaignSummary,
+        records.Episode,
+        records.Failure,
+        records.Metrics,
+        records.Progress,
+        records.Results,
+        records.Run,
+        records.RunResult,
+        records.Total,
+    ],
+)
+def test_records_read_only_what_the_api_promises(record: type[records.Record]) -> None:
+    assert set(record.model_fields) <= set(DESCRIPTION[record.__name__]["required"])
+
+
+def test_fields_that_the_client_does_not_know_are_kept(server: Server, client: Client) -> None:
+    answered = campaign(invented={"later": 1})
+    server.answer(200, answered)
+    assert client.campaign("c1").model_dump(mode="json") == answered
+
+
+def test_only_what_a_spec_was_given_is_sent(server: Server, client: Client) -> None:
+    server.answer(202, campaign("queued"))
+    client.submit(CampaignSpec(families=("low",), budget=Budget(episodes=3)))
+    assert json.loads(server.asked[0].body) == {"families": ["low"], "budget": {"episodes": 3}}
+    assert server.asked[0].headers["content-type"] == "application/json"
+
+
+def test_every_submission_has_a_key_of_its_own_unless_told_otherwise(server: Server, client: Client) -> None:
+    server.answer(202, campaign("queued"))
+    for key in (None, None, "nightly-17"):
+        client.submit({}, key)
+    first, second, third = (asked.headers["idempotency-key"] for asked in server.asked)
+    assert first != second
+    assert third == "nightly-17"
+
+
+def test_lists_are_read_page_by_page_as_far_as_they_are_wanted(server: Server, client: Client) -> None:
+    pages: list[dict[str, Any]] = [
+        {"items": [campaign(id="c3"), campaign(id="c2")], "next": "Mg=="},
+        {"items": [campaign(id="c1")], "next": None},
+    ]
+    for page in pages:
+        server.answer(200, page)
+    found = client.campaigns(state="running", page=2)
+    assert [each.id for each in itertools.islice(found, 2)] == ["c3", "c2"]
+    assert len(server.asked) == 1
+    assert [each.id for each in found] == ["c1"]
+    assert [asked.path for asked in server.asked] == [
+        "/v1/campaigns?state=running&limit=2",
+        "/v1/campaigns?state=running&limit=2&cursor=Mg%3D%3D",
+    ]
+
+
+def test_an_id_stays_one_part_of_the_path(server: Server, client: Client) -> None:
+    server.answer(200, campaign())
+    client.campaign("../c1?x=y#z")
+    assert server.asked[0].path == "/v1/campaigns/..%2Fc1%3Fx%3Dy%23z"
+
+
+def test_the_key_is_sent_with_every_request_and_shown_nowhere(server: Server) -> None:
+    server.answer(200, campaign())
+    with Client(server.url, "rs_secret") as client:
+        client.campaign("c1")
+        assert "rs_secret" not in repr(client) + str(vars(client))
+    assert server.asked[0].headers["authorization"] == "Bearer rs_secret"
+
+
+def test_a_service_below_a_path_is_reached_there(server: Server) -> None:
+    server.answer(200, campaign())
+    with Client(f"{server.url}/risk-sac/") as client:
+        client.campaign("c1")
+        assert client.url_of("c1") == f"{server.url}/risk-sac/v1/campaigns/c1"
+    assert server.asked[0].path == "/risk-sac/v1/campaigns/c1"
+
+
+def test_a_client_needs_neither_the_method_nor_the_service() -> None:
+    heavy = {"torch", "libsumo", "botorch", "numba", "fastapi", "sqlalchemy", "service"}
+    code = f"import sys, risk_sac.client; print(sorted({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout == b"[]\n"

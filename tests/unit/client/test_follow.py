@@ -1,0 +1,128 @@
+import time
+from collections import deque
+from typing import Any
+
+import pytest
+
+from risk_sac.client import Client, Event, Overdue, Refused, UnexpectedAnswer
+from tests.unit.client.scripted_server import Answer, Server, campaign
+
+STATUS, EVENTS = "/v1/campaigns/c1", "/v1/campaigns/c1/events"
+NO_STREAM = Answer(404, {"detail": "nothing is here", "reason": "unknown_route"})
+RUNNING = 'id: 7\nevent: state\ndata: {"run_id": null, "state": "running", "reason": null}\n\n'
+EPISODE = 'id: 8\nevent: episode\ndata: {"run_id": "low-random-0", "index": 0}\n\n'
+ENDED = 'id: 9\nevent: state\ndata: {"run_id": null, "state": "succeeded", "reason": null}\n\n'
+
+
+def script(server: Server, status: list[Answer], *streams: Answer) -> None:
+    server.by_path = {STATUS: deque(status), EVENTS: deque(streams)}
+
+
+def now(state: str, done: int = 0, **headers: str) -> Answer:
+    return Answer(200, campaign(state, done), {name.replace("_", "-"): value for name, value in headers.items()})
+
+
+def states(client: Client, **arguments: Any) -> list[str]:
+    return [each.state for each in client.follow("c1", **arguments)]
+
+
+def test_events_say_when_to_look(server: Server, client: Client) -> None:
+    stream = Answer(200, [": ping\n\n", RUNNING, EPISODE, ENDED])
+    script(server, [now("queued"), now("running"), now("succeeded", 4)], stream)
+    assert states(client) == ["queued", "running", "succeeded"]
+    assert [asked.path for asked in server.asked] == [STATUS, EVENTS, STATUS, STATUS]
+
+
+def test_without_a_stream_it_asks_as_often_as_the_service_wants(server: Server, client: Client) -> None:
+    script(server, [now("running", Retry_After="2"), now("succeeded")], NO_STREAM)
+    before = time.monotonic()
+    assert states(client) == ["running", "succeeded"]
+    assert time.monotonic() - before >= 2
+    assert [asked.path for asked in server.asked] == [STATUS, EVENTS, STATUS]
+
+
+def test_what_has_not_changed_is_not_sent_again(server: Server, client: Client) -> None:
+    unchanged = Answer(304, None, {"ETag": 'W/"1"', "Retry-After": "0.1"})
+    script(server, [now("running", ETag='W/"1"', Retry_After="0.1"), unchanged, now("succeeded")], NO_STREAM)
+    assert states(client) == ["running", "succeeded"]
+    asked = [each.headers.get("if-none-match") for each in server.asked if each.path == STATUS]
+    assert asked == [None, 'W/"1"', 'W/"1"']
+
+
+def test_a_broken_stream_goes_on_after_the_last_event(server: Server, client: Client) -> None:
+    script(server, [now("running")] * 3 + [now("succeeded")], Answer(200, [RUNNING, None]), Answer(200, [ENDED]))
+    assert states(client) == ["running", "succeeded"]
+    streams = [each.headers.get("last-event-id") for each in server.asked if each.path == EVENTS]
+    assert streams == [None, "7"]
+
+
+def test_a_stream_that_ends_too_early_is_not_the_end(server: Server, client: Client) -> None:
+    script(server, [now("running"), now("running"), now("succeeded")], Answer(200, []))
+    assert states(client) == ["running", "succeeded"]
+
+
+def test_a_campaign_that_takes_too_long_is_overdue(server: Server, client: Client) -> None:
+    script(server, [now("running", Retry_After="60")], NO_STREAM)
+    before = time.monotonic()
+    with pytest.raises(Overdue, match=r"did not end within 0.5 s"):
+        client.wait("c1", timeout_s=0.5)
+    assert time.monotonic() - before < 5
+
+
+def test_a_quiet_stream_does_not_hold_up_the_deadline(server: Server, client: Client) -> None:
+    script(server, [now("running")], Answer(200, [RUNNING, 5.0]))
+    before = time.monotonic()
+    with pytest.raises(Overdue):
+        client.wait("c1", timeout_s=0.5)
+    assert time.monotonic() - before < 4
+
+
+def test_a_campaign_deleted_meanwhile_is_an_error(server: Server, client: Client) -> None:
+    script(server, [now("running"), Answer(404, {"detail": "no campaign", "reason": "unknown_id"})], NO_STREAM)
+    with pytest.raises(Refused, match="no campaign"):
+        client.wait("c1")
+
+
+def test_wait_shows_every_change_and_returns_the_end(server: Server, client: Client) -> None:
+    script(server, [now("queued"), now("running", 2), now("succeeded", 4)], Answer(200, [RUNNING, ENDED]))
+    seen: list[int] = []
+    assert client.wait("c1", lambda each: seen.append(each.progress.episodes_done)).state == "succeeded"
+    assert seen == [0, 2, 4]
+
+
+def test_events_come_as_they_were_sent_and_go_on_after_a_break(server: Server, client: Client) -> None:
+    script(server, [now("succeeded")], Answer(200, [RUNNING, ": ping\n\n", EPISODE, None]), Answer(200, [ENDED]))
+    found = list(client.events("c1"))
+    assert [(each.id, each.name) for each in found] == [("7", "state"), ("8", "episode"), ("9", "state")]
+    assert found[1] == Event(id="8", name="episode", data={"run_id": "low-random-0", "index": 0})
+    assert [each.headers.get("last-event-id") for each in server.asked if each.path == EVENTS] == [None, "8"]
+
+
+def test_events_can_begin_after_one_that_was_seen(server: Server, client: Client) -> None:
+    script(server, [now("succeeded")], Answer(200, [ENDED]))
+    assert [each.id for each in client.events("c1", "8")] == ["9"]
+    assert server.asked[0].headers["last-event-id"] == "8"
+
+
+def test_events_of_an_unknown_campaign_are_refused(server: Server, client: Client) -> None:
+    script(server, [now("running")], NO_STREAM)
+    with pytest.raises(Refused):
+        next(client.events("c1"))
+
+
+def test_a_stream_of_something_else_is_an_error(server: Server, client: Client) -> None:
+    script(server, [now("running")], Answer(200, {"hello": "world"}))
+    with pytest.raises(UnexpectedAnswer, match="wanted a stream of events"):
+        next(client.events("c1"))
+
+
+def test_a_stream_that_ends_before_all_is_told_is_taken_up_even_if_the_campaign_has_ended_by_then(
+    server: Server, client: Client
+) -> None:
+    script(server, [now("succeeded")], Answer(200, [RUNNING]), Answer(200, [EPISODE, ENDED]))
+    assert [each.id for each in client.events("c1")] == ["7", "8", "9"]
+
+
+def test_a_campaign_whose_events_were_all_told_has_no_more(server: Server, client: Client) -> None:
+    script(server, [now("succeeded")], Answer(204))
+    assert list(client.events("c1", "9")) == []

@@ -1,0 +1,66 @@
+"""Formulas that want to do harm are refused, or watched for an episode in little time."""
+
+import time
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from risk_sac.config import Requirement
+from risk_sac.errors import FormulaError
+from risk_sac.risk.signals import SIGNALS
+from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor
+from tests.hostile_formulas import LONGEST, formulas
+
+STEP_S, STEPS = 0.1, 200
+TIME_S = 0.2
+FORMULAS = formulas()
+SHARES = 8  # one test each, so that several processes can share the work
+
+
+@pytest.fixture(scope="module")
+def trace() -> list[dict[str, float]]:
+    """Any values that the signals may have."""
+    generator = np.random.default_rng(0)
+    return [{name: generator.uniform(info.low, info.high) for name, info in SIGNALS.items()} for _ in range(STEPS)]
+
+
+def watch(formula: str, trace: list[dict[str, float]]) -> FormulaError | ValidationError | None:
+    """Watch a formula to the end; why it is refused, if it is, by an error that means a 422."""
+    try:
+        monitor = Monitor([Requirement(name="mine", formula=formula, scale=1.0)], STEP_S, STEPS)
+    except (FormulaError, ValidationError) as error:
+        return error
+    for signals in trace:
+        [robustness] = monitor.update(signals)
+        assert abs(robustness) <= ROBUSTNESS_CLIP
+    return None
+
+
+def timed(formula: str, trace: list[dict[str, float]]) -> tuple[FormulaError | ValidationError | None, float]:
+    """What became of it, and the processor time of the best of three, s; of one if that is quick anyway."""
+    took = []
+    while len(took) < 3 and min(took, default=TIME_S) > TIME_S / 4:
+        began = time.process_time()
+        refusal = watch(formula, trace)
+        took.append(time.process_time() - began)
+    return refusal, min(took)
+
+
+def test_there_are_more_than_500_of_them() -> None:
+    assert len(FORMULAS) >= 500
+    assert len(set(FORMULAS)) == len(FORMULAS)
+
+
+@pytest.mark.parametrize("share", range(SHARES))
+def test_hostile_formulas_are_refused_or_watched_in_little_time(share: int, trace: list[dict[str, float]]) -> None:
+    refusals = []
+    for formula in FORMULAS[share::SHARES]:
+        refusal, seconds = timed(formula, trace)
+        assert seconds <= TIME_S, formula
+        refusals.append(refusal)
+    assert refusals.count(None) > 10
+    wrong = [refusal for refusal in refusals if isinstance(refusal, FormulaError)]
+    assert len(wrong) > 50
+    assert all(refusal.field == "requirements[0].formula" for refusal in wrong)
+    assert all(refusal.position is not None and 0 <= refusal.position <= LONGEST for refusal in wrong)

@@ -1,0 +1,134 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from service.errors import StorageError
+from service.networks import limits
+from service.networks.errors import UploadError
+from service.networks.packaging import Packaging
+from service.networks.sandbox import CHECKER, inspect
+from tests.hostile_networks import NET, ROUTES, zipped
+
+BOUND = "import os, sys; from service.networks.checker.bounds import bind; bind();"
+
+
+def python(code: str) -> Sequence[str]:
+    """A checker that does what the code says; its argument is the packaging."""
+    return (sys.executable, "-I", "-c", code)
+
+
+def refusal(folder: Path, code: str, wall_s: float = 5) -> str:
+    with pytest.raises(UploadError) as caught:
+        inspect(folder, Packaging.XML, python(code), wall_s)
+    return str(caught.value)
+
+
+def test_a_good_network_passes_with_its_files(tmp_path: Path) -> None:
+    (tmp_path / "upload").write_bytes(zipped(ROUTES, NET))
+    report = inspect(tmp_path, Packaging.ZIP)
+    assert [(file.name, file.kind) for file in report.files] == [("net.xml", "net"), ("routes-0.xml", "routes")]
+    assert all((tmp_path / file.name).stat().st_size == file.bytes for file in report.files)
+
+
+def test_a_checker_that_crashes_refuses_the_upload(tmp_path: Path) -> None:
+    assert refusal(tmp_path, "import os; os.kill(os.getpid(), 11)") == (
+        "the simulator cannot load it: it was ended by SIGSEGV"
+    )
+    assert "ended by SIGABRT" in refusal(tmp_path, "import os; os.abort()")
+
+
+def test_a_checker_that_hangs_is_killed_with_its_children(tmp_path: Path) -> None:
+    code = (
+        "import signal, subprocess, sys, time; signal.signal(signal.SIGTERM, signal.SIG_IGN);"
+        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)']);"
+        "open('pid', 'w').write(str(child.pid)); time.sleep(60)"
+    )
+    began = time.monotonic()
+    assert refusal(tmp_path, code, wall_s=1) == "checking the upload takes more than 1 s; wanted a smaller network"
+    assert time.monotonic() - began < 10
+    pid = int((tmp_path / "pid").read_text())
+    for _ in range(100):
+        if not Path(f"/proc/{pid}").exists() or "State:\tZ" in Path(f"/proc/{pid}/status").read_text():
+            return
+        time.sleep(0.05)
+    pytest.fail("the child of the checker lives")
+
+
+def test_a_checker_that_floods_its_output_fills_no_memory(tmp_path: Path) -> None:
+    code = f"{BOUND} [os.write(1, bytes(1 << 20)) for _ in range(1000)]"
+    with pytest.raises(StorageError, match="cannot be checked"):
+        inspect(tmp_path, Packaging.XML, python(code))
+    assert (tmp_path / "report").stat().st_size <= 2 * limits.MAX_EXPANDED_BYTES
+
+
+def test_what_the_checker_says_is_not_believed_either(tmp_path: Path) -> None:
+    for said in ("", "hello", "[]", '{"refused": 3}', '{"summary": {"edges": "many"}}'):
+        with pytest.raises(StorageError, match="cannot be checked"):
+            inspect(tmp_path, Packaging.XML, python(f"print({said!r})"))
+    with pytest.raises(StorageError, match="cannot be checked"):
+        inspect(tmp_path, Packaging.XML, python("raise SystemExit(3)"))
+
+
+def test_a_checker_that_cannot_be_started_is_no_fault_of_the_upload(tmp_path: Path) -> None:
+    with pytest.raises(StorageError, match="No such file"):
+        inspect(tmp_path, Packaging.XML, (str(tmp_path / "missing"),))
+
+
+def test_the_checker_knows_nothing_of_the_servers_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RISK_SAC_DATABASE_URL", "postgresql://user:password@host")
+    code = "import os; open('environment', 'w').write('\\n'.join(os.environ)); os.abort()"
+    refusal(tmp_path, code)
+    assert set((tmp_path / "environment").read_text().split()) <= {"PATH", "LC_CTYPE"}  # Python sets the latter
+
+
+def bounded(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(python(BOUND + code), capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.parametrize(
+    ("code", "says"),
+    [
+        ("bytearray(limits.MEMORY_BYTES)", "MemoryError"),
+        ("[open(os.devnull) for _ in range(limits.OPEN_FILES)]", "Too many open files"),
+        ("open('big', 'wb').truncate(2 * limits.MAX_EXPANDED_BYTES + 1)", "File too large"),
+    ],
+)
+def test_the_checker_binds_itself(code: str, says: str, tmp_path: Path) -> None:
+    ended = bounded(f"from service.networks import limits; os.chdir({str(tmp_path)!r}); {code}")
+    assert ended.returncode == 1
+    assert says in ended.stderr
+
+
+def test_the_checker_ends_itself_when_nobody_watches() -> None:
+    assert CHECKER[1] == "-I"
+    code = f"from service.networks import limits; limits.WALL_S = 1; {BOUND} import time; time.sleep(30)"
+    ended = subprocess.run(python(code), timeout=20, check=False)
+    assert ended.returncode == -signal.SIGALRM
+
+
+def test_the_simulator_may_write_little_whatever_it_is_told(tmp_path: Path) -> None:
+    # Past our allow-list on purpose: this asks the simulator itself for output, of every vehicle in every step.
+    (tmp_path / "net.xml").write_text(NET)
+    (tmp_path / "log").touch()
+    code = (
+        "from service.networks.checker.bounds import bind_simulator; import libsumo; os.chdir(sys.argv[1]);"
+        "bind_simulator();"
+        "libsumo.start(['sumo', '-n', 'net.xml', '--fcd-output', 'out.xml', '--netstate-dump', 'dump.xml']);"
+        "[libsumo.simulationStep() for _ in range(20000)]; os._exit(0)"
+    )
+    subprocess.run([*python(BOUND + code), str(tmp_path)], capture_output=True, timeout=60, check=False)
+    written = [path.stat().st_size for path in tmp_path.glob("*.xml") if path.name != "net.xml"]
+    assert max(written) == limits.LOG_BYTES
+
+
+def test_the_report_is_json(tmp_path: Path) -> None:
+    (tmp_path / "upload").write_text("<net/>")
+    ended = subprocess.run([*CHECKER, "xml"], cwd=tmp_path, capture_output=True, check=True, env={"PATH": os.defpath})
+    assert "no edge" in json.loads(ended.stdout)["refused"]

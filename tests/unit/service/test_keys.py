@@ -1,0 +1,222 @@
+import hashlib
+import json
+import logging
+import os
+import stat
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from risk_sac.errors import ConfigError
+from service.errors import KeysError
+from service.keys.__main__ import main
+from service.keys.exposure import check_exposure, is_loopback
+from service.keys.file import KeyFile
+from service.keys.key import Scope
+from service.keys.ring import KeyRing
+from service.settings import ServiceSettings
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> KeyFile:
+    return KeyFile(tmp_path / "data" / "keys.json")
+
+
+@pytest.fixture
+def ring(file: KeyFile) -> KeyRing:
+    return KeyRing(file.path)
+
+
+def test_of_a_key_only_the_hash_of_its_secret_is_kept(file: KeyFile) -> None:
+    key, token = file.create("maps", "Ann", Scope.RUN)
+    secret = token.removeprefix(f"rsk_{key.id}_")
+    assert len(secret) == 43  # 256 bits in base64
+    assert secret not in file.path.read_text()
+    assert json.loads(file.path.read_text())["keys"][0]["hash"] == hashlib.sha256(secret.encode()).hexdigest()
+
+
+def test_no_two_tokens_are_alike(file: KeyFile) -> None:
+    tokens = {file.create("maps", "", Scope.READ)[1] for _ in range(20)}
+    assert len(tokens) == 20
+    assert len({key.id for key in file.read()}) == 20
+
+
+def test_only_the_owner_may_read_the_file_whatever_the_umask(file: KeyFile) -> None:
+    before = os.umask(0)
+    try:
+        key, _ = file.create("maps", "", Scope.READ)
+        assert stat.S_IMODE(file.path.stat().st_mode) == 0o600
+        file.revoke(key.id)
+        assert stat.S_IMODE(file.path.stat().st_mode) == 0o600
+    finally:
+        os.umask(before)
+
+
+def test_commands_at_the_same_time_lose_no_key(file: KeyFile) -> None:
+    with ThreadPoolExecutor(8) as pool:
+        made = list(pool.map(lambda n: file.create(f"p{n}", "", Scope.READ)[0], range(40)))
+    assert sorted(key.id for key in file.read()) == sorted(key.id for key in made)
+
+
+def test_what_a_killed_command_left_does_not_matter(file: KeyFile) -> None:
+    key, _ = file.create("maps", "", Scope.READ)
+    file.path.with_suffix(".tmp").write_text('{"keys": [')
+    assert file.read() == (key,)
+    other, _ = file.create("maps", "", Scope.READ)
+    assert file.read() == (key, other)
+
+
+def test_revoking_twice_keeps_the_first_time(file: KeyFile) -> None:
+    key, _ = file.create("maps", "", Scope.READ)
+    revoked = file.revoke(key.id)
+    assert revoked.revoked_at is not None
+    assert file.revoke(key.id) == revoked
+
+
+def test_revoking_an_unknown_key_is_an_error(file: KeyFile) -> None:
+    file.create("maps", "", Scope.READ)
+    with pytest.raises(KeysError, match="id is 'nobody'; wanted one that"):
+        file.revoke("nobody")
+
+
+def test_every_truncation_and_every_flipped_bit_is_noticed(file: KeyFile) -> None:
+    for scope in Scope:
+        file.create("maps", "Ann", scope)
+    whole = file.path.read_bytes()
+    damaged = [whole[:length] for length in range(len(whole))]
+    damaged += [whole[:at] + bytes([whole[at] ^ 1 << at % 8]) + whole[at + 1 :] for at in range(len(whole))]
+    for content in damaged:
+        file.path.write_bytes(content)
+        with pytest.raises(KeysError, match="is damaged; restore it"):
+            file.read()
+
+
+def test_a_damaged_file_is_never_written_over(file: KeyFile) -> None:
+    file.create("maps", "", Scope.READ)
+    file.path.write_text("{}")
+    with pytest.raises(KeysError, match="damaged"):
+        file.create("maps", "", Scope.READ)
+    assert file.path.read_text() == "{}"
+
+
+def test_ring_finds_a_key_by_its_token_only(file: KeyFile, ring: KeyRing) -> None:
+    key, token = file.create("maps", "", Scope.READ)
+    _, other = file.create("nets", "", Scope.READ)
+    assert ring.find(token) == key
+    mixed = f"rsk_{key.id}_{other[13:]}"
+    last = token[:-1] + ("A" if token[-1] != "A" else "B")
+    for wrong in ("", "rsk_", key.id, token[4:], token + "=", token.upper(), mixed, last, f"{token}\n", "ü" * 56):
+        assert ring.find(wrong) is None, wrong
+
+
+def test_ring_notices_new_and_revoked_keys_at_the_next_look(file: KeyFile, ring: KeyRing) -> None:
+    assert ring.keys() == {}
+    for _ in range(20):
+        key, token = file.create("maps", "", Scope.READ)
+        assert ring.find(token) == key
+        file.revoke(key.id)
+        assert ring.find(token) is None
+    file.path.unlink()
+    assert ring.keys() == {}
+
+
+def test_ring_takes_a_damaged_file_never_for_an_empty_one(
+    file: KeyFile, ring: KeyRing, caplog: pytest.LogCaptureFixture
+) -> None:
+    _, token = file.create("maps", "", Scope.READ)
+    whole = file.path.read_bytes()
+    assert ring.find(token)
+    for damaged in (b"", whole[:50], b'{"keys": [], "sha256": ""}', b"\xff\xfe"):
+        file.path.write_bytes(damaged)
+        for _ in range(3):
+            with pytest.raises(KeysError):
+                ring.keys()
+            with pytest.raises(KeysError):
+                ring.find(token)
+    assert len([record for record in caplog.records if record.levelno == logging.ERROR]) == 1, "said once"
+    file.path.write_bytes(whole)
+    assert ring.find(token)
+
+
+def test_ring_takes_what_is_no_file_never_for_an_empty_one(file: KeyFile, ring: KeyRing) -> None:
+    file.path.mkdir(parents=True)
+    with pytest.raises(KeysError, match="cannot be read: Is a directory"):
+        ring.keys()
+    file.path.rmdir()
+    assert ring.keys() == {}
+
+
+def test_ring_says_when_nobody_can_get_in_any_more(
+    file: KeyFile, ring: KeyRing, caplog: pytest.LogCaptureFixture
+) -> None:
+    file.revoke(file.create("maps", "", Scope.READ)[0].id)
+    ring.keys()
+    assert "all 1 API keys are revoked: every request is refused" in caplog.text
+
+
+def test_scopes_include_those_before_them() -> None:
+    included = {scope: [other.value for other in Scope if scope.includes(other)] for scope in Scope}
+    assert included == {"read": ["read"], "run": ["read", "run"], "admin": ["read", "run", "admin"]}
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.1", "::1", "localhost"])
+def test_loopback_needs_no_key(tmp_path: Path, host: str) -> None:
+    assert is_loopback(host)
+    check_exposure(ServiceSettings(data_dir=tmp_path, host=host))
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "fe80::1", "example.org", "localhost.evil.org", ""])
+def test_other_addresses_need_a_key_that_counts(tmp_path: Path, host: str) -> None:
+    settings = ServiceSettings(data_dir=tmp_path, host=host)
+    file = KeyFile(settings.keys_file)
+    with pytest.raises(ConfigError, match=r"wanted a loopback address, or API keys: create one with `risk-sac keys cr"):
+        check_exposure(settings)
+    key, _ = file.create("maps", "", Scope.READ)
+    check_exposure(settings)
+    file.revoke(key.id)
+    with pytest.raises(ConfigError):
+        check_exposure(settings)
+
+
+def test_no_address_is_served_with_damaged_keys(tmp_path: Path) -> None:
+    settings = ServiceSettings(data_dir=tmp_path)
+    settings.keys_file.write_text("")
+    with pytest.raises(KeysError, match="damaged"):
+        check_exposure(settings)
+
+
+def test_command_creates_lists_and_revokes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = ["--data-dir", str(tmp_path)]
+    ring = KeyRing(tmp_path / "keys.json")
+    assert main(["create", *folder, "--project", "maps", "--name", "Ann [b]", "--scope", "read"]) == 0
+    token = capsys.readouterr().out.strip()
+    key = ring.find(token)
+    assert key is not None
+    assert (key.project, key.name, key.scope) == ("maps", "Ann [b]", Scope.READ)
+    assert main(["list", *folder]) == 0
+    listed = capsys.readouterr().out
+    assert key.id in listed
+    assert "Ann [b]" in listed
+    assert token[13:] not in listed
+    assert main(["revoke", *folder, key.id]) == 0
+    assert ring.find(token) is None
+    assert main(["revoke", *folder, "nobody"]) == 1
+    assert "wanted one that" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ["--project", "Maps"],
+        ["--project", "-maps"],
+        ["--project", "a" * 41],
+        ["--project", "a\n"],
+        ["--project", "maps", "--name", "a\x1b[31m"],
+        ["--project", "maps", "--scope", "root"],
+    ],
+)
+def test_command_refuses_what_no_key_can_have(tmp_path: Path, wrong: list[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["create", "--data-dir", str(tmp_path), *wrong])
+    assert not (tmp_path / "keys.json").exists()

@@ -1,0 +1,91 @@
+"""The event loop's selector, by a clock that only its own sleep and the test move."""
+
+import selectors
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from service import loop
+from service.loop import BURST, PERIOD_S, GatheringSelector
+
+WORK_S = 0.001  # that the loop does each time it is woken
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 1000.0
+        self.slept = 0.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+        self.slept += seconds
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(loop, "time", clock)
+    return clock
+
+
+@pytest.fixture
+def ready() -> Iterator[Callable[[int], GatheringSelector]]:
+    """Makes a selector on which so many connections have something to say."""
+    with ExitStack() as stack:
+
+        def make(count: int) -> GatheringSelector:
+            selector = stack.enter_context(GatheringSelector())
+            for _ in range(count):
+                ends = socket.socketpair()
+                for end in ends:
+                    stack.enter_context(end)
+                ends[1].send(b"x")
+                selector.register(ends[0], selectors.EVENT_READ)
+            return selector
+
+        yield make
+
+
+def woken(selector: GatheringSelector, clock: Clock, seconds: float, every_s: float = WORK_S) -> int:
+    """How often it wakes in some time, in which it always has something to wake for."""
+    times, end = 0, clock.now + seconds
+    while clock.now < end:
+        assert selector.select(1.0)
+        clock.now += every_s
+        times += 1
+    return times
+
+
+def test_many_requests_gather(ready, clock):
+    selector = ready(8)
+    assert woken(selector, clock, 10.0) == pytest.approx(10.0 / PERIOD_S + BURST, abs=2)
+
+
+def test_one_client_that_asks_as_fast_as_it_is_answered_is_not_held_up(ready, clock):
+    assert woken(ready(1), clock, 10.0) > 0.85 * 10.0 / WORK_S
+
+
+def test_it_gathers_again_once_that_is_worth_it(ready, clock):
+    few, many = ready(1), ready(8)
+    woken(few, clock, 5.0)
+    for key in list(many.get_map().values()):
+        few.register(key.fileobj, key.events)
+    woken(few, clock, 1.5)  # until it tries again
+    assert woken(few, clock, 5.0) == pytest.approx(5.0 / PERIOD_S, abs=2)
+
+
+def test_rare_requests_are_seen_at_once(ready, clock):
+    woken(ready(8), clock, 10.0, every_s=1.5 * PERIOD_S)
+    assert clock.slept == 0
+
+
+def test_a_loop_at_work_does_not_wait(ready, clock):
+    selector = ready(8)
+    for _ in range(1000):
+        assert len(selector.select(0)) == 8
+    assert clock.slept == 0

@@ -1,0 +1,88 @@
+import pytest
+from prometheus_client import generate_latest
+from prometheus_client.parser import text_string_to_metric_families
+
+from risk_sac.config import CampaignSpec
+from risk_sac.types import Outcome
+from service.campaigns import State
+from service.local_executor import LocalExecutor
+from service.manager import Manager
+from service.settings import ServiceSettings
+from service.telemetry import registry, request_latencies
+
+SPEC = CampaignSpec(families=("low",), methods=("random", "sac"), seeds=(0, 1))
+
+
+@pytest.fixture
+def manager(store, tmp_path):
+    settings = ServiceSettings(data_dir=tmp_path)
+    return Manager(settings, store, LocalExecutor(settings))
+
+
+@pytest.fixture
+def scrape(store, manager):
+    """Scrapes the service: samples by name and labels."""
+    latencies = request_latencies()
+    metrics = registry(latencies, store, manager)
+
+    def read():
+        families = text_string_to_metric_families(generate_latest(metrics).decode())
+        samples = (sample for family in families for sample in family.samples)
+        return {(sample.name, *sorted(sample.labels.values())): sample.value for sample in samples}
+
+    read.latencies = latencies
+    return read
+
+
+def test_what_is_stored_is_counted(store, ledger, episode, scrape):
+    campaign = ledger.create(SPEC)
+    first, second, *_ = campaign.runs
+    for run in (first, second):
+        ledger.start_run(run.number)
+    for index in range(4):
+        ledger.add_episode(first.number, episode(index, Outcome.FAILURE if index % 2 else Outcome.REJECTED))
+    seen = scrape()
+    assert seen["risk_sac_episodes_total", "low", "random"] == 4
+    assert seen["risk_sac_episodes_total", "low", "sac"] == 0
+    assert seen["risk_sac_failures_total", "low", "random"] == 2
+    assert seen["risk_sac_run_ecr", *sorted([campaign.id, first.id, "low", "random"])] == 0.25  # as its metrics say
+    assert not [key for key in seen if key[0] == "risk_sac_run_ecr" and second.id in key]  # no episode yet
+    assert (seen["risk_sac_runs", "running"], seen["risk_sac_runs", "queued"]) == (2, 2)
+    assert (seen["risk_sac_campaigns", "running"], seen["risk_sac_campaigns", "failed"]) == (1, 0)
+    assert seen[("risk_sac_storage_available",)] == 1
+    assert seen[("process_resident_memory_bytes",)] > 0
+
+
+def test_counters_do_not_fall_when_a_campaign_is_deleted(store, ledger, episode, scrape):
+    kept, deleted = ledger.create(SPEC), ledger.create(SPEC)
+    for campaign in (kept, deleted):
+        ledger.start_run(campaign.runs[0].number)
+        for index in range(3):
+            ledger.add_episode(campaign.runs[0].number, episode(index))
+    assert scrape()["risk_sac_episodes_total", "low", "random"] == 6
+    ledger.delete(deleted.id)
+    assert scrape()["risk_sac_episodes_total", "low", "random"] == 6
+    ledger.add_episode(kept.runs[0].number, episode(3))
+    assert scrape()["risk_sac_episodes_total", "low", "random"] == 7
+    ledger.delete(kept.id)
+    assert scrape()["risk_sac_episodes_total", "low", "random"] == 7
+
+
+def test_lost_workers_and_a_refusing_disk_are_told(store, manager, scrape):
+    manager.restarts["killed"] += 2
+    store.refusal = "no space left on device"
+    seen = scrape()
+    assert seen["risk_sac_worker_restarts_total", "killed"] == 2
+    assert seen[("risk_sac_storage_available",)] == 0
+
+
+def test_latencies_are_those_of_one_app(scrape):
+    scrape.latencies.labels("/v1/campaigns", "GET", "200").observe(0.02)
+    seen = scrape()
+    assert seen["risk_sac_request_seconds_count", "/v1/campaigns", "200", "GET"] == 1
+    assert request_latencies().collect()[0].samples == []
+
+
+def test_every_state_has_a_figure(scrape):
+    seen = scrape()
+    assert all(seen["risk_sac_runs", state] == 0 for state in State)

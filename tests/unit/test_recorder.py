@@ -1,0 +1,77 @@
+from pathlib import Path
+
+import pytest
+
+from risk_sac.config import Budget, LearnerConfig, RunSpec
+from risk_sac.errors import CheckpointError, ConfigError
+from risk_sac.local_run import run
+from risk_sac.results import EPISODES, RESULTS, read_results
+from risk_sac.train import CHECKPOINT
+
+SPEC = RunSpec(
+    family="low",
+    method="random",
+    seed=3,
+    budget=Budget(episodes=8),
+    learner=LearnerConfig(checkpoint_every=2),
+)
+
+
+def execute(folder: Path, spec: RunSpec = SPEC):
+    return run(spec, folder, lambda done, metrics: None)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Every file of a finished run, and its results."""
+    folder = tmp_path_factory.mktemp("finished")
+    results = execute(folder)
+    assert results.contacts
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}, results
+
+
+@pytest.fixture
+def folder(finished, tmp_path):
+    for name, content in finished[0].items():
+        (tmp_path / name).write_bytes(content)
+    return tmp_path
+
+
+@pytest.mark.parametrize("damaged", [b"", b'{"spec": 1}', None])
+def test_damaged_results_are_written_anew_from_the_checkpoint(folder, finished, caplog, damaged):
+    content = (folder / RESULTS).read_bytes()
+    content = content.replace(b'"failures": ', b'"failures": 1', 1) if damaged is None else damaged
+    (folder / RESULTS).write_bytes(content)
+    results = execute(folder)
+    assert results.digest == finished[1].digest
+    assert results.contacts == finished[1].contacts
+    assert read_results(folder).metrics == finished[1].metrics
+    assert (folder / "results.json.damaged").read_bytes() == content
+    assert f"{folder / RESULTS} is damaged" in caplog.text
+
+
+@pytest.mark.parametrize("damaged", [b"", b"{}\n" * 3, b"\xff"])
+def test_a_damaged_file_of_episodes_is_written_anew(folder, finished, damaged):
+    (folder / EPISODES).write_bytes(damaged)
+    execute(folder)
+    assert (folder / EPISODES).read_bytes() == finished[0][EPISODES]
+
+
+def test_results_of_something_else_are_left_alone(tmp_path):
+    (tmp_path / RESULTS).write_text('{"accuracy": 0.9}')
+    with pytest.raises(ConfigError, match="is damaged, or was not written by a run"):
+        execute(tmp_path)
+    assert (tmp_path / RESULTS).read_text() == '{"accuracy": 0.9}'
+
+
+def test_a_folder_with_damaged_results_and_the_checkpoint_of_another_run_is_left_alone(folder):
+    (folder / RESULTS).write_bytes(b"")
+    with pytest.raises(CheckpointError, match="belongs to the run"):
+        execute(folder, SPEC.model_copy(update={"seed": 4}))
+    assert (folder / RESULTS).read_bytes() == b""
+    assert (folder / CHECKPOINT).exists()
+
+
+def test_a_contact_whose_series_is_lost_stays_a_contact(folder, finished):
+    assert not (folder / "failures").exists()
+    assert execute(folder).contacts == finished[1].contacts
