@@ -119,7 +119,7 @@ def test_a_tag_changes_exactly_when_the_body_does(serve, part):
         states.append(response.json()["state"])
         assert ("retry-after" in response.headers) is (states[-1] != "succeeded")
         time.sleep(0.01)  # there is a limit to the rate of requests
-    assert len(bodies) > 3
+    assert len(bodies) > 1
     assert all(len(same) == 1 for same in bodies.values())
     final = response.headers["etag"]
     for sent, status in ((final, 304), (f'"x", {final}', 304), ("*", 304), (next(iter(bodies)), 200)):

@@ -19,7 +19,7 @@ def test_a_campaign_runs_to_its_end_and_can_be_read(serve):
     while service.get(first)["state"] in ("queued", "running"):
         time.sleep(0.05)
         moving.add(service.get(first)["progress"]["episodes_done"])
-    assert len(moving) > 3
+    assert moving - {0, 100}, "no progress was seen"
     campaign = service.wait(first)
     assert campaign["state"] == "succeeded"
     assert campaign["progress"]["episodes_done"] == campaign["progress"]["episodes_total"] == 100
