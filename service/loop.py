@@ -2,16 +2,18 @@
 
 Whenever it wakes on a machine whose cores are all busy, it pushes a worker off one, finds cold caches there, and leaves
 cold caches behind. So it wakes at once as long as that happens rarely, and else at a limited rate, as network cards
-moderate their interrupts; but not for the sake of one client that asks as fast as it is answered.
+moderate their interrupts; but neither for the sake of a few clients that ask as fast as they are answered, nor for what
+a thread has found out for a request that has waited already.
 """
 
 import asyncio
+import select
 import selectors
 import time
 
-PERIOD_S = 0.02  # between two times that it wakes, while there is much to do
+PERIOD_S = 0.04  # between two times that it wakes, while there is much to do
 BURST = 10  # times that it wakes at once before that
-WORTH = 2.0  # requests, or the like, that have to gather in the mean
+WORTH = 3.0  # requests, or the like, that have to gather in the mean
 TRY_AGAIN_S = 1.0  # after fewer have
 WEIGHT = 0.25  # of the newest in that mean
 
@@ -34,12 +36,15 @@ class GatheringSelector(selectors.DefaultSelector):
         self._due = max(self._due, now - BURST * PERIOD_S) + PERIOD_S
         if self._due <= now:
             return ready
-        time.sleep(self._due - now)
-        gathered = super().select(0)
-        self._gathered += WEIGHT * (len(gathered) - self._gathered)
+        threads = next(iter(self.get_map()))  # the file by which they wake the loop, the first that asyncio registers
+        if select.select([threads], [], [], self._due - now)[0]:
+            self._due -= PERIOD_S
+            return super().select(0)
+        ready = super().select(0)
+        self._gathered += WEIGHT * (len(ready) - self._gathered)
         if self._gathered < WORTH:
             self._prompt_until, self._gathered = self._due + TRY_AGAIN_S, 2 * WORTH
-        return gathered
+        return ready
 
 
 def new_event_loop() -> asyncio.AbstractEventLoop:

@@ -25,6 +25,7 @@ MOST_POLLERS, MOST_STREAMS, LONGEST_S = 1000, 500, 3600.0
 # What clients ask for, and how many of ten do.
 KINDS = {"status": 6, "results": 2, "list": 2}
 CONDITIONAL = 0.8  # of them say what they have already
+MOMENTS = 50  # of a second at which clients ask, several at once, so that this process wakes only so often
 CATCH_UP_S = 10.0  # for streams, at the end, to tell what had happened by then
 
 
@@ -61,9 +62,9 @@ async def generate(load: Load, followers: list[Follower]) -> Polls:
 
 
 def pollers(load: Load, chance: Random) -> list[Poller]:
-    """All of them, spread over the second, in no order."""
+    """All of them, spread over the moments of a second, in no order."""
     kinds = [kind for kind, share in KINDS.items() for _ in range(share)]
-    offsets = [PERIOD_S * number / load.pollers for number in range(load.pollers)]
+    offsets = [PERIOD_S * (MOMENTS * number // load.pollers) / MOMENTS for number in range(load.pollers)]
     chance.shuffle(offsets)
     return [
         Poller(
@@ -118,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         stays_s=options.stays,
         seed=options.seed,
     )
-    # Clients elsewhere would push no worker off its core whenever they wake.
+    # Clients elsewhere would push no worker off its core whenever they wake, nor empty its caches.
     os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
     followers = _followers(load, options.go_on)
     polls = asyncio.run(generate(load, followers))

@@ -1,5 +1,7 @@
-"""The event loop's selector, by a clock that only its own sleep and the test move."""
+"""The event loop's selector, by a clock that only its own waiting and the test move."""
 
+import asyncio
+import select
 import selectors
 import socket
 from collections.abc import Callable, Iterator
@@ -21,31 +23,40 @@ class Clock:
     def monotonic(self) -> float:
         return self.now
 
-    def sleep(self, seconds: float) -> None:
-        self.now += seconds
-        self.slept += seconds
+    def select(
+        self, read: list[int], write: list[int], exceptional: list[int], seconds: float
+    ) -> tuple[list[int], ...]:
+        found = select.select(read, write, exceptional, 0)
+        if not any(found):
+            self.now += seconds
+            self.slept += seconds
+        return found
 
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
     monkeypatch.setattr(loop, "time", clock)
+    monkeypatch.setattr(loop, "select", clock)
     return clock
 
 
 @pytest.fixture
 def ready() -> Iterator[Callable[[int], GatheringSelector]]:
-    """Makes a selector on which so many connections have something to say."""
+    """Makes a selector on which so many connections have something to say, and a thread has or has not."""
     with ExitStack() as stack:
 
-        def make(count: int) -> GatheringSelector:
+        def pair(said: bytes) -> socket.socket:
+            ends = socket.socketpair()
+            for end in ends:
+                stack.enter_context(end)
+            ends[1].send(said)
+            return ends[0]
+
+        def make(count: int, *, found: bool = False) -> GatheringSelector:
             selector = stack.enter_context(GatheringSelector())
-            for _ in range(count):
-                ends = socket.socketpair()
-                for end in ends:
-                    stack.enter_context(end)
-                ends[1].send(b"x")
-                selector.register(ends[0], selectors.EVENT_READ)
+            for said in (b"x" if found else b"", *[b"x"] * count):
+                selector.register(pair(said), selectors.EVENT_READ)
             return selector
 
         yield make
@@ -73,10 +84,24 @@ def test_one_client_that_asks_as_fast_as_it_is_answered_is_not_held_up(ready, cl
 def test_it_gathers_again_once_that_is_worth_it(ready, clock):
     few, many = ready(1), ready(8)
     woken(few, clock, 5.0)
-    for key in list(many.get_map().values()):
+    for key in list(many.get_map().values())[1:]:
         few.register(key.fileobj, key.events)
     woken(few, clock, 1.5)  # until it tries again
     assert woken(few, clock, 5.0) == pytest.approx(5.0 / PERIOD_S, abs=2)
+
+
+def test_what_a_thread_has_found_is_passed_on_at_once(ready, clock):
+    assert woken(ready(8, found=True), clock, 10.0) == pytest.approx(10.0 / WORK_S, abs=2)
+    assert clock.slept == 0
+
+
+def test_a_real_loop_names_the_file_by_which_threads_wake_it():
+    selector = GatheringSelector()
+    event_loop = asyncio.SelectorEventLoop(selector)
+    (first,) = selector.get_map()
+    event_loop.call_soon_threadsafe(lambda: None)
+    assert select.select([first], [], [], 1)[0] == [first]
+    event_loop.close()
 
 
 def test_rare_requests_are_seen_at_once(ready, clock):
