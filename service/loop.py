@@ -23,27 +23,28 @@ class GatheringSelector(selectors.DefaultSelector):
 
     def __init__(self) -> None:
         super().__init__()
-        self._due = 0.0  # when it may wake, were it not for the burst
+        self._due = 0.0  # when it may look, were it not for the burst
         self._prompt_until = 0.0
         self._gathered = 2 * WORTH
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
         """What is ready; see `selectors.BaseSelector.select`."""
+        began = time.monotonic()
+        if (timeout is not None and timeout <= 0) or began < self._prompt_until:
+            return super().select(timeout)  # the loop is at work, or there is nothing to gather
+        pause_s = self._due - began
+        if pause_s > 0:
+            threads = next(iter(self.get_map()))  # the file by which they wake the loop, asyncio's first
+            if select.select([threads], [], [], pause_s)[0]:
+                return super().select(0)
+            timeout = None if timeout is None else max(0.0, timeout - pause_s)
         ready = super().select(timeout)
         now = time.monotonic()
-        if (timeout is not None and timeout <= 0) or now < self._prompt_until:
-            return ready  # the loop is at work, or there is nothing to gather
+        if pause_s > 0:
+            self._gathered += WEIGHT * (len(ready) - self._gathered)
+            if self._gathered < WORTH:
+                self._prompt_until, self._gathered = now + TRY_AGAIN_S, 2 * WORTH
         self._due = max(self._due, now - BURST * PERIOD_S) + PERIOD_S
-        if self._due <= now:
-            return ready
-        threads = next(iter(self.get_map()))  # the file by which they wake the loop, the first that asyncio registers
-        if select.select([threads], [], [], self._due - now)[0]:
-            self._due -= PERIOD_S
-            return super().select(0)
-        ready = super().select(0)
-        self._gathered += WEIGHT * (len(ready) - self._gathered)
-        if self._gathered < WORTH:
-            self._prompt_until, self._gathered = self._due + TRY_AGAIN_S, 2 * WORTH
         return ready
 
 

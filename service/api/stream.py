@@ -23,7 +23,7 @@ from service.store import Store
 
 logger = logging.getLogger(__name__)
 
-TICK_S = 0.5  # between two looks at a campaign's revision
+TICK_S = 1.0  # between two looks at a campaign's revision
 RETRY_MS = 1000  # after which a client whose connection broke comes back
 KEPT = 64  # batches
 LARGEST = 2**63 - 1  # of a database key
