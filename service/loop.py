@@ -1,12 +1,13 @@
-"""The server's event loop, which lets requests gather while there are many of them.
+"""The server's event loop, which lets requests gather while there are many of them and no core is idle.
 
-Whenever it wakes on a machine whose cores are all busy, it pushes a worker off one, finds cold caches there, and leaves
-cold caches behind. So it wakes at once as long as that happens rarely, and else at a limited rate, as network cards
-moderate their interrupts; but neither for the sake of a few clients that ask as fast as they are answered, nor for what
-a thread has found out for a request that has waited already.
+Whenever it wakes on such a machine, it pushes a worker off its core, finds cold caches there, and leaves cold caches
+behind. So it wakes at once as long as that happens rarely, and else at a limited rate, as network cards moderate their
+interrupts; but neither for the sake of a few clients that ask as fast as they are answered, nor for what a thread has
+found out for a request that has waited already.
 """
 
 import asyncio
+import os
 import select
 import selectors
 import time
@@ -14,7 +15,8 @@ import time
 PERIOD_S = 0.04  # between two times that it wakes, while there is much to do
 BURST = 10  # times that it wakes at once before that
 WORTH = 3.0  # requests, or the like, that have to gather in the mean
-TRY_AGAIN_S = 1.0  # after fewer have
+BUSY = 0.75  # of the cores, or there is nobody to be pushed off
+TRY_AGAIN_S = 1.0  # after one of them was lacking
 WEIGHT = 0.25  # of the newest in that mean
 
 
@@ -42,10 +44,15 @@ class GatheringSelector(selectors.DefaultSelector):
         now = time.monotonic()
         if pause_s > 0:
             self._gathered += WEIGHT * (len(ready) - self._gathered)
-            if self._gathered < WORTH:
+            if self._gathered < WORTH or not _busy():
                 self._prompt_until, self._gathered = now + TRY_AGAIN_S, 2 * WORTH
         self._due = max(self._due, now - BURST * PERIOD_S) + PERIOD_S
         return ready
+
+
+def _busy() -> bool:
+    """Whether the machine's cores were in use lately."""
+    return os.getloadavg()[0] >= BUSY * (os.cpu_count() or 1)
 
 
 def new_event_loop() -> asyncio.AbstractEventLoop:

@@ -1,6 +1,7 @@
-"""The event loop's selector, by a clock that only its own waiting and the test move."""
+"""The event loop's selector, by a clock that only its own waiting and the test move, on a busy machine."""
 
 import asyncio
+import os
 import select
 import selectors
 import socket
@@ -19,6 +20,7 @@ class Clock:
     def __init__(self) -> None:
         self.now = 1000.0
         self.slept = 0.0
+        self.load = 2.0 * os.cpu_count()
 
     def monotonic(self) -> float:
         return self.now
@@ -38,6 +40,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
     monkeypatch.setattr(loop, "time", clock)
     monkeypatch.setattr(loop, "select", clock)
+    monkeypatch.setattr(os, "getloadavg", lambda: (clock.load,) * 3)
     return clock
 
 
@@ -79,6 +82,11 @@ def test_many_requests_gather(ready, clock):
 
 def test_one_client_that_asks_as_fast_as_it_is_answered_is_not_held_up(ready, clock):
     assert woken(ready(1), clock, 10.0) > 0.85 * 10.0 / WORK_S
+
+
+def test_nobody_waits_beside_idle_cores(ready, clock):
+    clock.load = 0.5 * os.cpu_count()
+    assert woken(ready(8), clock, 10.0) > 0.85 * 10.0 / WORK_S
 
 
 def test_it_gathers_again_once_that_is_worth_it(ready, clock):
