@@ -17,7 +17,7 @@ from service.journal import Journal
 
 logger = logging.getLogger(__name__)
 
-READERS = 16  # requests answered in threads at once; of more, each would only wait longer for the interpreter
+READERS = 8  # requests answered in threads at once; of more, each would only wait longer for the interpreter
 ADVISORY_LOCK = 0x5249534B  # any number that all servers of this project agree on
 
 PRAGMAS = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000")
