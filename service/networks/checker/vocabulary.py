@@ -65,6 +65,17 @@ def _element(inside: str, names: str, *, required: str = "", **special: Type) ->
     return Element(frozenset(inside.split()), attributes | special, frozenset(required.split()))
 
 
+def _traffic_light(parent: str) -> Element:
+    return _element(
+        parent,
+        "offset",
+        required="id type programID",
+        type=values.SIGNAL_PROGRAM,
+        offset=values.FINITE,
+        programID=values.IDENTIFIER,
+    )
+
+
 _PARAM_KEYS = {"key": values.PARAMETER_KEY, "value": values.LABEL}
 _PHASE = _element(
     "tlLogic",
@@ -113,14 +124,7 @@ NET = {
     ),
     "neigh": _element("lane", "", required="lane"),
     "stopOffset": _element("edge lane", "vClasses exceptions", required="value", value=values.LENGTH),
-    "tlLogic": _element(
-        "net",
-        "offset",
-        required="id type programID",
-        type=values.SIGNAL_PROGRAM,
-        offset=values.FINITE,
-        programID=values.IDENTIFIER,
-    ),
+    "tlLogic": _traffic_light("net"),
     "phase": _PHASE,
     "junction": _element(
         "net",
@@ -242,14 +246,7 @@ def _demand(root: str) -> dict[str, Element]:
 
 ROUTES = _demand("routes")
 ADDITIONAL = _demand("additional") | {
-    "tlLogic": _element(
-        "additional",
-        "offset",
-        required="id type programID",
-        type=values.SIGNAL_PROGRAM,
-        offset=values.FINITE,
-        programID=values.IDENTIFIER,
-    ),
+    "tlLogic": _traffic_light("additional"),
     "phase": _PHASE,
     "busStop": _element("additional", f"{_ROADSIDE} personCapacity", required="id lane"),
     "trainStop": _element("additional", f"{_ROADSIDE} personCapacity", required="id lane"),
