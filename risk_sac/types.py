@@ -70,6 +70,8 @@ class Frame:
     width_m: Floats
     signal: Signal
     stop_line_m: float  # ego's front bumper to its next signal's stop line; negative once past; inf without one
+    lane_offset_m: Floats  # a vehicle's centre from its lane's centre, positive to the left; 0 of pedestrians
+    link: NDArray[np.uint8]  # SUMO's letter of the signal ahead, such as ord("g"): green, but has to yield; 0: none
     simulator_collisions: tuple[tuple[str, str], ...] = ()  # SUMO's own list, a cross-check only
     teleported: tuple[str, ...] = ()
 
@@ -89,7 +91,63 @@ class Outcome(StrEnum):
 
 
 # The rules, among a collision's verdicts, that speak of the simulator or the control and not of who is to blame.
-ARTEFACT_RULES = frozenset({"no_teleport", "no_spawn_overlap", "after_first_second", "inside_limits", "solid_bodies"})
+ARTEFACT_RULES = frozenset(
+    {
+        "no_teleport",
+        "no_spawn_overlap",
+        "conflict_after_release",
+        "inside_limits",
+        "inside_grip",
+        "solid_bodies",
+        "ego_model_saw",
+    }
+)
+
+
+class ConflictType(StrEnum):
+    """How the striker came into the ego's way."""
+
+    CUT_IN = "cut_in"
+    LEADER = "leader"
+    PEDESTRIAN = "pedestrian"
+    CROSSING = "crossing_vehicle"
+
+
+class Grade(StrEnum):
+    """Who would have prevented a valid failure; PCR counts `CAREFUL`."""
+
+    CAREFUL = "careful"  # the careful driver would not have touched: preventable
+    IDEAL = "ideal"  # full braking at once alone would not have
+    UNAVOIDABLE = "unavoidable"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReferenceOutcome:
+    """How a reference driver fares in the ego's place."""
+
+    avoids: bool  # does not touch, or stands when it is struck, or is struck from behind
+    impact_speed_mps: float  # of the reference driver at its contact; 0 if it avoids
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judgement:
+    """How a contact came about, and who would have prevented it. Times count from the adversaries' release."""
+
+    definitions: int  # version of the definitions it was judged by
+    conflict_type: ConflictType
+    conflict_s: float  # t0, when the conflict began; negative before the release
+    conflict_x_m: float  # where the striker was then, on the map
+    conflict_y_m: float
+    position: str  # ahead | alongside: the striker, seen from the ego, when the conflict began
+    hidden: bool  # whether the ego knew nothing of the striker when the conflict began
+    ego_manoeuvre: str  # straight | left_turn | right_turn | lane_change
+    ego_response: str  # none | late_braking | braking | standing | starting
+    ground: str  # lane | junction | crossing | beside_crossing: where the striker was struck
+    broke: tuple[str, ...]  # what the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red
+    unresponsive: bool  # a visible collision course of 1.5 s or more during which the ego never braked
+    grade: Grade | None  # None where the contact is not valid
+    drivers: Mapping[str, ReferenceOutcome]  # reference driver -> how it fares; empty where the contact is not valid
+    signature: str  # the class of failures it belongs to, in words; what differs in it is distinct
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,6 +173,7 @@ class Collision:
     min_robustness: float  # soft-min robustness, until 1 s before the contact too
     simulator_agrees: bool  # SUMO's own list names the same pair in the contact's frame; a cross-check only
     verdicts: Mapping[str, bool] = field(default_factory=dict)  # rule -> passed; valid if all passed
+    judgement: Judgement | None = None  # None in what was stored before contacts were judged
 
     @property
     def valid(self) -> bool:
@@ -125,6 +184,11 @@ class Collision:
     def artefact(self) -> bool:
         """Whether the simulator or the control made the contact, by one of `ARTEFACT_RULES`."""
         return any(rule in ARTEFACT_RULES and not passed for rule, passed in self.verdicts.items())
+
+    @property
+    def preventable(self) -> bool:
+        """Whether it is valid and the careful driver would have prevented it."""
+        return self.valid and self.judgement is not None and self.judgement.grade is Grade.CAREFUL
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -177,5 +241,16 @@ class RunMetrics:
     dual_variable: float  # λ
     temperature: float  # α
     # With defaults, so that what was stored before they were counted can still be read.
-    distinct_failures: int = 0  # valid failures that resemble no earlier one, see `risk_sac.metrics`
+    distinct_failures: int = 0  # valid failures that resemble no earlier one, see `risk_sac.verdicts.distinct`
     steps_per_distinct_failure: float | None = None  # environment steps; None without a failure
+    preventable: int = 0  # valid and of grade `careful`
+    pcr: float = 0.0  # preventable / episodes
+    pcr_low: float = 0.0
+    pcr_high: float = 1.0
+    window_pcr: float = 0.0
+    distinct_preventable: int = 0  # distinct failures of grade `careful`
+    artefacts: int = 0  # contacts that the simulator or the control made
+    unresponsive: int = 0  # valid failures in which the ego never braked for what it saw
+    signatures: Mapping[str, int] = field(default_factory=dict)  # signature -> valid failures
+    conflicts_by_second: tuple[int, ...] = ()  # valid failures by the second after the release in which they began
+    contacts_by_second: tuple[int, ...] = ()  # the same by the second of the contact
