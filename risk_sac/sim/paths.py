@@ -1,0 +1,84 @@
+"""Where a vehicle will drive: the centre line of its lanes along its route, junctions included."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import libsumo
+import numpy as np
+
+from risk_sac.types import Floats
+
+AHEAD_M = 120.0  # of road beyond a lane's own end: at 16 m/s more than anybody looks ahead
+SAME_POINT_M = 1e-3
+
+
+class Path(NamedTuple):
+    """A polyline of `p` points from the start of a lane on."""
+
+    x_m: Floats
+    y_m: Floats
+    station_m: Floats  # length of the line up to each point; 0 at the first
+    heading_rad: Floats  # of the segment that begins at the point; the last point repeats the one before
+
+
+class Along(NamedTuple):
+    """A vehicle on its path."""
+
+    path: Path
+    station_m: float  # of its front bumper
+    offset_m: float  # of its middle from the line, positive to the left
+
+
+class Paths:
+    """The paths of one net, each made once; needs a simulation that has loaded the net."""
+
+    def __init__(self) -> None:
+        self._paths: dict[tuple[tuple[str, ...], str], Path] = {}
+
+    def clear(self) -> None:
+        """Forgets all paths: another net may use the same names."""
+        self._paths.clear()
+
+    def of(self, route: tuple[str, ...], lane: str) -> Path:
+        """The path from the start of `lane` along `route`; where the lane does not lead on, it ends with the lane."""
+        if (route, lane) not in self._paths:
+            self._paths[route, lane] = _path(_lanes_ahead(route, lane))
+        return self._paths[route, lane]
+
+
+def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:
+    """The lane and those that follow it, junctions included, for `AHEAD_M`."""
+    lanes, length_m = [lane], 0.0
+    while length_m < AHEAD_M:
+        following = _next_lane(route, lanes[-1])
+        if following is None:
+            break
+        lanes.append(following)
+        length_m += libsumo.lane.getLength(following)
+    return lanes
+
+
+def _next_lane(route: Sequence[str], lane: str) -> str | None:
+    edge = lane.rpartition("_")[0]
+    wanted = None
+    if edge in route:
+        position = route.index(edge)
+        if position + 1 == len(route):
+            return None
+        wanted = route[position + 1]
+    for link in libsumo.lane.getLinks(lane):
+        approached, via = link[0], link[4]
+        if wanted is None or approached.rpartition("_")[0] == wanted:
+            following: str = via or approached
+            return following
+    return None
+
+
+def _path(lanes: Sequence[str]) -> Path:
+    points = np.array([point for lane in lanes for point in libsumo.lane.getShape(lane)])
+    apart = np.hypot(*np.diff(points, axis=0).T) > SAME_POINT_M
+    points = points[np.concatenate(([True], apart))]
+    steps = np.diff(points, axis=0)
+    station = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
+    heading = np.arctan2(steps[:, 1], steps[:, 0])
+    return Path(points[:, 0].copy(), points[:, 1].copy(), station, np.append(heading, heading[-1]))
