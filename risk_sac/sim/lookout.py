@@ -1,0 +1,142 @@
+"""Who is on a collision course with a vehicle's corridor: what its driver is told beyond what SUMO's models see.
+
+SUMO's drivers see pedestrians on crossings from one side only, none inside a junction or beside a crossing, and take a
+tilted car for a straight one: `MSPModel_Striping` derives the walking direction of a person that is moved by command
+from its route, not from its motion, and whoever "walks away" blocks nobody. So SUMO is told about no person at all, and
+one rule, the same from both sides, says what a driver has to stop for or to follow.
+
+Choice: others keep their velocity. The driver asks whether it would touch somebody if it kept its speed, or went as
+fast as it may: so one that has stopped for a pedestrian does not start before the pedestrian has left its path.
+"""
+
+import math
+
+import numpy as np
+
+from risk_sac.jit import compiled
+from risk_sac.sim.paths import Path
+from risk_sac.types import Bools, Floats
+
+LOOK_S = 4.0  # how far ahead a collision course counts
+CUT_IN_LOOK_S = 2.0  # the same for whoever drives in the vehicle's own direction, whose sideways motion is soon over
+TICK_S = 0.1
+MARGIN_M = 0.375  # on either side of the vehicle's body: the room in which a lane keeper wanders (UN R157)
+YIELDING_MPS2 = 3.4  # braking that is expected of crossing traffic; who could still stop so is no threat yet
+SAME_WAY_COS = 0.5
+MOVING_MPS = 0.5
+
+
+@compiled
+def project(path: Path, x: float, y: float) -> tuple[float, float, float]:
+    """Station, offset to the left, and heading of the nearest place on a path; its ends go on straight."""
+    best, station, offset, heading = math.inf, 0.0, 0.0, 0.0
+    last = len(path.x_m) - 2
+    for i in range(last + 1):
+        cos, sin = math.cos(path.heading_rad[i]), math.sin(path.heading_rad[i])
+        dx, dy = x - path.x_m[i], y - path.y_m[i]
+        along, across = dx * cos + dy * sin, dy * cos - dx * sin
+        length = path.station_m[i + 1] - path.station_m[i]
+        beyond = 0.0
+        if along < 0.0 and i > 0:
+            beyond = -along
+        elif along > length and i < last:
+            beyond = along - length
+        distance = math.hypot(beyond, across)
+        if distance < best:
+            best, heading = distance, path.heading_rad[i]
+            station = path.station_m[i] + min(max(along, 0.0 if i > 0 else along), length if i < last else along)
+            offset = across
+    return station, offset, heading
+
+
+@compiled
+def targets(
+    path: Path,
+    front_m: float,
+    offset_m: float,
+    length_m: float,
+    width_m: float,
+    speed_mps: float,
+    accel_mps2: float,
+    limit_mps: float,
+    x: Floats,
+    y: Floats,
+    heading: Floats,
+    vx: Floats,
+    vy: Floats,
+    half_length: Floats,
+    half_width: Floats,
+    vehicle: Bools,
+    candidate: Bools,
+) -> tuple[Floats, Floats]:
+    """What a driver has to stop for or to follow.
+
+    Args:
+      path: where it will drive.
+      front_m: station of its front bumper on the path.
+      offset_m: of its middle from the path.
+      length_m: of its body.
+      width_m: of its body.
+      speed_mps: its own.
+      accel_mps2: the most it accelerates.
+      limit_mps: the fastest it drives.
+      x: `n`, centre of each other actor; with `y`, `heading`, velocity `vx`, `vy`, and half extents.
+      y: see `x`.
+      heading: see `x`.
+      vx: see `x`.
+      vy: see `x`.
+      half_length: see `x`.
+      half_width: see `x`.
+      vehicle: `n`, whether it is one; the rest are pedestrians.
+      candidate: `n`, whom the driver knows of and looks out for.
+
+    Returns:
+      Distance from the front bumper to the body, m, inf for those that are no target; and the speed at which it
+      leads, m/s, 0 for those that the driver has to stop for. Both `n`.
+    """
+    n = len(x)
+    gap, lead = np.full(n, np.inf), np.zeros(n)
+    corridor = width_m / 2 + MARGIN_M
+    reach = limit_mps * LOOK_S + length_m
+    for i in range(n):
+        speed = math.hypot(vx[i], vy[i])
+        if not candidate[i]:
+            continue
+        s_now, _, way = project(path, x[i], y[i])
+        if abs(s_now - front_m) > reach + speed * LOOK_S:
+            continue
+        v_along = vx[i] * math.cos(way) + vy[i] * math.sin(way)
+        same_way = (
+            vehicle[i] and v_along > MOVING_MPS and abs(math.cos(heading[i] - way)) > SAME_WAY_COS
+        )
+        if same_way and s_now < front_m - length_m / 2:
+            continue  # whoever comes from behind, or is overtaken, keeps the distance itself
+        look = CUT_IN_LOOK_S if same_way else LOOK_S
+        inside_since, nearest = -1.0, math.inf
+        for k in range(int(round(look / TICK_S)) + 1):
+            t = k * TICK_S
+            s, d, way = project(path, x[i] + vx[i] * t, y[i] + vy[i] * t)
+            turn = heading[i] - way
+            cos, sin = abs(math.cos(turn)), abs(math.sin(turn))
+            if abs(d - offset_m) > corridor + half_length[i] * sin + half_width[i] * cos:
+                if inside_since >= 0.0:
+                    break
+                continue
+            if inside_since < 0.0:
+                inside_since = t
+                if vehicle[i] and not same_way and t > speed / (2.0 * YIELDING_MPS2):
+                    break  # it can still stop before the corridor: t · v is more than v² / 2b
+            extent = half_length[i] * cos + half_width[i] * sin
+            rear = front_m - length_m + speed_mps * t
+            front = front_m + min(speed_mps * t + 0.5 * accel_mps2 * t * t, max(limit_mps, speed_mps) * t)
+            if s + extent >= rear and s - extent <= front and s + extent > front_m:
+                nearest = min(nearest, s - extent)
+        if nearest == math.inf:
+            continue
+        if same_way:
+            turn = heading[i] - way
+            extent = half_length[i] * abs(math.cos(turn)) + half_width[i] * abs(math.sin(turn))
+            gap[i], lead[i] = max(s_now - extent - front_m, 0.0), v_along
+        else:
+            gap[i] = max(nearest - front_m, 0.0)
+    return gap, lead
