@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.scenario.families import Family
-from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.sumo import Room, SumoSimulation, VehicleCommand, Walker
 from risk_sac.types import STEP_S, Floats, Frame
@@ -105,15 +104,16 @@ TOLERANCE = 0.02  # m/s² and m/s: SUMO's rounding, divided by the step
 class Adversaries:
     """All adversaries of an episode: splits the joint action, and checks what was driven."""
 
-    def __init__(self, family: Family, limits: Limits, layout: Layout, frame: Frame) -> None:
+    def __init__(self, family: Family, limits: Limits, frame: Frame) -> None:
         speed = dict(zip(frame.ids, frame.speed_mps.tolist(), strict=True))
-        starts = {start.id: start for start in layout.pedestrians}
         self._limits = limits
         self._vehicles = {id_: VehicleControl(limits, speed[id_]) for id_ in family.vehicles}
         self._pedestrians = {}
         for id_ in family.pedestrians:
-            s = starts[id_]
-            walker = Walker(s.x_m, s.y_m, s.heading_rad, s.speed_mps)
+            row = frame.ids.index(id_)
+            walker = Walker(
+                float(frame.x_m[row]), float(frame.y_m[row]), float(frame.heading_rad[row]), float(frame.speed_mps[row])
+            )
             self._pedestrians[id_] = PedestrianControl(limits, walker)
         self._order = family.adversaries
         self._ids: tuple[str, ...] = ()
