@@ -14,8 +14,9 @@ from risk_sac.types import STEP_S, Bools, Floats, Frame, Kind
 
 NORMAL_DECEL_MPS2 = 4.5  # what SUMO assumes of a leader, and its default for passenger cars
 JERK_MPS3 = 12.65  # at which a braking builds up (UN R157, the careful driver)
+BUILD_UP_S = NORMAL_DECEL_MPS2 / JERK_MPS3  # which its model, whose braking steps, does not reckon with
 OWN_CHOICE_MPS = -1.0  # SUMO's word for the speed that its models choose
-SAFE_SPEED_MODE = 27  # SUMO's checks, but for its bound on braking: an emergency may exceed the normal deceleration
+SAFE_MODE, EMERGENCY_MODE = 31, 26  # SUMO holds told speeds to its normal deceleration, unless its checks of speed are off
 
 
 class Driver:
@@ -46,7 +47,6 @@ class Driver:
         self._accel_mps2: float | None = None  # None: nothing to tell
         self.telling = False
         get = libsumo.vehicle
-        get.setSpeedMode(vehicle, SAFE_SPEED_MODE)
         get.setSpeed(vehicle, cruise_mps)
         self._length, self._width = get.getLength(vehicle), get.getWidth(vehicle)
         self._accel, self._min_gap = get.getAccel(vehicle), get.getMinGap(vehicle)
@@ -67,12 +67,14 @@ class Driver:
         self._step += 1
         if self._accel_mps2 is None:
             if self.telling:
+                libsumo.vehicle.setSpeedMode(self._vehicle, SAFE_MODE)
                 libsumo.vehicle.setSpeed(self._vehicle, self._cruise_mps)
                 self.telling = False
             return
         self.telling = True
         braking_so_far = min(float(frame.accel_mps2[row]), 0.0)
         accel = max(self._accel_mps2, braking_so_far - JERK_MPS3 * STEP_S)
+        libsumo.vehicle.setSpeedMode(self._vehicle, EMERGENCY_MODE if accel < -NORMAL_DECEL_MPS2 else SAFE_MODE)
         libsumo.vehicle.setSpeed(self._vehicle, max(speed + accel * STEP_S, 0.0))
 
     def _decide(self, speed: float, frame: Frame, along: Along, limit_mps: float, candidate: Bools) -> float | None:
@@ -99,7 +101,7 @@ class Driver:
         wanted = math.inf
         for distance, lead_mps in zip(gap.tolist(), lead.tolist(), strict=True):
             if distance < math.inf:
-                wanted = min(wanted, self._worth(speed, distance - self._min_gap, lead_mps))
+                wanted = min(wanted, self._worth(speed, distance - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0), lead_mps))
         if wanted >= speed + self._accel * STEP_S or 0.0 <= self._cruise_mps <= wanted:
             return None
         return max((wanted - speed) / STEP_S, -self._emergency_mps2)
@@ -110,21 +112,3 @@ class Driver:
         if lead_mps > 0.0:
             return float(libsumo.vehicle.getFollowSpeed(self._vehicle, speed, gap_m, lead_mps, NORMAL_DECEL_MPS2))
         return float(libsumo.vehicle.getStopSpeed(self._vehicle, speed, gap_m))
-
-
-def about_to_cross(x: float, y: float, vx: float, vy: float, roadway: Floats) -> bool:
-    """Whether a pedestrian is on the carriageway, or will be within a second at its present velocity.
-
-    Args:
-      x: its place.
-      y: its place.
-      vx: its velocity.
-      vy: its velocity.
-      roadway: `areas x 4`: lowest and highest x, lowest and highest y.
-    """
-    for share in (0.0, 0.5, 1.0):
-        px, py = x + share * vx, y + share * vy
-        for low_x, high_x, low_y, high_y in roadway.tolist():
-            if low_x <= px <= high_x and low_y <= py <= high_y:
-                return True
-    return False

@@ -21,7 +21,7 @@ LOOK_S = 4.0  # how far ahead a collision course counts
 CUT_IN_LOOK_S = 2.0  # the same for whoever drives in the vehicle's own direction, whose sideways motion is soon over
 TICK_S = 0.1
 MARGIN_M = 0.375  # on either side of the vehicle's body: the room in which a lane keeper wanders (UN R157)
-YIELDING_MPS2 = 3.4  # braking that is expected of crossing traffic; who could still stop so is no threat yet
+YIELDING_MPS2 = 2.5  # of crossing traffic; SUMO's drivers, who stop well before the junction, never need more for it
 SAME_WAY_COS = 0.5
 MOVING_MPS = 0.5
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Area, Layout, VehicleStart
-from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver, about_to_cross
+from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
 from risk_sac.sim.paths import Along, Paths
 from risk_sac.types import STEP_S, Bools, Frame, Kind, Role, Signal
 
@@ -152,7 +152,6 @@ class SumoSimulation:
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
         self._layout = layout
         self._hidden: frozenset[str] = frozenset()
-        self._roadway = np.array([(a.x_low_m, a.x_high_m, a.y_low_m, a.y_high_m) for a in layout.roadway]).reshape(-1, 4)
         self._signal = layout.signal
         self._walk_signals: list[tuple[Area, int]] = []
         if layout.signal is not None:
@@ -240,20 +239,12 @@ class SumoSimulation:
     def _tell_drivers(self) -> None:
         """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians alone."""
         frame = self._frame
-        crossing = [
-            row
-            for row, id_ in enumerate(frame.ids)
-            if id_ in self._walkers
-            and about_to_cross(frame.x_m[row], frame.y_m[row], frame.vx_mps[row], frame.vy_mps[row], self._roadway)
-        ]
-        pedestrians = np.zeros(len(frame.ids), dtype=np.bool_)
-        pedestrians[crossing] = True
-        known = (frame.kind == Kind.VEHICLE) | pedestrians
-        known &= np.array([id_ not in self._hidden for id_ in frame.ids])
+        pedestrians = frame.kind == Kind.PEDESTRIAN
+        known = np.array([id_ not in self._hidden for id_ in frame.ids])
         self._tell(self._ego_driver, 0, known)
         for row, id_ in enumerate(frame.ids):
             driver = self._drivers.get(id_)
-            if driver is not None and (crossing or driver.telling):
+            if driver is not None and (self._walkers or driver.telling):
                 self._tell(driver, row, pedestrians)
 
     def _tell(self, driver: Driver, row: int, candidates: Bools) -> None:
