@@ -143,13 +143,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     @property
     def min_ttc_s(self) -> float:
-        """Smallest TTC of the episode so far, over the actors the ego answers for."""
-        return min(m.signals["ttc_s"] for m in self._trace.measures)
+        """Smallest TTC since the release, over the actors the ego answers for."""
+        return min(m.signals["ttc_s"] for m in self._trace.measures[self._trace.released :])
 
     @property
     def min_robustness(self) -> float:
-        """Smallest soft-min robustness of the episode so far."""
-        return min(m.soft_min for m in self._trace.measures)
+        """Smallest soft-min robustness since the release."""
+        return min(m.soft_min for m in self._trace.measures[self._trace.released :])
 
     def close(self) -> None:
         """Ends the simulation."""
@@ -204,10 +204,12 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _measure(self, frame: Frame, before: Frame | None) -> Measures:
         assessment = assess(frame, self.problem.rss, self._sight)
-        self._sim.hide(self._perception.update(frame, assessment.seen))
+        hidden = self._perception.update(frame, assessment.seen)
+        self._sim.hide(hidden)
+        known = np.array([id_ not in hidden for id_ in frame.ids[1:]])
         signals = publish(frame, before, assessment.least)
         robustness = self._monitor.update(signals)
-        return Measures(assessment, signals, robustness, soft_min(robustness, self._reward.softmin_sharpness))
+        return Measures(assessment, known, signals, robustness, soft_min(robustness, self._reward.softmin_sharpness))
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""

@@ -137,9 +137,7 @@ def _mixed(xi: Mapping[str, float]) -> Layout:
     stop_line = centre - CROSSING_HALF_WIDTH_M - start
     oncoming_edge, oncoming_after, oncoming_length = ("w3", "w2", 298.0) if signalised else ("w2", "w1", 396.0)
 
-    def car(
-        id_: str, role: Role, lane: int, before_m: float, speed_mps: float, body: Body = "car"
-    ) -> VehicleStart:
+    def car(id_: str, role: Role, lane: int, before_m: float, speed_mps: float, body: Body = "car") -> VehicleStart:
         return VehicleStart(
             id=id_,
             role=role,

@@ -22,6 +22,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Area, Layout, VehicleStart
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
+from risk_sac.sim.lookout import Bodies
 from risk_sac.sim.paths import Along, Paths
 from risk_sac.types import STEP_S, Bools, Frame, Kind, Role, Signal
 
@@ -32,6 +33,7 @@ PEDESTRIAN_SIZE_M = 0.5
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 GRAVITY_MPS2 = 9.81
 EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
+NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
 CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
@@ -110,7 +112,9 @@ class SumoSimulation:
         self._paths.clear()
         self._describe_actors()
         self._start_drivers()
-        self._limit_mps: float = libsumo.lane.getMaxSpeed(libsumo.vehicle.getLaneID(layout.ego.id))  # of all roads alike
+        self._limit_mps: float = libsumo.lane.getMaxSpeed(
+            libsumo.vehicle.getLaneID(layout.ego.id)
+        )  # of all roads alike
         return self._read()
 
     def release(self) -> None:
@@ -237,21 +241,22 @@ class SumoSimulation:
         self._walkers = {id_: replace(w, speed_mps=0.0, accel_mps2=0.0) for id_, w in self._walkers.items()}
 
     def _tell_drivers(self) -> None:
-        """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians alone."""
+        """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians near them."""
         frame = self._frame
-        pedestrians = frame.kind == Kind.PEDESTRIAN
+        bodies = Bodies.of(frame)
         known = np.array([id_ not in self._hidden for id_ in frame.ids])
-        self._tell(self._ego_driver, 0, known)
+        self._tell(self._ego_driver, 0, bodies, known)
+        if not self._walkers:
+            return
+        pedestrian = ~bodies.vehicle
+        near = np.hypot(*(each[:, None] - each[pedestrian] for each in (frame.x_m, frame.y_m))).min(axis=1) < NEAR_M
         for row, id_ in enumerate(frame.ids):
             driver = self._drivers.get(id_)
-            if driver is not None and (self._walkers or driver.telling):
-                self._tell(driver, row, pedestrians)
+            if driver is not None and (near[row] or driver.telling):
+                self._tell(driver, row, bodies, pedestrian)
 
-    def _tell(self, driver: Driver, row: int, candidates: Bools) -> None:
-        id_ = self._frame.ids[row]
-        others = candidates.copy()
-        others[row] = False
-        driver.tell(row, self._frame, self.along(id_), self._limit_mps, others)
+    def _tell(self, driver: Driver, row: int, bodies: Bodies, candidates: Bools) -> None:
+        driver.tell(row, self._frame, bodies, self.along(self._frame.ids[row]), self._limit_mps, candidates)
 
     def along(self, vehicle: str) -> Along:
         """Where a vehicle is on its path."""
