@@ -25,7 +25,9 @@ Motion = Callable[[float], tuple[float, float, float]]  # time from the release 
 FINE_S = 0.001
 
 
-def straight(x: float, y: float, heading: float, speed: float, *changes: tuple[float, float], start_s: float = -1.5) -> Motion:
+def straight(
+    x: float, y: float, heading: float, speed: float, *changes: tuple[float, float], start_s: float = -1.5
+) -> Motion:
     """Along a line, at (x, y) at `start_s`; each change is (from when, acceleration), and nobody drives backwards."""
     times = np.arange(start_s, 20.0, FINE_S)
     accel = np.zeros(len(times))
@@ -132,7 +134,9 @@ def mirrored(evidence: Evidence) -> Evidence:
 
 
 # The recurring cast: the ego in the lane along y = 0, whose left neighbour is y = 3.3.
-def pedestrian_crosses(speed: float = 12.0, walk: float = 1.4, seen_from_s: float = -math.inf, side: int = 1) -> Evidence:
+def pedestrian_crosses(
+    speed: float = 12.0, walk: float = 1.4, seen_from_s: float = -math.inf, side: int = 1
+) -> Evidence:
     """From the kerb (y = ±6.6) over the crossing at x = 100, so that the ego's middle meets it."""
     reach_s = (100.0 - CAR_M[0] / 2) / speed
     ego = straight(0.0, 0.0, 0.0, speed, start_s=0.0)
@@ -141,7 +145,9 @@ def pedestrian_crosses(speed: float = 12.0, walk: float = 1.4, seen_from_s: floa
     return stage(ego, walker, kinds=kinds, seen_from_s=seen_from_s, from_s=0.0)
 
 
-def cut_in(gap: float = 12.0, ego: float = 14.0, other: float = 9.0, rate: float = 1.2, at_s: float = 2.0, side: int = 1) -> Evidence:
+def cut_in(
+    gap: float = 12.0, ego: float = 14.0, other: float = 9.0, rate: float = 1.2, at_s: float = 2.0, side: int = 1
+) -> Evidence:
     """From the lane beside, `gap` metres ahead of the ego's front when it begins."""
     ego_motion = straight(0.0, 0.0, 0.0, ego)
     start = ego * (at_s + 1.5) + CAR_M[0] + gap - other * (at_s + 1.5)
