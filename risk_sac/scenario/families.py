@@ -309,6 +309,7 @@ def _dense(xi: Mapping[str, float]) -> Layout:
             Area(-250.0, 250.0, -DENSE_KERB_M, DENSE_KERB_M),
             Area(-CORNER_M, CORNER_M, -CORNER_M, CORNER_M),
         ),
+        junctions=(Area(-NEAR_M, NEAR_M, -NEAR_M, NEAR_M),),
         signal="centre",
         signal_offset_s=xi["signal_offset_s"],
         friction=xi["friction"],

@@ -24,7 +24,7 @@ from risk_sac.scenario.layout import Area, Layout, VehicleStart
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
 from risk_sac.sim.lookout import Bodies
 from risk_sac.sim.paths import Along, Paths
-from risk_sac.types import STEP_S, Bools, Frame, Kind, Role, Signal
+from risk_sac.types import STEP_S, Bools, Floats, Frame, Kind, Role, Signal
 
 logger = logging.getLogger(__name__)
 
@@ -33,6 +33,7 @@ PEDESTRIAN_SIZE_M = 0.5
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 GRAVITY_MPS2 = 9.81
 EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
+LISTED_WITHIN_S = 0.3
 NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
 CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
@@ -264,9 +265,32 @@ class SumoSimulation:
         path = self._paths.of(self._routes[vehicle], get.getLaneID(vehicle))
         return Along(path, get.getLanePosition(vehicle), get.getLateralLanePosition(vehicle))
 
+    def ego_path(self) -> tuple[Floats, Floats]:
+        """The ego's way ahead: x and y of points, its centre first."""
+        ego = self._vehicles[0]
+        path, station_m, offset_m = self.along(ego)
+        ahead = path.station_m > station_m
+        sin, cos = np.sin(path.heading_rad[ahead]), np.cos(path.heading_rad[ahead])
+        x = np.concatenate((self._frame.x_m[:1], path.x_m[ahead] - offset_m * sin))
+        y = np.concatenate((self._frame.y_m[:1], path.y_m[ahead] + offset_m * cos))
+        return x, y
+
     def path(self, vehicle: str) -> Along | None:
         """Where a vehicle is on its path; None once it left the net."""
         return self.along(vehicle) if vehicle in self._vehicles else None
+
+    def lists_collision(self, other: str) -> bool:
+        """Whether SUMO lists a collision of the ego with a vehicle, now or if it goes on for `LISTED_WITHIN_S`.
+
+        SUMO tests rectangles that lie along their lanes, so it is a little late or early where a body is turned. It
+        ends the episode: the simulation is past the contact afterwards.
+        """
+        pair = {self._vehicles[0], other}
+        for _ in range(round(LISTED_WITHIN_S / STEP_S)):
+            if any({c.collider, c.victim} == pair for c in libsumo.simulation.getCollisions()):
+                return True
+            libsumo.simulationStep()
+        return any({c.collider, c.victim} == pair for c in libsumo.simulation.getCollisions())
 
     def room(self, vehicle: str) -> Room | None:
         """How far `vehicle` may move sideways; None once it left the net.
