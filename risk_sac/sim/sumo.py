@@ -128,7 +128,7 @@ class SumoSimulation:
                 libsumo.vehicle.setType(start.id, f"adversary_{start.body}")
                 libsumo.vehicle.setSpeedMode(start.id, 0)
                 libsumo.vehicle.setLaneChangeMode(start.id, 0)
-                self._drivers.pop(start.id)
+                self._released[start.id] = self._drivers.pop(start.id)
 
     def _start_drivers(self) -> None:
         ego, *others = self._vehicles
@@ -136,6 +136,7 @@ class SumoSimulation:
         emergency = min(EGO_EMERGENCY_DECEL_MPS2, grip)
         cruise = {start.id: start.speed_mps for start in self._layout.vehicles if start.role is Role.ADVERSARY}
         self._drivers = {id_: Driver(id_, STEP_S, emergency, cruise.get(id_, OWN_CHOICE_MPS)) for id_ in others}
+        self._released: dict[str, Driver] = {}
         self._ego_driver = Driver(ego, self._ego.reaction_time_s, emergency)
 
     def _load(self, options: list[str]) -> None:
@@ -249,15 +250,36 @@ class SumoSimulation:
         self._tell(self._ego_driver, 0, bodies, known)
         if not self._walkers:
             return
-        pedestrian = ~bodies.vehicle
-        near = np.hypot(*(each[:, None] - each[pedestrian] for each in (frame.x_m, frame.y_m))).min(axis=1) < NEAR_M
+        near = _near_pedestrians(bodies)
         for row, id_ in enumerate(frame.ids):
             driver = self._drivers.get(id_)
             if driver is not None and (near[row] or driver.telling):
-                self._tell(driver, row, bodies, pedestrian)
+                self._tell(driver, row, bodies, ~bodies.vehicle)
 
     def _tell(self, driver: Driver, row: int, bodies: Bodies, candidates: Bools) -> None:
         driver.tell(row, self._frame, bodies, self.along(self._frame.ids[row]), self._limit_mps, candidates)
+
+    def intended_accel(self) -> dict[str, float]:
+        """What the drivers of the released vehicles would do if nobody commanded them, m/s².
+
+        They keep the speed they started with, or go slower where SUMO's models or a pedestrian in their way want that.
+        SUMO's wish is that of the step before, which is the newest it tells.
+        """
+        frame, bodies = self._frame, Bodies.of(self._frame)
+        near = _near_pedestrians(bodies)
+        found = {}
+        for row, id_ in enumerate(frame.ids):
+            driver = self._released.get(id_)
+            if driver is None:
+                continue
+            speed, accel = float(frame.speed_mps[row]), float(frame.accel_mps2[row])
+            models = (libsumo.vehicle.getSpeedWithoutTraCI(id_) - speed) / STEP_S + accel
+            wanted = min(models, max(driver.cruise_mps - speed, 0.0) / STEP_S)
+            told = None
+            if near[row]:
+                told = driver.decide(row, speed, bodies, self.along(id_), self._limit_mps, ~bodies.vehicle)
+            found[id_] = wanted if told is None else min(wanted, told)
+        return found
 
     def along(self, vehicle: str) -> Along:
         """Where a vehicle is on its path."""
@@ -396,6 +418,15 @@ class SumoSimulation:
             return Signal.NONE, math.inf
         _, _, distance_m, state = ahead[0]
         return COLOURS.get(state.lower(), Signal.NONE), distance_m
+
+
+def _near_pedestrians(bodies: Bodies) -> Bools:
+    """Who has a pedestrian within `NEAR_M`."""
+    if bodies.vehicle.all():
+        return np.zeros(len(bodies.vehicle), dtype=np.bool_)
+    away = (each[:, None] - each[~bodies.vehicle] for each in (bodies.x_m, bodies.y_m))
+    near: Bools = np.hypot(*away).min(axis=1) < NEAR_M
+    return near
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
