@@ -23,6 +23,7 @@ from risk_sac.risk.realism import broken_hard_rule, soft_cost
 from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S
+from risk_sac.scenario.families import LEAD_IN_S
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, History, agrees, find_contact, verdicts
 from risk_sac.sim.control import Adversaries
@@ -159,19 +160,31 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
         sumo_seed = int(self.np_random.integers(2**31 - 1))
-        self._frame = self._sim.reset(layout, sumo_seed, controlled=self._controlled)
-        self._adversaries = Adversaries(self.problem.family, limits, layout, self._frame)
         self._monitor.reset()
         self._perception.reset()
         self._trace = Trace(self._monitor.names)
         self._steps = 0
         self._inside_limits, self._teleported = True, False
         self._touched: set[str] = set()
-        self._started_s = self._frame.time_s
-        self._measures = self._measure(self._frame, None)
-        self._trace.append(self._frame, self._measures, None)
+        self._lead_in(self._sim.reset(layout, sumo_seed))
+        self._released_s = self._frame.time_s
+        self._adversaries = Adversaries(self.problem.family, limits, self._frame)
         self._check_feasible(scene)
+        if self._controlled:
+            self._sim.release()
+        else:
+            self._sim.halt_walkers()
         return self._observe(), {"robustness": self._measures.soft_min}
+
+    def _lead_in(self, start: Frame) -> None:
+        """Traffic, before anybody attacks: SUMO drives all vehicles, and pedestrians go on as the scene says."""
+        self._frame, self._measures = start, self._measure(start, None)
+        self._trace.append(start, self._measures, None)
+        for _ in range(round(LEAD_IN_S / STEP_S)):
+            self._sim.walk_on()
+            before, self._frame = self._frame, self._sim.step()
+            self._measures = self._measure(self._frame, before)
+            self._trace.append(self._frame, self._measures, None)
 
     def _check_feasible(self, scene: Scene) -> None:
         """C_hard of Eq. 5."""
@@ -220,7 +233,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             logger.info("SUMO lists no collision with %r at %.1f s", other, frame.time_s)
         visible_for_s = self._perception.known_for(other, frame.time_s)
         history = History(
-            started_s=self._started_s,
+            started_s=self._released_s,
             teleported=self._teleported,
             spawn_overlap=self._spawn_overlap,
             inside_limits=self._inside_limits,
@@ -229,7 +242,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             ever_visible=self._perception.ever_seen(other),
         )
         return Collision(
-            time_s=contact.time_s - self._started_s,
+            time_s=contact.time_s - self._released_s,
             other_id=other,
             other_kind=Kind(int(frame.kind[contact.other])).name.lower(),
             other_role=Role(int(frame.role[contact.other])).name.lower(),

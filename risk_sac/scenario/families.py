@@ -8,12 +8,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from risk_sac.config import CrossingType, DynamicElements, Environment, FamilyName, Interval, Odd, Scenery, SignalType
-from risk_sac.scenario.layout import Area, Layout, PedestrianStart, VehicleStart
+from risk_sac.scenario.layout import Area, Body, Layout, PedestrianStart, VehicleStart
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Role
 
 VEHICLE_LENGTH_M = 4.6
 KERB_M = 6.55  # of the mixed road from its axis: two lanes of 3.3 m each, and 5 cm inside
+
+LEAD_IN_S = 1.5  # in which SUMO drives everybody, before the adversaries are released to the policy
 
 EGO = "ego"
 LEFT, STRAIGHT, RIGHT = range(3)
@@ -69,7 +71,7 @@ def _odd(
             vehicle_speed_mps=Interval(low=0, high=limit_mps * 1.2),
             vehicle_accel_mps2=Interval(low=-8, high=3.5),
             pedestrian_speed_mps=Interval(low=0, high=3),
-            pedestrian_accel_mps2=Interval(low=-4, high=3),
+            pedestrian_accel_mps2=Interval(low=-1.5, high=1.5),
         ),
     )
 
@@ -135,16 +137,24 @@ def _mixed(xi: Mapping[str, float]) -> Layout:
     stop_line = centre - CROSSING_HALF_WIDTH_M - start
     oncoming_edge, oncoming_after, oncoming_length = ("w3", "w2", 298.0) if signalised else ("w2", "w1", 396.0)
 
-    def car(id_: str, role: Role, lane: int, before_m: float, speed_mps: float) -> VehicleStart:
+    def car(
+        id_: str, role: Role, lane: int, before_m: float, speed_mps: float, body: Body = "car"
+    ) -> VehicleStart:
         return VehicleStart(
-            id=id_, role=role, route=(edge, after), lane=lane, position_m=stop_line - before_m, speed_mps=speed_mps
+            id=id_,
+            role=role,
+            route=(edge, after),
+            lane=lane,
+            position_m=stop_line - before_m - LEAD_IN_S * speed_mps,
+            speed_mps=speed_mps,
+            body=body,
         )
 
     return Layout(
         net="mixed/mixed.net.xml",
         ego=car(EGO, Role.EGO, 2, xi["ego_distance_m"], xi["ego_speed_mps"]),
         vehicles=(
-            car("occluder", Role.ADVERSARY, 1, xi["occluder_distance_m"], xi["occluder_speed_mps"]),
+            car("occluder", Role.ADVERSARY, 1, xi["occluder_distance_m"], xi["occluder_speed_mps"], "truck"),
             car("follower", Role.BACKGROUND, 2, xi["ego_distance_m"] + 25.0, xi["ego_speed_mps"]),
             *(
                 VehicleStart(
@@ -163,7 +173,7 @@ def _mixed(xi: Mapping[str, float]) -> Layout:
                 id="pedestrian",
                 role=Role.ADVERSARY,
                 x_m=centre + xi["pedestrian_offset_m"],
-                y_m=-KERB_M - xi["pedestrian_setback_m"],
+                y_m=-KERB_M - xi["pedestrian_setback_m"] - LEAD_IN_S * xi["pedestrian_speed_mps"],
                 heading_rad=math.pi / 2,
                 speed_mps=xi["pedestrian_speed_mps"],
             ),
@@ -237,7 +247,7 @@ def _approach(
         role=role,
         route=(f"from_{leg}", f"to_{_LEG_AFTER[leg][turn]}"),
         lane=lane or (1 if turn == RIGHT else 2),
-        position_m=APPROACH_M - before_m,
+        position_m=APPROACH_M - before_m - LEAD_IN_S * speed_mps,
         speed_mps=speed_mps,
     )
 
@@ -284,7 +294,7 @@ def _dense(xi: Mapping[str, float]) -> Layout:
             PedestrianStart(
                 id="pedestrian",
                 role=Role.ADVERSARY,
-                x_m=DENSE_KERB_M + xi["pedestrian_setback_m"],
+                x_m=DENSE_KERB_M + xi["pedestrian_setback_m"] + LEAD_IN_S * xi["pedestrian_speed_mps"],
                 y_m=-(NEAR_M + FAR_M) / 2 + xi["pedestrian_offset_m"],
                 heading_rad=math.pi,
                 speed_mps=xi["pedestrian_speed_mps"],

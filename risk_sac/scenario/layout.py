@@ -1,8 +1,11 @@
 """Where everybody starts: the plain data between a scene and a simulator."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from risk_sac.types import Role
+
+Body = Literal["car", "truck"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -15,6 +18,7 @@ class VehicleStart:
     lane: int  # index on the first edge, 0 is the rightmost
     position_m: float  # of the front bumper along the first edge
     speed_mps: float
+    body: Body = "car"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +45,10 @@ class Area:
     def contains(self, x_m: float, y_m: float) -> bool:
         """Whether the point lies in the area."""
         return self.x_low_m <= x_m <= self.x_high_m and self.y_low_m <= y_m <= self.y_high_m
+
+    def grown(self, by_m: float) -> "Area":
+        """The area with a border added on every side."""
+        return Area(self.x_low_m - by_m, self.x_high_m + by_m, self.y_low_m - by_m, self.y_high_m + by_m)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,6 +14,7 @@ from risk_sac.types import STEP_S, Bools, Floats, Frame, Kind
 
 NORMAL_DECEL_MPS2 = 4.5  # what SUMO assumes of a leader, and its default for passenger cars
 JERK_MPS3 = 12.65  # at which a braking builds up (UN R157, the careful driver)
+OWN_CHOICE_MPS = -1.0  # SUMO's word for the speed that its models choose
 SAFE_SPEED_MODE = 27  # SUMO's checks, but for its bound on braking: an emergency may exceed the normal deceleration
 
 
@@ -21,17 +22,32 @@ class Driver:
     """One vehicle that SUMO drives, and what it was told last.
 
     It decides once in its reaction time, as SUMO's models do, and keeps its acceleration in between.
+
+    Attributes:
+      telling: whether it is held to a speed at present.
     """
 
-    def __init__(self, vehicle: str, reaction_s: float, emergency_mps2: float) -> None:
+    def __init__(
+        self, vehicle: str, reaction_s: float, emergency_mps2: float, cruise_mps: float = OWN_CHOICE_MPS
+    ) -> None:
+        """Takes its place beside a vehicle of the simulation.
+
+        Args:
+          vehicle: its id.
+          reaction_s: time between two decisions.
+          emergency_mps2: the hardest it can brake.
+          cruise_mps: the speed it is told to keep where nothing else binds.
+        """
         self._vehicle = vehicle
+        self._cruise_mps = cruise_mps
         self._period = round(reaction_s / STEP_S)
         self._emergency_mps2 = emergency_mps2
         self._step = 0
         self._accel_mps2: float | None = None  # None: nothing to tell
-        self._driven_mps2 = 0.0
+        self.telling = False
         get = libsumo.vehicle
         get.setSpeedMode(vehicle, SAFE_SPEED_MODE)
+        get.setSpeed(vehicle, cruise_mps)
         self._length, self._width = get.getLength(vehicle), get.getWidth(vehicle)
         self._accel, self._min_gap = get.getAccel(vehicle), get.getMinGap(vehicle)
 
@@ -50,13 +66,14 @@ class Driver:
             self._accel_mps2 = self._decide(speed, frame, along, limit_mps, candidate)
         self._step += 1
         if self._accel_mps2 is None:
-            if self._driven_mps2 != 0.0:
-                libsumo.vehicle.setSpeed(self._vehicle, -1)
-                self._driven_mps2 = 0.0
+            if self.telling:
+                libsumo.vehicle.setSpeed(self._vehicle, self._cruise_mps)
+                self.telling = False
             return
+        self.telling = True
         braking_so_far = min(float(frame.accel_mps2[row]), 0.0)
-        self._driven_mps2 = max(self._accel_mps2, braking_so_far - JERK_MPS3 * STEP_S)
-        libsumo.vehicle.setSpeed(self._vehicle, max(speed + self._driven_mps2 * STEP_S, 0.0))
+        accel = max(self._accel_mps2, braking_so_far - JERK_MPS3 * STEP_S)
+        libsumo.vehicle.setSpeed(self._vehicle, max(speed + accel * STEP_S, 0.0))
 
     def _decide(self, speed: float, frame: Frame, along: Along, limit_mps: float, candidate: Bools) -> float | None:
         """The acceleration that its model wants for the nearest of the targets; None where none binds."""
@@ -83,7 +100,7 @@ class Driver:
         for distance, lead_mps in zip(gap.tolist(), lead.tolist(), strict=True):
             if distance < math.inf:
                 wanted = min(wanted, self._worth(speed, distance - self._min_gap, lead_mps))
-        if wanted >= speed + self._accel * STEP_S:
+        if wanted >= speed + self._accel * STEP_S or 0.0 <= self._cruise_mps <= wanted:
             return None
         return max((wanted - speed) / STEP_S, -self._emergency_mps2)
 
@@ -93,13 +110,6 @@ class Driver:
         if lead_mps > 0.0:
             return float(libsumo.vehicle.getFollowSpeed(self._vehicle, speed, gap_m, lead_mps, NORMAL_DECEL_MPS2))
         return float(libsumo.vehicle.getStopSpeed(self._vehicle, speed, gap_m))
-
-
-def lookout(frame: Frame, row: int, known: Bools | None = None) -> Bools:
-    """Whom a driver looks out for: everybody it knows of but itself; without `known` it knows pedestrians alone."""
-    candidate = frame.kind == Kind.PEDESTRIAN if known is None else known.copy()
-    candidate[row] = False
-    return candidate
 
 
 def about_to_cross(x: float, y: float, vx: float, vy: float, roadway: Floats) -> bool:

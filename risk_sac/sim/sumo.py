@@ -1,27 +1,29 @@
-"""libsumo behind four verbs: reset, apply, step, close. The only module that imports it.
+"""libsumo behind a few verbs: reset, release, apply, step, close. SUMO's conventions end here.
 
-libsumo holds one simulation per process, so a worker process runs one episode at a time. SUMO's
-conventions (front bumper, compass degrees, string ids) end here.
+libsumo holds one simulation per process, so a worker process runs one episode at a time. Front bumpers, compass
+degrees and string ids stay inside this package.
 
-Pedestrians are points of our own dynamics. SUMO is told about one by a person that stands in for it
-while the ego can see it and it is on the roadway or on a crossing: SUMO has no switch that hides a
-person, so there is none while it is hidden.
+Pedestrians are points of our own dynamics, and SUMO knows nothing of them: `risk_sac.sim.lookout` says why, and
+`risk_sac.sim.driver` tells its drivers what to stop for.
 """
 
 import logging
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import IntEnum
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib.resources import files
 
 import libsumo
 import numpy as np
+from numpy.typing import NDArray
 
 from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
-from risk_sac.scenario.layout import Layout, VehicleStart
-from risk_sac.types import STEP_S, Frame, Kind, Role, Signal
+from risk_sac.scenario.layout import Area, Layout, VehicleStart
+from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver, about_to_cross
+from risk_sac.sim.paths import Along, Paths
+from risk_sac.types import STEP_S, Bools, Frame, Kind, Role, Signal
 
 logger = logging.getLogger(__name__)
 
@@ -30,6 +32,8 @@ PEDESTRIAN_SIZE_M = 0.5
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 GRAVITY_MPS2 = 9.81
 EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
+SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
+CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
 OPTIONS = (
     f"--step-length {STEP_S} --lateral-resolution 0.8 --default.speeddev 0 --insertion-checks none "
@@ -47,13 +51,6 @@ class Walker:
     heading_rad: float
     speed_mps: float
     accel_mps2: float = 0.0
-
-
-class Ground(IntEnum):
-    """Where a pedestrian stands, as moveToXY's keepRoute; drivers yield at a crossing, elsewhere they avoid contact."""
-
-    CROSSING = 2
-    ROADWAY = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +77,16 @@ class SumoSimulation:
         self._started = False
         self._walkers: dict[str, Walker] = {}
         self._lanes: dict[tuple[tuple[str, ...], str], tuple[float, float, float]] = {}
+        self._paths = Paths()
 
-    def reset(self, layout: Layout, seed: int, *, controlled: bool = True) -> Frame:
-        """Sets up an episode and returns its first frame.
+    def reset(self, layout: Layout, seed: int) -> Frame:
+        """Sets up an episode and returns its first frame; SUMO drives everybody until `release`.
+
+        It drives adversaries at the speed they start with, or slower where its models want that.
 
         Args:
           layout: where everybody starts.
           seed: SUMO's seed; the same seed and commands give the same episode.
-          controlled: whether adversary vehicles wait for commands; otherwise SUMO drives them.
 
         Raises:
           SimulationError: SUMO refused the layout.
@@ -95,7 +94,7 @@ class SumoSimulation:
         options = ["-n", str(NETS / layout.net), "-a", str(NETS / "vtypes.add.xml"), "--seed", str(seed), *OPTIONS]
         try:
             self._load(options)
-            self._place(layout, controlled)
+            self._place(layout)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise SimulationError(f"SUMO refused the layout of {layout.net}: {error}") from error
@@ -105,29 +104,43 @@ class SumoSimulation:
         self._vehicles = [start.id for start in (layout.ego, *layout.vehicles)]
         self._roles = {start.id: start.role for start in (layout.ego, *layout.vehicles)}
         self._roles |= {start.id: start.role for start in layout.pedestrians}
-        for start in layout.vehicles:
-            if controlled and start.role is Role.ADVERSARY:
-                # Only adversaries lose SUMO's safety checks; anyone else would drive through traffic.
-                libsumo.vehicle.setSpeedMode(start.id, 0)
-                libsumo.vehicle.setLaneChangeMode(start.id, 0)
         self._previous: dict[str, tuple[float, float]] = {}
         self._routes = {start.id: start.route for start in (layout.ego, *layout.vehicles)}
         self._lanes.clear()  # another net may use the same names
+        self._paths.clear()
         self._describe_actors()
+        self._start_drivers()
+        self._limit_mps: float = libsumo.lane.getMaxSpeed(libsumo.vehicle.getLaneID(layout.ego.id))  # of all roads alike
         return self._read()
+
+    def release(self) -> None:
+        """Hands the adversary vehicles over: from now on they wait for commands.
+
+        Only adversaries lose SUMO's safety checks; anyone else would drive through traffic.
+        """
+        for start in self._layout.vehicles:
+            if start.role is Role.ADVERSARY and start.id in self._vehicles:
+                libsumo.vehicle.setType(start.id, f"adversary_{start.body}")
+                libsumo.vehicle.setSpeedMode(start.id, 0)
+                libsumo.vehicle.setLaneChangeMode(start.id, 0)
+                self._drivers.pop(start.id)
+
+    def _start_drivers(self) -> None:
+        ego, *others = self._vehicles
+        grip = self._layout.friction * GRAVITY_MPS2
+        emergency = min(EGO_EMERGENCY_DECEL_MPS2, grip)
+        cruise = {start.id: start.speed_mps for start in self._layout.vehicles if start.role is Role.ADVERSARY}
+        self._drivers = {id_: Driver(id_, STEP_S, emergency, cruise.get(id_, OWN_CHOICE_MPS)) for id_ in others}
+        self._ego_driver = Driver(ego, self._ego.reaction_time_s, emergency)
 
     def _load(self, options: list[str]) -> None:
         if not self._started:
             libsumo.start(["sumo", *options])
             self._started = True
             return
-        if libsumo.person.getIDCount():
-            for person in libsumo.person.getIDList():
-                libsumo.person.remove(person)
-            libsumo.simulationStep()  # a moved person left behind crashed the next episode on some nets
         libsumo.load(options)
 
-    def _place(self, layout: Layout, controlled: bool) -> None:
+    def _place(self, layout: Layout) -> None:
         ego_type = f"ego_{self._ego.car_following}"
         grip = layout.friction * GRAVITY_MPS2
         libsumo.vehicletype.setActionStepLength(ego_type, self._ego.reaction_time_s)
@@ -135,15 +148,16 @@ class SumoSimulation:
         libsumo.vehicletype.setDecel(ego_type, min(EGO_DECEL_MPS2, grip))
         self._insert(layout.ego, ego_type)
         for start in layout.vehicles:
-            self._insert(start, "adversary" if controlled and start.role is Role.ADVERSARY else "background")
+            self._insert(start, f"background_{start.body}")
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
         self._layout = layout
         self._hidden: frozenset[str] = frozenset()
-        self._persons: dict[str, tuple[str, Ground]] = {}  # pedestrian -> its person in SUMO and where that stands
-        self._persons_added = 0
+        self._roadway = np.array([(a.x_low_m, a.x_high_m, a.y_low_m, a.y_high_m) for a in layout.roadway]).reshape(-1, 4)
         self._signal = layout.signal
+        self._walk_signals: list[tuple[Area, int]] = []
         if layout.signal is not None:
             _set_signal(layout.signal, layout.signal_offset_s)
+            self._walk_signals = _walk_signals(layout.signal, layout.crossings)
 
     @staticmethod
     def _insert(start: VehicleStart, type_id: str) -> None:
@@ -200,8 +214,7 @@ class SumoSimulation:
           SimulationError: libsumo failed, or the ego left the net.
         """
         try:
-            for id_, walker in self._walkers.items():
-                self._show(id_, walker)
+            self._tell_drivers()
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise SimulationError(f"SUMO failed during a step: {error}") from error
@@ -213,40 +226,51 @@ class SumoSimulation:
             self._describe_actors()
         return self._read()
 
-    def _show(self, id_: str, walker: Walker) -> None:
-        """Moves the person that stands in for a pedestrian, or removes it where SUMO must not know of it.
+    def walk_on(self) -> None:
+        """Moves every pedestrian on at its velocity for one step."""
+        for id_, w in self._walkers.items():
+            distance = w.speed_mps * STEP_S
+            x_m, y_m = w.x_m + distance * math.cos(w.heading_rad), w.y_m + distance * math.sin(w.heading_rad)
+            self._walkers[id_] = replace(w, x_m=x_m, y_m=y_m)
 
-        A person that changes ground is replaced by a fresh one: SUMO crashes when moveToXY takes a person
-        from a crossing to a car lane or a walking area (eclipse-sumo/sumo#17257), from a sidewalk it does not.
-        So is one that SUMO moved to a lane without registering it on that lane's edge: drivers look at
-        registered persons only, and would be blind to it.
-        """
-        ground = None if id_ in self._hidden else self._ground(walker)
-        person, stands_on = self._persons.get(id_, ("", None))
-        if person and (ground is not stands_on or not _registered(person)):
-            libsumo.person.remove(person)
-            del self._persons[id_]
-            stands_on = None
-        if ground is None:
-            return
-        if stands_on is None:
-            self._persons_added += 1
-            person = f"{id_}#{self._persons_added}"  # re-using an id within one step fails
-            edge = self._layout.ego.route[0]
-            libsumo.person.add(person, edge, 1.0, typeID="pedestrian")
-            libsumo.person.appendWalkingStage(person, [edge], 2.0)
-            self._persons[id_] = person, ground
-        libsumo.person.moveToXY(person, "", walker.x_m, walker.y_m, _compass(walker.heading_rad), keepRoute=ground)
+    def halt_walkers(self) -> None:
+        """Lets every pedestrian stand where it is."""
+        self._walkers = {id_: replace(w, speed_mps=0.0, accel_mps2=0.0) for id_, w in self._walkers.items()}
 
-    def _ground(self, walker: Walker) -> Ground | None:
-        """None off the road: nobody drives there, and SUMO's walking areas are where moveToXY crashes."""
-        for area in self._layout.crossings:
-            if area.contains(walker.x_m, walker.y_m):
-                return Ground.CROSSING
-        for area in self._layout.roadway:
-            if area.contains(walker.x_m, walker.y_m):
-                return Ground.ROADWAY
-        return None
+    def _tell_drivers(self) -> None:
+        """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians alone."""
+        frame = self._frame
+        crossing = [
+            row
+            for row, id_ in enumerate(frame.ids)
+            if id_ in self._walkers
+            and about_to_cross(frame.x_m[row], frame.y_m[row], frame.vx_mps[row], frame.vy_mps[row], self._roadway)
+        ]
+        pedestrians = np.zeros(len(frame.ids), dtype=np.bool_)
+        pedestrians[crossing] = True
+        known = (frame.kind == Kind.VEHICLE) | pedestrians
+        known &= np.array([id_ not in self._hidden for id_ in frame.ids])
+        self._tell(self._ego_driver, 0, known)
+        for row, id_ in enumerate(frame.ids):
+            driver = self._drivers.get(id_)
+            if driver is not None and (crossing or driver.telling):
+                self._tell(driver, row, pedestrians)
+
+    def _tell(self, driver: Driver, row: int, candidates: Bools) -> None:
+        id_ = self._frame.ids[row]
+        others = candidates.copy()
+        others[row] = False
+        driver.tell(row, self._frame, self.along(id_), self._limit_mps, others)
+
+    def along(self, vehicle: str) -> Along:
+        """Where a vehicle is on its path."""
+        get = libsumo.vehicle
+        path = self._paths.of(self._routes[vehicle], get.getLaneID(vehicle))
+        return Along(path, get.getLanePosition(vehicle), get.getLateralLanePosition(vehicle))
+
+    def path(self, vehicle: str) -> Along | None:
+        """Where a vehicle is on its path; None once it left the net."""
+        return self.along(vehicle) if vehicle in self._vehicles else None
 
     def room(self, vehicle: str) -> Room | None:
         """How far `vehicle` may move sideways; None once it left the net.
@@ -281,6 +305,7 @@ class SumoSimulation:
         get_position, get_angle = libsumo.vehicle.getPosition, libsumo.vehicle.getAngle
         get_speed, get_lateral = libsumo.vehicle.getSpeed, libsumo.vehicle.getLateralSpeed
         get_accel = libsumo.vehicle.getAcceleration
+        get_offset = libsumo.vehicle.getLateralLanePosition
         rows: list[float] = []  # flat: numpy converts nested sequences at half the speed
         previous = self._previous
         for id_, half in zip(self._vehicles, self._half_lengths, strict=True):
@@ -294,13 +319,16 @@ class SumoSimulation:
             else:
                 vx, vy = speed * cos, speed * sin
             previous[id_] = (x, y)
-            rows += (x - half * cos, y - half * sin, heading, vx, vy, speed, get_lateral(id_), get_accel(id_))
+            lateral, offset = get_lateral(id_), get_offset(id_)
+            rows += (x - half * cos, y - half * sin, heading, vx, vy, speed, lateral, get_accel(id_), offset)
         for w in self._walkers.values():
             vx, vy = w.speed_mps * math.cos(w.heading_rad), w.speed_mps * math.sin(w.heading_rad)
-            rows += (w.x_m, w.y_m, w.heading_rad, vx, vy, w.speed_mps, 0.0, w.accel_mps2)
-        x_m, y_m, heading_rad, vx_mps, vy_mps, speed_mps, lateral_mps, accel_mps2 = np.array(rows).reshape(-1, 8).T
+            rows += (w.x_m, w.y_m, w.heading_rad, vx, vy, w.speed_mps, 0.0, w.accel_mps2, 0.0)
+        x_m, y_m, heading_rad, vx_mps, vy_mps, speed_mps, lateral_mps, accel_mps2, lane_offset_m = (
+            np.array(rows).reshape(-1, 9).T
+        )
         signal, stop_line_m = self._next_signal()
-        return Frame(
+        self._frame = Frame(
             time_s=libsumo.simulation.getTime(),
             ids=self._ids,
             kind=self._kind,
@@ -317,11 +345,28 @@ class SumoSimulation:
             width_m=self._width,
             signal=signal,
             stop_line_m=stop_line_m,
-            simulator_collisions=tuple(
-                (_actor(c.collider), _actor(c.victim)) for c in libsumo.simulation.getCollisions()
-            ),
+            lane_offset_m=lane_offset_m,
+            link=self._links(),
+            simulator_collisions=tuple((c.collider, c.victim) for c in libsumo.simulation.getCollisions()),
             teleported=libsumo.simulation.getStartingTeleportIDList(),
         )
+        return self._frame
+
+    def _links(self) -> NDArray[np.uint8]:
+        """The letter of the signal ahead of the ego and of each adversary; a pedestrian's is that of its crossing."""
+        links = np.zeros(len(self._ids), dtype=np.uint8)
+        if self._signal is None:
+            return links
+        for row, id_ in enumerate(self._ids):
+            if self._roles[id_] is not Role.BACKGROUND and id_ not in self._walkers:
+                ahead = libsumo.vehicle.getNextTLS(id_)
+                links[row] = ord(ahead[0][3]) if ahead else 0
+        state = libsumo.trafficlight.getRedYellowGreenState(self._signal) if self._walkers else ""
+        for row, walker in enumerate(self._walkers.values(), start=len(self._vehicles)):
+            for area, index in self._walk_signals:
+                if area.contains(walker.x_m, walker.y_m):
+                    links[row] = ord(state[index])
+        return links
 
     def _next_signal(self) -> tuple[Signal, float]:
         if self._signal is None:
@@ -346,19 +391,14 @@ def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
     return width
 
 
-def _actor(sumo_id: str) -> str:
-    """The actor that a vehicle, or a person `pedestrian#3` that stands in for one, belongs to."""
-    return sumo_id.partition("#")[0]
-
-
-def _registered(person: str) -> bool:
-    lane: str = libsumo.person.getLaneID(person)
-    road: str = libsumo.person.getRoadID(person)
-    return lane.rpartition("_")[0] == road
-
-
-def _compass(heading_rad: float) -> float:
-    return 90.0 - math.degrees(heading_rad)
+def _walk_signals(signal: str, crossings: Sequence[Area]) -> list[tuple[Area, int]]:
+    """The crossings that a signal controls, each grown onto the sidewalks, and the index of its letter."""
+    found = []
+    for index, links in enumerate(libsumo.trafficlight.getControlledLinks(signal)):
+        for lane in {lane for link in links for lane in link if CROSSING_LANE.fullmatch(lane)}:
+            x, y = np.mean(libsumo.lane.getShape(lane), axis=0)
+            found += [(area.grown(SIDEWALK_M), index) for area in crossings if area.contains(x, y)]
+    return found
 
 
 def _set_signal(signal: str, offset_s: float) -> None:
