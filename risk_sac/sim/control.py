@@ -111,12 +111,12 @@ class VehicleControl:
         this alone is within the limit on lateral acceleration, and both bounds below always leave something.
         """
         limits, speed = self.limits, self.speed_mps
-        reach = min(limits.lateral_mps, limits.slip * speed)
         rate = min(limits.lateral_accel_mps2, CORRECTION_PER_M * speed**2)
-        left, right = (min(reach, _taper(side - EDGE_M, rate)) for side in (room.left_m, room.right_m))
+        room_m = (room.left_m if steer >= 0 else room.right_m) - EDGE_M
+        reach = min(limits.lateral_mps, limits.slip * speed, _taper(room_m, rate))
+        wanted = _clip(steer * limits.lateral_mps, -reach, reach)
         same_heading = self.lateral_mps * speed / before_mps if before_mps > 0.0 else 0.0
         turn, change = curvature * speed**2 * STEP_S, limits.lateral_accel_mps2 * STEP_S
-        wanted = _clip(steer * limits.lateral_mps, -right, left)
         wanted = _clip(wanted, same_heading - turn, same_heading + turn)
         self.lateral_mps = _clip(wanted, self.lateral_mps - change, self.lateral_mps + change)
 
@@ -145,12 +145,12 @@ class PedestrianControl:
         speed = _clip(state.speed_mps + accel * STEP_S, 0.0, limits.walk_speed_mps)
         disc = limits.walk_disc_mps2
         rate = self.across_mps2 / max(state.speed_mps, speed, disc / limits.heading_rate_radps)
-        heading = state.heading_rad + rate * STEP_S
-        distance = (state.speed_mps + speed) / 2 * STEP_S
+        turned = rate * STEP_S
+        distance, middle = (state.speed_mps + speed) / 2 * STEP_S, state.heading_rad + turned / 2
         self.state = Walker(
-            x_m=state.x_m + distance * math.cos(heading),
-            y_m=state.y_m + distance * math.sin(heading),
-            heading_rad=heading,
+            x_m=state.x_m + distance * math.cos(middle),
+            y_m=state.y_m + distance * math.sin(middle),
+            heading_rad=state.heading_rad + turned,
             speed_mps=speed,
             accel_mps2=(speed - state.speed_mps) / STEP_S,
         )
