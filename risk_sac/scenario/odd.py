@@ -77,7 +77,9 @@ def check(odd: Odd) -> None:
             raise _error(path, interval, "low < 0 < high, so that actors can both brake and accelerate")
     lateral = odd.dynamic.vehicle_lateral_accel_mps2
     if lateral is not None and lateral.high == 0:
-        raise _error("dynamic.vehicle_lateral_accel_mps2", lateral, "a high above 0; a lateral speed of 0 forbids moving")
+        raise _error(
+            "dynamic.vehicle_lateral_accel_mps2", lateral, "a high above 0; a lateral speed of 0 forbids moving"
+        )
     for path in ("scenery.signal_types", "scenery.crossing_types", "dynamic.actor_kinds"):
         if field(odd, path) == ():
             raise _error(path, (), "at least one kind, or the field left out")
