@@ -53,10 +53,10 @@ class VehicleControl:
     speed_mps: float
     accel_mps2: float = 0.0
     lateral_mps: float = 0.0
-    _path: Path | None = None
+    _path: Path | None = field(init=False, default=None)
     _bends: Bends = field(init=False)  # of that path
-    _at: int = 0  # where on them
-    _behind_per_m: float = 0.0  # curvature at the end of the path before, which the body has yet to leave
+    _at: int = field(init=False, default=0)  # where on them
+    _behind_per_m: float = field(init=False, default=0.0)  # bend before that path, which the body has yet to leave
     _preview_s: float = field(init=False)
 
     def __post_init__(self) -> None:
