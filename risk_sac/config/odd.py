@@ -55,8 +55,12 @@ class DynamicElements(Settings):
     """Speed of other vehicles, m/s."""
     vehicle_accel_mps2: Interval | None = None
     """Longitudinal acceleration of other vehicles, m/s²; low is the hardest braking."""
+    vehicle_lateral_speed_mps: Interval | None = None
+    """Speed of other vehicles across their lane, m/s, to either side. Usual is 1.2, UN R157's extreme 1.8."""
+    vehicle_lateral_accel_mps2: Interval | None = None
+    """Acceleration of other vehicles across their lane, m/s², to either side, without the lane's own curve."""
     pedestrian_speed_mps: Interval | None = None
-    """Speed of pedestrians, m/s."""
+    """Speed of pedestrians, m/s. Usual is walking, up to 2; a high of up to 3 lets them run."""
     pedestrian_accel_mps2: Interval | None = None
     """Acceleration of pedestrians, m/s²."""
 

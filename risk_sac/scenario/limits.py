@@ -1,13 +1,23 @@
 """Kinematic limits of the adversaries, as the ODD and the road surface allow."""
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
-from risk_sac.config import Odd
+from risk_sac.config import Interval, Odd
 
 GRAVITY_MPS2 = 9.81
+HEADROOM = 0.95  # share of the friction circle that is used; the rest is for what a step of 0.1 s cannot resolve
+CORNERING = 0.6  # of the circle, for the curve of the lane: drivers leave more, but brake in curves
+CHANGING_LANE = 0.3  # of the circle at most, for moving across the lane; at least 0.43 are left for braking
+SLIP = 0.2  # lateral over longitudinal speed: about 11 degrees against the lane
+
+# Where the ODD says nothing.
+LATERAL_MPS = 1.2  # a lane change of 3 s; UN R157 takes 1.8 m/s as the extreme
+LATERAL_ACCEL_MPS2 = 1.5
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Limits:
     """Bounds that hold at every step; all positive."""
 
@@ -15,15 +25,34 @@ class Limits:
     speed_mps: float
     accel_mps2: float
     brake_mps2: float
+    grip_mps2: float  # of the longitudinal and the lateral acceleration together, cornering included
     jerk_mps3: float = 20.0  # an emergency braking builds up in about 0.4 s
-    lateral_mps: float = 2.0  # a brisk lane change takes about 2 s
-    lateral_accel_mps2: float = 4.0
-    slip: float = 0.2  # lateral over longitudinal speed: about 11 degrees against the lane
+    lateral_mps: float = LATERAL_MPS
+    lateral_accel_mps2: float = LATERAL_ACCEL_MPS2
+    curvature_per_m: float = 0.2  # of a car that turns as tightly as it can
     # pedestrians
     walk_speed_mps: float
     walk_accel_mps2: float
     walk_brake_mps2: float
-    heading_rate_radps: float = 1.5
+    walk_disc_mps2: float = 1.5  # along and across the heading together
+    walk_jerk_mps3: float = 5.0  # from rest to full acceleration in 0.3 s
+    heading_rate_radps: float = 2.0  # of who stands: a right angle in 0.8 s
+
+    @cached_property
+    def cornering_mps2(self) -> float:
+        """Lateral acceleration that is planned for in a curve."""
+        return CORNERING * self.grip_mps2
+
+    @cached_property
+    def approach_mps2(self) -> float:
+        """Braking that the circle leaves to who drives a curve as planned and changes lane in it."""
+        lateral = self.cornering_mps2 + self.lateral_accel_mps2
+        return min(self.brake_mps2, math.sqrt(self.grip_mps2**2 - lateral**2))
+
+    @cached_property
+    def slip(self) -> float:
+        """Largest lateral speed as a share of the longitudinal; less where the hardest braking would outrun it."""
+        return min(SLIP, self.lateral_accel_mps2 / self.brake_mps2)
 
 
 def limits_from_odd(odd: Odd, friction: float) -> Limits:
@@ -41,12 +70,19 @@ def limits_from_odd(odd: Odd, friction: float) -> Limits:
         and dynamic.pedestrian_accel_mps2
     ):
         raise ValueError("the ODD is incomplete; intersect it with a family's default first")
-    grip = friction * GRAVITY_MPS2
+    grip = HEADROOM * friction * GRAVITY_MPS2
     return Limits(
         speed_mps=dynamic.vehicle_speed_mps.high,
         accel_mps2=min(dynamic.vehicle_accel_mps2.high, grip),
         brake_mps2=min(-dynamic.vehicle_accel_mps2.low, grip),
+        grip_mps2=grip,
+        lateral_mps=_high(dynamic.vehicle_lateral_speed_mps, LATERAL_MPS),
+        lateral_accel_mps2=min(_high(dynamic.vehicle_lateral_accel_mps2, LATERAL_ACCEL_MPS2), CHANGING_LANE * grip),
         walk_speed_mps=dynamic.pedestrian_speed_mps.high,
         walk_accel_mps2=dynamic.pedestrian_accel_mps2.high,
         walk_brake_mps2=-dynamic.pedestrian_accel_mps2.low,
     )
+
+
+def _high(interval: Interval | None, default: float) -> float:
+    return default if interval is None else interval.high

@@ -27,8 +27,17 @@ SENSIBLE: dict[str, Interval] = {
     "dynamic.ego_speed_mps": Interval(low=0, high=60),
     "dynamic.vehicle_speed_mps": Interval(low=0, high=60),
     "dynamic.vehicle_accel_mps2": Interval(low=-12, high=12),
+    "dynamic.vehicle_lateral_speed_mps": Interval(low=0, high=1.8),
+    "dynamic.vehicle_lateral_accel_mps2": Interval(low=0, high=3),
     "dynamic.pedestrian_speed_mps": Interval(low=0, high=10),
     "dynamic.pedestrian_accel_mps2": Interval(low=-10, high=10),
+}
+
+# A family's default says what is usual; up to here every family supports what is not, for a user who asks for it.
+EXTREME: dict[str, Interval] = {
+    "dynamic.vehicle_lateral_speed_mps": Interval(low=0, high=1.8),  # UN R157
+    "dynamic.vehicle_lateral_accel_mps2": Interval(low=0, high=3),
+    "dynamic.pedestrian_speed_mps": Interval(low=0, high=3),  # running
 }
 
 Branch = TypeVar("Branch", bound=Settings)
@@ -39,7 +48,7 @@ def intersect(default: Odd, user: Odd) -> Odd:
 
     Args:
       default: the family's, complete.
-      user: narrows it; a field left out keeps the default's.
+      user: narrows it, or widens a field of `EXTREME` up to that; a field left out keeps the default's.
 
     Raises:
       OddError: a field of the user's is physically senseless or leaves nothing of the default's.
@@ -66,6 +75,11 @@ def check(odd: Odd) -> None:
         interval = field(odd, path)
         if interval is not None and not interval.low < 0 < interval.high:
             raise _error(path, interval, "low < 0 < high, so that actors can both brake and accelerate")
+    lateral = odd.dynamic.vehicle_lateral_accel_mps2
+    if lateral is not None and lateral.high == 0:
+        raise _error(
+            "dynamic.vehicle_lateral_accel_mps2", lateral, "a high above 0; a lateral speed of 0 forbids moving"
+        )
     for path in ("scenery.signal_types", "scenery.crossing_types", "dynamic.actor_kinds"):
         if field(odd, path) == ():
             raise _error(path, (), "at least one kind, or the field left out")
@@ -159,9 +173,10 @@ def _share(parameter: Parameter, allowed: tuple[str, ...]) -> Interval | None:
 def _intersect_branch(branch: str, default: Branch, user: Branch) -> Branch:
     values = {}
     for name in type(default).model_fields:
-        ours, theirs = getattr(default, name), getattr(user, name)
+        usual, theirs = getattr(default, name), getattr(user, name)
+        ours = EXTREME.get(f"{branch}.{name}", usual)
         if theirs is None or ours is None:
-            values[name] = ours if theirs is None else theirs
+            values[name] = usual if theirs is None else theirs
             continue
         values[name] = common = _common(ours, theirs)
         if not common:

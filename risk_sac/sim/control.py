@@ -2,20 +2,27 @@
 
 Vehicles take (longitudinal acceleration, lateral velocity), pedestrians (acceleration, heading rate).
 Each limit holds on the motion that is driven, not only on what was asked for: acceleration tapers before
-standstill and top speed, and lateral speed before the road's edge, so that no clipping causes a jolt.
+standstill and top speed, speed before a bend, and lateral speed before the road's edge, so that no clipping
+causes a jolt.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.scenario.families import Family
 from risk_sac.scenario.limits import Limits
+from risk_sac.sim.bends import BODY_M, Bends, bends
+from risk_sac.sim.paths import Along, Path
 from risk_sac.sim.sumo import Room, SumoSimulation, VehicleCommand, Walker
 from risk_sac.types import STEP_S, Floats, Frame
+
+CORRECTION_PER_M = 0.05  # curvature that is left for steering in the tightest bend, and so before a road's edge
+EDGE_M = 0.03  # of the road that is kept free: what a car overshoots by that brakes while it straightens
+SKID = 0.98  # who is too fast for a curve keeps a fifth of its grip for braking, or it would never slow down
 
 
 def _taper(distance: float, rate: float) -> float:
@@ -24,7 +31,7 @@ def _taper(distance: float, rate: float) -> float:
     With decrements of c = rate·dt and D = distance/dt, k full decrements fit, k(k+1)/2·c <= D, and the rest is
     spread over k + 1 steps. The continuous √(2·rate·distance) would overshoot by up to half a decrement.
     """
-    if distance <= 0.0:
+    if distance <= 0.0 or rate <= 0.0:
         return 0.0
     change, total = rate * STEP_S, distance / STEP_S
     full = int((math.sqrt(1.0 + 8.0 * total / change) - 1.0) / 2.0)
@@ -37,65 +44,131 @@ def _clip(value: float, low: float, high: float) -> float:
 
 @dataclass(slots=True)
 class VehicleControl:
-    """Turns actions into bounded speed and lateral speed; remembers what it last commanded."""
+    """Turns actions into bounded speed and lateral speed; remembers what it last commanded.
+
+    The friction circle is shared in this order: the bend of the lane, a lane change, braking and accelerating.
+    """
 
     limits: Limits
     speed_mps: float
     accel_mps2: float = 0.0
     lateral_mps: float = 0.0
+    _path: Path | None = field(init=False, default=None)
+    _bends: Bends = field(init=False)  # of that path
+    _at: int = field(init=False, default=0)  # where on them
+    _behind_per_m: float = field(init=False, default=0.0)  # bend before that path, which the body has yet to leave
+    _preview_s: float = field(init=False)
 
-    def step(self, drive: float, steer: float, room: Room) -> VehicleCommand:
+    def __post_init__(self) -> None:
+        # As long as it takes to get from full acceleration to the braking that bends are approached with.
+        self._preview_s = (self.limits.accel_mps2 + self.limits.approach_mps2) / self.limits.jerk_mps3
+
+    def step(self, drive: float, steer: float, room: Room, along: Along) -> VehicleCommand:
         """One step of 0.1 s.
 
         Args:
           drive: longitudinal acceleration as a share of the limit, -1 (hardest braking) to 1.
           steer: lateral velocity as a share of the limit, -1 (right) to 1 (left).
           room: what is left of the road on both sides.
+          along: where it is on the path it takes if it does not steer.
         """
-        limits = self.limits
-        wanted = drive * (limits.accel_mps2 if drive >= 0 else limits.brake_mps2)
-        change = limits.jerk_mps3 * STEP_S
-        low = max(-limits.brake_mps2, -_taper(self.speed_mps, limits.jerk_mps3))
-        high = min(limits.accel_mps2, _taper(limits.speed_mps - self.speed_mps, limits.jerk_mps3))
-        self.accel_mps2 = _clip(_clip(wanted, low, high), self.accel_mps2 - change, self.accel_mps2 + change)
-        self.speed_mps = _clip(self.speed_mps + self.accel_mps2 * STEP_S, 0.0, limits.speed_mps)
-
-        change = limits.lateral_accel_mps2 * STEP_S
-        reach = min(limits.lateral_mps, limits.slip * self.speed_mps)  # a car cannot slide sideways
-        left = min(reach, _taper(room.left_m, limits.lateral_accel_mps2))
-        right = min(reach, _taper(room.right_m, limits.lateral_accel_mps2))
-        wanted = _clip(steer * limits.lateral_mps, -right, left)
-        self.lateral_mps = _clip(wanted, self.lateral_mps - change, self.lateral_mps + change)
+        curvature, ahead, cap = self._look_ahead(along)
+        before = self.speed_mps
+        self._accelerate(drive, curvature, ahead, cap)
+        self._steer(steer, room, max(self.limits.curvature_per_m - curvature, CORRECTION_PER_M), before)
         return VehicleCommand(self.speed_mps, self.lateral_mps)
+
+    def _look_ahead(self, along: Along) -> tuple[float, float, float]:
+        """Curvature here, the largest just ahead, and the speed that bends allow where it will be shortly."""
+        if along.path is not self._path:
+            if self._path is not None:
+                self._behind_per_m = self._bends.ahead_per_m[self._at]
+            self._path, self._bends = along.path, bends(along.path, self.limits)
+        self._at = self._bends.index(along.station_m)
+        behind = self._behind_per_m if along.station_m < BODY_M else 0.0
+        preview = self._bends.index(along.station_m + self.speed_mps * self._preview_s)
+        curvature = max(self._bends.curvature_per_m[self._at], behind)
+        cap = min(self._bends.cap_mps[self._at], self._bends.cap_mps[preview])
+        return curvature, max(self._bends.ahead_per_m[self._at], behind), cap
+
+    def _accelerate(self, drive: float, curvature: float, ahead: float, cap_mps: float) -> None:
+        limits, speed = self.limits, self.speed_mps
+        wanted = drive * (limits.accel_mps2 if drive >= 0 else limits.brake_mps2)
+        bend = max(curvature * speed**2, min(ahead * speed**2, limits.cornering_mps2))
+        across = min(bend + limits.lateral_accel_mps2, SKID * limits.grip_mps2)
+        grip = math.sqrt(limits.grip_mps2**2 - across**2)
+        low = max(-limits.brake_mps2, -grip, -_taper(speed, limits.jerk_mps3))
+        high = min(limits.accel_mps2, grip, _taper(limits.speed_mps - speed, limits.jerk_mps3))
+        high = max(min(high, (cap_mps - speed) / self._preview_s), low)
+        change = limits.jerk_mps3 * STEP_S
+        self.accel_mps2 = _clip(_clip(wanted, low, high), self.accel_mps2 - change, self.accel_mps2 + change)
+        self.speed_mps = _clip(speed + self.accel_mps2 * STEP_S, 0.0, limits.speed_mps)
+
+    def _steer(self, steer: float, room: Room, curvature: float, before_mps: float) -> None:
+        """Moves across the lane as a car can: on a path whose curvature is bounded, so not at a standstill.
+
+        Keeping its heading, a car that brakes loses lateral speed with the longitudinal; `limits.slip` is such that
+        this alone is within the limit on lateral acceleration, and both bounds below always leave something.
+        """
+        limits, speed = self.limits, self.speed_mps
+        rate = min(limits.lateral_accel_mps2, CORRECTION_PER_M * speed**2)
+        room_m = (room.left_m if steer >= 0 else room.right_m) - EDGE_M
+        reach = min(limits.lateral_mps, limits.slip * speed, _taper(room_m, rate))
+        wanted = _clip(steer * limits.lateral_mps, -reach, reach)
+        same_heading = self.lateral_mps * speed / before_mps if before_mps > 0.0 else 0.0
+        turn, change = curvature * speed**2 * STEP_S, limits.lateral_accel_mps2 * STEP_S
+        wanted = _clip(wanted, same_heading - turn, same_heading + turn)
+        self.lateral_mps = _clip(wanted, self.lateral_mps - change, self.lateral_mps + change)
 
 
 @dataclass(slots=True)
 class PedestrianControl:
-    """Integrates a pedestrian's motion under bounded acceleration and heading rate."""
+    """Integrates a pedestrian's motion; along and across its heading it accelerates on a disc.
+
+    Source: that heading rate falls with about 1/speed, Wang et al., A kinematic constraint on pedestrian walking
+    (arXiv 2506.15321).
+    """
 
     limits: Limits
     state: Walker
+    across_mps2: float = 0.0
 
     def step(self, drive: float, turn: float) -> Walker:
         """One step of 0.1 s.
 
         Args:
           drive: acceleration as a share of the limit, -1 to 1.
-          turn: heading rate as a share of the limit, -1 (clockwise) to 1.
+          turn: heading rate as a share of what the speed allows, -1 (clockwise) to 1.
         """
         limits, state = self.limits, self.state
-        wanted = drive * (limits.walk_accel_mps2 if drive >= 0 else limits.walk_brake_mps2)
-        speed = _clip(state.speed_mps + wanted * STEP_S, 0.0, limits.walk_speed_mps)
-        heading = state.heading_rad + turn * limits.heading_rate_radps * STEP_S
-        distance = (state.speed_mps + speed) / 2 * STEP_S
+        accel, self.across_mps2 = self._accelerate(drive, turn)
+        speed = _clip(state.speed_mps + accel * STEP_S, 0.0, limits.walk_speed_mps)
+        disc = limits.walk_disc_mps2
+        rate = self.across_mps2 / max(state.speed_mps, speed, disc / limits.heading_rate_radps)
+        turned = rate * STEP_S
+        distance, middle = (state.speed_mps + speed) / 2 * STEP_S, state.heading_rad + turned / 2
         self.state = Walker(
-            x_m=state.x_m + distance * math.cos(heading),
-            y_m=state.y_m + distance * math.sin(heading),
-            heading_rad=heading,
+            x_m=state.x_m + distance * math.cos(middle),
+            y_m=state.y_m + distance * math.sin(middle),
+            heading_rad=state.heading_rad + turned,
             speed_mps=speed,
             accel_mps2=(speed - state.speed_mps) / STEP_S,
         )
         return self.state
+
+    def _accelerate(self, drive: float, turn: float) -> tuple[float, float]:
+        """Acceleration along and across: towards what is wanted on the disc, by at most the jerk."""
+        limits, along, across = self.limits, self.state.accel_mps2, self.across_mps2
+        jerk = limits.walk_jerk_mps3
+        low = -_taper(self.state.speed_mps, jerk)
+        high = _taper(limits.walk_speed_mps - self.state.speed_mps, jerk)
+        wanted = drive * (limits.walk_accel_mps2 if drive >= 0 else limits.walk_brake_mps2)
+        to_along, to_across = _clip(wanted, low, high), turn * limits.walk_disc_mps2
+        too_much = max(math.hypot(to_along, to_across) / limits.walk_disc_mps2, 1.0)
+        to_along, to_across = to_along / too_much - along, to_across / too_much - across
+        share = min(jerk * STEP_S / max(math.hypot(to_along, to_across), 1e-9), 1.0)
+        # The disc is convex, and the taper only takes acceleration away: nothing leads out of it.
+        return _clip(along + share * to_along, low, high), across + share * to_across
 
 
 TOLERANCE = 0.02  # m/s² and m/s: SUMO's rounding, divided by the step
@@ -105,15 +178,16 @@ class Adversaries:
     """All adversaries of an episode: splits the joint action, and checks what was driven."""
 
     def __init__(self, family: Family, limits: Limits, frame: Frame) -> None:
-        speed = dict(zip(frame.ids, frame.speed_mps.tolist(), strict=True))
+        """The controls go on from the motion in `frame`."""
+        f, rows = frame, {id_: row for row, id_ in enumerate(frame.ids)}
         self._limits = limits
-        self._vehicles = {id_: VehicleControl(limits, speed[id_]) for id_ in family.vehicles}
+        self._vehicles = {
+            id_: VehicleControl(limits, *(float(a[rows[id_]]) for a in (f.speed_mps, f.accel_mps2, f.lateral_mps)))
+            for id_ in family.vehicles
+        }
         self._pedestrians = {}
         for id_ in family.pedestrians:
-            row = frame.ids.index(id_)
-            walker = Walker(
-                float(frame.x_m[row]), float(frame.y_m[row]), float(frame.heading_rad[row]), float(frame.speed_mps[row])
-            )
+            walker = Walker(*(float(a[rows[id_]]) for a in (f.x_m, f.y_m, f.heading_rad, f.speed_mps)))
             self._pedestrians[id_] = PedestrianControl(limits, walker)
         self._order = family.adversaries
         self._ids: tuple[str, ...] = ()
@@ -123,9 +197,9 @@ class Adversaries:
         first, second = action[::2], action[1::2]
         vehicles = {}
         for k, (id_, control) in enumerate(self._vehicles.items()):
-            room = sim.room(id_)
-            if room is not None:
-                vehicles[id_] = control.step(first[k], second[k], room)
+            room, along = sim.room(id_), sim.path(id_)
+            if room is not None and along is not None:
+                vehicles[id_] = control.step(first[k], second[k], room, along)
         k = len(self._vehicles)
         walkers = {
             id_: control.step(first[k + j], second[k + j]) for j, (id_, control) in enumerate(self._pedestrians.items())

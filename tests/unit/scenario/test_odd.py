@@ -161,3 +161,32 @@ def test_thresholds_follow_the_odd_and_the_reaction_time() -> None:
     quick = {r.name: r.formula for r in requirements_from_odd(dry, 0.1)}
     assert quick["safe_ttc"] == "ttc_s >= 1.5"
     assert quick["bounded_braking"].endswith(">= 8.1)")  # 0.9 · min(9.81, 9)
+
+
+def test_a_user_may_widen_what_is_only_usual_up_to_the_extreme() -> None:
+    usual = DEFAULT.model_copy(
+        update={
+            "dynamic": DEFAULT.dynamic.model_copy(
+                update={"vehicle_lateral_speed_mps": interval(0, 1.2), "pedestrian_speed_mps": interval(0, 2)}
+            )
+        }
+    )
+    assert intersect(usual, Odd()).dynamic == usual.dynamic
+    wide = Odd(dynamic=DynamicElements(vehicle_lateral_speed_mps=interval(0, 1.8), pedestrian_speed_mps=interval(0, 5)))
+    both = intersect(usual, wide).dynamic
+    assert both.vehicle_lateral_speed_mps == interval(0, 1.8)
+    assert both.pedestrian_speed_mps == interval(0, 3)  # running, and no more
+    assert both.vehicle_speed_mps == usual.dynamic.vehicle_speed_mps
+
+
+@pytest.mark.parametrize(
+    ("dynamic", "wanted"),
+    [
+        (DynamicElements(vehicle_lateral_speed_mps=interval(0, 1.9)), r"bounds within \[0, 1.8\]"),
+        (DynamicElements(vehicle_lateral_speed_mps=interval(-1, 1)), r"bounds within \[0, 1.8\]"),
+        (DynamicElements(vehicle_lateral_accel_mps2=interval(0, 0)), "a high above 0"),
+    ],
+)
+def test_a_senseless_lateral_limit_is_refused(dynamic: DynamicElements, wanted: str) -> None:
+    with pytest.raises(OddError, match=wanted):
+        intersect(DEFAULT, Odd(dynamic=dynamic))
