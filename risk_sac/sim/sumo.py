@@ -33,6 +33,8 @@ PEDESTRIAN_SIZE_M = 0.5
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 GRAVITY_MPS2 = 9.81
 EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
+# So that the commanded lateral speed is the one driven; its limits are those of `risk_sac.sim.control`.
+STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFactor": "1"}
 LISTED_WITHIN_S = 0.3
 NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
@@ -126,6 +128,8 @@ class SumoSimulation:
         for start in self._layout.vehicles:
             if start.role is Role.ADVERSARY and start.id in self._vehicles:
                 libsumo.vehicle.setType(start.id, f"adversary_{start.body}")
+                for name, value in STEERED.items():  # a change of type leaves the lane-change model as it is
+                    libsumo.vehicle.setParameter(start.id, f"laneChangeModel.{name}", value)
                 libsumo.vehicle.setSpeedMode(start.id, 0)
                 libsumo.vehicle.setLaneChangeMode(start.id, 0)
                 self._released[start.id] = self._drivers.pop(start.id)
