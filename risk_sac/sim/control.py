@@ -94,8 +94,8 @@ class VehicleControl:
 
     def _accelerate(self, drive: float, intended_mps2: float, curvature: float, ahead: float, cap_mps: float) -> None:
         limits, speed = self.limits, self.speed_mps
-        # Choice: the less a command says, the more the driver's own intention counts. Doing nothing is then to drive on as
-        # anybody would, and not to run into whoever stands ahead or over a red light.
+        # Choice: the less a command says, the more the driver's own intention counts. Doing nothing is then to drive on
+        # as anybody would, and not to run into whoever stands ahead or over a red light.
         wanted = drive * (limits.accel_mps2 if drive >= 0 else limits.brake_mps2) + (1.0 - abs(drive)) * intended_mps2
         bend = max(curvature * speed**2, min(ahead * speed**2, limits.cornering_mps2))
         across = min(bend + limits.lateral_accel_mps2, SKID * limits.grip_mps2)

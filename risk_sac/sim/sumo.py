@@ -22,6 +22,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Area, Layout, VehicleStart
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
+from risk_sac.sim.ego import NOTHING_HIDDEN, Belief, Glimpse
 from risk_sac.sim.lookout import Bodies
 from risk_sac.sim.paths import Along, Paths
 from risk_sac.types import STEP_S, Bools, Floats, Frame, Kind, Role, Signal
@@ -161,7 +162,7 @@ class SumoSimulation:
             self._insert(start, f"background_{start.body}")
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
         self._layout = layout
-        self._hidden: frozenset[str] = frozenset()
+        self._belief = NOTHING_HIDDEN
         self._signal = layout.signal
         self._walk_signals: list[tuple[Area, int]] = []
         if layout.signal is not None:
@@ -203,18 +204,18 @@ class SumoSimulation:
                 libsumo.vehicle.changeSublane(id_, command.lateral_mps * STEP_S)
         self._walkers.update(walkers)
 
-    def hide(self, hidden: frozenset[str]) -> None:
-        """Makes the ego blind to these actors, and only to these.
+    def believe(self, belief: Belief) -> None:
+        """Makes the ego blind to the hidden actors, and lets it reckon with those it remembers.
 
         Its car-following and junction models, that is: SUMO's lane-change model has no list of vehicles to ignore.
         """
-        if hidden == self._hidden:
+        before, self._belief = self._belief.hidden, belief
+        if belief.hidden == before:
             return
-        vehicles = " ".join(sorted(id_ for id_ in hidden if id_ not in self._walkers))
+        vehicles = " ".join(sorted(id_ for id_ in belief.hidden if id_ not in self._walkers))
         ego = self._vehicles[0]
         libsumo.vehicle.setParameter(ego, "carFollowModel.ignoreIDs", vehicles)
         libsumo.vehicle.setParameter(ego, "junctionModel.ignoreIDs", vehicles)
-        self._hidden = hidden
 
     def step(self) -> Frame:
         """Advances 0.1 s.
@@ -250,8 +251,8 @@ class SumoSimulation:
         """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians near them."""
         frame = self._frame
         bodies = Bodies.of(frame)
-        known = np.array([id_ not in self._hidden for id_ in frame.ids])
-        self._tell(self._ego_driver, 0, bodies, known)
+        known = np.array([id_ not in self._belief.hidden for id_ in frame.ids])
+        self._tell(self._ego_driver, 0, self._as_believed(bodies), known)
         if not self._walkers:
             return
         near = _near_pedestrians(bodies)
@@ -259,6 +260,17 @@ class SumoSimulation:
             driver = self._drivers.get(id_)
             if driver is not None and (near[row] or driver.telling):
                 self._tell(driver, row, bodies, ~bodies.vehicle)
+
+    def _as_believed(self, bodies: Bodies) -> Bodies:
+        """The bodies where the ego expects them: of whom it does not see it knows no better."""
+        if not self._belief.expected:
+            return bodies
+        believed = bodies._replace(**{name: getattr(bodies, name).copy() for name in Glimpse._fields[1:]})
+        for id_, glimpse in self._belief.expected.items():
+            row = self._frame.ids.index(id_)
+            for name in Glimpse._fields[1:]:
+                getattr(believed, name)[row] = getattr(glimpse, name)
+        return believed
 
     def _tell(self, driver: Driver, row: int, bodies: Bodies, candidates: Bools) -> None:
         driver.tell(row, self._frame, bodies, self.along(self._frame.ids[row]), self._limit_mps, candidates)
