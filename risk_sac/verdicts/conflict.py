@@ -54,7 +54,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     seen = seen_along(path, evidence, striker)
     course = _courses(path, evidence, striker)
     begins, lasts = course, course
-    same_way = _drives_the_same_way(evidence, striker)
+    same_way = _drives_the_same_way(evidence, striker, seen.turn_rad)
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         begins = lasts = course & _at_the_carriageway(evidence, striker)
     elif same_way:
@@ -154,16 +154,15 @@ def _at_the_carriageway(evidence: Evidence, striker: int) -> Bools:
     return soon_inside(areas, e.x_m[:, striker], e.y_m[:, striker], e.vx_mps[:, striker], e.vy_mps[:, striker], KERB_S)
 
 
-def _drives_the_same_way(evidence: Evidence, striker: int) -> bool:
-    """Whether the striker drives the ego's way: within 30 degrees, or within 60 where it did so in the last 3 s.
+def _drives_the_same_way(evidence: Evidence, striker: int, turn_rad: Floats) -> bool:
+    """Whether the striker drives the ego's way: in the last 3 s within 60 degrees of its path, and once within 30.
 
-    The second holds for one that the ego follows round a bend.
+    One that the ego follows round a bend does; one that turns into the ego's way comes from across.
     """
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         return False
-    first = evidence.since(TURN_WINDOW_S)
-    cos = np.cos(evidence.heading_rad[first:, striker] - evidence.heading_rad[first:, 0])
-    return bool(cos[-1] > SAME_WAY_COS or (cos[-1] > TURNING_COS and np.nanmax(cos) > SAME_WAY_COS))
+    cos = np.cos(turn_rad[evidence.since(TURN_WINDOW_S) :])
+    return bool(cos.max() > SAME_WAY_COS and cos.min() > TURNING_COS)
 
 
 def seen_along(path: Path, evidence: Evidence, striker: int) -> AlongSeries:

@@ -9,6 +9,7 @@ from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import DEFINITIONS, judge
 from tests.unit.verdicts.staged import (
     LANE_M,
+    STREET,
     crossing_car,
     cut_in,
     leader_brakes,
@@ -120,7 +121,7 @@ def test_an_ego_in_a_turn(turn: int, name: str) -> None:
         return 12.0 * np.sin(a) + 6.0 * min(t, 0.0), turn * 12.0 * (1 - np.cos(a)), turn * a
 
     walker = straight(12.0, turn * 12.0, 0.0, 0.0)
-    found = judged(stage(turning, walker, kinds=WALKING))
+    found = judged(stage(turning, walker, kinds=WALKING, ground=replace(STREET, roadway=())))
     assert found.ego_manoeuvre == name
     assert found.conflict_s < 1.0  # foreseen round the bend
 

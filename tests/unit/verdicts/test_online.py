@@ -8,7 +8,7 @@ import pytest
 
 from risk_sac.types import Frame, Kind, Signal
 from risk_sac.verdicts.conflict import find_conflict
-from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
 from risk_sac.verdicts.online import conflicts_now
 from risk_sac.verdicts.path import polyline
 from tests.unit.verdicts.staged import LANE_M, STREET, cut_in, leader_brakes, pedestrian_crosses
@@ -117,21 +117,7 @@ def test_the_path_ahead_decides() -> None:
 def test_a_record_begins_where_it_would_have_been_seen(evidence: Evidence) -> None:
     began = find_conflict(evidence, 1).frame
     e = evidence
-    rows = {
-        name: getattr(e, name)
-        for name in (
-            "x_m",
-            "y_m",
-            "heading_rad",
-            "vx_mps",
-            "vy_mps",
-            "speed_mps",
-            "lateral_mps",
-            "accel_mps2",
-            "lane_offset_m",
-            "link",
-        )
-    }
+    rows = {name: getattr(e, name) for name in (*PER_ACTOR, "link")}
 
     def at(t: int) -> bool:
         now = Frame(
