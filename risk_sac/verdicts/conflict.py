@@ -86,6 +86,7 @@ def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
     return bool(lasted and (evidence.accel_mps2[first:, 0] > -BRAKES_MPS2).all())
 
 
+@compiled
 def _since(begins: Bools, lasts: Bools) -> int:
     """The first frame in which a condition begins that then lasts until the last frame, in which it holds anyway."""
     first, missing = len(begins) - 1, 0
