@@ -63,7 +63,7 @@ any_failure = st.builds(
         (failure(), False),
         (failure(ego=8.3), False),
         (failure(ego=8.4), True),  # 30 km/h
-        (failure(ego=13.9), True),
+        (failure(ego=20.0, after=-0.1), True),
         (failure(other=9.0), True),
         (failure(after=1.9), False),
         (failure(after=2.1), True),
@@ -94,10 +94,10 @@ def test_a_signature_holds_few_cells() -> None:
     cells = {
         cell_of(failure(ego=ego, other=1.4, after=after)) for ego in range(4, 14) for after in (0.5, 1.0, 1.5, 3.0)
     }
-    assert len(cells) <= 6
+    assert len(cells) <= 4
 
 
 def test_infinite_features_lie_at_the_edge_and_nan_nowhere() -> None:
-    assert cell_of(failure(ego=float("inf"))) == (2, 0, 0)
+    assert cell_of(failure(ego=float("inf"))) == (1, 0, 0)
     with pytest.raises(NotFinite, match="wanted no NaN"):
         cell_of(failure(other=float("nan")))
