@@ -32,7 +32,7 @@ class Ground:
 
     friction: float = 1.0
     speed_limit_mps: float = 13.89
-    lane_width_m: float = 3.2
+    lane_width_m: float = 3.3
     crossings: tuple[Area, ...] = ()  # pedestrian crossings
     junctions: tuple[Area, ...] = ()
     roadway: tuple[Area, ...] = ()  # where vehicles drive; none: pedestrians are judged as if always on it

@@ -171,6 +171,9 @@ def test_contact_in_the_only_frame(found: Staged) -> None:
         pytest.param(
             stage(straight(0.0, 0.0, 0.0, 12.0, (3.0, -3.0)), straight(70.0, 0.0, 0.0, 0.0)), False, id="brakes at last"
         ),
+        pytest.param(
+            stage(straight(0.0, 0.0, 0.0, 12.0, (3.0, -1.3)), straight(70.0, 0.0, 0.0, 0.0)), True, id="only dawdles"
+        ),
         pytest.param(stage(straight(0.0, 0.0, 0.0, 12.0), straight(70.0, 0.0, 0.0, 0.0)), True, id="into a parked car"),
     ],
 )

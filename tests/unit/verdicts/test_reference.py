@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
 from risk_sac.types import Grade, Kind, ReferenceOutcome
@@ -193,6 +193,22 @@ def test_the_bound_avoids_what_careful_avoids_before_a_cut_in(
     assume(gap / closing < 7.0)
     assume(1.5 / rate < (gap + 2 * CAR_M[0]) / closing - 0.2)  # or the ego has passed before it is over
     found = outcomes(cut_in(gap=gap, ego=ego, other=ego - closing, rate=rate))
+    assert found["ideal"].avoids >= found["careful"].avoids
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(4.0, 15.0), st.floats(0.8, 2.5), st.floats(0.0, 9.0), st.floats(0.2, 1.5), st.floats(0.2, 4.0))
+def test_the_bound_avoids_what_careful_avoids_before_a_pedestrian(
+    speed: float, walk: float, braking: float, braked_s: float, seen_s: float
+) -> None:
+    reach_s = 97.7 / speed
+    ego = straight(0.0, 0.0, 0.0, speed, (reach_s - braked_s, -braking), start_s=0.0)
+    walker = straight(98.0, walk * reach_s, -math.pi / 2, walk, start_s=0.0)
+    try:
+        evidence = stage(ego, walker, kinds=WALKING, from_s=0.0, seen_from_s=reach_s - seen_s, until_s=reach_s + 5.0)
+    except AssertionError:  # the ego braked enough
+        reject()
+    found = outcomes(evidence)
     assert found["ideal"].avoids >= found["careful"].avoids
 
 
