@@ -49,11 +49,10 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     A conflict begins no earlier than the ego knows of the striker; with a pedestrian that steps out from behind a
     truck, when it comes into sight. With one that nobody could see it begins with the contact.
     """
-    path = recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
+    path = ego_path(evidence)
     known = evidence.known[:, striker]
     seen = seen_along(path, evidence, striker)
     course = _courses(path, evidence, striker)
-    begins, lasts = course, course
     same_way = _drives_the_same_way(evidence, striker, seen.turn_rad)
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         begins = lasts = course & _at_the_carriageway(evidence, striker)
@@ -65,8 +64,9 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
         begins = lasts = course | _cannot_stop(path, evidence, striker)
     frame = _since(begins & known, lasts & known)
     unseen = _since(begins, lasts)
+    course_from = _since(course & known, course & known)
     if same_way and unseen == len(course) - 1:  # neither led nor cut in: the ego itself came over
-        frame, unseen = _since(course & known, course & known), _since(course, course)
+        frame, unseen = course_from, _since(course, course)
     return Conflict(
         type=_type(evidence, striker, frame, same_way, seen.across_m),
         frame=frame,
@@ -75,7 +75,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
         y_m=float(evidence.y_m[frame, striker]),
         position="ahead" if seen.gap_m[frame] > 0.0 else "alongside",
         hidden=not known[unseen],
-        course_from=_since(course & known, course & known),
+        course_from=course_from,
     )
 
 
@@ -164,6 +164,11 @@ def _drives_the_same_way(evidence: Evidence, striker: int, turn_rad: Floats) -> 
         return False
     cos = np.cos(turn_rad[evidence.since(TURN_WINDOW_S) :])
     return bool(cos.max() > SAME_WAY_COS and cos.min() > TURNING_COS)
+
+
+def ego_path(evidence: Evidence) -> Path:
+    """The ego's recorded path."""
+    return recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
 
 
 def seen_along(path: Path, evidence: Evidence, striker: int) -> AlongSeries:

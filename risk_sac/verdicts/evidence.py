@@ -26,7 +26,7 @@ PER_ACTOR = (
 AREAS = ("crossings", "junctions", "roadway")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Ground:
     """Where an episode takes place, as far as a verdict depends on it."""
 
