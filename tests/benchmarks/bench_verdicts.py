@@ -1,5 +1,9 @@
-"""What judging one contact costs, once everything is compiled: rules, conflict, five drivers, labels, signature."""
+"""What judging one contact costs, once everything is compiled: rules, conflict, five drivers, labels, signature.
 
+Processor time: it is one thread, and others use the machine too.
+"""
+
+import time
 import timeit
 
 import pytest
@@ -31,6 +35,6 @@ def verdict(evidence: Evidence) -> None:
 def test_a_verdict_stays_within_its_budget(name: str) -> None:
     evidence = STAGED[name]()
     assert judge(evidence, "actor_1", valid=True).grade is not None  # warm
-    took_ms = min(timeit.repeat(lambda: verdict(evidence), number=20, repeat=10)) / 20 * 1e3
+    took_ms = min(timeit.repeat(lambda: verdict(evidence), timer=time.process_time, number=20, repeat=10)) / 20 * 1e3
     print(f"\n{name}, {len(evidence.time_s)} frames: {took_ms:.2f} ms")
     assert took_ms < BUDGET_MS
