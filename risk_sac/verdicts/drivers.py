@@ -72,7 +72,7 @@ def fuzzy(situation: Situation) -> float:
     if not _in_the_way(situation):
         return 0.0
     ahead = situation.along
-    return braking(max(ahead.gap_m, 0.0), situation.speed_mps, -situation.braking_mps2, max(ahead.speed_mps, 0.0))
+    return braking(max(ahead.gap_m, 0.0), situation.speed_mps, -situation.braking_mps2, ahead.speed_mps)
 
 
 @compiled
