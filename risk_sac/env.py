@@ -124,8 +124,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         valid = collision is not None and collision.valid
         reward = risk_reward(
             self._measures.signals["ttc_s"],
-            self._measures.signals["rss_longitudinal_m"],
-            self._measures.signals["rss_lateral_m"],
+            self._measures.signals["rss_margin"],
             float(valid),
             float(collision is not None and not valid),
             self._reward,
@@ -207,7 +206,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._sim.hide(self._perception.update(frame, assessment.seen))
         signals = publish(frame, before, assessment.least)
         robustness = self._monitor.update(signals)
-        return Measures(assessment, signals, robustness, soft_min(robustness, self._reward.softmin_sharpness))
+        least = soft_min(robustness[self._monitor.shapes], self._reward.softmin_sharpness)
+        return Measures(assessment, signals, robustness, least)
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""
