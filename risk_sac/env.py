@@ -25,12 +25,19 @@ from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.scenario.families import LEAD_IN_S
 from risk_sac.scenario.limits import limits_from_odd
-from risk_sac.sim.collision import Contact, History, agrees, find_contact, verdicts
+from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.trace import Measures, Trace
 from risk_sac.types import STEP_S, Collision, Frame, Kind, Role, Scene
+from risk_sac.verdicts.artefact import Handling, artefact_verdicts
+from risk_sac.verdicts.conflict import find_conflict
+from risk_sac.verdicts.evidence import Evidence, Ground
+from risk_sac.verdicts.judge import judge
+from risk_sac.verdicts.online import conflicts_now
+from risk_sac.verdicts.path import polyline
+from risk_sac.verdicts.validity import validity_verdicts
 
 logger = logging.getLogger(__name__)
 
@@ -142,13 +149,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     @property
     def min_ttc_s(self) -> float:
-        """Smallest TTC of the episode so far, over the actors the ego answers for."""
-        return min(m.signals["ttc_s"] for m in self._trace.measures)
+        """Smallest TTC since the release, over the actors the ego answers for."""
+        return min(m.signals["ttc_s"] for m in self._trace.measures[self._trace.released :])
 
     @property
     def min_robustness(self) -> float:
-        """Smallest soft-min robustness of the episode so far."""
-        return min(m.soft_min for m in self._trace.measures)
+        """Smallest soft-min robustness since the release."""
+        return min(m.soft_min for m in self._trace.measures[self._trace.released :])
 
     def close(self) -> None:
         """Ends the simulation."""
@@ -158,6 +165,14 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._unit_scene = self.problem.space.to_unit(scene)
         layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
+        self._ground = Ground(
+            friction=layout.friction,
+            speed_limit_mps=self.problem.speed_limit_mps,
+            lane_width_m=layout.lane_width_m,
+            crossings=layout.crossings,
+            junctions=layout.junctions,
+            roadway=layout.roadway,
+        )
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._monitor.reset()
         self._perception.reset()
@@ -186,14 +201,23 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._trace.append(self._frame, self._measures, None)
 
     def _check_feasible(self, scene: Scene) -> None:
-        """C_hard of Eq. 5."""
-        measures = self._measures
-        self._spawn_overlap = bool(measures.assessment.view.overlap.any() or self._in_contact())
+        """C_hard of Eq. 5, when the adversaries are released."""
+        view = self._measures.assessment.view
+        self._spawn_overlap = bool(view.overlap.any() or self._in_contact())
         rule = broken_hard_rule(
-            self._spawn_overlap, float(measures.assessment.view.gap.min()), measures.signals["ttc_s"]
+            self._spawn_overlap,
+            float(view.gap.min()),
+            self._measures.signals["ttc_s"],
+            worst_rss_margin(self._measures.assessment),
+            in_conflict=self._careful_driver_in_conflict(),
         )
         if rule is not None:
             raise InfeasibleScene(f"scene of {scene.family!r} breaks {rule}: {dict(scene.values)}", reason=rule)
+
+    def _careful_driver_in_conflict(self) -> bool:
+        known = np.concatenate(([True], self._measures.known))
+        path = polyline(*self._sim.ego_path(), float(self._frame.heading_rad[0]))
+        return bool(conflicts_now(self._frame, path, known, self._ground).any())
 
     def _in_contact(self) -> set[str]:
         """Who touches somebody other than the ego."""
@@ -203,11 +227,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _measure(self, frame: Frame, before: Frame | None) -> Measures:
         assessment = assess(frame, self.problem.rss, self._sight)
-        self._sim.hide(self._perception.update(frame, assessment.seen))
+        hidden = self._perception.update(frame, assessment.seen)
+        self._sim.hide(hidden)
+        known = np.array([id_ not in hidden for id_ in frame.ids[1:]])
         signals = publish(frame, before, assessment.least)
         robustness = self._monitor.update(signals)
         least = soft_min(robustness[self._monitor.shapes], self._reward.softmin_sharpness)
-        return Measures(assessment, signals, robustness, least)
+        return Measures(assessment, known, signals, robustness, least)
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""
@@ -234,21 +260,30 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _judge(self, contact: Contact) -> Collision:
         frame, measures = self._frame, self._trace.measures
-        warning = measures[:-WARNING_STEPS]
+        warning = measures[self._trace.released : -WARNING_STEPS]
         other = frame.ids[contact.other]
-        simulator_agrees = agrees(frame, frame.ids[0], other)
-        if not simulator_agrees:  # its test takes lane-aligned rectangles and persons on mapped lanes only
-            logger.info("SUMO lists no collision with %r at %.1f s", other, frame.time_s)
+        evidence = self._evidence()
+        striker = evidence.column(other)
+        conflict = find_conflict(evidence, striker)
         visible_for_s = self._perception.known_for(other, frame.time_s)
-        history = History(
-            started_s=self._released_s,
+        simulator_agrees = None if frame.kind[contact.other] == Kind.PEDESTRIAN else self._sim.lists_collision(other)
+        handling = Handling(
             teleported=self._teleported,
             spawn_overlap=self._spawn_overlap,
             inside_limits=self._inside_limits,
             touched_before=other in self._touched,
-            visible_for_s=visible_for_s,
-            ever_visible=self._perception.ever_seen(other),
+            ego_model_saw=True,
         )
+        verdicts = {
+            **artefact_verdicts(evidence, striker, conflict, handling),
+            **validity_verdicts(
+                evidence,
+                striker,
+                contact,
+                visible_for_s=visible_for_s,
+                ever_visible=self._perception.ever_seen(other),
+            ),
+        }
         return Collision(
             time_s=contact.time_s - self._released_s,
             other_id=other,
@@ -268,8 +303,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             ego_peak_braking_mps2=max(m.signals["ego_braking_mps2"] for m in measures),
             min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
             simulator_agrees=simulator_agrees,
-            verdicts=verdicts(contact, frame, history),
+            verdicts=verdicts,
+            judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict),
         )
+
+    def _evidence(self) -> Evidence:
+        known = [np.concatenate(([True], measures.known)) for measures in self._trace.measures]
+        return Evidence.of(self._trace.frames, known, self._released_s, self._ground)
 
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.problem.family.horizon_steps

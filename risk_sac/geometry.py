@@ -253,3 +253,34 @@ def overlapping_pairs(x: Floats, y: Floats, heading: Floats, length: Floats, wid
             ):
                 pairs.append((i, j))
     return pairs
+
+
+ZONE_MARGIN_M = 0.05  # a contact this close to an edge lies on it
+
+
+def contact_point(view: RelativeView) -> tuple[float, float]:
+    """Middle of the corners of either box that lie in the other, in the ego's frame; of the first of the others."""
+    margin = ZONE_MARGIN_M
+    a, b = view.ego_half_length, view.ego_half_width
+    corner_x, corner_y = (c[:, 0] for c in corners(view))
+    theirs = (np.abs(corner_x) <= a + margin) & (np.abs(corner_y) <= b + margin)
+    own_x, own_y = np.array([a, -a, -a, a]), np.array([b, b, -b, -b])
+    dx, dy = own_x - view.x[0], own_y - view.y[0]
+    along, across = dx * view.cos[0] + dy * view.sin[0], dy * view.cos[0] - dx * view.sin[0]
+    ours = (np.abs(along) <= view.half_length[0] + margin) & (np.abs(across) <= view.half_width[0] + margin)
+    points_x = np.concatenate((corner_x[theirs], own_x[ours]))
+    points_y = np.concatenate((corner_y[theirs], own_y[ours]))
+    if len(points_x) == 0:  # edges cross without a corner inside: the bodies' centres tell the place
+        return float(np.clip(view.x[0], -a, a)), float(np.clip(view.y[0], -b, b))
+    return float(np.clip(points_x.mean(), -a, a)), float(np.clip(points_y.mean(), -b, b))
+
+
+def zone(x: float, y: float, half_length: float, half_width: float) -> str:
+    """Which side of a body the point lies on; a corner belongs to the front or the rear."""
+    depth = {
+        "front": half_length - x,
+        "rear": half_length + x,
+        "left": half_width - y + ZONE_MARGIN_M,
+        "right": half_width + y + ZONE_MARGIN_M,
+    }
+    return min(depth, key=lambda side: depth[side])

@@ -71,6 +71,12 @@ class Problem:
         visibility = self.odd.environment.visibility_m
         return float("inf") if visibility is None else visibility.low
 
+    @property
+    def speed_limit_mps(self) -> float:
+        """The posted limit; all roads of a family have the same."""
+        limit = self.odd.scenery.speed_limit_mps
+        return float("inf") if limit is None else limit.high
+
 
 def _rss_parameters(odd: Odd, ego: EgoConfig) -> RssParameters:
     """RSS under the ODD: the ego's delay, and the braking that a driver can be relied on to do, and has to expect.

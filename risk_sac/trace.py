@@ -13,14 +13,18 @@ from risk_sac.durable import replace_file
 from risk_sac.risk.publish import Assessment
 from risk_sac.types import Bools, Floats, Frame, SeriesFile
 
-PER_ACTOR = ("x_m", "y_m", "heading_rad", "speed_mps", "lateral_mps", "accel_mps2")
-PER_OTHER: dict[str, Callable[[Assessment], Floats | Bools]] = {
-    "distance_m": lambda assessment: assessment.view.gap,
-    "ttc_s": lambda assessment: assessment.ttc_s,
-    "rss_longitudinal_m": lambda assessment: assessment.rss_longitudinal_m,
-    "rss_lateral_m": lambda assessment: assessment.rss_lateral_m,
-    "visible": lambda assessment: assessment.seen,
-}
+PER_ACTOR = (
+    "x_m",
+    "y_m",
+    "heading_rad",
+    "vx_mps",
+    "vy_mps",
+    "speed_mps",
+    "lateral_mps",
+    "accel_mps2",
+    "lane_offset_m",
+    "link",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +32,20 @@ class Measures:
     """What one frame says about risk, and what the requirements say to it."""
 
     assessment: Assessment
+    known: Bools  # n - 1, whom the ego knows of: in its sight, or remembered
     signals: dict[str, float]
     robustness: Floats  # M, scaled
     soft_min: float
+
+
+PER_OTHER: dict[str, Callable[[Measures], Floats | Bools]] = {
+    "distance_m": lambda measures: measures.assessment.view.gap,
+    "ttc_s": lambda measures: measures.assessment.ttc_s,
+    "rss_longitudinal_m": lambda measures: measures.assessment.rss_longitudinal_m,
+    "rss_lateral_m": lambda measures: measures.assessment.rss_lateral_m,
+    "visible": lambda measures: measures.assessment.seen,
+    "known": lambda measures: measures.known,
+}
 
 
 @dataclass(slots=True)
@@ -40,10 +55,15 @@ class Trace:
     requirements: tuple[str, ...]
     frames: list[Frame] = field(default_factory=list)
     measures: list[Measures] = field(default_factory=list)
-    actions: list[NDArray[np.float32]] = field(default_factory=list)  # one fewer than frames
+    actions: list[NDArray[np.float32]] = field(default_factory=list)  # one for each frame after the release
+
+    @property
+    def released(self) -> int:
+        """Index of the frame at which the adversaries were released."""
+        return len(self.frames) - 1 - len(self.actions)
 
     def append(self, frame: Frame, measures: Measures, action: NDArray[np.float32] | None) -> None:
-        """Records a frame and the action that led to it, None for the first."""
+        """Records a frame and the action that led to it, None up to the release."""
         self.frames.append(frame)
         self.measures.append(measures)
         if action is not None:
@@ -52,13 +72,14 @@ class Trace:
     def series(self) -> dict[str, NDArray[np.generic]]:
         """Arrays by name: `T` frames, `n` actors of the first frame, NaN where one has left.
 
-        `actions` is `T x a`, the action that led to the frame; NaN in the first.
+        `actions` is `T x a`, the action that led to the frame; NaN up to the release, which was at `released_s`.
         """
         first = self.frames[0]
         column = {id_: i for i, id_ in enumerate(first.ids)}
         steps, n = len(self.frames), len(first.ids)
         result: dict[str, NDArray[np.generic]] = {
             "time_s": np.array([frame.time_s for frame in self.frames]),
+            "released_s": np.array(self.frames[self.released].time_s),
             "ids": np.array(first.ids),
             "kind": first.kind,
             "role": first.role,
@@ -79,10 +100,11 @@ class Trace:
         for name, of in PER_OTHER.items():
             values = np.full((steps, n), np.nan)
             for t, measures in enumerate(self.measures):
-                values[t, columns[t][1:]] = of(measures.assessment)
+                values[t, columns[t][1:]] = of(measures)
             result[name] = values
         size = len(self.actions[0]) if self.actions else 0
-        result["actions"] = np.vstack((np.full((1, size), np.nan, dtype=np.float32), *self.actions))
+        none = np.full((self.released + 1, size), np.nan, dtype=np.float32)
+        result["actions"] = np.vstack((none, *self.actions))
         return result
 
 

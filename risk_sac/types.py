@@ -171,7 +171,7 @@ class Collision:
     visible_for_s: float  # known to the ego without a break before contact, sensor memory included; 0 if unseen
     ego_peak_braking_mps2: float
     min_robustness: float  # soft-min robustness, until 1 s before the contact too
-    simulator_agrees: bool  # SUMO's own list names the same pair in the contact's frame; a cross-check only
+    simulator_agrees: bool | None  # SUMO lists the same pair within 0.3 s; None for pedestrians, whom it does not know
     verdicts: Mapping[str, bool] = field(default_factory=dict)  # rule -> passed; valid if all passed
     judgement: Judgement | None = None  # None in what was stored before contacts were judged
 

@@ -29,7 +29,7 @@ CLOSING_SCALE_MPS = 15.0  # closing speed at which the closeness term saturates;
 MIN_INITIAL_TTC_S = 1.0  # a shorter one leaves a default driver (0.5 s delay) no chance: the scene itself collides
 MIN_INITIAL_GAP_M = 0.5  # bodies placed closer than traffic ever stands
 
-HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc"]
+HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc", "initial_rss", "initial_conflict"]
 
 
 @compiled
@@ -131,13 +131,17 @@ def soft_cost(
     return (jerk + excess + closeness) / 3.0
 
 
-def broken_hard_rule(overlaps: bool, gap_m: float, ttc_s: float) -> HardRule | None:
-    """C_hard of (5): the rule by which the first frame is physically implausible, or None.
+def broken_hard_rule(
+    overlaps: bool, gap_m: float, ttc_s: float, rss_margin: float, *, in_conflict: bool
+) -> HardRule | None:
+    """C_hard of (5): the rule by which the frame of the release is implausible or unfair, or None.
 
     Args:
       overlaps: whether any two bodies overlap.
       gap_m: smallest distance between the ego's body and another.
       ttc_s: smallest time to collision of the ego.
+      rss_margin: smallest RSS margin of the ego; below 0 the situation is dangerous.
+      in_conflict: whether the careful driver in the ego's place is in a conflict already.
     """
     if overlaps:
         return "initial_overlap"
@@ -145,4 +149,8 @@ def broken_hard_rule(overlaps: bool, gap_m: float, ttc_s: float) -> HardRule | N
         return "initial_gap"
     if ttc_s < MIN_INITIAL_TTC_S:
         return "initial_ttc"
+    if rss_margin < 0.0:
+        return "initial_rss"
+    if in_conflict:
+        return "initial_conflict"
     return None

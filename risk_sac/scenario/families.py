@@ -137,9 +137,7 @@ def _mixed(xi: Mapping[str, float]) -> Layout:
     stop_line = centre - CROSSING_HALF_WIDTH_M - start
     oncoming_edge, oncoming_after, oncoming_length = ("w3", "w2", 298.0) if signalised else ("w2", "w1", 396.0)
 
-    def car(
-        id_: str, role: Role, lane: int, before_m: float, speed_mps: float, body: Body = "car"
-    ) -> VehicleStart:
+    def car(id_: str, role: Role, lane: int, before_m: float, speed_mps: float, body: Body = "car") -> VehicleStart:
         return VehicleStart(
             id=id_,
             role=role,
@@ -311,6 +309,7 @@ def _dense(xi: Mapping[str, float]) -> Layout:
             Area(-250.0, 250.0, -DENSE_KERB_M, DENSE_KERB_M),
             Area(-CORNER_M, CORNER_M, -CORNER_M, CORNER_M),
         ),
+        junctions=(Area(-NEAR_M, NEAR_M, -NEAR_M, NEAR_M),),
         signal="centre",
         signal_offset_s=xi["signal_offset_s"],
         friction=xi["friction"],

@@ -61,6 +61,8 @@ class Layout:
     pedestrians: tuple[PedestrianStart, ...] = ()
     crossings: tuple[Area, ...] = ()  # pedestrian crossings, where drivers yield
     roadway: tuple[Area, ...] = ()  # where vehicles drive, as far as pedestrians may get there
+    junctions: tuple[Area, ...] = ()  # where the ways of vehicles cross
+    lane_width_m: float = 3.3
     signal: str | None = None  # id of the traffic light
     signal_offset_s: float = 0.0  # where in its cycle the episode starts
     friction: float = 1.0

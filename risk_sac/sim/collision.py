@@ -1,25 +1,18 @@
-"""The collision oracle: our own box test, the contact's place, and the validity verdicts.
+"""The collision oracle: our own box test and the contact's place; `risk_sac.verdicts` judges it.
 
 SUMO's list is only a cross-check. A contact found between two frames is located by bisection on the
 interpolated poses, so that where it lies does not depend on the step length.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from risk_sac.geometry import RelativeView, box_view, corners
-from risk_sac.types import Frame, Kind
+from risk_sac.geometry import RelativeView, box_view, contact_point, zone
+from risk_sac.types import Frame
 
 BISECTIONS = 10  # of 0.1 s: locates the contact to 0.1 ms
-ZONE_MARGIN_M = 0.05  # a contact this close to an edge lies on it
-FLANK_FROM_FRONT_M = 1.5  # a flank contact nearer to the front bumper than this is a front corner
-STANDING_MPS = 0.5
-FIRST_SECOND_S = 1.0
-CROSSING_HEADING_SIN = 0.5  # headings at least 30 degrees apart: a crossing conflict, not a sideswipe
-CROSSING_VISIBLE_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +95,7 @@ def _pair_view(before: Frame, frame: Frame, one: int, other: int, share: float) 
 
 def _describe(before: Frame, other: int, frame: Frame, share: float) -> Contact:
     view = _pair_view(before, frame, 0, other, share)
-    x, y = _contact_point(view)
+    x, y = contact_point(view)
     cos, sin = float(view.cos[0]), float(view.sin[0])
     dx, dy = x - float(view.x[0]), y - float(view.y[0])
     other_lateral = view.ego_vy + float(view.vy[0])
@@ -112,8 +105,8 @@ def _describe(before: Frame, other: int, frame: Frame, share: float) -> Contact:
         time_s=frame.time_s - (1.0 - share) * (frame.time_s - before.time_s),
         x_m=x,
         y_m=y,
-        ego_zone=_zone(x, y, view.ego_half_length, view.ego_half_width),
-        other_zone=_zone(
+        ego_zone=zone(x, y, view.ego_half_length, view.ego_half_width),
+        other_zone=zone(
             dx * cos + dy * sin, dy * cos - dx * sin, float(view.half_length[0]), float(view.half_width[0])
         ),
         lateral_offset_m=float(view.y[0]),
@@ -122,76 +115,3 @@ def _describe(before: Frame, other: int, frame: Frame, share: float) -> Contact:
         closing_lateral_other_mps=-side * other_lateral,
         relative_speed_mps=float(math.hypot(view.vx[0], view.vy[0])),
     )
-
-
-def _contact_point(view: RelativeView) -> tuple[float, float]:
-    """Middle of the corners of either box that lie in the other, in the ego's frame."""
-    margin = ZONE_MARGIN_M
-    a, b = view.ego_half_length, view.ego_half_width
-    corner_x, corner_y = (c[:, 0] for c in corners(view))
-    theirs = (np.abs(corner_x) <= a + margin) & (np.abs(corner_y) <= b + margin)
-    own_x, own_y = np.array([a, -a, -a, a]), np.array([b, b, -b, -b])
-    dx, dy = own_x - view.x[0], own_y - view.y[0]
-    along, across = dx * view.cos[0] + dy * view.sin[0], dy * view.cos[0] - dx * view.sin[0]
-    ours = (np.abs(along) <= view.half_length[0] + margin) & (np.abs(across) <= view.half_width[0] + margin)
-    points_x = np.concatenate((corner_x[theirs], own_x[ours]))
-    points_y = np.concatenate((corner_y[theirs], own_y[ours]))
-    if len(points_x) == 0:  # edges cross without a corner inside: the bodies' centres tell the place
-        return float(np.clip(view.x[0], -a, a)), float(np.clip(view.y[0], -b, b))
-    return float(np.clip(points_x.mean(), -a, a)), float(np.clip(points_y.mean(), -b, b))
-
-
-def _zone(x: float, y: float, half_length: float, half_width: float) -> str:
-    """Which side of a body the point lies on; a corner belongs to the front or the rear."""
-    depth = {
-        "front": half_length - x,
-        "rear": half_length + x,
-        "left": half_width - y + ZONE_MARGIN_M,
-        "right": half_width + y + ZONE_MARGIN_M,
-    }
-    return min(depth, key=lambda zone: depth[zone])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class History:
-    """What happened before the contact, as far as the verdicts ask for it."""
-
-    started_s: float
-    teleported: bool
-    spawn_overlap: bool
-    inside_limits: bool  # every adversary, up to the contact
-    touched_before: bool  # the striking actor's body overlapped another one earlier
-    visible_for_s: float
-    ever_visible: bool
-
-
-def verdicts(contact: Contact, frame: Frame, history: History) -> Mapping[str, bool]:
-    """The validity rules, each with whether the contact passes it; all must pass (tier 2).
-
-    Source: design of the tiers in the README; `degenerate` rules come last.
-    """
-    vehicle = frame.kind[contact.other] == Kind.VEHICLE
-    adversary_hit_flank = (
-        contact.ego_zone in ("left", "right")
-        and frame.length_m[0] / 2 - contact.x_m > FLANK_FROM_FRONT_M
-        and contact.closing_lateral_other_mps > contact.closing_lateral_ego_mps
-    )
-    crossing_conflict = bool(
-        vehicle and abs(contact.heading_sin) >= CROSSING_HEADING_SIN and history.visible_for_s >= CROSSING_VISIBLE_S
-    )
-    return {
-        "no_teleport": not history.teleported,
-        "no_spawn_overlap": not history.spawn_overlap,
-        "after_first_second": contact.time_s - history.started_s > FIRST_SECOND_S,
-        "inside_limits": history.inside_limits,
-        "solid_bodies": not history.touched_before,
-        "not_from_behind": contact.ego_zone != "rear",
-        "ego_moving": bool(frame.speed_mps[0] >= STANDING_MPS),
-        "no_sideswipe": not adversary_hit_flank or crossing_conflict,
-        "seen_before": history.ever_visible,
-    }
-
-
-def agrees(frame: Frame, ego: str, other: str) -> bool:
-    """Whether SUMO lists the pair in this frame."""
-    return any({ego, other} == set(pair) for pair in frame.simulator_collisions)

@@ -7,16 +7,20 @@ Its code is SUMO's: the distance is ours, what speed it is worth is said by the 
 import math
 
 import libsumo
+import numpy as np
 
-from risk_sac.sim.lookout import targets
+from risk_sac.sim.lookout import Bodies, targets
 from risk_sac.sim.paths import Along
-from risk_sac.types import STEP_S, Bools, Floats, Frame, Kind
+from risk_sac.types import STEP_S, Bools, Frame
 
 NORMAL_DECEL_MPS2 = 4.5  # what SUMO assumes of a leader, and its default for passenger cars
 JERK_MPS3 = 12.65  # at which a braking builds up (UN R157, the careful driver)
 BUILD_UP_S = NORMAL_DECEL_MPS2 / JERK_MPS3  # which its model, whose braking steps, does not reckon with
 OWN_CHOICE_MPS = -1.0  # SUMO's word for the speed that its models choose
-SAFE_MODE, EMERGENCY_MODE = 31, 26  # SUMO holds told speeds to its normal deceleration, unless its checks of speed are off
+SAFE_MODE, EMERGENCY_MODE = (
+    31,
+    26,
+)  # SUMO holds told speeds to its normal deceleration, unless its checks of speed are off
 
 
 class Driver:
@@ -48,22 +52,22 @@ class Driver:
         self.telling = False
         get = libsumo.vehicle
         get.setSpeed(vehicle, cruise_mps)
-        self._length, self._width = get.getLength(vehicle), get.getWidth(vehicle)
         self._accel, self._min_gap = get.getAccel(vehicle), get.getMinGap(vehicle)
 
-    def tell(self, row: int, frame: Frame, along: Along, limit_mps: float, candidate: Bools) -> None:
+    def tell(self, row: int, frame: Frame, bodies: Bodies, along: Along, limit_mps: float, candidate: Bools) -> None:
         """Tells SUMO how fast the vehicle may drive in the next step.
 
         Args:
           row: of the vehicle in the frame.
           frame: all actors now.
+          bodies: theirs.
           along: the vehicle on its path.
           limit_mps: of its lane.
           candidate: `n` actors of the frame; whom it knows of and looks out for.
         """
         speed = float(frame.speed_mps[row])
         if self._step % self._period == 0:
-            self._accel_mps2 = self._decide(speed, frame, along, limit_mps, candidate)
+            self._accel_mps2 = self._decide(row, speed, bodies, along, limit_mps, candidate)
         self._step += 1
         if self._accel_mps2 is None:
             if self.telling:
@@ -77,31 +81,17 @@ class Driver:
         libsumo.vehicle.setSpeedMode(self._vehicle, EMERGENCY_MODE if accel < -NORMAL_DECEL_MPS2 else SAFE_MODE)
         libsumo.vehicle.setSpeed(self._vehicle, max(speed + accel * STEP_S, 0.0))
 
-    def _decide(self, speed: float, frame: Frame, along: Along, limit_mps: float, candidate: Bools) -> float | None:
+    def _decide(
+        self, row: int, speed: float, bodies: Bodies, along: Along, limit_mps: float, candidate: Bools
+    ) -> float | None:
         """The acceleration that its model wants for the nearest of the targets; None where none binds."""
-        gap, lead = targets(
-            along.path,
-            along.station_m,
-            along.offset_m,
-            self._length,
-            self._width,
-            speed,
-            self._accel,
-            limit_mps,
-            frame.x_m,
-            frame.y_m,
-            frame.heading_rad,
-            frame.vx_mps,
-            frame.vy_mps,
-            frame.length_m / 2,
-            frame.width_m / 2,
-            frame.kind == Kind.VEHICLE,
-            candidate,
-        )
+        gap, lead = targets(*along, row, speed, self._accel, limit_mps, bodies, candidate)
         wanted = math.inf
-        for distance, lead_mps in zip(gap.tolist(), lead.tolist(), strict=True):
-            if distance < math.inf:
-                wanted = min(wanted, self._worth(speed, distance - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0), lead_mps))
+        for i in np.flatnonzero(gap < math.inf):
+            distance, lead_mps = float(gap[i]), float(lead[i])
+            wanted = min(
+                wanted, self._worth(speed, distance - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0), lead_mps)
+            )
         if wanted >= speed + self._accel * STEP_S or 0.0 <= self._cruise_mps <= wanted:
             return None
         return max((wanted - speed) / STEP_S, -self._emergency_mps2)

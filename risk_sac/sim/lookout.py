@@ -10,12 +10,13 @@ fast as it may: so one that has stopped for a pedestrian does not start before t
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from risk_sac.jit import compiled
 from risk_sac.sim.paths import Path
-from risk_sac.types import Bools, Floats
+from risk_sac.types import Bools, Floats, Frame, Kind
 
 LOOK_S = 4.0  # how far ahead a collision course counts
 CUT_IN_LOOK_S = 2.0  # the same for whoever drives in the vehicle's own direction, whose sideways motion is soon over
@@ -24,6 +25,33 @@ MARGIN_M = 0.375  # on either side of the vehicle's body: the room in which a la
 YIELDING_MPS2 = 2.5  # of crossing traffic; SUMO's drivers, who stop well before the junction, never need more for it
 SAME_WAY_COS = 0.5
 MOVING_MPS = 0.5
+
+
+class Bodies(NamedTuple):
+    """All `n` actors of a frame, as a driver looks at them."""
+
+    x_m: Floats
+    y_m: Floats
+    heading_rad: Floats
+    vx_mps: Floats
+    vy_mps: Floats
+    half_length_m: Floats
+    half_width_m: Floats
+    vehicle: Bools  # the rest are pedestrians
+
+    @classmethod
+    def of(cls, frame: Frame) -> "Bodies":
+        """Those of a frame."""
+        return cls(
+            frame.x_m,
+            frame.y_m,
+            frame.heading_rad,
+            frame.vx_mps,
+            frame.vy_mps,
+            frame.length_m / 2,
+            frame.width_m / 2,
+            frame.kind == int(Kind.VEHICLE),
+        )
 
 
 @compiled
@@ -54,19 +82,11 @@ def targets(
     path: Path,
     front_m: float,
     offset_m: float,
-    length_m: float,
-    width_m: float,
+    own: int,
     speed_mps: float,
     accel_mps2: float,
     limit_mps: float,
-    x: Floats,
-    y: Floats,
-    heading: Floats,
-    vx: Floats,
-    vy: Floats,
-    half_length: Floats,
-    half_width: Floats,
-    vehicle: Bools,
+    bodies: Bodies,
     candidate: Bools,
 ) -> tuple[Floats, Floats]:
     """What a driver has to stop for or to follow.
@@ -75,45 +95,37 @@ def targets(
       path: where it will drive.
       front_m: station of its front bumper on the path.
       offset_m: of its middle from the path.
-      length_m: of its body.
-      width_m: of its body.
+      own: its row among the bodies.
       speed_mps: its own.
       accel_mps2: the most it accelerates.
       limit_mps: the fastest it drives.
-      x: `n`, centre of each other actor; with `y`, `heading`, velocity `vx`, `vy`, and half extents.
-      y: see `x`.
-      heading: see `x`.
-      vx: see `x`.
-      vy: see `x`.
-      half_length: see `x`.
-      half_width: see `x`.
-      vehicle: `n`, whether it is one; the rest are pedestrians.
+      bodies: all `n` actors.
       candidate: `n`, whom the driver knows of and looks out for.
 
     Returns:
       Distance from the front bumper to the body, m, inf for those that are no target; and the speed at which it
       leads, m/s, 0 for those that the driver has to stop for. Both `n`.
     """
+    x, y, heading, vx, vy, half_length, half_width, vehicle = bodies
     n = len(x)
     gap, lead = np.full(n, np.inf), np.zeros(n)
+    length_m, width_m = 2.0 * half_length[own], 2.0 * half_width[own]
     corridor = width_m / 2 + MARGIN_M
     reach = limit_mps * LOOK_S + length_m
     for i in range(n):
         speed = math.hypot(vx[i], vy[i])
-        if not candidate[i]:
+        if i == own or not candidate[i]:
             continue
         s_now, _, way = project(path, x[i], y[i])
         if abs(s_now - front_m) > reach + speed * LOOK_S:
             continue
         v_along = vx[i] * math.cos(way) + vy[i] * math.sin(way)
-        same_way = (
-            vehicle[i] and v_along > MOVING_MPS and abs(math.cos(heading[i] - way)) > SAME_WAY_COS
-        )
+        same_way = vehicle[i] and v_along > MOVING_MPS and abs(math.cos(heading[i] - way)) > SAME_WAY_COS
         if same_way and s_now < front_m - length_m / 2:
             continue  # whoever comes from behind, or is overtaken, keeps the distance itself
         look = CUT_IN_LOOK_S if same_way else LOOK_S
         inside_since, nearest = -1.0, math.inf
-        for k in range(int(round(look / TICK_S)) + 1):
+        for k in range(round(look / TICK_S) + 1):
             t = k * TICK_S
             s, d, way = project(path, x[i] + vx[i] * t, y[i] + vy[i] * t)
             turn = heading[i] - way

@@ -22,8 +22,9 @@ from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Area, Layout, VehicleStart
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
+from risk_sac.sim.lookout import Bodies
 from risk_sac.sim.paths import Along, Paths
-from risk_sac.types import STEP_S, Bools, Frame, Kind, Role, Signal
+from risk_sac.types import STEP_S, Bools, Floats, Frame, Kind, Role, Signal
 
 logger = logging.getLogger(__name__)
 
@@ -32,6 +33,8 @@ PEDESTRIAN_SIZE_M = 0.5
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 GRAVITY_MPS2 = 9.81
 EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
+LISTED_WITHIN_S = 0.3
+NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
 CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
@@ -110,7 +113,9 @@ class SumoSimulation:
         self._paths.clear()
         self._describe_actors()
         self._start_drivers()
-        self._limit_mps: float = libsumo.lane.getMaxSpeed(libsumo.vehicle.getLaneID(layout.ego.id))  # of all roads alike
+        self._limit_mps: float = libsumo.lane.getMaxSpeed(
+            libsumo.vehicle.getLaneID(layout.ego.id)
+        )  # of all roads alike
         return self._read()
 
     def release(self) -> None:
@@ -237,21 +242,22 @@ class SumoSimulation:
         self._walkers = {id_: replace(w, speed_mps=0.0, accel_mps2=0.0) for id_, w in self._walkers.items()}
 
     def _tell_drivers(self) -> None:
-        """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians alone."""
+        """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians near them."""
         frame = self._frame
-        pedestrians = frame.kind == Kind.PEDESTRIAN
+        bodies = Bodies.of(frame)
         known = np.array([id_ not in self._hidden for id_ in frame.ids])
-        self._tell(self._ego_driver, 0, known)
+        self._tell(self._ego_driver, 0, bodies, known)
+        if not self._walkers:
+            return
+        pedestrian = ~bodies.vehicle
+        near = np.hypot(*(each[:, None] - each[pedestrian] for each in (frame.x_m, frame.y_m))).min(axis=1) < NEAR_M
         for row, id_ in enumerate(frame.ids):
             driver = self._drivers.get(id_)
-            if driver is not None and (self._walkers or driver.telling):
-                self._tell(driver, row, pedestrians)
+            if driver is not None and (near[row] or driver.telling):
+                self._tell(driver, row, bodies, pedestrian)
 
-    def _tell(self, driver: Driver, row: int, candidates: Bools) -> None:
-        id_ = self._frame.ids[row]
-        others = candidates.copy()
-        others[row] = False
-        driver.tell(row, self._frame, self.along(id_), self._limit_mps, others)
+    def _tell(self, driver: Driver, row: int, bodies: Bodies, candidates: Bools) -> None:
+        driver.tell(row, self._frame, bodies, self.along(self._frame.ids[row]), self._limit_mps, candidates)
 
     def along(self, vehicle: str) -> Along:
         """Where a vehicle is on its path."""
@@ -259,9 +265,32 @@ class SumoSimulation:
         path = self._paths.of(self._routes[vehicle], get.getLaneID(vehicle))
         return Along(path, get.getLanePosition(vehicle), get.getLateralLanePosition(vehicle))
 
+    def ego_path(self) -> tuple[Floats, Floats]:
+        """The ego's way ahead: x and y of points, its centre first."""
+        ego = self._vehicles[0]
+        path, station_m, offset_m = self.along(ego)
+        ahead = path.station_m > station_m
+        sin, cos = np.sin(path.heading_rad[ahead]), np.cos(path.heading_rad[ahead])
+        x = np.concatenate((self._frame.x_m[:1], path.x_m[ahead] - offset_m * sin))
+        y = np.concatenate((self._frame.y_m[:1], path.y_m[ahead] + offset_m * cos))
+        return x, y
+
     def path(self, vehicle: str) -> Along | None:
         """Where a vehicle is on its path; None once it left the net."""
         return self.along(vehicle) if vehicle in self._vehicles else None
+
+    def lists_collision(self, other: str) -> bool:
+        """Whether SUMO lists a collision of the ego with a vehicle, now or if it goes on for `LISTED_WITHIN_S`.
+
+        SUMO tests rectangles that lie along their lanes, so it is a little late or early where a body is turned. It
+        ends the episode: the simulation is past the contact afterwards.
+        """
+        pair = {self._vehicles[0], other}
+        for _ in range(round(LISTED_WITHIN_S / STEP_S)):
+            if any({c.collider, c.victim} == pair for c in libsumo.simulation.getCollisions()):
+                return True
+            libsumo.simulationStep()
+        return any({c.collider, c.victim} == pair for c in libsumo.simulation.getCollisions())
 
     def room(self, vehicle: str) -> Room | None:
         """How far `vehicle` may move sideways; None once it left the net.

@@ -1,0 +1,223 @@
+"""When, where and how the conflict with the striker began.
+
+Sources: UN Regulation 157, Annex 3, for cut-ins and leaders; for pedestrians and crossing vehicles a careful driver
+after Engström et al., "Modeling road user response timing in naturalistic traffic conflicts" (arXiv 2208.08651).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from risk_sac.jit import compiled
+from risk_sac.types import Bools, ConflictType, Floats, Kind
+from risk_sac.verdicts.along import AlongSeries, along_series
+from risk_sac.verdicts.areas import soon_inside
+from risk_sac.verdicts.course import CORRIDOR_M, HORIZON_S, Body, entry_distance, time_to_touch
+from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.lane_conflict import lane_conflicts
+from risk_sac.verdicts.path import Path, recorded_path
+
+KERB_S = 1.0  # a pedestrian this near to the carriageway is about to step onto it
+YIELDING_MPS2 = 3.4  # what a driver who means to stop brakes with
+SAME_WAY_COS = math.cos(math.radians(30.0))
+TURNING_COS = math.cos(math.radians(60.0))
+TURN_WINDOW_S = 3.0
+SETTLED_S = 2.0  # who has been in the ego's lane for so long is its leader, and no longer cuts in
+BRIDGE = 2  # frames, 0.2 s: a conflict interrupted for no longer has not ended
+UNRESPONSIVE_S = 1.5
+BRAKES_MPS2 = 0.5  # more than the drag of a released pedal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conflict:
+    """How the conflict that ended in the contact came about."""
+
+    type: ConflictType
+    frame: int  # when it began for a driver who sees what the ego sees
+    time_s: float  # t0, from the release
+    x_m: float  # where the striker was then
+    y_m: float
+    position: str  # ahead | alongside
+    hidden: bool  # the ego knew nothing of the striker when the bodies' motion made it a conflict
+    course_from: int  # first frame of the visible collision course that lasted until the contact
+
+
+def find_conflict(evidence: Evidence, striker: int) -> Conflict:
+    """The conflict with the actor in column `striker`, which lasted until the contact in the last frame.
+
+    A conflict begins no earlier than the ego knows of the striker; with a pedestrian that steps out from behind a
+    truck, when it comes into sight. With one that nobody could see it begins with the contact.
+    """
+    path = recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
+    known = evidence.known[:, striker]
+    seen = seen_along(path, evidence, striker)
+    course = _courses(path, evidence, striker)
+    begins, lasts = course, course
+    same_way = _drives_the_same_way(evidence, striker)
+    if evidence.kind[striker] == Kind.PEDESTRIAN:
+        begins = lasts = course & _at_the_carriageway(evidence, striker)
+    elif same_way:
+        offset, accel = column(evidence.lane_offset_m, striker), column(evidence.accel_mps2, striker)
+        speed = column(evidence.speed_mps, 0)
+        begins, lasts = lane_conflicts(seen, speed, offset, accel, evidence.ground.lane_width_m)
+    else:
+        begins = lasts = course | _cannot_stop(path, evidence, striker)
+    frame = _since(begins & known, lasts & known)
+    unseen = _since(begins, lasts)
+    if same_way and unseen == len(course) - 1:  # neither led nor cut in: the ego itself came over
+        frame, unseen = _since(course & known, course & known), _since(course, course)
+    return Conflict(
+        type=_type(evidence, striker, frame, same_way, seen.across_m),
+        frame=frame,
+        time_s=float(evidence.time_s[frame]),
+        x_m=float(evidence.x_m[frame, striker]),
+        y_m=float(evidence.y_m[frame, striker]),
+        position="ahead" if seen.gap_m[frame] > 0.0 else "alongside",
+        hidden=not known[unseen],
+        course_from=_since(course & known, course & known),
+    )
+
+
+def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
+    """Whether the ego was on a visible collision course for 1.5 s or more until the contact and never braked in it."""
+    first = conflict.course_from
+    lasted = evidence.time_s[-1] - evidence.time_s[first] >= UNRESPONSIVE_S - 1e-6
+    return bool(lasted and (evidence.accel_mps2[first:, 0] > -BRAKES_MPS2).all())
+
+
+def _since(begins: Bools, lasts: Bools) -> int:
+    """The first frame in which a condition begins that then lasts until the last frame, in which it holds anyway."""
+    first, missing = len(begins) - 1, 0
+    for t in range(len(begins) - 2, -1, -1):
+        if begins[t]:
+            first, missing = t, 0
+        elif lasts[t]:
+            missing = 0
+        else:
+            missing += 1
+            if missing > BRIDGE:
+                break
+    return first
+
+
+def _courses(path: Path, evidence: Evidence, striker: int) -> Bools:
+    """Frames at the end of the record from which the bodies, keeping their speeds, meet within the horizon."""
+    e = evidence
+    return collision_courses(
+        path,
+        column(e.speed_mps, 0),
+        e.length_m[0] / 2,
+        e.width_m[0] / 2 + CORRIDOR_M,
+        column(e.x_m, striker),
+        column(e.y_m, striker),
+        column(e.heading_rad, striker),
+        column(e.vx_mps, striker),
+        column(e.vy_mps, striker),
+        e.length_m[striker] / 2,
+        e.width_m[striker] / 2,
+    )
+
+
+@compiled
+def collision_courses(
+    path: Path,
+    speed: Floats,
+    half_length: float,
+    half_width: float,
+    x: Floats,
+    y: Floats,
+    heading: Floats,
+    vx: Floats,
+    vy: Floats,
+    other_half_length: float,
+    other_half_width: float,
+) -> Bools:
+    """Whether each frame is on a collision course, `T`; looked for backwards, False before it was first interrupted."""
+    found = np.zeros(len(speed), dtype=np.bool_)
+    missing = 0
+    for t in range(len(speed) - 1, -1, -1):
+        other = Body(x[t], y[t], heading[t], vx[t], vy[t], other_half_length, other_half_width)
+        found[t] = time_to_touch(path, path.s[t], speed[t], half_length, half_width, other, HORIZON_S) <= HORIZON_S
+        missing = 0 if found[t] else missing + 1
+        if missing > BRIDGE + 1:  # the last frame may be beyond the contact
+            break
+    return found
+
+
+def _at_the_carriageway(evidence: Evidence, striker: int) -> Bools:
+    """Whether the pedestrian is on the carriageway, or at most 1 s from its kerb."""
+    e, ground = evidence, evidence.ground
+    if not ground.roadway:
+        return np.ones(len(e.time_s), dtype=np.bool_)
+    areas = ground.roadway + ground.crossings
+    return soon_inside(areas, e.x_m[:, striker], e.y_m[:, striker], e.vx_mps[:, striker], e.vy_mps[:, striker], KERB_S)
+
+
+def _drives_the_same_way(evidence: Evidence, striker: int) -> bool:
+    """Whether the striker drives the ego's way: within 30 degrees, or within 60 where it did so in the last 3 s.
+
+    The second holds for one that the ego follows round a bend.
+    """
+    if evidence.kind[striker] == Kind.PEDESTRIAN:
+        return False
+    first = evidence.since(TURN_WINDOW_S)
+    cos = np.cos(evidence.heading_rad[first:, striker] - evidence.heading_rad[first:, 0])
+    return bool(cos[-1] > SAME_WAY_COS or (cos[-1] > TURNING_COS and np.nanmax(cos) > SAME_WAY_COS))
+
+
+def seen_along(path: Path, evidence: Evidence, striker: int) -> AlongSeries:
+    """The striker along the ego's path, frame by frame."""
+    e = evidence
+    return along_series(
+        path,
+        column(e.speed_mps, 0),
+        e.length_m[0] / 2,
+        column(e.x_m, striker),
+        column(e.y_m, striker),
+        column(e.heading_rad, striker),
+        column(e.vx_mps, striker),
+        column(e.vy_mps, striker),
+        e.length_m[striker] / 2,
+        e.width_m[striker] / 2,
+    )
+
+
+def column(values: Floats, actor: int) -> Floats:
+    """One actor's values, in one piece as compiled code likes them."""
+    return np.ascontiguousarray(values[:, actor])
+
+
+def _cannot_stop(path: Path, evidence: Evidence, striker: int) -> Bools:
+    """Frames, 4 s before the contact at most, in which the striker could no longer stop before the ego's corridor.
+
+    Both paths are on record, so where they meet is known, and that both come there too.
+    """
+    e, first = evidence, evidence.since(HORIZON_S)
+    x, y = column(e.x_m, striker)[first:], column(e.y_m, striker)[first:]
+    distance, _ = entry_distance(
+        path,
+        first,
+        path.s[-1],
+        e.length_m[0] / 2,
+        e.width_m[0] / 2 + CORRIDOR_M,
+        x,
+        y,
+        column(e.heading_rad, striker)[first:],
+        e.length_m[striker] / 2,
+        e.width_m[striker] / 2,
+    )
+    gone = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
+    found = np.zeros(len(e.time_s), dtype=np.bool_)
+    found[first:] = distance - gone <= e.speed_mps[first:, striker] ** 2 / (2 * YIELDING_MPS2)
+    return found
+
+
+def _type(evidence: Evidence, striker: int, frame: int, same_way: bool, across_m: Floats) -> ConflictType:
+    if evidence.kind[striker] == Kind.PEDESTRIAN:
+        return ConflictType.PEDESTRIAN
+    if not same_way:
+        return ConflictType.CROSSING
+    first = int(np.searchsorted(evidence.time_s, evidence.time_s[frame] - SETTLED_S - 1e-6))
+    settled = (np.abs(across_m[first : frame + 1]) <= evidence.ground.lane_width_m / 2).all()
+    return ConflictType.LEADER if settled else ConflictType.CUT_IN

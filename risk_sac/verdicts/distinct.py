@@ -1,0 +1,90 @@
+"""Which failures are different ones: by signature first, then by cells of what varies within it.
+
+Choice: fixed cells, not the distance to failures found before. Whether a failure lies in an empty cell may depend on
+the order, how many cells are filled does not: a run that resumes, or two that are pooled, count alike, and the count
+never falls. The edges are where severity changes (30 and 50 km/h) and where a driver had time to act; few cells, for
+what a signature holds is one failure at several speeds rather than several failures.
+"""
+
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from risk_sac.errors import NotFinite
+from risk_sac.types import Collision
+
+
+class Axis(NamedTuple):
+    """One feature and the edges between its cells."""
+
+    name: str
+    edges: tuple[float, ...]
+
+
+KMH = 1 / 3.6
+AXES = (
+    Axis("ego_speed_mps", (30 * KMH, 50 * KMH)),
+    Axis("other_speed_mps", (30 * KMH, 50 * KMH)),
+    Axis("from_conflict_s", (2.0,)),  # what the careful driver needs to be at full braking
+)
+Cell = tuple[int, ...]
+
+
+def signature_of(collision: Collision) -> str:
+    """Its judgement's; of one stored before contacts were judged, its striker."""
+    if collision.judgement is None:
+        return f"unjudged {collision.other_role} {collision.other_kind}"
+    return collision.judgement.signature
+
+
+def cell_of(collision: Collision) -> Cell:
+    """The cell of a failure within its signature.
+
+    Raises:
+      NotFinite: a feature is NaN; infinite ones lie in the outermost cell.
+    """
+    judged = collision.judgement
+    values = {
+        "ego_speed_mps": collision.ego_speed_mps,
+        "other_speed_mps": collision.other_speed_mps,
+        "from_conflict_s": collision.time_s - judged.conflict_s if judged else 0.0,
+    }
+    if any(value != value for value in values.values()):
+        raise NotFinite(f"collision at {collision.time_s:g} s has {values}; wanted no NaN")
+    return tuple(bisect_right(axis.edges, values[axis.name]) for axis in AXES)
+
+
+class DistinctFailures:
+    """Counts distinct failures, one by one; a policy that repeats its one way to make the ego fail is paid once."""
+
+    def __init__(self) -> None:
+        self._found: set[tuple[str, Cell]] = set()
+
+    @property
+    def count(self) -> int:
+        """Distinct failures so far; the same whatever their order."""
+        return len(self._found)
+
+    @property
+    def signatures(self) -> Mapping[str, int]:
+        """Distinct failures by signature, sorted."""
+        return dict(sorted(Counter(signature for signature, _ in self._found).items()))
+
+    def add(self, collision: Collision) -> bool:
+        """Whether a failure is distinct from all before it; it then counts among them.
+
+        Raises:
+          NotFinite: one of its features is NaN.
+        """
+        key = signature_of(collision), cell_of(collision)
+        if key in self._found:
+            return False
+        self._found.add(key)
+        return True
+
+
+def distinct_failures(collisions: Sequence[Collision]) -> tuple[int, ...]:
+    """Positions of the first of each kind among failures in order of occurrence; see `DistinctFailures`."""
+    found = DistinctFailures()
+    return tuple(position for position, collision in enumerate(collisions) if found.add(collision))

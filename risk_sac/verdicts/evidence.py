@@ -1,0 +1,185 @@
+"""What is recorded of an episode up to its contact, as arrays: all that a judge may look at."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.scenario.layout import Area
+from risk_sac.types import STEP_S, Bools, Floats, Frame
+
+Letters = NDArray[np.uint8]
+
+PER_ACTOR = (
+    "x_m",
+    "y_m",
+    "heading_rad",
+    "vx_mps",
+    "vy_mps",
+    "speed_mps",
+    "lateral_mps",
+    "accel_mps2",
+    "lane_offset_m",
+)
+AREAS = ("crossings", "junctions", "roadway")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Ground:
+    """Where an episode takes place, as far as a verdict depends on it."""
+
+    friction: float = 1.0
+    speed_limit_mps: float = 13.89
+    lane_width_m: float = 3.2
+    crossings: tuple[Area, ...] = ()  # pedestrian crossings
+    junctions: tuple[Area, ...] = ()
+    roadway: tuple[Area, ...] = ()  # where vehicles drive; none: pedestrians are judged as if always on it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Evidence:
+    """`T` frames up to and including the contact's, `n` actors; the ego is column 0, NaN where an actor has left."""
+
+    time_s: Floats  # T, from the adversaries' release; negative before it
+    ids: tuple[str, ...]
+    kind: NDArray[np.int8]  # n
+    role: NDArray[np.int8]  # n
+    length_m: Floats  # n
+    width_m: Floats  # n
+    x_m: Floats  # this and the following: T x n
+    y_m: Floats
+    heading_rad: Floats
+    vx_mps: Floats
+    vy_mps: Floats
+    speed_mps: Floats
+    lateral_mps: Floats
+    accel_mps2: Floats
+    lane_offset_m: Floats  # from the lane SUMO has the vehicle on; NaN where it was not recorded
+    link: Letters  # SUMO's letter of the signal ahead, of the crossing for a pedestrian; 0: none
+    known: Bools  # in the ego's sight, or remembered
+    ground: Ground = Ground()
+    lane_heading_rad: Floats | None = None  # T x n: the direction of the lane an actor is on, where it is known
+    step_s: float = STEP_S
+
+    @classmethod
+    def of(cls, frames: Sequence[Frame], known: Sequence[Bools], released_s: float, ground: Ground) -> "Evidence":
+        """From the frames of an episode; actors may leave, but none may come.
+
+        Args:
+          frames: from the lead-in to the contact's frame, at least one.
+          known: per frame, who of `frame.ids` the ego knows of, itself included.
+          released_s: `time_s` at which the adversaries were released.
+          ground: where it takes place.
+
+        Raises:
+          ValueError: there is no frame, or `known` does not go with them.
+        """
+        if not frames or len(known) != len(frames):
+            raise ValueError(
+                f"{len(frames)} frames and {len(known)} of `known`; wanted one of each per step, at least 1"
+            )
+        first = frames[0]
+        column = {id_: i for i, id_ in enumerate(first.ids)}
+        shape = len(frames), len(first.ids)
+        values: dict[str, Any] = {name: np.full(shape, np.nan) for name in PER_ACTOR}
+        values["link"] = np.zeros(shape, dtype=np.uint8)
+        values["known"] = np.zeros(shape, dtype=np.bool_)
+        for start, end in _runs(frames):
+            columns = [column[id_] for id_ in frames[start].ids]
+            for name in (*PER_ACTOR, "link"):
+                values[name][start:end, columns] = [getattr(frame, name) for frame in frames[start:end]]
+            values["known"][start:end, columns] = [*known[start:end]]
+        return cls(
+            time_s=np.array([frame.time_s for frame in frames]) - released_s,
+            ids=first.ids,
+            kind=first.kind,
+            role=first.role,
+            length_m=first.length_m,
+            width_m=first.width_m,
+            ground=ground,
+            **values,
+        )
+
+    @classmethod
+    def from_series(cls, series: Mapping[str, NDArray[Any]], ground: Ground, released_s: float = 0.0) -> "Evidence":
+        """From a stored time series, so that a failure can be judged anew by other definitions.
+
+        What an older series lacks is filled in: velocities from positions, no signals, no lane offsets, and what the
+        ego knew from what it saw.
+        """
+        x, y = series["x_m"], series["y_m"]
+        shape = x.shape
+        time_s = np.asarray(series["time_s"], dtype=np.float64)
+        known = np.array(series["known"] if "known" in series else series["visible"] == 1.0, dtype=np.bool_)
+        known[:, 0] = True
+        filled: dict[str, Any] = {
+            "vx_mps": _rate(x, time_s),
+            "vy_mps": _rate(y, time_s),
+            "lane_offset_m": np.full(shape, np.nan),
+            "link": np.zeros(shape, dtype=np.uint8),
+        }
+        return cls(
+            time_s=time_s - released_s,
+            ids=tuple(str(id_) for id_ in series["ids"]),
+            kind=series["kind"],
+            role=series["role"],
+            length_m=series["length_m"],
+            width_m=series["width_m"],
+            known=known,
+            ground=ground,
+            lane_heading_rad=series.get("lane_heading_rad"),
+            **(filled | {name: series[name] for name in (*PER_ACTOR, "link") if name in series}),
+        )
+
+    def series(self) -> dict[str, NDArray[Any]]:
+        """The arrays by name, as `from_series` takes them."""
+        names = [each.name for each in fields(self) if each.name not in ("ids", "ground", "step_s")]
+        result = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+        return result | {"ids": np.array(self.ids)}
+
+    def column(self, id_: str) -> int:
+        """Column of an actor that is there in the last frame.
+
+        Raises:
+          ValueError: it is not, or it is the ego.
+        """
+        if id_ not in self.ids[1:]:
+            raise ValueError(f"striker {id_!r} is not among the recorded {self.ids[1:]}")
+        column = self.ids.index(id_)
+        if np.isnan(self.x_m[-1, column]):
+            raise ValueError(f"striker {id_!r} has left before the contact; wanted one that is there in the last frame")
+        return column
+
+    def since(self, before_s: float) -> int:
+        """The first frame of the last `before_s` seconds."""
+        return int(np.searchsorted(self.time_s, self.time_s[-1] - before_s - 1e-6))
+
+    def unwrapped_offset_m(self, column: int) -> Floats:
+        """Offset from the centre of the lane that the actor is on in the first frame, `T`.
+
+        SUMO's offset jumps by a lane's width when the vehicle's centre passes to the next lane.
+        """
+        offset = self.lane_offset_m[:, column]
+        width = self.ground.lane_width_m
+        steps = np.diff(offset, prepend=offset[:1])
+        unwrapped: Floats = offset[0] + np.cumsum(steps - width * np.round(steps / width))
+        return unwrapped
+
+
+def _runs(frames: Sequence[Frame]) -> Iterator[tuple[int, int]]:
+    """Stretches of frames with the same actors."""
+    start = 0
+    for i in range(1, len(frames) + 1):
+        if i == len(frames) or frames[i].ids != frames[start].ids:
+            yield start, i
+            start = i
+
+
+def _rate(values: Floats, time_s: Floats) -> Floats:
+    """Change per second over the step before; of the first frame over the one after."""
+    if len(values) < 2:
+        return np.zeros_like(values)
+    steps: Floats = np.diff(values, axis=0) / np.diff(time_s)[:, None]
+    return np.vstack((steps[:1], steps))

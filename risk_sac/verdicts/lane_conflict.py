@@ -1,0 +1,80 @@
+"""The conflict with a vehicle that drives the ego's way: a leader's, or one that cuts in.
+
+Source: UN Regulation 157, Annex 3 (guidance on traffic disturbance critical scenarios): a cut-in is perceived 0.375 m
+off the lane's centre, a leader's braking from 5 m/s² on, and both are a danger below 2 s to collision.
+"""
+
+import math
+
+import numpy as np
+
+from risk_sac.jit import compiled
+from risk_sac.types import Bools, Floats
+from risk_sac.verdicts.along import Along, AlongSeries
+from risk_sac.verdicts.course import HORIZON_S
+
+WANDER_M = 0.375  # what a vehicle strays from its lane's centre without meaning anything
+DANGER_TTC_S = 2.0
+LEADER_BRAKES_MPS2 = 5.0
+
+
+@compiled
+def towards(across: float, offset: float, lane_width: float) -> float:
+    """How far a vehicle is off the centre of the lane beside the ego's, towards the ego, m.
+
+    SUMO's offset jumps by a lane's width when the vehicle passes to the next lane; where it stands across the ego's
+    path tells which lane's centre is meant. Without a recorded offset that place alone decides.
+
+    Args:
+      across: of its centre from the ego's path, positive to the left.
+      offset: from the centre of the lane SUMO has it on, positive to the left; or NaN.
+      lane_width: of the lanes.
+    """
+    seen = lane_width - abs(across)
+    if math.isnan(offset):
+        return seen
+    recorded = -offset if across > 0.0 else offset
+    return recorded + lane_width * round((seen - recorded) / lane_width)
+
+
+@compiled
+def lane_conflict(other: Along, speed: float, offset: float, accel: float, lane_width: float) -> tuple[bool, bool]:
+    """Whether a conflict begins with a vehicle that drives the ego's way, and whether one goes on that had begun.
+
+    A cut-in begins when the vehicle is more than 0.375 m off its lane's centre towards the ego, and less than 2 s
+    ahead or alongside; a conflict with a leader when it brakes harder than 5 m/s², or is less than 2 s ahead.
+    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s.
+
+    Args:
+      other: the vehicle along the ego's path.
+      speed: of the ego.
+      offset: see `towards`.
+      accel: of the vehicle.
+      lane_width: of the lanes.
+    """
+    in_lane = abs(other.across_m) <= lane_width / 2
+    coming = in_lane or towards(other.across_m, offset, lane_width) > WANDER_M
+    alongside = other.gap_m <= 0.0 and other.behind_m <= 0.0
+    brakes = in_lane and 0.0 < other.gap_m <= HORIZON_S * speed and accel < -LEADER_BRAKES_MPS2
+    begins = brakes or (coming and (alongside or other.ttc_s < DANGER_TTC_S))
+    return begins, begins or (coming and other.ttc_s < HORIZON_S)
+
+
+@compiled
+def lane_conflicts(
+    others: AlongSeries, speed: Floats, offset: Floats, accel: Floats, lane_width: float
+) -> tuple[Bools, Bools]:
+    """`lane_conflict` of every frame, two arrays `T`."""
+    count = len(speed)
+    begins, lasts = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    for t in range(count):
+        other = Along(
+            others.gap_m[t],
+            others.behind_m[t],
+            others.ttc_s[t],
+            others.across_m[t],
+            others.turn_rad[t],
+            others.speed_mps[t],
+        )
+        begins[t], lasts[t] = lane_conflict(other, speed[t], offset[t], accel[t], lane_width)
+    return begins, lasts

@@ -1,0 +1,105 @@
+"""Whether the careful driver is in a conflict with anybody right now, for who drives and who starts scenes.
+
+The measures are those of `risk_sac.verdicts.conflict`; only what a record knows of the future is foreseen here: the
+ego's path is given, and everybody else goes on straight.
+"""
+
+import math
+
+import numpy as np
+
+from risk_sac.types import Bools, Frame, Kind
+from risk_sac.verdicts.along import along
+from risk_sac.verdicts.areas import soon_inside
+from risk_sac.verdicts.conflict import KERB_S, SAME_WAY_COS, YIELDING_MPS2
+from risk_sac.verdicts.course import CORRIDOR_M, HORIZON_S, Body, entry_distance, time_to_touch
+from risk_sac.verdicts.evidence import Ground
+from risk_sac.verdicts.lane_conflict import lane_conflict
+from risk_sac.verdicts.path import Path
+
+NEAR_S = 1.0  # two vehicles that pass a place no further apart in time are in each other's way
+AHEAD_M = 0.5  # between two foreseen poses
+STANDING_MPS = 0.1
+YIELDS = frozenset(b"ruyg")  # signals at which a driver is expected to stop, or to let others pass
+
+
+def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground) -> Bools:
+    """With whom of `frame.ids` the careful driver in the ego's place is in a conflict.
+
+    A crossing vehicle that has to stop or to yield, and still can at 3.4 m/s², is expected to: in a record the contact
+    tells that it did not.
+
+    Args:
+      frame: all actors now.
+      path: the ego's path ahead, from its centre; see `risk_sac.verdicts.path.polyline`.
+      known: `n`, whom the ego knows of.
+      ground: where it takes place.
+
+    Returns:
+      `n`; False for the ego.
+    """
+    found = np.zeros(len(frame.ids), dtype=np.bool_)
+    for i in np.flatnonzero(known):
+        if i > 0:
+            found[i] = _in_conflict(frame, path, int(i), ground)
+    return found
+
+
+def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground) -> bool:
+    f = frame
+    other = Body(f.x_m[i], f.y_m[i], f.heading_rad[i], f.vx_mps[i], f.vy_mps[i], f.length_m[i] / 2, f.width_m[i] / 2)
+    speed, half_length = f.ego_speed_mps, float(f.length_m[0]) / 2
+    half_width = float(f.width_m[0]) / 2 + CORRIDOR_M
+    if f.kind[i] == Kind.PEDESTRIAN:
+        here = slice(i, i + 1)
+        areas = ground.roadway + ground.crossings
+        if ground.roadway and not soon_inside(areas, f.x_m[here], f.y_m[here], f.vx_mps[here], f.vy_mps[here], KERB_S):
+            return False
+        return time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S
+    seen = along(path, 0, float(path.s[0]), speed, half_length, other)
+    if math.cos(seen.turn_rad) > SAME_WAY_COS:
+        begins, _ = lane_conflict(seen, speed, f.lane_offset_m[i], f.accel_mps2[i], ground.lane_width_m)
+        return begins
+    entry_m, meets_m = _entry(path, speed, half_length, half_width, other, float(f.speed_mps[i]))
+    stops = not math.isfinite(entry_m)
+    if stops and int(f.link[i]) in YIELDS:
+        return False
+    if time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S:
+        return True
+    return not stops and _both_come(entry_m, meets_m - path.s[0], speed, half_length, other, float(f.speed_mps[i]))
+
+
+def _entry(
+    path: Path, speed: float, half_length: float, half_width: float, other: Body, other_speed: float
+) -> tuple[float, float]:
+    """`entry_distance` of who goes on straight, as far as it needs to stop; infinite if it can stop before."""
+    stopping_m = other_speed**2 / (2 * YIELDING_MPS2)
+    ahead = np.linspace(0.0, stopping_m, math.ceil(stopping_m / AHEAD_M) + 1)
+    cos, sin = (other.vx / other_speed, other.vy / other_speed) if other_speed > STANDING_MPS else (0.0, 0.0)
+    return entry_distance(
+        path,
+        0,
+        path.s[0] + speed * HORIZON_S,
+        half_length,
+        half_width,
+        other.x + ahead * cos,
+        other.y + ahead * sin,
+        np.full(len(ahead), other.heading),
+        other.half_length,
+        other.half_width,
+    )
+
+
+def _both_come(
+    entry_m: float, meets_m: float, speed: float, half_length: float, other: Body, other_speed: float
+) -> bool:
+    """Whether both pass the place where their ways meet within the horizon, and less than 1 s apart."""
+    if speed < STANDING_MPS or other_speed < STANDING_MPS:
+        return False
+    passing_m = 2 * (half_length + other.half_length)
+    here_s, there_s = max(meets_m, 0.0) / speed, entry_m / other_speed
+    return (
+        here_s <= HORIZON_S
+        and here_s <= there_s + passing_m / other_speed + NEAR_S
+        and there_s <= here_s + passing_m / speed + NEAR_S
+    )

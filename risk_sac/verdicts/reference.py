@@ -1,0 +1,145 @@
+"""Who would have prevented a contact: the reference drivers' verdicts, and the grade that follows.
+
+Source: UN Regulation 157, 5.2.5 and Annex 3; the drivers in `risk_sac.verdicts.drivers`.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from risk_sac.geometry import box_view, contact_point, zone
+from risk_sac.scenario.limits import GRAVITY_MPS2
+from risk_sac.types import ConflictType, Grade, ReferenceOutcome
+from risk_sac.verdicts.along import AlongSeries
+from risk_sac.verdicts.conflict import Conflict, seen_along
+from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
+from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.path import Path, recorded_path
+from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, Track, drive, replay
+
+DRIVERS = {"careful": (CAREFUL, CAREFUL_PERCEIVES_S), "fsm": (FUZZY, 0.0), "rss": (RSS, 0.0), "ideal": (IDEAL, 0.0)}
+INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
+R157_BRAKES_MPS2, R157_DELAY_S = 6.0, 0.35
+AVOIDED = ReferenceOutcome(avoids=True, impact_speed_mps=0.0)
+
+
+def reference_outcomes(evidence: Evidence, striker: int, conflict: Conflict) -> Mapping[str, ReferenceOutcome]:
+    """How each reference driver fares in the ego's place against the actor in column `striker`.
+
+    `r157_ttc` speaks of cut-ins only and is left out of everything else.
+    """
+    path, track = ego_path(evidence), striker_track(evidence, striker)
+    outcomes = {
+        name: _outcome(evidence, path, track, driver, conflict.frame, perceives_s)
+        for name, (driver, perceives_s) in DRIVERS.items()
+    }
+    if conflict.type is ConflictType.CUT_IN:
+        outcomes["r157_ttc"] = _by_ttc(evidence, path, striker)
+    return outcomes
+
+
+def grade(outcomes: Mapping[str, ReferenceOutcome]) -> Grade:
+    """Who would have prevented the contact."""
+    if outcomes["careful"].avoids:
+        return Grade.CAREFUL
+    return Grade.IDEAL if outcomes["ideal"].avoids else Grade.UNAVOIDABLE
+
+
+def replayed_contact_s(evidence: Evidence, striker: int) -> float:
+    """When the recorded motions touch, from the release: a check of the rollout's means; inf if they never do."""
+    path, track = ego_path(evidence), striker_track(evidence, striker)
+    after = replay(path, evidence.length_m[0] / 2, evidence.width_m[0] / 2, track, evidence.step_s)
+    return float(evidence.time_s[0] + after)
+
+
+def ego_path(evidence: Evidence) -> Path:
+    """The ego's recorded path."""
+    return recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
+
+
+def striker_track(evidence: Evidence, striker: int) -> Track:
+    """The striker's recorded motion."""
+    e = evidence
+    return Track(
+        np.ascontiguousarray(e.x_m[:, striker]),
+        np.ascontiguousarray(e.y_m[:, striker]),
+        np.unwrap(e.heading_rad[:, striker]),
+        float(e.vx_mps[-1, striker]),
+        float(e.vy_mps[-1, striker]),
+        float(e.length_m[striker]) / 2,
+        float(e.width_m[striker]) / 2,
+    )
+
+
+def _outcome(
+    evidence: Evidence, path: Path, track: Track, driver: int, began: int, perceives_s: float
+) -> ReferenceOutcome:
+    e = evidence
+    first = began + round(perceives_s / e.step_s)
+    last = len(e.time_s) - 1
+    half_length, half_width = float(e.length_m[0]) / 2, float(e.width_m[0]) / 2
+    if first >= last:  # it is struck before it perceives
+        ending = Ending(
+            True, last * e.step_s, float(e.speed_mps[-1, 0]), *_pose(path), track.x[-1], track.y[-1], track.heading[-1]
+        )
+    else:
+        speed = float(e.speed_mps[first, 0])
+        grip = e.ground.friction * GRAVITY_MPS2
+        ending = drive(
+            driver, path, half_length, half_width, track, first, speed, grip, HORIZON_S - perceives_s, e.step_s
+        )
+    if not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, half_length, half_width, track):
+        return AVOIDED
+    return ReferenceOutcome(avoids=False, impact_speed_mps=float(ending.speed_mps))
+
+
+def _pose(path: Path) -> tuple[float, float, float]:
+    return float(path.x[-1]), float(path.y[-1]), float(path.heading[-1])
+
+
+def _from_behind(ending: Ending, half_length: float, half_width: float, track: Track) -> bool:
+    """Whether the contact lies on the ego's rear."""
+    dx, dy = ending.other_x - ending.x, ending.other_y - ending.y
+    cos, sin = np.cos(ending.heading), np.sin(ending.heading)
+    turn = ending.other_heading - ending.heading
+    still = np.zeros(1)
+    view = box_view(
+        np.array([dx * cos + dy * sin]),
+        np.array([dy * cos - dx * sin]),
+        still,
+        still,
+        np.array([np.cos(turn)]),
+        np.array([np.sin(turn)]),
+        np.array([track.half_length]),
+        np.array([track.half_width]),
+        0.0,
+        0.0,
+        half_length,
+        half_width,
+    )
+    return zone(*contact_point(view), half_length, half_width) == "rear"
+
+
+def _by_ttc(evidence: Evidence, path: Path, striker: int) -> ReferenceOutcome:
+    """UN R157, 5.2.5.2: a cut-in is preventable if TTC > v_rel / (2 · 6 m/s²) + 0.35 s when it intrudes by 0.3 m.
+
+    Its impact speed is the recorded ego's: the rule knows no driver.
+    """
+    seen = seen_along(path, evidence, striker)
+    t = _intrusion(evidence, striker, seen)
+    closing = evidence.speed_mps[t, 0] - seen.speed_mps[t]
+    needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_DELAY_S
+    if seen.gap_m[t] > 0.0 and seen.ttc_s[t] > needed_s:
+        return AVOIDED
+    return ReferenceOutcome(avoids=False, impact_speed_mps=float(evidence.speed_mps[-1, 0]))
+
+
+def _intrusion(evidence: Evidence, striker: int, seen: AlongSeries) -> int:
+    """The frame in which the striker last came 0.3 m into the ego's lane; the contact's if it did not."""
+    e = evidence
+    reach = (
+        np.abs(np.sin(seen.turn_rad)) * e.length_m[striker] + np.abs(np.cos(seen.turn_rad)) * e.width_m[striker]
+    ) / 2
+    intrudes = np.abs(seen.across_m) - reach <= e.ground.lane_width_m / 2 - INTRUSION_M
+    outside = np.flatnonzero(~intrudes)
+    return min(int(outside[-1]) + 1, len(intrudes) - 1) if len(outside) else 0

@@ -1,0 +1,193 @@
+"""A reference driver in the ego's place: the striker's motion is kept, the ego's path too, its speed is the driver's.
+
+The recorded ego is followed until the driver perceives the conflict; from then on the driver's own profile counts,
+even where the ego was braking harder.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from risk_sac.jit import compiled
+from risk_sac.types import Floats
+from risk_sac.verdicts.along import along
+from risk_sac.verdicts.course import Body, touches
+from risk_sac.verdicts.drivers import (
+    FUZZY_DELAY_S,
+    RSS_DELAY_S,
+    Situation,
+    careful,
+    fuzzy,
+    ideal,
+    rss,
+    towards_command,
+)
+from risk_sac.verdicts.path import Path, pose_at
+
+CAREFUL, IDEAL, FUZZY, RSS = range(4)
+FINE_S = 0.01  # between two box tests; at 30 m/s of closing 0.3 m
+LOOK = 5  # fine steps between two looks of a driver that goes by what it sees
+HORIZON_S = 8.0  # from the beginning of the conflict
+STANDING_MPS = 0.1
+
+
+class Track(NamedTuple):
+    """A recorded motion at equal steps; `T` of each. After its end it goes on with its last velocity."""
+
+    x: Floats
+    y: Floats
+    heading: Floats  # without jumps of 2π
+    vx: float  # after the end
+    vy: float
+    half_length: float
+    half_width: float
+
+
+class Ending(NamedTuple):
+    """How a rollout ended; the poses are those of the contact."""
+
+    touched: bool
+    time_s: float  # from the first recorded frame
+    speed_mps: float
+    x: float
+    y: float
+    heading: float
+    other_x: float
+    other_y: float
+    other_heading: float
+
+
+@compiled
+def place(track: Track, frame: float) -> tuple[float, float, float]:
+    """Where the body is at a fraction of a frame, or after the record's end: x, y, heading."""
+    last = len(track.x) - 1
+    if frame >= last:
+        return track.x[last], track.y[last], track.heading[last]
+    k = int(frame)
+    share = frame - k
+    return (
+        track.x[k] + share * (track.x[k + 1] - track.x[k]),
+        track.y[k] + share * (track.y[k + 1] - track.y[k]),
+        track.heading[k] + share * (track.heading[k + 1] - track.heading[k]),
+    )
+
+
+@compiled
+def drive(
+    driver: int,
+    path: Path,
+    half_length: float,
+    half_width: float,
+    track: Track,
+    first: int,
+    speed: float,
+    grip: float,
+    horizon_s: float,
+    step_s: float,
+) -> Ending:
+    """Lets a driver brake for the striker until it stands, touches it, or the horizon is over.
+
+    Args:
+      driver: CAREFUL, IDEAL, FUZZY or RSS.
+      path: the recorded ego's, a point per frame.
+      half_length: of the ego.
+      half_width: of the ego.
+      track: the striker's recorded motion.
+      first: the frame from which the driver drives; for FUZZY and RSS from which it looks out.
+      speed: of the ego then.
+      grip: the most braking the road bears, m/s².
+      horizon_s: how long it is followed.
+      step_s: between two recorded frames.
+    """
+    s, braking, wanted, danger_s = path.s[first], 0.0, 0.0, math.inf
+    last = len(track.x) - 1
+    x, y, heading = pose_at(path, s)
+    other_x, other_y, other_heading = place(track, float(first))
+    looks = driver in (FUZZY, RSS)
+    for step in range(1, round(horizon_s / FINE_S) + 1):
+        since = (step - 1) * FINE_S
+        frame = first + since / step_s
+        if looks and (step - 1) % LOOK == 0:
+            moves = track.vx, track.vy
+            if frame < last:
+                k = int(frame)
+                moves = (track.x[k + 1] - track.x[k]) / step_s, (track.y[k + 1] - track.y[k]) / step_s
+            wanted = _wanted(
+                driver, path, s, speed, braking, half_length, half_width, track, other_x, other_y, other_heading, moves
+            )
+            if wanted > 0.0:
+                danger_s = min(danger_s, since)
+        if driver == CAREFUL:
+            braking = careful(since + FINE_S / 2, grip)
+        elif driver == IDEAL:
+            braking = ideal(grip)
+        else:
+            delay = FUZZY_DELAY_S if driver == FUZZY else RSS_DELAY_S
+            if since >= danger_s + delay:
+                braking = towards_command(braking, wanted, grip, FINE_S)
+        own_frame = first + (since + FINE_S) / step_s
+        if looks and danger_s == math.inf and own_frame < last:  # nothing to perceive yet: the recorded ego drives on
+            k = int(own_frame)
+            s_next = path.s[k] + (own_frame - k) * (path.s[k + 1] - path.s[k])
+            speed, s = (s_next - s) / FINE_S, s_next
+        else:
+            slower = max(speed - braking * FINE_S, 0.0)
+            s += (speed + slower) / 2 * FINE_S
+            speed = slower
+        if speed <= STANDING_MPS and braking > 0.0:
+            break
+        x, y, heading = pose_at(path, s)
+        other_x, other_y, other_heading = place(track, own_frame)
+        if own_frame > last:
+            other_x += (own_frame - last) * step_s * track.vx
+            other_y += (own_frame - last) * step_s * track.vy
+        if touches(
+            x, y, heading, half_length, half_width, other_x, other_y, other_heading, track.half_length, track.half_width
+        ):
+            return Ending(True, own_frame * step_s, speed, x, y, heading, other_x, other_y, other_heading)
+    return Ending(False, math.inf, speed, x, y, heading, other_x, other_y, other_heading)
+
+
+@compiled
+def _wanted(
+    driver: int,
+    path: Path,
+    s: float,
+    speed: float,
+    braking: float,
+    half_length: float,
+    half_width: float,
+    track: Track,
+    x: float,
+    y: float,
+    heading: float,
+    moves: tuple[float, float],
+) -> float:
+    """What a driver that goes by what it sees would brake with now."""
+    other = Body(x, y, heading, moves[0], moves[1], track.half_length, track.half_width)
+    first = max(int(np.searchsorted(path.s, s, side="right")) - 1, 0)
+    seen = along(path, first, s, speed, half_length, other)
+    direction = heading - seen.turn_rad
+    across = moves[1] * math.cos(direction) - moves[0] * math.sin(direction)
+    reach = abs(math.sin(seen.turn_rad)) * track.half_length + abs(math.cos(seen.turn_rad)) * track.half_width
+    situation = Situation(seen, speed, braking, half_width, reach, across)
+    return fuzzy(situation) if driver == FUZZY else rss(situation)
+
+
+@compiled
+def replay(path: Path, half_length: float, half_width: float, track: Track, step_s: float) -> float:
+    """When the recorded ego first touches the striker, s from the first frame; inf if it never does."""
+    last = len(track.x) - 1
+    per_step = round(step_s / FINE_S)
+    for step in range(last * per_step + 1):
+        frame = step / per_step
+        k = min(int(frame), max(last - 1, 0))
+        s = path.s[k] + (frame - k) * (path.s[min(k + 1, last)] - path.s[k])
+        x, y, heading = pose_at(path, s)
+        other_x, other_y, other_heading = place(track, frame)
+        if touches(
+            x, y, heading, half_length, half_width, other_x, other_y, other_heading, track.half_length, track.half_width
+        ):
+            return frame * step_s
+    return math.inf
