@@ -18,10 +18,10 @@ from risk_sac.jit import compiled
 from risk_sac.types import Bools, Floats
 
 BUILD_UP_S = 0.4  # in which an emergency braking builds up from nothing to an actor's limit
-ORDINARY_JERK = 0.5  # share of the jerk that this takes, up to which a driver counts as ordinary
-COMFORT_MPS2 = 3.0  # about what adaptive cruise control keeps to; drivers exceed it in emergencies only
-COMFORT_SHARE = 0.5  # of an actor's limit, where that is less: pedestrians have a comfort level too
-LATERAL_COMFORT_MPS2 = 0.5  # across the lane or the walking direction; half of what SUMO changes lanes with
+ORDINARY_JERK = 0.75  # share of the jerk that this takes, up to which a driver counts as ordinary
+COMFORT_MPS2 = 4.5  # what SUMO's drivers brake with at a light; drivers exceed it in emergencies only
+COMFORT_SHARE = 0.6  # of an actor's limit, where that is less: pedestrians have a comfort level too
+LATERAL_COMFORT_MPS2 = 0.75  # across the lane or the walking direction; SUMO changes lanes with up to 1
 LATERAL_LIMIT_MPS2 = 1.5  # at which the lateral excess saturates
 CLOSE_GAP_M = 2.0  # an extreme proximity: less than half a car
 CLOSING_SCALE_MPS = 15.0  # closing speed at which the closeness term saturates; above, no driver could react
@@ -36,7 +36,7 @@ HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc", "initial_rss
 def jerk_term(accel_mps2: float, previous_accel_mps2: float, limit_mps2: float, step_s: float) -> float:
     """Abrupt control of one adversary, max(|Δa| / dt - ordinary, 0) / (greatest - ordinary), at most 1.
 
-    Choice: the greatest jerk is the actor's own, limit / BUILD_UP_S, and half of it is free: what ordinary drivers do
+    Choice: the greatest jerk is the actor's own, limit / BUILD_UP_S, and three quarters of it are free: what ordinary drivers do
     at a light or behind a leader is not what the cost is to speak of.
 
     Args:

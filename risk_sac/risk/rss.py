@@ -19,9 +19,9 @@ from risk_sac.types import Bools, Floats
 LONGITUDINAL_CAP_M = LATERAL_CAP_M = 50.0
 
 # Choice: the margins that undisturbed traffic leaves, so that the scaled margin is about 1 in it: to a leader
-# 8 to 25 m, to a car beside the ego in the next lane 1.1 m. A lateral scale of 5 m would leave such a car at
+# 8 to 15 m, to a car beside the ego in the next lane 1.1 m. A lateral scale of 5 m would leave such a car at
 # 0.2, below every leader that matters.
-LONGITUDINAL_SCALE_M = 16.0
+LONGITUDINAL_SCALE_M = 12.0
 LATERAL_SCALE_M = 1.1
 SCALED_LOW, SCALED_HIGH = -3.0, 2.0
 
@@ -30,7 +30,7 @@ class RssParameters(NamedTuple):
     """What RSS assumes of both parties. The ego is the one that responds."""
 
     response_s: float = 0.5  # ρ
-    accel_mps2: float = 2.6  # a_max,accel during the response time
+    accel_mps2: float = 1.5  # a_max,accel during the response time; who follows or brakes has no foot on the pedal
     brake_min_mps2: float = 6.0  # b_min: what the responding vehicle can be relied on to do
     brake_max_mps2: float = 6.0  # b_max: the hardest braking of the vehicle ahead that is to be expected
     lateral_accel_mps2: float = 0.5

@@ -15,8 +15,9 @@ MIN_TTC_S = 1.5  # below it a conflict counts as serious in traffic conflict stu
 FREE_TTC_S = 10.0  # what the signal ttc_s says where no collision is in sight
 PEDESTRIAN_GAP_M = 0.5  # what a driver leaves beside a pedestrian at walking pace, at the very least,
 PEDESTRIAN_GAP_PER_MPS = 0.1  # and so much more for each m/s: 1.9 m at 50 km/h
-PEDESTRIAN_SCALE_M = 10.0
-STANDING_MPS = 0.5  # slower than that, an ego counts as standing
+PEDESTRIAN_SCALE_M = 11.0
+STANDING_MPS = 0.5  # slower than that, an ego counts as standing,
+STANDING_M = 10.0  # which is worth as much as this gap
 EMERGENCY_BRAKING_MPS2 = 9.0  # of SUMO's default passenger car, on dry asphalt
 RED_LIGHT_HOLD_S = 1.0
 BRAKING_HOLD_S = 0.5  # braking shorter than that is a correction, not an emergency stop
@@ -111,7 +112,7 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
     - TTC: a second of margin after the ego's reaction, and never under MIN_TTC_S; 1 where no collision is in sight.
     - RSS: the signal is scaled already, and is negative where the situation is dangerous.
     - Pedestrians: a minimum gap that grows with the ego's speed, unless the ego stands and lets them pass; a standing
-      ego has the margin 1 whoever walks past it.
+      ego has the margin of a gap of STANDING_M, whoever walks past it.
     - Red light: the braking that it takes to stop at the line must be within what the car, or the worst friction of
       the ODD, friction · g, can give; the step that crosses the line on red is far beyond it. That is held for
       RED_LIGHT_HOLD_S, not for good, or it would stay the worst margin of the episode. A car that waits at the
@@ -138,8 +139,7 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
     ]
     if "pedestrian" in (odd.dynamic.actor_kinds or ()):
         moving = f"pedestrian_gap_m >= {PEDESTRIAN_GAP_M:g} + {PEDESTRIAN_GAP_PER_MPS:g} * ego_speed_mps"
-        per_mps = PEDESTRIAN_SCALE_M / STANDING_MPS
-        standing = f"{per_mps:g} * ego_speed_mps <= {per_mps * STANDING_MPS:g}"
+        standing = f"{STANDING_M / STANDING_MPS:g} * ego_speed_mps <= {STANDING_M:g}"
         requirements.append(
             Requirement(name="pedestrian_gap", formula=f"{moving} or {standing}", scale=PEDESTRIAN_SCALE_M)
         )
