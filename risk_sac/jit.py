@@ -4,12 +4,32 @@ A step of a small SUMO scene takes some 50 µs, less than a dozen numpy calls on
 keep the measures from costing several times the simulation.
 """
 
+import hashlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+SETTINGS = vars(numba.config)
+HERE = Path(__file__).parent
+COMPILED = ("*.py", "risk/*.py", "verdicts/*.py")  # where compiled functions are
+
+
+def _cache_folder() -> str:
+    """A folder for what these sources compile to.
+
+    numba looks at a function's own file only: after a change in a file whose functions it calls, the function would be
+    taken from disk with the old ones in it.
+    """
+    digest = hashlib.sha256()
+    for source in sorted(path for pattern in COMPILED for path in HERE.glob(pattern)):
+        digest.update(source.read_bytes())
+    return str(Path(SETTINGS["CACHE_DIR"] or HERE / "__pycache__") / digest.hexdigest()[:16])
+
+
+SETTINGS["CACHE_DIR"] = _cache_folder()
 
 
 def compiled(function: Function) -> Function:

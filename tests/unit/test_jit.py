@@ -1,0 +1,45 @@
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import risk_sac.jit
+
+ASK = "from risk_sac.risk.outer import outer; print(outer(1.0))"
+OUTER = """
+from risk_sac.jit import compiled
+from risk_sac.risk.inner import inner
+
+@compiled
+def outer(x):
+    return inner(x)
+"""
+INNER = """
+from risk_sac.jit import compiled
+
+@compiled
+def inner(x):
+    return x + {}
+"""
+
+
+def test_a_change_in_a_called_function_is_not_hidden_by_the_cache(tmp_path: Path) -> None:
+    package = tmp_path / "risk_sac"
+    (package / "risk").mkdir(parents=True)
+    shutil.copy(risk_sac.jit.__file__, package / "jit.py")
+    for module in ("__init__.py", "risk/__init__.py"):
+        (package / module).touch()
+    (package / "risk" / "outer.py").write_text(OUTER)
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    answers = []
+    for added in (1.0, 1.0, 2.0):
+        (package / "risk" / "inner.py").write_text(INNER.format(added))
+        found = subprocess.run(
+            [sys.executable, "-c", ASK], env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert found.returncode == 0, found.stderr
+        answers.append(float(found.stdout))
+    assert answers == [2.0, 2.0, 3.0]
+    assert list(package.rglob("*.nbi"))
