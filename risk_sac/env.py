@@ -216,9 +216,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             raise InfeasibleScene(f"scene of {scene.family!r} breaks {rule}: {dict(scene.values)}", reason=rule)
 
     def _careful_driver_in_conflict(self) -> bool:
-        known = np.concatenate(([True], self._measures.known))
+        seen = np.concatenate(([True], self._measures.assessment.seen))
         path = polyline(*self._sim.ego_path(), float(self._frame.heading_rad[0]))
-        return bool(conflicts_now(self._frame, path, known, self._ground).any())
+        return bool(conflicts_now(self._frame, path, seen, self._ground).any())
 
     def _in_contact(self) -> set[str]:
         """Who touches somebody other than the ego."""
@@ -228,12 +228,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _measure(self, frame: Frame, before: Frame | None) -> Measures:
         assessment = assess(frame, self.problem.rss, self._sight)
-        hidden = self._perception.update(frame, assessment.seen)
-        self._sim.hide(hidden)
-        known = np.array([id_ not in hidden for id_ in frame.ids[1:]])
+        self._sim.believe(self._perception.update(frame, assessment.seen))
         signals = publish(frame, before, assessment.least)
         robustness = self._monitor.update(signals)
-        return Measures(assessment, known, signals, robustness, soft_min(robustness, self._reward.softmin_sharpness))
+        return Measures(assessment, signals, robustness, soft_min(robustness, self._reward.softmin_sharpness))
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""
@@ -257,7 +255,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         evidence = self._evidence()
         striker = evidence.column(other)
         conflict = find_conflict(evidence, striker)
-        visible_for_s = self._perception.known_for(other, frame.time_s)
+        visible_for_s = self._perception.in_view_for(other, frame.time_s)
         simulator_agrees = None if frame.kind[contact.other] == Kind.PEDESTRIAN else self._sim.lists_collision(other)
         handling = Handling(
             teleported=self._teleported,
@@ -300,8 +298,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         )
 
     def _evidence(self) -> Evidence:
-        known = [np.concatenate(([True], measures.known)) for measures in self._trace.measures]
-        return Evidence.of(self._trace.frames, known, self._released_s, self._ground)
+        seen = [np.concatenate(([True], measures.assessment.seen)) for measures in self._trace.measures]
+        return Evidence.of(self._trace.frames, seen, self._released_s, self._ground)
 
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.problem.family.horizon_steps

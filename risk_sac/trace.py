@@ -32,19 +32,17 @@ class Measures:
     """What one frame says about risk, and what the requirements say to it."""
 
     assessment: Assessment
-    known: Bools  # n - 1, whom the ego knows of: in its sight, or remembered
     signals: dict[str, float]
     robustness: Floats  # M, scaled
     soft_min: float
 
 
-PER_OTHER: dict[str, Callable[[Measures], Floats | Bools]] = {
-    "distance_m": lambda measures: measures.assessment.view.gap,
-    "ttc_s": lambda measures: measures.assessment.ttc_s,
-    "rss_longitudinal_m": lambda measures: measures.assessment.rss_longitudinal_m,
-    "rss_lateral_m": lambda measures: measures.assessment.rss_lateral_m,
-    "visible": lambda measures: measures.assessment.seen,
-    "known": lambda measures: measures.known,
+PER_OTHER: dict[str, Callable[[Assessment], Floats | Bools]] = {
+    "distance_m": lambda assessment: assessment.view.gap,
+    "ttc_s": lambda assessment: assessment.ttc_s,
+    "rss_longitudinal_m": lambda assessment: assessment.rss_longitudinal_m,
+    "rss_lateral_m": lambda assessment: assessment.rss_lateral_m,
+    "visible": lambda assessment: assessment.seen,
 }
 
 
@@ -100,7 +98,7 @@ class Trace:
         for name, of in PER_OTHER.items():
             values = np.full((steps, n), np.nan)
             for t, measures in enumerate(self.measures):
-                values[t, columns[t][1:]] = of(measures)
+                values[t, columns[t][1:]] = of(measures.assessment)
             result[name] = values
         size = len(self.actions[0]) if self.actions else 0
         none = np.full((self.released + 1, size), np.nan, dtype=np.float32)

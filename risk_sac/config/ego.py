@@ -19,8 +19,8 @@ class SensorConfig(Settings):
     """Opening angle centred on the ego's heading, rad."""
     occlusion: bool = True
     """Whether vehicles hide what stands behind them."""
-    memory_s: NonNegative = 0.5
-    """How long an actor that went out of sight is still known, s; a tracker coasts over short occlusions."""
+    memory_s: NonNegative = 3.0
+    """How long an actor that went out of sight is still reckoned with, s; it is expected to go on as it did then."""
 
 
 class EgoConfig(Settings):

@@ -63,7 +63,7 @@ class VehicleControl:
         # As long as it takes to get from full acceleration to the braking that bends are approached with.
         self._preview_s = (self.limits.accel_mps2 + self.limits.approach_mps2) / self.limits.jerk_mps3
 
-    def step(self, drive: float, steer: float, room: Room, along: Along) -> VehicleCommand:
+    def step(self, drive: float, steer: float, room: Room, along: Along, intended_mps2: float = 0.0) -> VehicleCommand:
         """One step of 0.1 s.
 
         Args:
@@ -71,10 +71,11 @@ class VehicleControl:
           steer: lateral velocity as a share of the limit, -1 (right) to 1 (left).
           room: what is left of the road on both sides.
           along: where it is on the path it takes if it does not steer.
+          intended_mps2: what its driver would do if nobody commanded it.
         """
         curvature, ahead, cap = self._look_ahead(along)
         before = self.speed_mps
-        self._accelerate(drive, curvature, ahead, cap)
+        self._accelerate(drive, intended_mps2, curvature, ahead, cap)
         self._steer(steer, room, max(self.limits.curvature_per_m - curvature, CORRECTION_PER_M), before)
         return VehicleCommand(self.speed_mps, self.lateral_mps)
 
@@ -91,9 +92,11 @@ class VehicleControl:
         cap = min(self._bends.cap_mps[self._at], self._bends.cap_mps[preview])
         return curvature, max(self._bends.ahead_per_m[self._at], behind), cap
 
-    def _accelerate(self, drive: float, curvature: float, ahead: float, cap_mps: float) -> None:
+    def _accelerate(self, drive: float, intended_mps2: float, curvature: float, ahead: float, cap_mps: float) -> None:
         limits, speed = self.limits, self.speed_mps
-        wanted = drive * (limits.accel_mps2 if drive >= 0 else limits.brake_mps2)
+        # Choice: the less a command says, the more the driver's own intention counts. Doing nothing is then to drive on
+        # as anybody would, and not to run into whoever stands ahead or over a red light.
+        wanted = drive * (limits.accel_mps2 if drive >= 0 else limits.brake_mps2) + (1.0 - abs(drive)) * intended_mps2
         bend = max(curvature * speed**2, min(ahead * speed**2, limits.cornering_mps2))
         across = min(bend + limits.lateral_accel_mps2, SKID * limits.grip_mps2)
         grip = math.sqrt(limits.grip_mps2**2 - across**2)
@@ -198,11 +201,12 @@ class Adversaries:
     def command(self, action: Sequence[float], sim: SumoSimulation) -> None:
         """Sends one joint action, two entries per adversary in the family's order."""
         first, second = action[::2], action[1::2]
+        intended = sim.intended_accel()
         vehicles = {}
         for k, (id_, control) in enumerate(self._vehicles.items()):
             room, along = sim.room(id_), sim.path(id_)
             if room is not None and along is not None:
-                vehicles[id_] = control.step(first[k], second[k], room, along)
+                vehicles[id_] = control.step(first[k], second[k], room, along, intended.get(id_, 0.0))
         k = len(self._vehicles)
         walkers = {
             id_: control.step(first[k + j], second[k + j]) for j, (id_, control) in enumerate(self._pedestrians.items())

@@ -30,6 +30,7 @@ class Driver:
 
     Attributes:
       telling: whether it is held to a speed at present.
+      cruise_mps: the speed it is told to keep where nothing else binds; below 0 SUMO chooses.
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class Driver:
           cruise_mps: the speed it is told to keep where nothing else binds.
         """
         self._vehicle = vehicle
-        self._cruise_mps = cruise_mps
+        self.cruise_mps = cruise_mps
         self._period = round(reaction_s / STEP_S)
         self._emergency_mps2 = emergency_mps2
         self._step = 0
@@ -67,12 +68,12 @@ class Driver:
         """
         speed = float(frame.speed_mps[row])
         if self._step % self._period == 0:
-            self._accel_mps2 = self._decide(row, speed, bodies, along, limit_mps, candidate)
+            self._accel_mps2 = self.decide(row, speed, bodies, along, limit_mps, candidate)
         self._step += 1
         if self._accel_mps2 is None:
             if self.telling:
                 libsumo.vehicle.setSpeedMode(self._vehicle, SAFE_MODE)
-                libsumo.vehicle.setSpeed(self._vehicle, self._cruise_mps)
+                libsumo.vehicle.setSpeed(self._vehicle, self.cruise_mps)
                 self.telling = False
             return
         self.telling = True
@@ -81,7 +82,7 @@ class Driver:
         libsumo.vehicle.setSpeedMode(self._vehicle, EMERGENCY_MODE if accel < -NORMAL_DECEL_MPS2 else SAFE_MODE)
         libsumo.vehicle.setSpeed(self._vehicle, max(speed + accel * STEP_S, 0.0))
 
-    def _decide(
+    def decide(
         self, row: int, speed: float, bodies: Bodies, along: Along, limit_mps: float, candidate: Bools
     ) -> float | None:
         """The acceleration that its model wants for the nearest of the targets; None where none binds."""
@@ -92,7 +93,7 @@ class Driver:
             wanted = min(
                 wanted, self._worth(speed, distance - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0), lead_mps)
             )
-        if wanted >= speed + self._accel * STEP_S or 0.0 <= self._cruise_mps <= wanted:
+        if wanted >= speed + self._accel * STEP_S or 0.0 <= self.cruise_mps <= wanted:
             return None
         return max((wanted - speed) / STEP_S, -self._emergency_mps2)
 

@@ -1,6 +1,8 @@
 """What the ego perceives: a line-of-sight sensor and the memory of who was seen since when."""
 
 import math
+from collections.abc import Mapping
+from typing import NamedTuple
 
 from risk_sac.config import SensorConfig
 from risk_sac.geometry import Sight
@@ -20,50 +22,83 @@ def sight(sensor: SensorConfig | None, visibility_m: float) -> Sight:
 
 
 TIME_TOLERANCE_S = 1e-6  # SUMO counts milliseconds, we add floats
+FLICKER_S = 0.5  # out of sight for no longer, an actor was in view without a break
+
+
+class Glimpse(NamedTuple):
+    """An actor as it was last seen."""
+
+    time_s: float
+    x_m: float
+    y_m: float
+    heading_rad: float
+    vx_mps: float
+    vy_mps: float
+
+    def moved_on(self, time_s: float) -> "Glimpse":
+        """Where it is expected to be, if it keeps its velocity."""
+        ahead_s = time_s - self.time_s
+        return self._replace(time_s=time_s, x_m=self.x_m + ahead_s * self.vx_mps, y_m=self.y_m + ahead_s * self.vy_mps)
+
+
+class Belief(NamedTuple):
+    """What the ego makes of what it does not see."""
+
+    hidden: frozenset[str]  # of whom it knows nothing
+    expected: Mapping[str, Glimpse]  # whom it remembers
+
+
+NOTHING_HIDDEN = Belief(frozenset(), {})
 
 
 class Perception:
-    """Whom the ego knows of, and since when without a break.
+    """Whom the ego sees, and whom it remembers.
 
-    An actor is known while it is in sight and for the sensor's memory afterwards.
+    An actor is remembered for the sensor's memory after it went out of sight, and expected to go on as it did then.
     """
 
     def __init__(self, memory_s: float) -> None:
         self._memory_s = memory_s
-        self._known_since: dict[str, float] = {}
-        self._last_seen: dict[str, float] = {}
+        self._in_view_since: dict[str, float] = {}
+        self._last_seen: dict[str, Glimpse] = {}
 
     def reset(self) -> None:
         """Forgets the previous episode."""
-        self._known_since.clear()
+        self._in_view_since.clear()
         self._last_seen.clear()
 
-    def update(self, frame: Frame, seen: Bools) -> frozenset[str]:
+    def update(self, frame: Frame, seen: Bools) -> Belief:
         """Looks at a frame.
 
         Args:
           frame: all actors, the ego first.
           seen: which of the others are in sight.
-
-        Returns:
-          The ids that must be hidden from the ego's models.
         """
-        now, forgotten = frame.time_s, frame.time_s - self._memory_s - TIME_TOLERANCE_S
-        known_since, last_seen = self._known_since, self._last_seen
-        hidden = []
-        for id_, in_sight in zip(frame.ids[1:], seen.tolist(), strict=True):
+        now, last_seen = frame.time_s, self._last_seen
+        hidden, expected = [], {}
+        for row, (id_, in_sight) in enumerate(zip(frame.ids[1:], seen.tolist(), strict=True), start=1):
+            glimpse = last_seen.get(id_)
+            if glimpse is None or now - glimpse.time_s > FLICKER_S + TIME_TOLERANCE_S:
+                self._in_view_since.pop(id_, None)
             if in_sight:
-                last_seen[id_] = now
-                if id_ not in known_since:
-                    known_since[id_] = now
-            elif last_seen.get(id_, -math.inf) < forgotten:
-                known_since.pop(id_, None)
+                last_seen[id_] = Glimpse(
+                    now,
+                    float(frame.x_m[row]),
+                    float(frame.y_m[row]),
+                    float(frame.heading_rad[row]),
+                    float(frame.vx_mps[row]),
+                    float(frame.vy_mps[row]),
+                )
+                self._in_view_since.setdefault(id_, now)
+            elif glimpse is not None and now - glimpse.time_s <= self._memory_s + TIME_TOLERANCE_S:
+                expected[id_] = glimpse.moved_on(now)
+            else:
                 hidden.append(id_)
-        return frozenset(hidden)
+        return Belief(frozenset(hidden), expected)
 
-    def known_for(self, id_: str, time_s: float) -> float:
-        """How long the ego has known of `id_` without a break, s; 0 if it does not."""
-        since = self._known_since.get(id_)
+    def in_view_for(self, id_: str, time_s: float) -> float:
+        """How long `id_` has been in sight without a break, s; 0 if it is not."""
+        since = self._in_view_since.get(id_)
         return 0.0 if since is None else time_s - since
 
     def ever_seen(self, id_: str) -> bool:

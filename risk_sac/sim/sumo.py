@@ -22,6 +22,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Area, Layout, VehicleStart
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
+from risk_sac.sim.ego import NOTHING_HIDDEN, Belief, Glimpse
 from risk_sac.sim.lookout import Bodies
 from risk_sac.sim.paths import Along, Paths
 from risk_sac.types import STEP_S, Bools, Floats, Frame, Kind, Role, Signal
@@ -33,6 +34,8 @@ PEDESTRIAN_SIZE_M = 0.5
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 GRAVITY_MPS2 = 9.81
 EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
+# So that the commanded lateral speed is the one driven; its limits are those of `risk_sac.sim.control`.
+STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFactor": "1"}
 LISTED_WITHIN_S = 0.3
 NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
@@ -126,9 +129,11 @@ class SumoSimulation:
         for start in self._layout.vehicles:
             if start.role is Role.ADVERSARY and start.id in self._vehicles:
                 libsumo.vehicle.setType(start.id, f"adversary_{start.body}")
+                for name, value in STEERED.items():  # a change of type leaves the lane-change model as it is
+                    libsumo.vehicle.setParameter(start.id, f"laneChangeModel.{name}", value)
                 libsumo.vehicle.setSpeedMode(start.id, 0)
                 libsumo.vehicle.setLaneChangeMode(start.id, 0)
-                self._drivers.pop(start.id)
+                self._released[start.id] = self._drivers.pop(start.id)
 
     def _start_drivers(self) -> None:
         ego, *others = self._vehicles
@@ -136,6 +141,7 @@ class SumoSimulation:
         emergency = min(EGO_EMERGENCY_DECEL_MPS2, grip)
         cruise = {start.id: start.speed_mps for start in self._layout.vehicles if start.role is Role.ADVERSARY}
         self._drivers = {id_: Driver(id_, STEP_S, emergency, cruise.get(id_, OWN_CHOICE_MPS)) for id_ in others}
+        self._released: dict[str, Driver] = {}
         self._ego_driver = Driver(ego, self._ego.reaction_time_s, emergency)
 
     def _load(self, options: list[str]) -> None:
@@ -156,7 +162,7 @@ class SumoSimulation:
             self._insert(start, f"background_{start.body}")
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
         self._layout = layout
-        self._hidden: frozenset[str] = frozenset()
+        self._belief = NOTHING_HIDDEN
         self._signal = layout.signal
         self._walk_signals: list[tuple[Area, int]] = []
         if layout.signal is not None:
@@ -198,18 +204,18 @@ class SumoSimulation:
                 libsumo.vehicle.changeSublane(id_, command.lateral_mps * STEP_S)
         self._walkers.update(walkers)
 
-    def hide(self, hidden: frozenset[str]) -> None:
-        """Makes the ego blind to these actors, and only to these.
+    def believe(self, belief: Belief) -> None:
+        """Makes the ego blind to the hidden actors, and lets it reckon with those it remembers.
 
         Its car-following and junction models, that is: SUMO's lane-change model has no list of vehicles to ignore.
         """
-        if hidden == self._hidden:
+        before, self._belief = self._belief.hidden, belief
+        if belief.hidden == before:
             return
-        vehicles = " ".join(sorted(id_ for id_ in hidden if id_ not in self._walkers))
+        vehicles = " ".join(sorted(id_ for id_ in belief.hidden if id_ not in self._walkers))
         ego = self._vehicles[0]
         libsumo.vehicle.setParameter(ego, "carFollowModel.ignoreIDs", vehicles)
         libsumo.vehicle.setParameter(ego, "junctionModel.ignoreIDs", vehicles)
-        self._hidden = hidden
 
     def step(self) -> Frame:
         """Advances 0.1 s.
@@ -245,19 +251,51 @@ class SumoSimulation:
         """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians near them."""
         frame = self._frame
         bodies = Bodies.of(frame)
-        known = np.array([id_ not in self._hidden for id_ in frame.ids])
-        self._tell(self._ego_driver, 0, bodies, known)
+        known = np.array([id_ not in self._belief.hidden for id_ in frame.ids])
+        self._tell(self._ego_driver, 0, self._as_believed(bodies), known)
         if not self._walkers:
             return
-        pedestrian = ~bodies.vehicle
-        near = np.hypot(*(each[:, None] - each[pedestrian] for each in (frame.x_m, frame.y_m))).min(axis=1) < NEAR_M
+        near = _near_pedestrians(bodies)
         for row, id_ in enumerate(frame.ids):
             driver = self._drivers.get(id_)
             if driver is not None and (near[row] or driver.telling):
-                self._tell(driver, row, bodies, pedestrian)
+                self._tell(driver, row, bodies, ~bodies.vehicle)
+
+    def _as_believed(self, bodies: Bodies) -> Bodies:
+        """The bodies where the ego expects them: of whom it does not see it knows no better."""
+        if not self._belief.expected:
+            return bodies
+        believed = bodies._replace(**{name: getattr(bodies, name).copy() for name in Glimpse._fields[1:]})
+        for id_, glimpse in self._belief.expected.items():
+            row = self._frame.ids.index(id_)
+            for name in Glimpse._fields[1:]:
+                getattr(believed, name)[row] = getattr(glimpse, name)
+        return believed
 
     def _tell(self, driver: Driver, row: int, bodies: Bodies, candidates: Bools) -> None:
         driver.tell(row, self._frame, bodies, self.along(self._frame.ids[row]), self._limit_mps, candidates)
+
+    def intended_accel(self) -> dict[str, float]:
+        """What the drivers of the released vehicles would do if nobody commanded them, m/s².
+
+        They keep the speed they started with, or go slower where SUMO's models or a pedestrian in their way want that.
+        SUMO's wish is that of the step before, which is the newest it tells.
+        """
+        frame, bodies = self._frame, Bodies.of(self._frame)
+        near = _near_pedestrians(bodies)
+        found = {}
+        for row, id_ in enumerate(frame.ids):
+            driver = self._released.get(id_)
+            if driver is None:
+                continue
+            speed, accel = float(frame.speed_mps[row]), float(frame.accel_mps2[row])
+            models = (libsumo.vehicle.getSpeedWithoutTraCI(id_) - speed) / STEP_S + accel
+            wanted = min(models, max(driver.cruise_mps - speed, 0.0) / STEP_S)
+            told = None
+            if near[row]:
+                told = driver.decide(row, speed, bodies, self.along(id_), self._limit_mps, ~bodies.vehicle)
+            found[id_] = wanted if told is None else min(wanted, told)
+        return found
 
     def along(self, vehicle: str) -> Along:
         """Where a vehicle is on its path."""
@@ -396,6 +434,15 @@ class SumoSimulation:
             return Signal.NONE, math.inf
         _, _, distance_m, state = ahead[0]
         return COLOURS.get(state.lower(), Signal.NONE), distance_m
+
+
+def _near_pedestrians(bodies: Bodies) -> Bools:
+    """Who has a pedestrian within `NEAR_M`."""
+    if bodies.vehicle.all():
+        return np.zeros(len(bodies.vehicle), dtype=np.bool_)
+    away = (each[:, None] - each[~bodies.vehicle] for each in (bodies.x_m, bodies.y_m))
+    near: Bools = np.hypot(*away).min(axis=1) < NEAR_M
+    return near
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
