@@ -19,7 +19,7 @@ from risk_sac.geometry import overlapping_pairs
 from risk_sac.observation import LIMIT, Encoder
 from risk_sac.problem import Problem
 from risk_sac.risk.publish import assess, publish, worst_rss_margin
-from risk_sac.risk.realism import broken_hard_rule, soft_cost
+from risk_sac.risk.realism import broken_hard_rule, lateral_accel, soft_cost
 from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S
@@ -131,8 +131,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         valid = collision is not None and collision.valid
         reward = risk_reward(
             self._measures.signals["ttc_s"],
-            self._measures.signals["rss_longitudinal_m"],
-            self._measures.signals["rss_lateral_m"],
+            self._measures.signals["rss_margin"],
             float(valid),
             float(collision is not None and not valid),
             self._reward,
@@ -231,7 +230,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._sim.believe(self._perception.update(frame, assessment.seen))
         signals = publish(frame, before, assessment.least)
         robustness = self._monitor.update(signals)
-        return Measures(assessment, signals, robustness, soft_min(robustness, self._reward.softmin_sharpness))
+        least = soft_min(robustness[self._monitor.shapes], self._reward.softmin_sharpness)
+        return Measures(assessment, signals, robustness, least)
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""
@@ -242,6 +242,14 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return soft_cost(
             frame.accel_mps2[adversary],
             before.accel_mps2[adversary],
+            lateral_accel(
+                frame.lateral_mps[adversary],
+                before.lateral_mps[adversary],
+                frame.heading_rad[adversary] - before.heading_rad[adversary],
+                frame.speed_mps[adversary],
+                frame.kind[adversary] == Kind.PEDESTRIAN,
+                STEP_S,
+            ),
             self._adversaries.accel_limits(frame),
             now.assessment.view.gap[others],
             previous.assessment.view.gap[others],

@@ -15,11 +15,12 @@ import numpy as np
 
 from risk_sac.errors import NotFinite
 from risk_sac.types import Collision, EpisodeRecord, Floats, Outcome, RunMetrics
+from risk_sac.verdicts.distinct import DistinctFailures
+from risk_sac.verdicts.distinct import distinct_failures as distinct_failures
 
 WINDOW = 100  # episodes of the sliding ECR
 NORMAL_QUANTILE = 1.959963984540054  # two-sided 95 %
 RESAMPLES = 10_000
-DISTINCT = 0.1  # least distance, as OFD measures it, of two failures that are not the same one again
 
 
 class Feature(NamedTuple):
@@ -159,41 +160,6 @@ def outcome_dispersion(features: Floats) -> float | None:
     total = math.fsum(_distances(features[:row], features[row]) for row in range(1, count))
     pairs: float = count * (count - 1) / 2
     return total / pairs / math.sqrt(width)
-
-
-class DistinctFailures:
-    """Which failures are new, decided one by one.
-
-    Choice: a failure is distinct if no earlier distinct one with the same striker, and the same zones on both bodies,
-    has outcome features nearer than `DISTINCT`. A policy that repeats its one way to make the ego fail is then paid
-    for that way once.
-    """
-
-    def __init__(self) -> None:
-        self.count = 0
-        self._found: dict[tuple[str, str, str], list[Floats]] = {}
-
-    def add(self, collision: Collision) -> bool:
-        """Whether a failure is distinct from all before it; it then counts among them.
-
-        Raises:
-            NotFinite: an outcome feature is NaN.
-        """
-        features = outcome_features(collision)
-        alike = self._found.setdefault((collision.other_id, collision.ego_zone, collision.other_zone), [])
-        if alike:
-            nearest = float(np.sqrt(((np.array(alike) - features) ** 2).mean(axis=1)).min())
-            if nearest < DISTINCT:
-                return False
-        alike.append(features)
-        self.count += 1
-        return True
-
-
-def distinct_failures(collisions: Sequence[Collision]) -> tuple[int, ...]:
-    """Positions of the distinct ones among failures in order of occurrence; see `DistinctFailures`."""
-    found = DistinctFailures()
-    return tuple(position for position, collision in enumerate(collisions) if found.add(collision))
 
 
 def results_digest(records: Sequence[EpisodeRecord]) -> str:

@@ -15,6 +15,8 @@ from risk_sac.scenario.odd import intersect, narrow, requirements_from_odd
 from risk_sac.scenario.space import SceneSpace
 from risk_sac.types import STEP_S
 
+RSS_BRAKING_MPS2 = 6.0  # a firm braking: a driver's whose car would stop by 8 and more
+
 
 @dataclass(frozen=True, slots=True)
 class Problem:
@@ -77,11 +79,19 @@ class Problem:
 
 
 def _rss_parameters(odd: Odd, ego: EgoConfig) -> RssParameters:
-    """RSS under the ODD: the ego's delay, the worst grip for its own braking, the others' hardest braking."""
-    limits = limits_from_odd(odd, friction=1.0)
-    grip = odd.environment.friction.low * GRAVITY_MPS2 if odd.environment.friction else GRAVITY_MPS2
+    """RSS under the ODD: the ego's delay, and the braking that a driver can be relied on to do, and has to expect.
+
+    Choice: both are RSS_BRAKING_MPS2 or the worst grip of the road that all share. SUMO's drivers keep a headway of 1 s
+    and trust the one ahead to brake no harder than they do themselves; that they stop by 4.5 m/s² behind a
+    leader who does by 8 would make all of ordinary following dangerous.
+    """
+    friction = odd.environment.friction
+    limits = limits_from_odd(odd, friction.low if friction else 1.0)
+    grip = friction.low * GRAVITY_MPS2 if friction else GRAVITY_MPS2
     return RssParameters(
-        response_s=ego.reaction_time_s, brake_min_mps2=min(4.5, grip), brake_max_mps2=limits.brake_mps2
+        response_s=ego.reaction_time_s,
+        brake_min_mps2=min(RSS_BRAKING_MPS2, grip),
+        brake_max_mps2=min(RSS_BRAKING_MPS2, limits.brake_mps2),
     )
 
 

@@ -26,6 +26,8 @@ class Requirement(Settings):
     formula: Annotated[str, Field(min_length=1, max_length=500)]
     scale: Positive
     """Physical size of a clear margin, in the formula's unit; robustness is divided by it."""
+    shapes: bool = True
+    """Whether it counts in the soft minimum and so in the reward's shaping; if not, it is only monitored."""
 
 
 class Budget(Settings):

@@ -3,19 +3,26 @@
 C_real(s, a) = C_hard(s, a) + C_soft(s, a)                                           (5)
 
 Choice: C_hard acts on the whole episode. A scene that breaks one of its rules is rejected before the
-first step, so what remains during an episode is C_soft, in [0, 1].
+first step, so what remains during an episode is C_soft, in [0, 1]. It speaks of what adversaries do, and each term
+of it leaves free what an ordinary driver does: undisturbed traffic costs about 0, or a bound on the cost
+would mean nothing.
 
 Source: RISK-SAC, Sec. III-B.
 """
 
 from typing import Literal
 
-from risk_sac.jit import compiled
-from risk_sac.types import Floats
+import numpy as np
 
-JERK_SCALE_MPS3 = 20.0  # at which the jerk term saturates: full braking from rest to 9 m/s² in about 0.5 s
-COMFORT_MPS2 = 3.0  # about what adaptive cruise control keeps to; drivers exceed it in emergencies only
-COMFORT_SHARE = 0.5  # of an actor's limit, where that is less: pedestrians have a comfort level too
+from risk_sac.jit import compiled
+from risk_sac.types import Bools, Floats
+
+BUILD_UP_S = 0.4  # in which an emergency braking builds up from nothing to an actor's limit
+ORDINARY_JERK = 0.75  # share of the jerk that this takes, up to which a driver counts as ordinary
+COMFORT_MPS2 = 4.5  # what SUMO's drivers brake with at a light; drivers exceed it in emergencies only
+COMFORT_SHARE = 0.6  # of an actor's limit, where that is less: pedestrians have a comfort level too
+LATERAL_COMFORT_MPS2 = 0.75  # across the lane or the walking direction; SUMO changes lanes with up to 1
+LATERAL_LIMIT_MPS2 = 1.5  # at which the lateral excess saturates
 CLOSE_GAP_M = 2.0  # an extreme proximity: less than half a car
 CLOSING_SCALE_MPS = 15.0  # closing speed at which the closeness term saturates; above, no driver could react
 
@@ -26,21 +33,40 @@ HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc", "initial_rss
 
 
 @compiled
-def jerk_term(accel_mps2: float, previous_accel_mps2: float, step_s: float) -> float:
-    """Abrupt control of one adversary, min(|Δa| / (dt · scale), 1)."""
-    return min(abs(accel_mps2 - previous_accel_mps2) / (step_s * JERK_SCALE_MPS3), 1.0)
+def jerk_term(accel_mps2: float, previous_accel_mps2: float, limit_mps2: float, step_s: float) -> float:
+    """Abrupt control of one adversary, max(|Δa| / dt - ordinary, 0) / (greatest - ordinary), at most 1.
 
-
-@compiled
-def acceleration_term(accel_mps2: float, limit_mps2: float) -> float:
-    """Excess acceleration of one adversary, max(|a| - comfort, 0) / (limit - comfort), at most 1.
+    Choice: the greatest jerk is the actor's own, limit / BUILD_UP_S, and three quarters of it are free: what ordinary drivers do
+    at a light or behind a leader is not what the cost is to speak of.
 
     Args:
       accel_mps2: its acceleration.
+      previous_accel_mps2: in the step before.
+      limit_mps2: greatest absolute acceleration that it is capable of, above 0.
+      step_s: dt.
+    """
+    greatest = limit_mps2 / BUILD_UP_S
+    ordinary = ORDINARY_JERK * greatest
+    jerk = abs(accel_mps2 - previous_accel_mps2) / step_s
+    return min(max(jerk - ordinary, 0.0) / (greatest - ordinary), 1.0)
+
+
+@compiled
+def acceleration_term(accel_mps2: float, lateral_accel_mps2: float, limit_mps2: float) -> float:
+    """Excess acceleration of one adversary, the larger of that along and that across its way.
+
+    Each is max(|a| - comfort, 0) / (limit - comfort), at most 1. Choice: across counts too, or a car that swings
+    from side to side would cost nothing.
+
+    Args:
+      accel_mps2: its acceleration.
+      lateral_accel_mps2: across its lane, or across a pedestrian's walking direction.
       limit_mps2: greatest absolute acceleration that it is capable of, above 0.
     """
     comfort = min(COMFORT_MPS2, COMFORT_SHARE * limit_mps2)
-    return min(max(abs(accel_mps2) - comfort, 0.0) / (limit_mps2 - comfort), 1.0)
+    along = max(abs(accel_mps2) - comfort, 0.0) / (limit_mps2 - comfort)
+    across = max(abs(lateral_accel_mps2) - LATERAL_COMFORT_MPS2, 0.0) / (LATERAL_LIMIT_MPS2 - LATERAL_COMFORT_MPS2)
+    return min(max(along, across), 1.0)
 
 
 @compiled
@@ -60,9 +86,19 @@ def closeness_term(gap_m: float, previous_gap_m: float, step_s: float) -> float:
 
 
 @compiled
+def lateral_accel(
+    lateral_mps: Floats, previous_lateral_mps: Floats, turn_rad: Floats, speed_mps: Floats, walks: Bools, step_s: float
+) -> Floats:
+    """Acceleration across the lane of vehicles, and across the walking direction of pedestrians, `n`, m/s²."""
+    turn = np.arctan2(np.sin(turn_rad), np.cos(turn_rad))
+    return np.where(walks, speed_mps * turn, lateral_mps - previous_lateral_mps) / step_s
+
+
+@compiled
 def soft_cost(
     accel_mps2: Floats,
     previous_accel_mps2: Floats,
+    lateral_accel_mps2: Floats,
     limit_mps2: Floats,
     gap_m: Floats,
     previous_gap_m: Floats,
@@ -78,6 +114,7 @@ def soft_cost(
     Args:
       accel_mps2: `n`, acceleration of each adversary in this step.
       previous_accel_mps2: `n`, in the step before.
+      lateral_accel_mps2: `n`, across the lane of a vehicle or the walking direction of a pedestrian.
       limit_mps2: `n`, greatest absolute acceleration of each.
       gap_m: `n`, distance between each adversary's body and the ego's.
       previous_gap_m: `n`, one step before.
@@ -88,8 +125,8 @@ def soft_cost(
     """
     jerk = excess = closeness = 0.0
     for k in range(len(accel_mps2)):
-        jerk = max(jerk, jerk_term(accel_mps2[k], previous_accel_mps2[k], step_s))
-        excess = max(excess, acceleration_term(accel_mps2[k], limit_mps2[k]))
+        jerk = max(jerk, jerk_term(accel_mps2[k], previous_accel_mps2[k], limit_mps2[k], step_s))
+        excess = max(excess, acceleration_term(accel_mps2[k], lateral_accel_mps2[k], limit_mps2[k]))
         closeness = max(closeness, closeness_term(gap_m[k], previous_gap_m[k], step_s))
     return (jerk + excess + closeness) / 3.0
 

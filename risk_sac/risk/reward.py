@@ -54,23 +54,21 @@ def near_miss(ttc_s: Value, weight: float, scale_s: float) -> Value:
     return weight * decay
 
 
-def rss_violation(longitudinal_m: Value, lateral_m: Value, weight: float) -> Value:
+def rss_violation(margin: Value, weight: float) -> Value:
     """Indicator that a situation is dangerous in the sense of RSS, the third term of R_risk in (1).
 
     Args:
-      longitudinal_m: longitudinal RSS margin, m; below 0 means violated.
-      lateral_m: lateral RSS margin, m.
-      weight: reward where both are violated; either alone is no danger.
+      margin: the larger of the longitudinal and the lateral RSS margin, scaled; below 0 both are violated.
+      weight: reward where they are.
 
     Source: Shalev-Shwartz et al., "On a formal model of safe and scalable self-driving cars", 2017.
     """
-    return weight * ((longitudinal_m < 0) & (lateral_m < 0))  # type: ignore[return-value]  # numpy's stubs lose float64
+    return weight * (margin < 0)  # type: ignore[return-value]  # numpy's stubs lose float64
 
 
 def risk_reward(
     ttc_s: Value,
-    rss_longitudinal_m: Value,
-    rss_lateral_m: Value,
+    rss_margin: Value,
     valid_collision: Value,
     degenerate_collision: Value,
     config: RewardConfig,
@@ -81,8 +79,7 @@ def risk_reward(
 
     Args:
       ttc_s: time to collision after the step, s.
-      rss_longitudinal_m: longitudinal RSS margin after the step, m.
-      rss_lateral_m: lateral RSS margin after the step, m.
+      rss_margin: smallest RSS margin after the step, scaled.
       valid_collision: 1 if the step ended in a valid collision.
       degenerate_collision: 1 if it ended in contact that a validity rule refuses.
       config: sizes of the four terms.
@@ -90,9 +87,7 @@ def risk_reward(
     sparse = collision_bonus(valid_collision, config.valid_collision) - degenerate_penalty(
         degenerate_collision, config.degenerate_collision
     )
-    dense = near_miss(ttc_s, config.ttc_weight, config.ttc_scale_s) + rss_violation(
-        rss_longitudinal_m, rss_lateral_m, config.rss_weight
-    )
+    dense = near_miss(ttc_s, config.ttc_weight, config.ttc_scale_s) + rss_violation(rss_margin, config.rss_weight)
     return sparse + dense
 
 

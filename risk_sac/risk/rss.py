@@ -1,4 +1,8 @@
-"""Responsibility-Sensitive Safety distances and margins.
+"""Responsibility-Sensitive Safety distances, and one margin for each actor.
+
+Choice: RSS gives two distances along a lane; here they are taken along the ego's axes, whatever the other's
+heading. What is along one body's axis is across the other's, so that braking and acceleration are blended by
+the angle between them: cross traffic stops by its brakes and not by its steering.
 
 Source: Shalev-Shwartz, Shammah, Shashua 2017, "On a Formal Model of Safe and Scalable Self-driving
 Cars", Definitions 1 (same direction), 2 (opposite directions) and 6 (lateral).
@@ -10,93 +14,146 @@ import numpy as np
 
 from risk_sac.geometry import RelativeView
 from risk_sac.jit import compiled
-from risk_sac.types import Floats
+from risk_sac.types import Bools, Floats
 
-LONGITUDINAL_CAP_M = 50.0
-LATERAL_CAP_M = 5.0
+LONGITUDINAL_CAP_M = LATERAL_CAP_M = 50.0
+
+# Choice: the margins that undisturbed traffic leaves, so that the scaled margin is about 1 in it: to a leader
+# 8 to 15 m, to a car beside the ego in the next lane 1.1 m. A lateral scale of 5 m would leave such a car at
+# 0.2, below every leader that matters.
+LONGITUDINAL_SCALE_M = 12.0
+LATERAL_SCALE_M = 1.1
+SCALED_LOW, SCALED_HIGH = -3.0, 2.0
 
 
 class RssParameters(NamedTuple):
     """What RSS assumes of both parties. The ego is the one that responds."""
 
     response_s: float = 0.5  # ρ
-    accel_mps2: float = 2.6  # a_max,accel during the response time
-    brake_min_mps2: float = 4.5  # b_min: what the responding vehicle can be relied on to do
-    brake_max_mps2: float = 8.0  # b_max: the hardest braking of the vehicle ahead
+    accel_mps2: float = 1.5  # a_max,accel during the response time; who follows or brakes has no foot on the pedal
+    brake_min_mps2: float = 6.0  # b_min: what the responding vehicle can be relied on to do
+    brake_max_mps2: float = 6.0  # b_max: the hardest braking of the vehicle ahead that is to be expected
     lateral_accel_mps2: float = 0.5
-    lateral_brake_mps2: float = 1.0
+    lateral_brake_mps2: float = 2.0
     fluctuation_m: float = 0.1  # μ, lateral noise that is no manoeuvre
+    walk_accel_mps2: float = 0.5  # a pedestrian's, in any direction
+    walk_brake_mps2: float = 2.0
 
 
 @compiled
-def same_direction(rear_mps: float, front_mps: float, parameters: RssParameters) -> float:
+def stopping(speed_mps: float, response_s: float, accel_mps2: float, brake_mps2: float) -> float:
+    """Way until standstill, (v + v_ρ) ρ/2 + v_ρ |v_ρ| / (2 b) with v_ρ = v + ρ a, m; negative for who moves away.
+
+    Args:
+      speed_mps: v, towards the other.
+      response_s: ρ, in which it accelerates.
+      accel_mps2: a.
+      brake_mps2: b, with which it brakes thereafter.
+    """
+    after = speed_mps + response_s * accel_mps2
+    return (speed_mps + after) * (response_s / 2) + after * abs(after) / (2 * brake_mps2)
+
+
+@compiled
+def same_direction(rear_m: float, front_mps: float, brake_max_mps2: float) -> float:
     """d_min = [v_r ρ + a ρ²/2 + (v_r + ρ a)² / (2 b_min) − v_f² / (2 b_max)]_+ , m  (Def. 1).
 
     Args:
-      rear_mps: v_r, speed of the vehicle behind.
+      rear_m: way of the vehicle behind until it stands, the first three terms; see `stopping`.
       front_mps: v_f, speed of the one ahead.
-      parameters: see `RssParameters`.
+      brake_max_mps2: b_max, with which that one may brake.
     """
-    p = parameters
-    after = rear_mps + p.response_s * p.accel_mps2
-    distance = (
-        (rear_mps + after) * (p.response_s / 2)
-        + after * after / (2 * p.brake_min_mps2)
-        - front_mps * front_mps / (2 * p.brake_max_mps2)
-    )
-    return max(distance, 0.0)
+    return max(rear_m - front_mps * front_mps / (2 * brake_max_mps2), 0.0)
 
 
 @compiled
-def opposite_direction(ego_mps: float, other_mps: float, parameters: RssParameters) -> float:
-    """d_min: both respond after ρ and brake with b_min; speeds are magnitudes, m  (Def. 2)."""
-    p = parameters
-    ego_after = ego_mps + p.response_s * p.accel_mps2
-    other_after = other_mps + p.response_s * p.accel_mps2
-    return (ego_mps + ego_after + other_mps + other_after) * (p.response_s / 2) + (
-        ego_after * ego_after + other_after * other_after
-    ) / (2 * p.brake_min_mps2)
-
-
-@compiled
-def lateral(closing_ego_mps: float, closing_other_mps: float, parameters: RssParameters) -> float:
-    """d_min = μ + [Σ_i (v_i + v_i,ρ) ρ/2 + v_i,ρ² / (2 b_lat)]_+ , m  (Def. 6).
+def approaching(ego_m: float, other_m: float) -> float:
+    """d_min where both respond and brake, [Σ_i stopping_i]_+ , m  (Def. 2, and Def. 6 without μ).
 
     Args:
-      closing_ego_mps: the ego's lateral speed towards the other; negative when it moves away.
-      closing_other_mps: the other's towards the ego.
-      parameters: see `RssParameters`.
+      ego_m: way of the ego towards the other until it stands, see `stopping`.
+      other_m: way of the other towards the ego.
     """
-    p = parameters
-    total = 0.0
-    for closing in (closing_ego_mps, closing_other_mps):
-        after = closing + p.response_s * p.lateral_accel_mps2
-        total += (closing + after) * (p.response_s / 2) + after * abs(after) / (2 * p.lateral_brake_mps2)
-    return p.fluctuation_m + max(total, 0.0)
+    return max(ego_m + other_m, 0.0)
+
+
+class Margins(NamedTuple):
+    """RSS margins to each of the `n` others."""
+
+    longitudinal_m: Floats  # negative where violated
+    lateral_m: Floats
+    scaled: Floats  # the larger of the two, each divided by its scale; negative where the situation is dangerous
 
 
 @compiled
-def margins(view: RelativeView, parameters: RssParameters) -> tuple[Floats, Floats]:
-    """Longitudinal and lateral RSS margin to each other actor, two arrays `n`, m.
+def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Margins:
+    """RSS margins to each other actor.
 
-    A margin is the distance between the bodies along one of the ego's axes minus the RSS distance; the
-    situation is dangerous where both are negative. An actor alongside has no longitudinal distance.
+    A margin is the distance between the bodies along an axis minus the RSS distance along it; bodies that
+    overlap along the axis have a negative distance, so that the margin goes on falling. The situation is dangerous
+    where both margins are negative, that is where the larger of the two is: one signal, continuous in position
+    and velocity.
+
+    Choice: the lateral margin is the larger of that across the ego's course and that across the other's, for bodies
+    that stay clear along any direction do not touch. Otherwise an oncoming car that passes a turning ego
+    would count as a danger, for it moves across the ego's axes all the way. A pedestrian has no course worth
+    relying on.
+
+    Choice: the lateral scale grows to the longitudinal one with the angle between the courses, since what is
+    across the ego's course is along that of cross traffic, and as fast.
+
+    Args:
+      view: the scene.
+      walks: `n`; who is a pedestrian.
+      parameters: see `RssParameters`.
     """
+    p = parameters
     n = len(view.x)
-    longitudinal, sideways = np.empty(n), np.empty(n)
+    longitudinal, sideways, scaled = np.empty(n), np.empty(n), np.empty(n)
     ego = max(view.ego_vx, 0.0)
+    ego_way = stopping(ego, p.response_s, p.accel_mps2, p.brake_min_mps2)
     for i in range(n):
         along, across = view.vx[i] + view.ego_vx, view.vy[i] + view.ego_vy  # the other's velocity in the ego's axes
+        cos, sin = abs(view.cos[i]), abs(view.sin[i])
+        accel_x, brake_x, accel_y, brake_y, scale = (
+            p.accel_mps2 * cos + p.lateral_accel_mps2 * sin,
+            p.brake_min_mps2 * cos + p.lateral_brake_mps2 * sin,
+            p.accel_mps2 * sin + p.lateral_accel_mps2 * cos,
+            p.brake_min_mps2 * sin + p.lateral_brake_mps2 * cos,
+            LONGITUDINAL_SCALE_M * sin + LATERAL_SCALE_M * cos,
+        )
+        if walks[i]:
+            accel_x = accel_y = p.walk_accel_mps2
+            brake_x = brake_y = p.walk_brake_mps2
+            scale = LATERAL_SCALE_M
+
         if view.x[i] < 0.0:
-            distance = same_direction(max(along, 0.0), ego, parameters)
+            way = stopping(max(along, 0.0), p.response_s, accel_x, brake_x)
+            distance = same_direction(way, ego, p.brake_max_mps2)
         elif along < 0.0:
-            distance = opposite_direction(ego, -along, parameters)
+            distance = approaching(ego_way, stopping(-along, p.response_s, accel_x, brake_x))
         else:
-            distance = same_direction(ego, along, parameters)
-        clear = max(abs(view.x[i]) - view.reach[0, i], 0.0)
-        longitudinal[i] = min(max(clear - distance, -LONGITUDINAL_CAP_M), LONGITUDINAL_CAP_M)
-        side = np.sign(view.y[i])
-        distance = lateral(side * view.ego_vy, -side * across, parameters)
-        clear = max(abs(view.y[i]) - view.reach[1, i], 0.0)
-        sideways[i] = min(max(clear - distance, -LATERAL_CAP_M), LATERAL_CAP_M)
-    return longitudinal, sideways
+            distance = same_direction(ego_way, along, p.brake_max_mps2)
+        clear = abs(view.x[i]) - view.reach[0, i] - distance
+        longitudinal[i] = min(max(clear, -LONGITUDINAL_CAP_M), LONGITUDINAL_CAP_M)
+
+        side = 1.0 if view.y[i] >= 0.0 else -1.0
+        distance = approaching(
+            stopping(side * view.ego_vy, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2),
+            stopping(-side * across, p.response_s, accel_y, brake_y),
+        )
+        clear = abs(view.y[i]) - view.reach[1, i] - distance
+        if not walks[i]:
+            side = 1.0 if view.separation[3, i] >= 0.0 else -1.0
+            ego_closing = side * (view.ego_vy * view.cos[i] - view.ego_vx * view.sin[i])
+            closing = side * (along * view.sin[i] - across * view.cos[i])
+            distance = approaching(
+                stopping(ego_closing, p.response_s, accel_y, brake_y),
+                stopping(closing, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2),
+            )
+            clear = max(clear, abs(view.separation[3, i]) - view.reach[3, i] - distance)
+        clear -= p.fluctuation_m
+        sideways[i] = min(max(clear, -LATERAL_CAP_M), LATERAL_CAP_M)
+        larger = max(longitudinal[i] / LONGITUDINAL_SCALE_M, sideways[i] / scale)
+        scaled[i] = min(max(larger, SCALED_LOW), SCALED_HIGH)
+    return Margins(longitudinal, sideways, scaled)

@@ -18,16 +18,23 @@ class SignalInfo:
 
 SIGNALS: dict[str, SignalInfo] = {
     "ttc_s": SignalInfo("s", 0.0, 10.0, "smallest time to collision of the ego with any actor"),
-    "rss_longitudinal_m": SignalInfo(
-        "m", -50.0, 50.0, "smallest longitudinal RSS margin to an actor inside the lateral RSS distance"
+    "rss_margin": SignalInfo(
+        "1",
+        -3.0,
+        2.0,
+        "smallest RSS margin to any actor, about 1 in undisturbed traffic: of the longitudinal and the lateral margin, "
+        "each in its scale, the larger; negative where the situation is dangerous",
     ),
-    "rss_lateral_m": SignalInfo(
-        "m", -5.0, 5.0, "smallest lateral RSS margin to an actor inside the longitudinal RSS distance"
-    ),
-    "pedestrian_gap_m": SignalInfo("m", 0.0, 50.0, "distance from the ego's body to the nearest pedestrian"),
+    "pedestrian_gap_m": SignalInfo("m", 0.0, 30.0, "distance from the ego's body to the nearest pedestrian"),
     "vehicle_gap_m": SignalInfo("m", 0.0, 50.0, "distance from the ego's body to the nearest vehicle"),
     "red_light_m": SignalInfo(
         "m", -5.0, 50.0, "distance to the stop line while its signal is red; negative once it was crossed on red"
+    ),
+    "red_light_braking_mps2": SignalInfo(
+        "m/s²",
+        0.0,
+        12.0,
+        "braking that stops the ego at a red signal's line; 12 once it was crossed on red, 0 without one",
     ),
     "ego_speed_mps": SignalInfo("m/s", 0.0, 60.0, "speed of the ego"),
     "ego_braking_mps2": SignalInfo("m/s²", 0.0, 12.0, "deceleration of the ego; 0 while it accelerates"),

@@ -67,6 +67,7 @@ class Monitor:
           FormulaError: naming the requirement, the position and the reason.
         """
         self.names = tuple(requirement.name for requirement in requirements)
+        self.shapes = np.array([requirement.shapes for requirement in requirements])  # M; which are part of φ
         self._per_scale = np.array([1.0 / requirement.scale for requirement in requirements])
         self._slots: dict[str, int] = {}  # text of a sub-formula -> where its value lies
         self._values: list[float] = []

@@ -12,8 +12,12 @@ from risk_sac.scenario.space import Parameter, SceneSpace
 
 GRAVITY_MPS2 = 9.81
 MIN_TTC_S = 1.5  # below it a conflict counts as serious in traffic conflict studies
-PEDESTRIAN_GAP_M = 1.0  # what a driver leaves beside a pedestrian at the very least
-STANDING_MPS = 0.5  # slower than that, an ego counts as standing
+FREE_TTC_S = 10.0  # what the signal ttc_s says where no collision is in sight
+PEDESTRIAN_GAP_M = 0.5  # what a driver leaves beside a pedestrian at walking pace, at the very least,
+PEDESTRIAN_GAP_PER_MPS = 0.1  # and so much more for each m/s: 1.9 m at 50 km/h
+PEDESTRIAN_SCALE_M = 11.0
+STANDING_MPS = 0.5  # slower than that, an ego counts as standing,
+STANDING_M = 10.0  # which is worth as much as this gap
 EMERGENCY_BRAKING_MPS2 = 9.0  # of SUMO's default passenger car, on dry asphalt
 RED_LIGHT_HOLD_S = 1.0
 BRAKING_HOLD_S = 0.5  # braking shorter than that is a correction, not an emergency stop
@@ -116,14 +120,19 @@ def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
 def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement, ...]:
     """The STL requirements that an ego has to meet in this ODD, thresholds included.
 
-    - TTC: a second of margin after the ego's reaction, and never under MIN_TTC_S.
-    - RSS: the signals only look at actors whose other margin is used up already, so each says by itself whether a
-      situation is dangerous; one has its slope along the lane, the other across it.
-    - Pedestrians: a minimum gap, unless the ego stands and lets them pass.
-    - Red light: the signal is the distance to the line, and negative only in the step that crosses it; that is held
-      for RED_LIGHT_HOLD_S, not for good, or a legal stop near the line would stay the worst margin of the episode.
-    - Braking: BRAKING_HOLD_S on end at nine tenths of what the car, or the worst friction of the ODD, friction · g,
-      can give means that the ego had no reserve left.
+    Choice: each scale is what undisturbed traffic leaves, so that its robustness is about 1 there and falls without
+    a clip as danger grows; else the one with the smallest scale would be the soft minimum whatever happens.
+
+    - TTC: a second of margin after the ego's reaction, and never under MIN_TTC_S; 1 where no collision is in sight.
+    - RSS: the signal is scaled already, and is negative where the situation is dangerous.
+    - Pedestrians: a minimum gap that grows with the ego's speed, unless the ego stands and lets them pass; a standing
+      ego has the margin of a gap of STANDING_M, whoever walks past it.
+    - Red light: the braking that it takes to stop at the line must be within what the car, or the worst friction of
+      the ODD, friction · g, can give; the step that crosses the line on red is far beyond it. That is held for
+      RED_LIGHT_HOLD_S, not for good, or it would stay the worst margin of the episode. A car that waits at the
+      line needs no braking and has the margin 1, however near it stopped.
+    - Braking: BRAKING_HOLD_S on end at nine tenths of what car and road can give means that the ego had no reserve
+      left. It is flat until then, and so no part of φ.
 
     Args:
       odd: complete, as `intersect` returns it.
@@ -131,24 +140,29 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
 
     Returns:
       TTC, RSS and braking always; pedestrians and red light where the ODD has them.
+
+    Source: Hayward 1972 for TTC; the scales are medians over episodes that nobody disturbs.
     """
     ttc_s = max(MIN_TTC_S, reaction_time_s + 1.0)
     friction = odd.environment.friction
     grip_mps2 = EMERGENCY_BRAKING_MPS2 if friction is None else friction.low * GRAVITY_MPS2
-    braking_mps2 = round(0.9 * min(grip_mps2, EMERGENCY_BRAKING_MPS2), 2)
+    grip_mps2 = round(min(grip_mps2, EMERGENCY_BRAKING_MPS2), 2)
     requirements = [
-        Requirement(name="safe_ttc", formula=f"ttc_s >= {ttc_s:g}", scale=ttc_s),
-        Requirement(name="rss_longitudinal", formula="rss_longitudinal_m >= 0", scale=10.0),
-        Requirement(name="rss_lateral", formula="rss_lateral_m >= 0", scale=1.0),
+        Requirement(name="safe_ttc", formula=f"ttc_s >= {ttc_s:g}", scale=FREE_TTC_S - ttc_s),
+        Requirement(name="rss_margin", formula="rss_margin >= 0", scale=1.0),
     ]
     if "pedestrian" in (odd.dynamic.actor_kinds or ()):
-        formula = f"pedestrian_gap_m >= {PEDESTRIAN_GAP_M:g} or ego_speed_mps <= {STANDING_MPS:g}"
-        requirements.append(Requirement(name="pedestrian_gap", formula=formula, scale=5.0))
+        moving = f"pedestrian_gap_m >= {PEDESTRIAN_GAP_M:g} + {PEDESTRIAN_GAP_PER_MPS:g} * ego_speed_mps"
+        standing = f"{STANDING_M / STANDING_MPS:g} * ego_speed_mps <= {STANDING_M:g}"
+        requirements.append(
+            Requirement(name="pedestrian_gap", formula=f"{moving} or {standing}", scale=PEDESTRIAN_SCALE_M)
+        )
     if set(odd.scenery.signal_types or ()) - {"none"}:
-        formula = f"historically[0,{RED_LIGHT_HOLD_S:g}] (red_light_m >= 0)"
-        requirements.append(Requirement(name="no_red_light_entry", formula=formula, scale=2.0))
+        formula = f"historically[0,{RED_LIGHT_HOLD_S:g}] (red_light_braking_mps2 <= {grip_mps2:g})"
+        requirements.append(Requirement(name="no_red_light_entry", formula=formula, scale=grip_mps2))
+    braking_mps2 = round(0.9 * grip_mps2, 2)
     formula = f"not historically[0,{BRAKING_HOLD_S:g}] (ego_braking_mps2 >= {braking_mps2:g})"
-    requirements.append(Requirement(name="bounded_braking", formula=formula, scale=braking_mps2))
+    requirements.append(Requirement(name="bounded_braking", formula=formula, scale=braking_mps2, shapes=False))
     return tuple(requirements)
 
 

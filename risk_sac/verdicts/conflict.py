@@ -26,7 +26,7 @@ TURN_WINDOW_S = 3.0
 SETTLED_S = 2.0  # who has been in the ego's lane for so long is its leader, and no longer cuts in
 BRIDGE = 2  # frames, 0.2 s: a conflict interrupted for no longer has not ended
 UNRESPONSIVE_S = 1.5
-BRAKES_MPS2 = 0.5  # more than the drag of a released pedal
+BRAKES_MPS2 = 1.5  # Krauss's drivers dawdle with up to σ · accel = 1.3 m/s², and mean nothing by it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,12 +49,11 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     A conflict begins no earlier than the ego knows of the striker; with a pedestrian that steps out from behind a
     truck, when it comes into sight. With one that nobody could see it begins with the contact.
     """
-    path = recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
+    path = ego_path(evidence)
     known = evidence.known[:, striker]
     seen = seen_along(path, evidence, striker)
     course = _courses(path, evidence, striker)
-    begins, lasts = course, course
-    same_way = _drives_the_same_way(evidence, striker)
+    same_way = _drives_the_same_way(evidence, striker, seen.turn_rad)
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         begins = lasts = course & _at_the_carriageway(evidence, striker)
     elif same_way:
@@ -65,8 +64,9 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
         begins = lasts = course | _cannot_stop(path, evidence, striker)
     frame = _since(begins & known, lasts & known)
     unseen = _since(begins, lasts)
+    course_from = _since(course & known, course & known)
     if same_way and unseen == len(course) - 1:  # neither led nor cut in: the ego itself came over
-        frame, unseen = _since(course & known, course & known), _since(course, course)
+        frame, unseen = course_from, _since(course, course)
     return Conflict(
         type=_type(evidence, striker, frame, same_way, seen.across_m),
         frame=frame,
@@ -75,7 +75,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
         y_m=float(evidence.y_m[frame, striker]),
         position="ahead" if seen.gap_m[frame] > 0.0 else "alongside",
         hidden=not known[unseen],
-        course_from=_since(course & known, course & known),
+        course_from=course_from,
     )
 
 
@@ -86,6 +86,7 @@ def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
     return bool(lasted and (evidence.accel_mps2[first:, 0] > -BRAKES_MPS2).all())
 
 
+@compiled
 def _since(begins: Bools, lasts: Bools) -> int:
     """The first frame in which a condition begins that then lasts until the last frame, in which it holds anyway."""
     first, missing = len(begins) - 1, 0
@@ -154,16 +155,20 @@ def _at_the_carriageway(evidence: Evidence, striker: int) -> Bools:
     return soon_inside(areas, e.x_m[:, striker], e.y_m[:, striker], e.vx_mps[:, striker], e.vy_mps[:, striker], KERB_S)
 
 
-def _drives_the_same_way(evidence: Evidence, striker: int) -> bool:
-    """Whether the striker drives the ego's way: within 30 degrees, or within 60 where it did so in the last 3 s.
+def _drives_the_same_way(evidence: Evidence, striker: int, turn_rad: Floats) -> bool:
+    """Whether the striker drives the ego's way: in the last 3 s within 60 degrees of its path, and once within 30.
 
-    The second holds for one that the ego follows round a bend.
+    One that the ego follows round a bend does; one that turns into the ego's way comes from across.
     """
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         return False
-    first = evidence.since(TURN_WINDOW_S)
-    cos = np.cos(evidence.heading_rad[first:, striker] - evidence.heading_rad[first:, 0])
-    return bool(cos[-1] > SAME_WAY_COS or (cos[-1] > TURNING_COS and np.nanmax(cos) > SAME_WAY_COS))
+    cos = np.cos(turn_rad[evidence.since(TURN_WINDOW_S) :])
+    return bool(cos.max() > SAME_WAY_COS and cos.min() > TURNING_COS)
+
+
+def ego_path(evidence: Evidence) -> Path:
+    """The ego's recorded path."""
+    return recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
 
 
 def seen_along(path: Path, evidence: Evidence, striker: int) -> AlongSeries:

@@ -2,8 +2,8 @@
 
 Choice: fixed cells, not the distance to failures found before. Whether a failure lies in an empty cell may depend on
 the order, how many cells are filled does not: a run that resumes, or two that are pooled, count alike, and the count
-never falls. The edges are where severity changes (30 and 50 km/h) and where a driver had time to act; few cells, for
-what a signature holds is one failure at several speeds rather than several failures.
+never falls. The edges are where people begin to die (30 km/h) and where a driver had time to act; eight cells at most,
+for what a signature holds is one failure at several speeds rather than several failures.
 """
 
 from bisect import bisect_right
@@ -24,8 +24,8 @@ class Axis(NamedTuple):
 
 KMH = 1 / 3.6
 AXES = (
-    Axis("ego_speed_mps", (30 * KMH, 50 * KMH)),
-    Axis("other_speed_mps", (30 * KMH, 50 * KMH)),
+    Axis("ego_speed_mps", (30 * KMH,)),
+    Axis("other_speed_mps", (30 * KMH,)),
     Axis("from_conflict_s", (2.0,)),  # what the careful driver needs to be at full braking
 )
 Cell = tuple[int, ...]

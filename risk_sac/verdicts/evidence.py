@@ -26,13 +26,13 @@ PER_ACTOR = (
 AREAS = ("crossings", "junctions", "roadway")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Ground:
     """Where an episode takes place, as far as a verdict depends on it."""
 
     friction: float = 1.0
     speed_limit_mps: float = 13.89
-    lane_width_m: float = 3.2
+    lane_width_m: float = 3.3
     crossings: tuple[Area, ...] = ()  # pedestrian crossings
     junctions: tuple[Area, ...] = ()
     roadway: tuple[Area, ...] = ()  # where vehicles drive; none: pedestrians are judged as if always on it

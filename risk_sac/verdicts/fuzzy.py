@@ -64,11 +64,14 @@ def critical(gap: float, ego: float, ego_accel: float, leader: float) -> float:
 
 @compiled
 def braking(gap: float, ego: float, ego_accel: float, leader: float) -> float:
-    """What the model brakes with, m/s²: up to 4 as PFS grows, from 4 to 6 as CFS does."""
+    """What the model brakes with, m/s²: up to 4 as PFS grows, from 4 to 6 as CFS does.
+
+    Who comes towards the ego has a negative speed, which only CFS can make sense of.
+    """
     urgency = critical(gap, ego, ego_accel, leader)
     if urgency > 0.0:
         return COMFORT_MPS2 + urgency * (HARDEST_MPS2 - COMFORT_MPS2)
-    return proactive(gap, ego, leader) * COMFORT_MPS2
+    return proactive(gap, ego, max(leader, 0.0)) * COMFORT_MPS2
 
 
 @compiled

@@ -4,6 +4,8 @@ Accelerations come from quadratics fitted to a second of the front bumper's posi
 polyline has kinks, and a lateral move starts and stops within a step; a second is what a real vehicle needs to yaw.
 """
 
+from functools import cache
+
 import numpy as np
 
 from risk_sac.scenario.limits import GRAVITY_MPS2
@@ -46,6 +48,7 @@ def used_grip(evidence: Evidence, striker: int) -> Floats:
     return size
 
 
+@cache
 def _curvature(points: int, step_s: float) -> Floats:
     """Weights that take `points` samples to the coefficient of t² of their least-squares quadratic."""
     t = (np.arange(points) - (points - 1) / 2) * step_s

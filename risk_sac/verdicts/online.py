@@ -39,7 +39,9 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground) -> Boo
       `n`; False for the ego.
     """
     found = np.zeros(len(frame.ids), dtype=np.bool_)
-    for i in np.flatnonzero(known):
+    apart_m = np.hypot(frame.x_m - frame.x_m[0], frame.y_m - frame.y_m[0]) - (frame.length_m + frame.length_m[0])
+    within_reach = apart_m <= HORIZON_S * (frame.speed_mps + frame.ego_speed_mps)
+    for i in np.flatnonzero(known & within_reach):
         if i > 0:
             found[i] = _in_conflict(frame, path, int(i), ground)
     return found

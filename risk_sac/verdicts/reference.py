@@ -11,12 +11,14 @@ from risk_sac.geometry import box_view, contact_point, zone
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import ConflictType, Grade, ReferenceOutcome
 from risk_sac.verdicts.along import AlongSeries
-from risk_sac.verdicts.conflict import Conflict, seen_along
+from risk_sac.verdicts.conflict import Conflict, ego_path, seen_along
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.path import Path, recorded_path
+from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, Track, drive, replay
 
+# Who perceives, and how long after the conflict began. Choice: fsm and rss look out from the beginning of the conflict
+# on, not before, and perceive what they themselves hold to be dangerous: all drivers judge the same conflict.
 DRIVERS = {"careful": (CAREFUL, CAREFUL_PERCEIVES_S), "fsm": (FUZZY, 0.0), "rss": (RSS, 0.0), "ideal": (IDEAL, 0.0)}
 INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
 R157_BRAKES_MPS2, R157_DELAY_S = 6.0, 0.35
@@ -50,11 +52,6 @@ def replayed_contact_s(evidence: Evidence, striker: int) -> float:
     path, track = ego_path(evidence), striker_track(evidence, striker)
     after = replay(path, evidence.length_m[0] / 2, evidence.width_m[0] / 2, track, evidence.step_s)
     return float(evidence.time_s[0] + after)
-
-
-def ego_path(evidence: Evidence) -> Path:
-    """The ego's recorded path."""
-    return recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
 
 
 def striker_track(evidence: Evidence, striker: int) -> Track:

@@ -27,7 +27,7 @@ from risk_sac.verdicts.path import Path, pose_at
 
 CAREFUL, IDEAL, FUZZY, RSS = range(4)
 FINE_S = 0.01  # between two box tests; at 30 m/s of closing 0.3 m
-LOOK = 5  # fine steps between two looks of a driver that goes by what it sees
+LOOK = 10  # fine steps, 0.1 s, between two looks of a driver that goes by what it sees
 HORIZON_S = 8.0  # from the beginning of the conflict
 STANDING_MPS = 0.1
 

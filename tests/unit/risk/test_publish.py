@@ -5,8 +5,18 @@ import numpy as np
 import pytest
 
 from risk_sac.geometry import relative_view
-from risk_sac.risk.publish import CROSSED_ON_RED_M, GAP_CAP_M, in_charge, least_margins, publish, red_light_margin
-from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
+from risk_sac.risk.publish import (
+    CROSSED_ON_RED_M,
+    GAP_CAP_M,
+    PEDESTRIAN_GAP_CAP_M,
+    RED_LIGHT_BRAKING_CAP_MPS2,
+    in_charge,
+    least_margins,
+    publish,
+    red_light_braking,
+    red_light_margin,
+)
+from risk_sac.risk.rss import SCALED_HIGH, SCALED_LOW
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.types import Frame, Kind, Role, Signal
@@ -40,9 +50,8 @@ def frame_of(
     )
 
 
-def signals_of(frame: Frame, ttc: list[float], along: list[float], across: list[float]) -> dict[str, float]:
-    view = relative_view(frame)
-    return publish(frame, None, least_margins(view, frame.kind, np.array(ttc), np.array(along), np.array(across)))
+def signals_of(frame: Frame, ttc: list[float], rss: list[float]) -> dict[str, float]:
+    return publish(frame, None, least_margins(relative_view(frame), frame.kind, np.array(ttc), np.array(rss)))
 
 
 @pytest.mark.parametrize(
@@ -54,17 +63,17 @@ def test_the_ego_answers_for_whoever_is_not_behind_its_rear_bumper(x_m: float, y
 
 
 def test_every_published_signal_and_no_other_has_a_value() -> None:
-    assert signals_of(frame_of((20, 0, VEHICLE)), [3.0], [-4.0], [-0.5]).keys() == SIGNALS.keys()
+    assert signals_of(frame_of((20, 0, VEHICLE)), [3.0], [-0.5]).keys() == SIGNALS.keys()
 
 
 def test_nothing_to_measure_takes_the_caps() -> None:
-    assert signals_of(frame_of(), [], [], []) == {
+    assert signals_of(frame_of(), [], []) == {
         "ttc_s": TTC_CAP_S,
-        "rss_longitudinal_m": LONGITUDINAL_CAP_M,
-        "rss_lateral_m": LATERAL_CAP_M,
-        "pedestrian_gap_m": GAP_CAP_M,
+        "rss_margin": SCALED_HIGH,
+        "pedestrian_gap_m": PEDESTRIAN_GAP_CAP_M,
         "vehicle_gap_m": GAP_CAP_M,
         "red_light_m": GAP_CAP_M,
+        "red_light_braking_mps2": 0.0,
         "ego_speed_mps": 10.0,
         "ego_braking_mps2": 0.0,
     }
@@ -73,46 +82,39 @@ def test_nothing_to_measure_takes_the_caps() -> None:
 def test_the_caps_are_the_ends_of_the_published_ranges() -> None:
     for name, cap in (
         ("ttc_s", TTC_CAP_S),
-        ("rss_longitudinal_m", LONGITUDINAL_CAP_M),
-        ("rss_lateral_m", LATERAL_CAP_M),
-        ("pedestrian_gap_m", GAP_CAP_M),
+        ("rss_margin", SCALED_HIGH),
+        ("pedestrian_gap_m", PEDESTRIAN_GAP_CAP_M),
         ("vehicle_gap_m", GAP_CAP_M),
         ("red_light_m", GAP_CAP_M),
     ):
         assert SIGNALS[name].high == cap
+    assert SIGNALS["rss_margin"].low == SCALED_LOW
+    assert SIGNALS["red_light_braking_mps2"].high == RED_LIGHT_BRAKING_CAP_MPS2
 
 
 def test_the_least_value_among_those_in_charge_is_published() -> None:
     frame = frame_of((30, 0, VEHICLE), (50, 3, VEHICLE), (-20, 0, VEHICLE))
-    published = signals_of(frame, [4.0, 2.5, 0.5], [-3.0, -7.0, -30.0], [-0.5, -0.2, -2.0])
+    published = signals_of(frame, [4.0, 2.5, 0.5], [0.3, -0.2, -2.0])
     assert published["ttc_s"] == 2.5  # the tailgater's 0.5 s does not count
-    assert published["rss_longitudinal_m"] == -7.0
-    assert published["rss_lateral_m"] == -0.5
-
-
-def test_an_rss_margin_counts_only_where_the_other_one_is_violated_too() -> None:
-    frame = frame_of((30, 3.5, VEHICLE), (40, 0, VEHICLE))
-    published = signals_of(frame, [9.0, 9.0], [-20.0, 12.0], [1.5, -3.0])
-    # The first is aside, the second far enough ahead: neither makes a pair of violations.
-    assert published["rss_longitudinal_m"] == 12.0
-    assert published["rss_lateral_m"] == 1.5
+    assert published["rss_margin"] == -0.2
 
 
 def test_gaps_count_in_every_direction_and_by_kind() -> None:
     frame = frame_of((-9, 0, VEHICLE), (20, 0, VEHICLE), (0, -8, PEDESTRIAN))
-    published = signals_of(frame, [9.0] * 3, [9.0] * 3, [9.0] * 3)
+    published = signals_of(frame, [9.0] * 3, [2.0] * 3)
     assert published["vehicle_gap_m"] == pytest.approx(5.0)
     assert published["pedestrian_gap_m"] == pytest.approx(6.0)
 
 
 def test_distant_bodies_are_capped() -> None:
-    published = signals_of(frame_of((200, 0, VEHICLE), (0, 200, PEDESTRIAN)), [10.0] * 2, [50.0] * 2, [5.0] * 2)
-    assert published["vehicle_gap_m"] == published["pedestrian_gap_m"] == GAP_CAP_M
+    published = signals_of(frame_of((200, 0, VEHICLE), (0, 200, PEDESTRIAN)), [10.0] * 2, [2.0] * 2)
+    assert published["vehicle_gap_m"] == GAP_CAP_M
+    assert published["pedestrian_gap_m"] == PEDESTRIAN_GAP_CAP_M
 
 
 @pytest.mark.parametrize(("accel_mps2", "braking_mps2"), [(-3.5, 3.5), (2.0, 0.0), (0.0, 0.0)])
 def test_braking_is_a_deceleration_and_never_negative(accel_mps2: float, braking_mps2: float) -> None:
-    assert signals_of(frame_of(accel_mps2=accel_mps2), [], [], [])["ego_braking_mps2"] == braking_mps2
+    assert signals_of(frame_of(accel_mps2=accel_mps2), [], [])["ego_braking_mps2"] == braking_mps2
 
 
 def at_light(signal: Signal, stop_line_m: float) -> Frame:
@@ -144,6 +146,7 @@ def test_only_a_red_light_has_a_margin(signal: Signal, stop_line_m: float, margi
 )
 def test_passing_the_stop_line_on_red_is_negative(before: Frame, after: Frame) -> None:
     assert red_light_margin(after, before) == CROSSED_ON_RED_M < 0
+    assert red_light_braking(after, before) == RED_LIGHT_BRAKING_CAP_MPS2
 
 
 @pytest.mark.parametrize(
@@ -158,7 +161,24 @@ def test_passing_the_stop_line_on_red_is_negative(before: Frame, after: Frame) -
 )
 def test_no_red_light_was_run(before: Frame, after: Frame) -> None:
     assert red_light_margin(after, before) >= 0
+    assert red_light_braking(after, before) < RED_LIGHT_BRAKING_CAP_MPS2
 
 
 def test_approaching_a_red_light_counts_down() -> None:
     assert red_light_margin(at_light(Signal.RED, 3.0), at_light(Signal.RED, 3.9)) == 3.0
+
+
+@pytest.mark.parametrize(
+    ("signal", "speed_mps", "stop_line_m", "braking_mps2"),
+    [
+        (Signal.RED, 10.0, 12.0, 4.0),  # 10² / (2 · 12.5)
+        (Signal.RED, 10.0, 2.0, RED_LIGHT_BRAKING_CAP_MPS2),
+        (Signal.RED, 0.0, 0.0, 0.0),  # waits at the line
+        (Signal.RED, 1.0, 0.0, 1.0),  # creeps up to it
+        (Signal.GREEN, 10.0, 2.0, 0.0),
+        (Signal.YELLOW, 10.0, 2.0, 0.0),
+    ],
+)
+def test_braking_for_a_red_light(signal: Signal, speed_mps: float, stop_line_m: float, braking_mps2: float) -> None:
+    frame = replace(frame_of(speed_mps=speed_mps), signal=signal, stop_line_m=stop_line_m)
+    assert red_light_braking(frame, None) == pytest.approx(braking_mps2)

@@ -9,26 +9,48 @@ from risk_sac.risk.realism import (
     broken_hard_rule,
     closeness_term,
     jerk_term,
+    lateral_accel,
     soft_cost,
 )
 
 
-def test_jerk_is_measured_against_its_scale() -> None:
-    assert jerk_term(1.0, 0.0, 0.1) == pytest.approx(0.5)  # 10 of 20 m/s³
-    assert jerk_term(0.0, 1.0, 0.1) == pytest.approx(0.5)
-    assert jerk_term(8.0, -8.0, 0.1) == 1.0
+def test_jerk_costs_beyond_what_ordinary_drivers_do() -> None:
+    # of a limit of 8 m/s² that builds up in 0.4 s: 20 m/s³, of which 15 are free
+    assert jerk_term(1.5, 0.0, 8.0, 0.1) == 0.0
+    assert jerk_term(1.75, 0.0, 8.0, 0.1) == pytest.approx(0.5)
+    assert jerk_term(0.0, 1.75, 8.0, 0.1) == pytest.approx(0.5)
+    assert jerk_term(8.0, -8.0, 8.0, 0.1) == 1.0
+
+
+def test_a_pedestrians_jerk_is_measured_against_its_own_limit() -> None:
+    assert jerk_term(0.375, 0.0, 1.5, 0.1) == pytest.approx(1.0)  # 1.5 / 0.4 = 3.75 m/s³
 
 
 def test_acceleration_costs_only_beyond_comfort() -> None:
-    assert acceleration_term(-3.0, 8.0) == 0.0
-    assert acceleration_term(-5.5, 8.0) == pytest.approx(0.5)  # half way from 3 to 8
-    assert acceleration_term(8.0, 8.0) == 1.0
-    assert acceleration_term(9.0, 8.0) == 1.0
+    assert acceleration_term(-4.5, 0.0, 8.0) == 0.0
+    assert acceleration_term(-6.25, 0.0, 8.0) == pytest.approx(0.5)  # half way from 4.5 to 8
+    assert acceleration_term(8.0, 0.0, 8.0) == 1.0
+    assert acceleration_term(9.0, 0.0, 8.0) == 1.0
 
 
-def test_a_pedestrians_comfort_is_half_of_its_limit() -> None:
-    assert acceleration_term(1.5, 3.0) == 0.0
-    assert acceleration_term(2.25, 3.0) == pytest.approx(0.5)
+def test_a_pedestrians_comfort_is_a_share_of_its_limit() -> None:
+    assert acceleration_term(0.9, 0.0, 1.5) == pytest.approx(0.0)  # 0.6 of 1.5
+    assert acceleration_term(1.2, 0.0, 1.5) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_swerving_costs_like_braking(side: float) -> None:
+    assert acceleration_term(0.0, side * 0.75, 8.0) == 0.0
+    assert acceleration_term(0.0, side * 1.125, 8.0) == pytest.approx(0.5)
+    assert acceleration_term(-6.25, side * 1.5, 8.0) == 1.0  # the larger of the two
+
+
+def test_what_is_across_is_a_vehicles_change_of_lateral_speed_and_a_pedestrians_turn() -> None:
+    across = lateral_accel(
+        np.array([0.5, 9.0]), np.array([0.4, 9.0]), np.array([0.3, 0.1 - 2 * np.pi]), np.array([10.0, 1.5]),
+        np.array([False, True]), 0.1,
+    )  # fmt: skip
+    assert across.tolist() == pytest.approx([1.0, 1.5])  # 0.1 m/s in 0.1 s; 1.5 m/s · 1 rad/s, past the seam at π
 
 
 def test_closeness_costs_what_is_both_near_and_sudden() -> None:
@@ -42,25 +64,28 @@ def test_closeness_costs_what_is_both_near_and_sudden() -> None:
 
 def test_soft_cost_is_the_mean_of_the_worst_terms() -> None:
     # jerk 0.5 of the first, excess 0.5 and no jerk of the second, closeness 0.375 of the second
-    columns = [[1.0, -5.5], [0.0, -5.5], [8.0, 8.0], [20.0, 0.5], [20.0, 1.25]]
+    columns = [[1.75, -6.25], [0.0, -6.25], [0.0, 0.0], [8.0, 8.0], [20.0, 0.5], [20.0, 1.25]]
     cost = soft_cost(*map(np.array, columns), 0.1)
     assert cost == pytest.approx((0.5 + 0.5 + 0.375) / 3)
 
 
 def test_without_adversaries_nothing_costs() -> None:
-    assert soft_cost(*[np.empty(0)] * 5, 0.1) == 0.0
+    assert soft_cost(*[np.empty(0)] * 6, 0.1) == 0.0
 
 
 def test_calm_driving_costs_nothing() -> None:
-    assert soft_cost(*map(np.array, ([0.0], [0.0], [8.0], [CLOSE_GAP_M], [CLOSE_GAP_M + 1])), 0.1) == 0.0
+    assert soft_cost(*map(np.array, ([0.0], [0.0], [0.5], [8.0], [CLOSE_GAP_M], [CLOSE_GAP_M + 1])), 0.1) == 0.0
 
 
 accels, gaps = st.floats(-50, 50), st.floats(0, 100)
 
 
-@given(st.lists(st.tuples(accels, accels, st.floats(0.1, 12), gaps, gaps), max_size=6), st.sampled_from([0.05, 0.1]))
+@given(
+    st.lists(st.tuples(accels, accels, accels, st.floats(0.1, 12), gaps, gaps), max_size=6),
+    st.sampled_from([0.05, 0.1]),
+)
 def test_soft_cost_stays_in_the_unit_interval(rows: list[tuple[float, ...]], step_s: float) -> None:
-    columns = np.array(rows).reshape(-1, 5).T
+    columns = np.array(rows).reshape(-1, 6).T
     assert 0.0 <= soft_cost(*columns, step_s) <= 1.0
 
 

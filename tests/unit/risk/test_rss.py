@@ -8,14 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.geometry import RelativeView, relative_view
+from risk_sac.risk import rss
 from risk_sac.risk.rss import (
     LATERAL_CAP_M,
+    LATERAL_SCALE_M,
     LONGITUDINAL_CAP_M,
+    LONGITUDINAL_SCALE_M,
+    SCALED_HIGH,
+    SCALED_LOW,
     RssParameters,
-    lateral,
-    margins,
-    opposite_direction,
-    same_direction,
+    approaching,
+    stopping,
 )
 from risk_sac.types import Frame, Kind, Role, Signal
 
@@ -29,6 +32,35 @@ P = RssParameters(
     lateral_brake_mps2=1.0,
     fluctuation_m=0.1,
 )
+
+
+def way(speed_mps: float, p: RssParameters) -> float:
+    return stopping(speed_mps, p.response_s, p.accel_mps2, p.brake_min_mps2)
+
+
+def same_direction(rear_mps: float, front_mps: float, p: RssParameters) -> float:
+    return rss.same_direction(way(rear_mps, p), front_mps, p.brake_max_mps2)
+
+
+def opposite_direction(ego_mps: float, other_mps: float, p: RssParameters) -> float:
+    return approaching(way(ego_mps, p), way(other_mps, p))
+
+
+def lateral(ego_mps: float, other_mps: float, p: RssParameters) -> float:
+    ways = (stopping(v, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2) for v in (ego_mps, other_mps))
+    return p.fluctuation_m + approaching(*ways)
+
+
+def margins(view: RelativeView, p: RssParameters, *, walks: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    found = rss.margins(view, np.full(len(view.x), walks), p)
+    return found.longitudinal_m, found.lateral_m
+
+
+def scaled(view: RelativeView, p: RssParameters = P, *, walks: bool = False) -> list[float]:
+    result: list[float] = rss.margins(view, np.full(len(view.x), walks), p).scaled.tolist()
+    return result
+
+
 speed = st.floats(0, 40)
 drift = st.floats(-3, 3)
 
@@ -182,9 +214,9 @@ def test_lateral_margin_is_the_same_on_both_sides(side: int) -> None:
     assert leaving.tolist() == pytest.approx([2.9])
 
 
-def test_alongside_there_is_no_longitudinal_distance() -> None:
+def test_alongside_the_longitudinal_distance_is_how_far_the_bodies_overlap() -> None:
     longitudinal, _ = margins(view_of(10.0, (1.0, 3.0, 0, 10, 0)), P)
-    assert longitudinal.tolist() == pytest.approx([-(11 + 18 - 100 / 16)])
+    assert longitudinal.tolist() == pytest.approx([-3 - (11 + 18 - 100 / 16)])
 
 
 @settings(deadline=None)  # the first call compiles
@@ -202,3 +234,68 @@ def test_overlapping_bodies_are_in_danger_both_ways() -> None:
     longitudinal, sideways = margins(view_of(10.0, (1.0, 0.5, 0, 10, 0)), P)
     assert longitudinal[0] < 0
     assert sideways[0] < 0
+    assert scaled(view_of(10.0, (1.0, 0.5, 0, 10, 0)))[0] < 0
+
+
+def test_the_scaled_margin_is_the_larger_of_both_each_in_its_scale() -> None:
+    leader, beside = (34.0, 0, 0, 8, 0), (1.0, 3.0, 0, 10, 0)
+    assert scaled(view_of(10.0, leader)) == pytest.approx([5 / LONGITUDINAL_SCALE_M])
+    assert scaled(view_of(10.0, beside)) == pytest.approx([(1 - 0.85) / LATERAL_SCALE_M])
+
+
+@settings(deadline=None)  # the first call compiles
+@given(
+    st.floats(0, 30),
+    st.tuples(*(st.floats(-80, 80), st.floats(-40, 40), st.floats(-4, 4), st.floats(-30, 30), st.floats(-30, 30))),
+    st.booleans(),
+)
+def test_the_scaled_margin_is_negative_exactly_where_both_margins_are(
+    ego_mps: float, other: tuple[float, float, float, float, float], walks: bool
+) -> None:
+    view = view_of(ego_mps, other)
+    [along], [across] = margins(view, P, walks=walks)
+    [margin] = scaled(view, walks=walks)
+    assert (margin < 0) == (along < 0 and across < 0)
+    assert SCALED_LOW <= margin <= SCALED_HIGH
+
+
+@settings(deadline=None)  # the first call compiles
+@given(
+    st.floats(0, 30),
+    st.tuples(st.floats(0.5, 80), st.floats(0.5, 40), st.floats(-4, 4), st.floats(1, 30), st.floats(-30, 30)),
+    st.booleans(),
+)
+def test_left_and_right_are_alike(ego_mps: float, other: tuple[float, float, float, float, float], walks: bool) -> None:
+    x, y, heading, vx, vy = other
+    mirrored = (x, -y, -heading, vx, -vy)
+    assert scaled(view_of(ego_mps, other), walks=walks) == pytest.approx(
+        scaled(view_of(ego_mps, mirrored), walks=walks)
+    )
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(
+    ("ego_mps", "other"),
+    [
+        pytest.param(0.0, (10.0, 0.0, math.pi / 2, 0, 10), id="cross traffic passes an ego at its stop line"),
+        pytest.param(0.0, (10.0, -20.0, math.pi / 2, 0, 10), id="cross traffic comes past an ego at its stop line"),
+        pytest.param(12.0, (20.0, -14.0, math.pi / 2, 0, 0), id="cross traffic waits at its red light"),
+        pytest.param(12.0, (20.0, -28.0, math.pi / 2, 0, 8), id="cross traffic brakes for its red light"),
+        pytest.param(14.0, (30.0, 3.3, math.pi, -14, 0), id="oncoming in the opposite lane"),
+        pytest.param(4.0, (12.0, -2.0, math.pi - 0.35, -9.4, 3.4), id="oncoming past an ego that begins to turn"),
+        pytest.param(13.0, (19.0, 0.0, 0.0, 13, 0), id="a leader at SUMO's headway of 1 s"),
+        pytest.param(14.0, (0.0, 3.2, 0.0, 14, 0), id="beside it in the next lane"),
+    ],
+)
+def test_undisturbed_traffic_is_not_dangerous(
+    ego_mps: float, other: tuple[float, float, float, float, float], side: int
+) -> None:
+    x, y, heading, vx, vy = other
+    assert scaled(view_of(ego_mps, (x, side * y, side * heading, vx, side * vy)), RssParameters())[0] > 0
+
+
+def test_the_margin_falls_all_the_way_to_a_leader_that_stands() -> None:
+    far_to_near = [scaled(view_of(12.0, (x, 0.2, 0, 0, 0)), RssParameters())[0] for x in np.arange(40.0, 4.0, -0.5)]
+    assert np.all(np.diff(far_to_near) < 0)
+    assert far_to_near[0] > 0.5
+    assert far_to_near[-1] < -1

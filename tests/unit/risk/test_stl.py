@@ -128,9 +128,9 @@ FORMULAS: dict[str, Any] = {
         ("-", ("*", ("/", "vehicle_gap_m", 2), "ttc_s"), ("*", 1.5, "ego_speed_mps")),
         -3,
     ),
-    "abs(rss_lateral_m - -1) * (2 + ttc_s) <= -(-1e1)": (
+    "abs(rss_margin - -1) * (2 + ttc_s) <= -(-1e1)": (
         "<=",
-        ("*", ("abs", ("-", "rss_lateral_m", -1)), ("+", 2, "ttc_s")),
+        ("*", ("abs", ("-", "rss_margin", -1)), ("+", 2, "ttc_s")),
         10,
     ),
     # the same timed sub-formula twice, and windows in windows: rtamt by itself gets the first one wrong
@@ -152,10 +152,13 @@ FORMULAS: dict[str, Any] = {
 }
 SHIPPED_FORMULAS: dict[str, Any] = {
     "safe_ttc": (">=", "ttc_s", 1.5),
-    "rss_longitudinal": (">=", "rss_longitudinal_m", 0),
-    "rss_lateral": (">=", "rss_lateral_m", 0),
-    "pedestrian_gap": ("or", (">=", "pedestrian_gap_m", 1), ("<=", "ego_speed_mps", 0.5)),
-    "no_red_light_entry": ("historically", (0, 10), (">=", "red_light_m", 0)),
+    "rss_margin": (">=", "rss_margin", 0),
+    "pedestrian_gap": (
+        "or",
+        (">=", "pedestrian_gap_m", ("+", 0.5, ("*", 0.1, "ego_speed_mps"))),
+        ("<=", ("*", 20, "ego_speed_mps"), 10),
+    ),
+    "no_red_light_entry": ("historically", (0, 10), ("<=", "red_light_braking_mps2", 5.89)),
     "bounded_braking": ("not", ("historically", (0, 5), (">=", "ego_braking_mps2", 5.3))),
 }
 
@@ -325,7 +328,7 @@ BAD: list[tuple[str, int | None, str]] = [  # formula, position, reason
     ("rise(ttc_s >= 1)", 0, "'rise' is not supported; use p and not prev p"),
     ("sqrt(ttc_s) >= 1", 0, "'sqrt' is not supported"),
     ("true and ttc_s >= 1", 0, "'true' is not supported; use a comparison"),
-    ("tcc_s >= 1", 0, "unknown signal 'tcc_s'; the published ones are ttc_s, rss_longitudinal_m"),
+    ("tcc_s >= 1", 0, "unknown signal 'tcc_s'; the published ones are ttc_s, rss_margin"),
     ("ego.speed >= 1", 3, "unknown character '.'"),
     ("ttc_s ≥ 1", 6, "unknown character '≥'"),
     ("ttc_s >= 1; import os", 10, "unknown character ';'"),

@@ -22,29 +22,30 @@ STREET = Ground(
     roadway=(Area(-1000.0, 1000.0, -6.6, 6.6),),
 )
 Motion = Callable[[float], tuple[float, float, float]]  # time from the release -> x, y, heading
-FINE_S = 0.001
 
 
 def straight(
     x: float, y: float, heading: float, speed: float, *changes: tuple[float, float], start_s: float = -1.5
 ) -> Motion:
     """Along a line, at (x, y) at `start_s`; each change is (from when, acceleration), and nobody drives backwards."""
-    times = np.arange(start_s, 20.0, FINE_S)
-    accel = np.zeros(len(times))
-    for since, value in changes:
-        accel[times >= since - 1e-9] = value
-    speeds = np.empty(len(times))
-    now = speed
-    for i, a in enumerate(accel):
-        speeds[i] = now
-        now = max(now + a * FINE_S, 0.0)
-    gone = np.concatenate(([0.0], np.cumsum((speeds[1:] + speeds[:-1]) / 2 * FINE_S)))
+    pieces = [(start_s, 0.0, speed, 0.0)]  # from when, metres gone, speed, acceleration
+    for since, accel in changes:
+        pieces.append((since, *_gone(pieces[-1], since), accel))
 
     def at(t: float) -> tuple[float, float, float]:
-        s = float(np.interp(t, times, gone))
+        s, _ = _gone(next(piece for piece in reversed(pieces) if t >= piece[0] or piece is pieces[0]), t)
         return x + s * math.cos(heading), y + s * math.sin(heading), heading
 
     return at
+
+
+def _gone(piece: tuple[float, float, float, float], t: float) -> tuple[float, float]:
+    """Metres gone and speed at `t`; who brakes comes to a stand."""
+    since, gone, speed, accel = piece
+    after = t - since
+    if accel < 0.0:
+        after = min(after, speed / -accel)
+    return gone + speed * after + accel * after * after / 2, speed + accel * after
 
 
 def sideways(motion: Motion, start_s: float, rate_mps: float, until_m: float) -> Motion:

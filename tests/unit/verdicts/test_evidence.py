@@ -6,7 +6,7 @@ import pytest
 from risk_sac.types import Frame, Kind, Role, Signal
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import judge
-from tests.unit.verdicts.staged import STREET, cut_in, leader_brakes, straight, stage
+from tests.unit.verdicts.staged import STREET, cut_in, leader_brakes, stage, straight
 
 
 def frame(time_s: float, ids: tuple[str, ...]) -> Frame:

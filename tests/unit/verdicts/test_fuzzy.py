@@ -44,3 +44,7 @@ def test_a_longer_gap_is_never_more_dangerous(a: float, b: float, ego: float, le
     near, far = min(a, b), max(a, b)
     assert 0.0 <= proactive(far, ego, leader) <= proactive(near, ego, leader) <= 1.0
     assert 0.0 <= critical(far, ego, accel, leader) <= critical(near, ego, accel, leader) <= 1.0
+
+
+def test_who_comes_closer_is_more_critical_than_who_stands() -> None:
+    assert braking(25.0, 10.0, 0.0, -5.0) > braking(25.0, 10.0, 0.0, 0.0)

@@ -1,0 +1,103 @@
+import random
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.errors import NotFinite
+from risk_sac.types import Collision, ConflictType, Judgement
+from risk_sac.verdicts.distinct import DistinctFailures, cell_of, distinct_failures
+
+JUDGED = Judgement(
+    definitions=1,
+    conflict_type=ConflictType.LEADER,
+    conflict_s=2.0,
+    conflict_x_m=0.0,
+    conflict_y_m=0.0,
+    position="ahead",
+    hidden=False,
+    ego_manoeuvre="straight",
+    ego_response="none",
+    ground="lane",
+    broke=(),
+    unresponsive=False,
+    grade=None,
+    drivers={},
+    signature="leader",
+)
+
+
+def failure(signature: str | None = "leader", ego: float = 6.0, other: float = 2.0, after: float = 1.0) -> Collision:
+    return Collision(
+        time_s=2.0 + after,
+        other_id="adv_0",
+        other_kind="vehicle",
+        other_role="adversary",
+        contact_x_m=2.0,
+        contact_y_m=0.1,
+        ego_zone="front",
+        other_zone="rear",
+        ego_speed_mps=ego,
+        other_speed_mps=other,
+        relative_speed_mps=ego - other,
+        lateral_offset_m=0.0,
+        min_ttc_s=1.0,
+        min_rss_margin_m=0.0,
+        visible_for_s=3.0,
+        ego_peak_braking_mps2=1.0,
+        min_robustness=-3.0,
+        simulator_agrees=True,
+        judgement=None if signature is None else replace(JUDGED, signature=signature),
+    )
+
+
+any_failure = st.builds(
+    failure, st.sampled_from(["leader", "cut-in", None]), st.floats(0, 30), st.floats(0, 30), st.floats(0, 8)
+)
+
+
+@pytest.mark.parametrize(
+    ("second", "distinct"),
+    [
+        (failure(), False),
+        (failure(ego=8.3), False),
+        (failure(ego=8.4), True),  # 30 km/h
+        (failure(ego=20.0, after=-0.1), True),
+        (failure(other=9.0), True),
+        (failure(after=1.9), False),
+        (failure(after=2.1), True),
+        (failure("cut-in"), True),
+        (failure(None), True),
+        (replace(failure(), ego_zone="left", other_id="adv_1", min_robustness=0.0), False),
+    ],
+)
+def test_signature_first_and_then_the_cell(second: Collision, distinct: bool) -> None:
+    assert distinct_failures([failure(), second]) == ((0, 1) if distinct else (0,))
+
+
+@given(st.lists(any_failure, max_size=30), st.randoms(use_true_random=False))
+def test_the_count_is_the_same_in_any_order_and_after_a_resume(hits: list[Collision], order: random.Random) -> None:
+    found, again = DistinctFailures(), DistinctFailures()
+    for hit in hits:
+        found.add(hit)
+    shuffled = list(hits)
+    order.shuffle(shuffled)
+    for hit in shuffled + hits[:3]:
+        again.add(hit)
+    assert found.count == again.count == len(distinct_failures(hits))
+    assert found.signatures == again.signatures
+    assert sum(found.signatures.values()) == found.count
+
+
+def test_a_signature_holds_few_cells() -> None:
+    cells = {
+        cell_of(failure(ego=ego, other=1.4, after=after)) for ego in range(4, 14) for after in (0.5, 1.0, 1.5, 3.0)
+    }
+    assert len(cells) <= 4
+
+
+def test_infinite_features_lie_at_the_edge_and_nan_nowhere() -> None:
+    assert cell_of(failure(ego=float("inf"))) == (1, 0, 0)
+    with pytest.raises(NotFinite, match="wanted no NaN"):
+        cell_of(failure(other=float("nan")))

@@ -1,0 +1,61 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.verdicts.along import Along
+from risk_sac.verdicts.lane_conflict import lane_conflict, towards
+
+LANE_M = 3.3
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(
+    ("across", "offset", "expected"),
+    [
+        (3.3, 0.0, 0.0),  # in the middle of the lane beside
+        (2.8, -0.5, 0.5),
+        (3.8, 0.5, -0.5),
+        (1.7, -1.6, 1.6),  # at its edge
+        (1.6, 1.6, 1.7),  # and just over it: SUMO has it on the ego's lane now
+        (1.8, 1.6, 1.7),  # the ego itself drives 0.2 m to the right
+        (0.0, 0.0, 3.3),
+        (6.6, 0.0, -3.3),  # two lanes away
+    ],
+)
+def test_offset_towards_the_ego_from_the_lane_beside(side: int, across: float, offset: float, expected: float) -> None:
+    assert towards(side * across, side * offset, LANE_M) == pytest.approx(expected)
+
+
+@given(st.floats(-9.0, 9.0))
+def test_a_wrapped_offset_says_what_the_place_says(across: float) -> None:
+    offset = (across + LANE_M / 2) % LANE_M - LANE_M / 2
+    assert towards(across, offset, LANE_M) == pytest.approx(towards(across, math.nan, LANE_M))
+
+
+def seen(gap: float, ttc: float = math.inf, across: float = 0.0) -> Along:
+    return Along(gap, -gap - 9.2, ttc, across, 0.0, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("other", "accel", "offset", "expected"),
+    [
+        (seen(10.0, 1.9), 0.0, 0.0, (True, True)),
+        (seen(10.0, 2.1), 0.0, 0.0, (False, True)),  # goes on, but does not begin
+        (seen(10.0, 4.1), 0.0, 0.0, (False, False)),
+        (seen(39.0), -5.1, 0.0, (True, True)),
+        (seen(39.0), -4.9, 0.0, (False, False)),
+        (seen(41.0), -8.0, 0.0, (False, False)),  # 4 s at 10 m/s
+        (seen(10.0, 1.0, 3.3), 0.0, 0.0, (False, False)),  # keeps to its lane
+        (seen(10.0, 1.0, 2.9), 0.0, -0.4, (True, True)),
+        (seen(10.0, 1.0, 2.95), 0.0, -0.35, (False, False)),
+        (seen(-1.0, math.inf, 2.9), 0.0, -0.4, (True, True)),  # alongside
+        (seen(-9.3, math.inf, 2.9), 0.0, -0.4, (False, False)),  # behind
+        (seen(10.0, 1.0, 3.7), 0.0, 0.4, (False, False)),  # moves away
+    ],
+)
+def test_when_a_conflict_begins_and_when_it_goes_on(
+    other: Along, accel: float, offset: float, expected: tuple[bool, bool]
+) -> None:
+    assert lane_conflict(other, 10.0, offset, accel, LANE_M) == expected

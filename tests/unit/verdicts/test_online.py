@@ -1,0 +1,138 @@
+"""What is in conflict now: by hand, in the mirror, and as the record says that began there."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from risk_sac.types import Frame, Kind, Signal
+from risk_sac.verdicts.conflict import find_conflict
+from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
+from risk_sac.verdicts.online import conflicts_now
+from risk_sac.verdicts.path import polyline
+from tests.unit.verdicts.staged import LANE_M, STREET, cut_in, leader_brakes, pedestrian_crosses
+
+Actor = tuple[float, float, float, float, Kind]  # x, y, heading, speed, kind
+CAR, WALKER = Kind.VEHICLE, Kind.PEDESTRIAN
+AHEAD = polyline(np.array([0.0, 200.0]), np.zeros(2))
+
+
+def frame(*others: Actor, ego: float = 12.0, mirror: int = 1, **changes: object) -> Frame:
+    x, y, heading, speed, kinds = zip((0.0, 0.0, 0.0, ego, CAR), *others, strict=True)
+    n = len(kinds)
+    heading_rad = mirror * np.array(heading)
+    vehicles = np.array(kinds) == CAR
+    return replace(
+        Frame(
+            time_s=0.0,
+            ids=tuple(f"a{i}" for i in range(n)),
+            kind=np.array(kinds, dtype=np.int8),
+            role=np.minimum(np.arange(n), 1).astype(np.int8),
+            x_m=np.array(x),
+            y_m=mirror * np.array(y),
+            heading_rad=heading_rad,
+            vx_mps=np.array(speed) * np.cos(heading_rad),
+            vy_mps=np.array(speed) * np.sin(heading_rad),
+            speed_mps=np.array(speed),
+            lateral_mps=np.zeros(n),
+            accel_mps2=np.zeros(n),
+            length_m=np.where(vehicles, 4.6, 0.5),
+            width_m=np.where(vehicles, 1.85, 0.5),
+            signal=Signal.NONE,
+            stop_line_m=math.inf,
+            lane_offset_m=np.zeros(n),
+            link=np.zeros(n, dtype=np.uint8),
+        ),
+        **changes,
+    )
+
+
+def in_conflict(now: Frame, known: bool = True) -> bool:
+    found = conflicts_now(now, AHEAD, np.full(len(now.ids), known), STREET)
+    assert not found[0]
+    return bool(found[1])
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+@pytest.mark.parametrize(
+    ("other", "expected"),
+    [
+        pytest.param((27.0, 0.0, 0.0, 0.0, CAR), True, id="a standing leader, 1.9 s"),
+        pytest.param((32.0, 0.0, 0.0, 0.0, CAR), False, id="a standing leader, 2.3 s"),
+        pytest.param((15.0, 0.0, 0.0, 12.0, CAR), False, id="a leader as fast"),
+        pytest.param((-15.0, 0.0, 0.0, 20.0, CAR), False, id="a follower"),
+        pytest.param((10.0, LANE_M, 0.0, 5.0, CAR), False, id="a slow neighbour"),
+        pytest.param((30.0, LANE_M, math.pi, 12.0, CAR), False, id="oncoming in its lane"),
+        pytest.param((60.0, 0.0, math.pi, 12.0, CAR), True, id="oncoming in the ego's"),
+        pytest.param((36.0, -36.0, math.pi / 2, 12.0, CAR), True, id="crossing at the same time"),
+        pytest.param((36.0, -80.0, math.pi / 2, 12.0, CAR), False, id="crossing long after"),
+        pytest.param((36.0, 5.0, -math.pi / 2, 1.4, WALKER), True, id="a pedestrian before the ego"),
+        pytest.param((36.0, 5.0, math.pi / 2, 1.4, WALKER), False, id="a pedestrian that walks off"),
+        pytest.param((36.0, 8.1, -math.pi / 2, 1.4, WALKER), False, id="a pedestrian that comes too late"),
+        pytest.param((36.0, 8.5, 0.0, 0.0, WALKER), False, id="a pedestrian on the sidewalk"),
+        pytest.param((36.0, 1.1, 0.0, 0.0, WALKER), True, id="a pedestrian within the corridor"),
+        pytest.param((36.0, 1.6, 0.0, 0.0, WALKER), False, id="a pedestrian beside the corridor"),
+    ],
+)
+def test_who_is_in_conflict(other: Actor, expected: bool, mirror: int) -> None:
+    assert in_conflict(frame(other, mirror=mirror)) is expected
+    assert not in_conflict(frame(other, mirror=mirror), known=False)
+
+
+def test_a_leader_that_brakes_hard() -> None:
+    leader = (30.0, 0.0, 0.0, 12.0, CAR)
+    assert in_conflict(frame(leader, accel_mps2=np.array([0.0, -5.5])))
+    assert not in_conflict(frame(leader, accel_mps2=np.array([0.0, -4.5])))
+
+
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_a_neighbour_that_comes_over(mirror: int) -> None:
+    now = frame((12.0, 2.8, 0.0, 7.0, CAR), mirror=mirror)
+    assert in_conflict(replace(now, lane_offset_m=np.array([0.0, mirror * -0.5])))
+    assert not in_conflict(replace(now, y_m=now.y_m * 3.0 / 2.8, lane_offset_m=np.array([0.0, mirror * -0.3])))
+
+
+@pytest.mark.parametrize(("letter", "expected"), [("r", False), ("g", False), ("G", True), ("", True)])
+def test_who_has_to_stop_and_can_is_expected_to(letter: str, expected: bool) -> None:
+    link = np.array([0, ord(letter) if letter else 0], dtype=np.uint8)
+    assert in_conflict(frame((36.0, -36.0, math.pi / 2, 12.0, CAR), link=link)) is expected
+    near = frame((20.0, -20.0, math.pi / 2, 12.0, CAR), link=link)  # needs 21 m, and has 16.4
+    assert in_conflict(near)
+
+
+def test_a_standing_ego_is_in_nobodys_way() -> None:
+    assert not in_conflict(frame((30.0, -8.0, math.pi / 2, 10.0, CAR), ego=0.0))
+
+
+def test_the_path_ahead_decides() -> None:
+    walker = (20.0, 20.0, 0.0, 0.0, WALKER)
+    bend = polyline(np.array([0.0, 20.0, 20.0]), np.array([0.0, 0.0, 50.0]))
+    now, ground = frame(walker), replace(STREET, roadway=())
+    assert not conflicts_now(now, AHEAD, np.ones(2, bool), ground)[1]
+    assert conflicts_now(now, bend, np.ones(2, bool), ground)[1]
+
+
+@pytest.mark.parametrize("evidence", [leader_brakes(), cut_in(), cut_in(gap=5.0), pedestrian_crosses()])
+def test_a_record_begins_where_it_would_have_been_seen(evidence: Evidence) -> None:
+    began = find_conflict(evidence, 1).frame
+    e = evidence
+    rows = {name: getattr(e, name) for name in (*PER_ACTOR, "link")}
+
+    def at(t: int) -> bool:
+        now = Frame(
+            time_s=float(e.time_s[t]),
+            ids=e.ids,
+            kind=e.kind,
+            role=e.role,
+            length_m=e.length_m,
+            width_m=e.width_m,
+            signal=Signal.NONE,
+            stop_line_m=math.inf,
+            **{name: values[t] for name, values in rows.items()},
+        )
+        path = polyline(e.x_m[t, 0] + np.array([0.0, 200.0]), e.y_m[t, 0] + np.zeros(2))
+        return bool(conflicts_now(now, path, e.known[t], e.ground)[1])
+
+    assert at(began)
+    assert not at(began - 1)

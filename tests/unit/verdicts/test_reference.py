@@ -1,0 +1,246 @@
+"""Reference drivers against stopping distances worked out by hand."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, reject, settings
+from hypothesis import strategies as st
+
+from risk_sac.types import Grade, Kind, ReferenceOutcome
+from risk_sac.verdicts.conflict import find_conflict
+from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
+from risk_sac.verdicts.reference import grade, reference_outcomes, replayed_contact_s
+from tests.unit.verdicts.staged import (
+    CAR_M,
+    LANE_M,
+    STREET,
+    crossing_car,
+    cut_in,
+    leader_brakes,
+    mirrored,
+    pedestrian_crosses,
+    sideways,
+    stage,
+    straight,
+)
+
+WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
+
+
+def outcomes(evidence: Evidence) -> Mapping[str, ReferenceOutcome]:
+    return reference_outcomes(evidence, 1, find_conflict(evidence, 1))
+
+
+def standing_in_the_way(distance_m: float, speed: float = 15.0, friction: float = 1.0) -> Evidence:
+    """A pedestrian that comes into sight at time 0, standing `distance_m` ahead of the ego's front."""
+    ego = straight(-1.5 * speed, 0.0, 0.0, speed)
+    walker = straight(CAR_M[0] / 2 + distance_m + 0.25, 0.0, 0.0, 0.0)
+    return stage(
+        ego,
+        walker,
+        kinds=WALKING,
+        seen_from_s=0.0,
+        until_s=distance_m / speed + 1.0,
+        ground=replace(STREET, friction=friction),
+    )
+
+
+# careful from 15 m/s: 6 m perceiving, 0.75 s at 0.4 m/s²: 11.1375; 0.5686 s of jerk: 7.906, then 12.428²/(2·7.593) =
+# 10.170; together 35.21 m. On friction 0.5 (4.905 m/s²): 0.3561 s of jerk: 5.114, then 13.756²/9.81 = 19.29; 41.54 m.
+# The bound: 225/16 = 14.06 m, and 225/9.81 = 22.94 m on friction 0.5.
+# fsm: PFS and CFS of something that stands 0.75 s of 15 m/s away are 1 long before: 11.25 m, then 6 m/s² with its jerk.
+@pytest.mark.parametrize(
+    ("driver", "friction", "needs_m"),
+    [("careful", 1.0, 35.21), ("careful", 0.5, 41.54), ("ideal", 1.0, 14.06), ("ideal", 0.5, 22.94)],
+)
+def test_a_driver_needs_its_stopping_distance(driver: str, friction: float, needs_m: float) -> None:
+    assert outcomes(standing_in_the_way(needs_m + 0.1, friction=friction))[driver].avoids
+    assert not outcomes(standing_in_the_way(needs_m - 0.1, friction=friction))[driver].avoids
+
+
+# rss: 0.75 s at 15 m/s: 11.25 m; 0.4743 s of jerk: 15·0.4743 − 12.65·0.4743³/6 = 6.890, then 13.577²/12 = 15.36;
+# 33.50 m.
+def test_rss_needs_its_response_time_and_6_mps2() -> None:
+    assert outcomes(standing_in_the_way(33.6))["rss"].avoids
+    assert not outcomes(standing_in_the_way(33.4))["rss"].avoids
+
+
+def test_fsm_avoids_what_it_sees_in_time_and_not_what_it_does_not() -> None:
+    assert outcomes(standing_in_the_way(34.0))["fsm"].avoids
+    assert not outcomes(standing_in_the_way(30.0))["fsm"].avoids
+
+
+def test_impact_speed_of_the_bound() -> None:
+    # 225 − 2 · 8 · 10 = 65
+    assert outcomes(standing_in_the_way(10.0))["ideal"].impact_speed_mps == pytest.approx(math.sqrt(65.0), abs=0.2)
+
+
+def test_a_driver_that_does_not_perceive_in_time_strikes_as_the_ego_did() -> None:
+    found = outcomes(standing_in_the_way(5.0))["careful"]  # 0.33 s
+    assert found == ReferenceOutcome(avoids=False, impact_speed_mps=pytest.approx(15.0))
+
+
+def test_a_driver_counts_on_its_own_where_the_ego_braked_harder() -> None:
+    # The ego brakes with 9 m/s² from 0.2 s after the conflict began: careful takes over 0.2 s later, at 13.2 m/s.
+    ego = straight(-1.5 * 15.0, 0.0, 0.0, 15.0, (0.2, -9.0))
+    walker = straight(CAR_M[0] / 2 + 14.0 + 0.25, 0.0, 0.0, 0.0)
+    found = outcomes(stage(ego, walker, kinds=WALKING, seen_from_s=0.0))["careful"]
+    assert found.impact_speed_mps == pytest.approx(13.2, abs=0.6)
+
+
+def test_who_stands_when_it_is_struck_has_avoided() -> None:
+    # A head-on driver: everybody is struck in the end, the bound after it has come to a stand.
+    evidence = stage(straight(0.0, 0.0, 0.0, 8.0), straight(60.0, 0.0, math.pi, 8.0))
+    assert outcomes(evidence)["ideal"].avoids
+    slow_ego = stage(straight(0.0, 0.0, 0.0, 0.0, (1.0, 1.0)), straight(60.0, 0.0, math.pi, 10.0))
+    assert outcomes(slow_ego)["careful"].avoids
+
+
+def test_who_is_struck_from_behind_has_avoided() -> None:
+    # It cuts in alongside and slightly behind: the driver that brakes less is struck on the flank.
+    beside = straight(-2.0, LANE_M, 0.0, 13.0)
+    evidence = stage(straight(0.0, 0.0, 0.0, 12.0), sideways(beside, 1.0, -1.0, LANE_M))
+    behind = stage(straight(0.0, 0.0, 0.0, 12.0), straight(-20.0, 0.0, 0.0, 14.0))
+    assert all(found.avoids for name, found in outcomes(behind).items() if name in ("careful", "ideal"))
+    assert set(outcomes(evidence)) == {"careful", "fsm", "rss", "ideal", "r157_ttc"}
+
+
+# v_rel 5: 5/12 + 0.35 = 0.767 s, 3.83 m. It intrudes by 0.3 m when its side is 1.35 m from the ego's middle: 1.025 m
+# over, 0.854 s after it began, in which the gap shrinks by 4.27 m.
+@pytest.mark.parametrize(("gap", "avoids"), [(4.27 + 3.83 + 0.6, True), (4.27 + 3.83 - 0.6, False)])
+@pytest.mark.parametrize("side", [1, -1])
+def test_r157_measures_a_cut_in_at_the_intrusion(gap: float, avoids: bool, side: int) -> None:
+    assert outcomes(cut_in(gap=gap, side=side))["r157_ttc"].avoids is avoids
+
+
+def test_r157_ttc_speaks_of_cut_ins_only() -> None:
+    for evidence in (leader_brakes(), crossing_car(), pedestrian_crosses()):
+        assert set(outcomes(evidence)) == {"careful", "fsm", "rss", "ideal"}
+
+
+@pytest.mark.parametrize(
+    ("careful", "ideal", "expected"),
+    [
+        (True, True, Grade.CAREFUL),
+        (True, False, Grade.CAREFUL),
+        (False, True, Grade.IDEAL),
+        (False, False, Grade.UNAVOIDABLE),
+    ],
+)
+def test_grades(careful: bool, ideal: bool, expected: Grade) -> None:
+    found = {"careful": careful, "ideal": ideal}
+    assert grade({k: ReferenceOutcome(avoids=v, impact_speed_mps=0.0) for k, v in found.items()}) is expected
+
+
+STAGED = {
+    "pedestrian": pedestrian_crosses(),
+    "hidden": pedestrian_crosses(seen_from_s=6.5),
+    "cut-in": cut_in(),
+    "close cut-in": cut_in(gap=4.0),
+    "alongside": cut_in(gap=-3.0, ego=12.0, other=12.0),
+    "leader": leader_brakes(),
+    "crossing": crossing_car(),
+    "crossing later": crossing_car(ahead=2.0),
+}
+
+
+@pytest.mark.parametrize("name", STAGED)
+def test_the_recorded_ego_replayed_makes_the_contact_again(name: str) -> None:
+    evidence = STAGED[name]
+    assert evidence.time_s[-1] - 0.1 - 1e-6 <= replayed_contact_s(evidence, 1) <= evidence.time_s[-1] + 1e-6
+
+
+@pytest.mark.parametrize("name", STAGED)
+def test_the_mirrored_contact_has_the_same_outcomes(name: str) -> None:
+    assert outcomes(mirrored(STAGED[name])) == outcomes(STAGED[name])
+
+
+speeds = st.floats(3.0, 20.0)
+
+
+@settings(deadline=None, max_examples=40)
+@given(speeds, st.floats(1.0, 60.0), st.sampled_from([0.4, 0.7, 1.0]))
+def test_the_bound_avoids_what_careful_avoids(speed: float, distance: float, friction: float) -> None:
+    found = outcomes(standing_in_the_way(distance, speed, friction))
+    assert found["ideal"].avoids >= found["careful"].avoids
+    assert found["ideal"].impact_speed_mps <= found["careful"].impact_speed_mps + 0.2
+
+
+@settings(deadline=None, max_examples=30)
+@given(speeds, st.floats(1.0, 40.0), st.floats(0.5, 20.0))
+def test_more_room_never_makes_it_worse(speed: float, distance: float, more: float) -> None:
+    near, far = outcomes(standing_in_the_way(distance, speed)), outcomes(standing_in_the_way(distance + more, speed))
+    for driver in ("careful", "ideal", "rss", "fsm"):
+        assert far[driver].avoids >= near[driver].avoids
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(4.0, 40.0), st.floats(6.0, 16.0), st.floats(5.5, 9.0))
+def test_the_bound_avoids_what_careful_avoids_behind_a_leader(gap: float, speed: float, braking: float) -> None:
+    found = outcomes(leader_brakes(gap, speed, braking))
+    assert found["ideal"].avoids >= found["careful"].avoids
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.floats(4.0, 20.0), st.floats(8.0, 16.0), st.floats(1.0, 8.0), st.floats(0.5, 2.0))
+def test_the_bound_avoids_what_careful_avoids_before_a_cut_in(
+    gap: float, ego: float, slower: float, rate: float
+) -> None:
+    closing = min(slower, ego - 0.5)
+    assume(gap / closing < 7.0)
+    assume(1.5 / rate < (gap + 2 * CAR_M[0]) / closing - 0.2)  # or the ego has passed before it is over
+    found = outcomes(cut_in(gap=gap, ego=ego, other=ego - closing, rate=rate))
+    assert found["ideal"].avoids >= found["careful"].avoids
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(4.0, 15.0), st.floats(0.8, 2.5), st.floats(0.0, 9.0), st.floats(0.2, 1.5), st.floats(0.2, 4.0))
+def test_the_bound_avoids_what_careful_avoids_before_a_pedestrian(
+    speed: float, walk: float, braking: float, braked_s: float, seen_s: float
+) -> None:
+    reach_s = 97.7 / speed
+    ego = straight(0.0, 0.0, 0.0, speed, (reach_s - braked_s, -braking), start_s=0.0)
+    walker = straight(98.0, walk * reach_s, -math.pi / 2, walk, start_s=0.0)
+    try:
+        evidence = stage(ego, walker, kinds=WALKING, from_s=0.0, seen_from_s=reach_s - seen_s, until_s=reach_s + 5.0)
+    except AssertionError:  # the ego braked enough
+        reject()
+    found = outcomes(evidence)
+    assert found["ideal"].avoids >= found["careful"].avoids
+
+
+def test_a_moved_and_turned_scene_has_the_same_outcomes() -> None:
+    evidence = STAGED["cut-in"]
+    turn, cos, sin = 2.0, math.cos(2.0), math.sin(2.0)
+    moved = replace(
+        evidence,
+        x_m=100.0 + evidence.x_m * cos - evidence.y_m * sin,
+        y_m=-50.0 + evidence.x_m * sin + evidence.y_m * cos,
+        heading_rad=(evidence.heading_rad + turn + math.pi) % math.tau - math.pi,
+        vx_mps=evidence.vx_mps * cos - evidence.vy_mps * sin,
+        vy_mps=evidence.vx_mps * sin + evidence.vy_mps * cos,
+    )
+    for name, found in outcomes(moved).items():
+        assert found.avoids == outcomes(evidence)[name].avoids
+        assert found.impact_speed_mps == pytest.approx(outcomes(evidence)[name].impact_speed_mps)
+
+
+def test_an_actor_that_left_does_not_disturb() -> None:
+    evidence = STAGED["leader"]
+    left = np.full((len(evidence.time_s), 1), np.nan)
+    gone = {name: np.hstack((getattr(evidence, name), left)) for name in PER_ACTOR}
+    wide = replace(
+        evidence,
+        ids=(*evidence.ids, "gone"),
+        kind=np.append(evidence.kind, 0),
+        role=np.append(evidence.role, 2),
+        length_m=np.append(evidence.length_m, 4.6),
+        width_m=np.append(evidence.width_m, 1.85),
+        link=np.hstack((evidence.link, evidence.link[:, :1])),
+        known=np.hstack((evidence.known, evidence.known[:, :1])),
+        **gone,
+    )
+    assert outcomes(wide) == outcomes(evidence)
