@@ -9,7 +9,7 @@ for family in low mixed dense; do
     netconvert --node-files "$family/$family.nod.xml" --edge-files "$family/$family.edg.xml" $connections \
         --output-file "$family/$family.net.xml" --no-turnarounds true --offset.disable-normalization true \
         --walkingareas true --tls.default-type static --tls.green.time 25 --tls.yellow.time 3 \
-        --output.original-names false --junctions.scurve-stretch 1 --write-license false
+        --output.original-names false --junctions.scurve-stretch 1 --junctions.internal-link-detail 20 --write-license false
     # The header carries a date and the machine's paths; drop it, so that a rebuild gives the same file.
     sed '/^<!--/,/-->$/d' "$family/$family.net.xml" >"$family/$family.net.xml.tmp"
     mv "$family/$family.net.xml.tmp" "$family/$family.net.xml"

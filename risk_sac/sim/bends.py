@@ -12,7 +12,7 @@ from risk_sac.types import Floats
 
 GRID_M = 0.5
 BODY_M = 4.6  # SUMO turns a body while it passes a corner of the lane, over the body's own length
-AHEAD_M = 4.0  # about half a second before a bend begins, braking makes way for it
+AHEAD_M = 5.0  # so early braking makes way for a bend; more than BODY_M, or a bend is not seen whole as it begins
 NO_BEND_PER_M = 1e-6
 
 

@@ -174,7 +174,10 @@ class PedestrianControl:
         return _clip(along + share * to_along, low, high), across + share * to_across
 
 
-TOLERANCE = 0.02  # m/s² and m/s: SUMO's rounding, divided by the step
+TOLERANCE_MPS = 0.02  # SUMO's rounding, divided by the step
+LEAP_MPS = (
+    4.0  # at a corner of a coarsely drawn lane, a body off its middle moves by up to 0.3 m more or less in a step
+)
 
 
 class Adversaries:
@@ -229,15 +232,19 @@ class Adversaries:
         return self._accel_limits
 
     def keep_limits(self, frame: Frame) -> bool:
-        """Whether every adversary vehicle drove as commanded, and so inside its limits.
+        """Whether every adversary vehicle drove as commanded, and so inside its limits, and was nowhere else.
 
         Less lateral motion than commanded passes: SUMO pauses it for some steps where a vehicle enters a junction.
-        Pedestrians move by our own dynamics and cannot deviate. The controls go on from what was driven.
+        Pedestrians move by our own dynamics and cannot deviate. The controls go on from what was driven: who is too
+        fast for a bend when it is released is commanded to brake, and keeps its limits if it does.
         """
         self.rows(frame)
         kept = True
         for row, control in self._driven:
             speed, lateral = float(frame.speed_mps[row]), float(frame.lateral_mps[row])
-            kept &= abs(speed - control.speed_mps) <= TOLERANCE and abs(lateral) <= abs(control.lateral_mps) + TOLERANCE
+            kept &= abs(speed - control.speed_mps) <= TOLERANCE_MPS
+            kept &= abs(lateral) <= abs(control.lateral_mps) + TOLERANCE_MPS
+            moved = math.hypot(float(frame.vx_mps[row]), float(frame.vy_mps[row]))
+            kept &= abs(moved - math.hypot(speed, lateral)) <= LEAP_MPS
             control.speed_mps, control.lateral_mps = speed, lateral
         return kept

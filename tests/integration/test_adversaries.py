@@ -2,21 +2,26 @@
 
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from risk_sac.config import FamilyName
-from risk_sac.env import RiskSacEnv, make_default
+from risk_sac.config import AgentConfig, Budget, EgoConfig, FamilyName, LearnerConfig, RunSpec
+from risk_sac.env import Observation, RiskSacEnv, make_default
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import GRAVITY_MPS2, Limits, limits_from_odd
-from risk_sac.types import STEP_S, Floats, Frame
+from risk_sac.sim.control import Adversaries
+from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.train import train
+from risk_sac.types import STEP_S, EpisodeRecord, Floats, Frame, RunMetrics, SeriesFile
 
 ROUNDING = 0.02  # of SUMO's positions and speeds, divided by the step where a derivative is taken
 WINDOW = 9  # steps, 0.8 s, over which an acceleration is fitted to positions: SUMO's lanes have corners
 EPISODES = 20
 NAMES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
-each_family = pytest.mark.parametrize("name", NAMES)
 
 
 def actions(seed: int, size: int) -> Iterator[Floats]:
@@ -35,23 +40,80 @@ def actions(seed: int, size: int) -> Iterator[Floats]:
         yield value
 
 
-def drive(env: RiskSacEnv, seed: int) -> tuple[float, list[Frame]]:
-    """Friction, and the frames from the release on; not only until the first contact, for the control does not stop."""
-    env.reset(seed=seed)
-    source, steps = actions(seed, env.action_size), env.problem.family.horizon_steps
-    for _ in range(steps):
-        env.step(next(source).astype(np.float32))
-        assert env._inside_limits, seed
-    friction = env.problem.family.layout(env.problem.space.from_unit(env._unit_scene).values).friction
-    return friction, list(env.trace.frames[-steps - 1 :])
+class Driven(NamedTuple):
+    """An episode from the release on."""
+
+    limits: Limits
+    friction: float
+    frames: list[Frame]
 
 
-@pytest.fixture(scope="module", params=NAMES)
-def episodes(request: pytest.FixtureRequest) -> tuple[FamilyName, list[tuple[Limits, float, list[Frame]]]]:
-    family = FAMILIES[request.param]
-    with closing(make_default(request.param)) as env:
-        driven = [drive(env, seed) for seed in range(EPISODES)]
-    return request.param, [(limits_from_odd(family.odd, friction), friction, frames) for friction, frames in driven]
+def driven(env: RiskSacEnv) -> Driven:
+    """The episode that `env` has just ended."""
+    problem = env.problem
+    friction = problem.family.layout(problem.space.from_unit(env._unit_scene).values).friction
+    frames = list(env.trace.frames[-env._steps - 1 :])
+    return Driven(limits_from_odd(problem.odd, friction), friction, frames)
+
+
+def at_random(name: FamilyName, _: Path, __: pytest.MonkeyPatch) -> list[Driven]:
+    episodes = []
+    with closing(make_default(name)) as env:
+        for seed in range(EPISODES):
+            env.reset(seed=seed)
+            ended, source = False, actions(seed, env.action_size)
+            while not ended:
+                _, _, terminated, truncated, _ = env.step(next(source).astype(np.float32))
+                assert env._inside_limits, seed
+                ended = terminated or truncated
+            episodes.append(driven(env))
+    return episodes
+
+
+def by_a_learner(name: FamilyName, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Driven]:
+    episodes: list[Driven] = []
+
+    class Watched(RiskSacEnv):
+        def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+            outcome = super().step(action)
+            assert self._inside_limits
+            if outcome[2] or outcome[3]:
+                episodes.append(driven(self))
+            return outcome
+
+    monkeypatch.setattr("risk_sac.train.RiskSacEnv", Watched)
+    agent = AgentConfig(hidden_sizes=(16, 16), batch_size=16, warmup_steps=150)
+    spec = RunSpec(
+        family=name,
+        method="risk-sac",
+        seed=0,
+        learner=LearnerConfig(agent=agent),
+        budget=Budget(episodes=8, evaluation_episodes=2),
+    )
+    train(spec, folder, Silent())
+    return episodes
+
+
+class Silent:
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        pass
+
+    def should_stop(self) -> bool:
+        return False
+
+
+Episodes = tuple[FamilyName, list[Driven]]
+
+
+@pytest.fixture(
+    scope="module",
+    params=[(name, by) for by in (at_random, by_a_learner) for name in NAMES],
+    ids=lambda p: f"{p[0]}-{p[1].__name__}",
+)
+def episodes(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Episodes:
+    name, by = request.param
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        return name, by(name, tmp_path_factory.mktemp("run"), monkeypatch)
 
 
 def track(frames: list[Frame], id_: str, name: str) -> Floats:
@@ -66,12 +128,9 @@ def fitted_acceleration(x: Floats, y: Floats) -> Floats:
     return np.hypot(np.convolve(x, weights, "valid"), np.convolve(y, weights, "valid"))
 
 
-Episodes = tuple[FamilyName, list[tuple[Limits, float, list[Frame]]]]
-
-
 def test_no_body_leaves_its_friction_circle(episodes: Episodes) -> None:
-    name, driven = episodes
-    for seed, (_, friction, frames) in enumerate(driven):
+    name, all_driven = episodes
+    for seed, (_, friction, frames) in enumerate(all_driven):
         for id_ in FAMILIES[name].vehicles:
             x, y = track(frames, id_, "x_m"), track(frames, id_, "y_m")
             if len(x) > WINDOW:
@@ -79,8 +138,8 @@ def test_no_body_leaves_its_friction_circle(episodes: Episodes) -> None:
 
 
 def test_vehicles_keep_their_limits_along_and_across_the_lane(episodes: Episodes) -> None:
-    name, driven = episodes
-    for seed, (limits, _, frames) in enumerate(driven):
+    name, all_driven = episodes
+    for seed, (limits, _, frames) in enumerate(all_driven):
         for id_ in FAMILIES[name].vehicles:
             speed, lateral = track(frames, id_, "speed_mps"), track(frames, id_, "lateral_mps")
             accel = np.diff(speed) / STEP_S
@@ -96,8 +155,8 @@ def test_vehicles_keep_their_limits_along_and_across_the_lane(episodes: Episodes
 
 
 def test_no_body_turns_more_tightly_than_a_car(episodes: Episodes) -> None:
-    name, driven = episodes
-    for seed, (limits, _, frames) in enumerate(driven):
+    name, all_driven = episodes
+    for seed, (limits, _, frames) in enumerate(all_driven):
         for id_ in FAMILIES[name].vehicles:
             heading = np.unwrap(track(frames, id_, "heading_rad"))
             way = np.concatenate(
@@ -111,10 +170,12 @@ def test_no_body_turns_more_tightly_than_a_car(episodes: Episodes) -> None:
 
 
 def test_pedestrians_accelerate_and_turn_as_a_person_can(episodes: Episodes) -> None:
-    name, driven = episodes
-    for seed, (limits, _, frames) in enumerate(driven):
+    name, all_driven = episodes
+    for seed, (limits, _, frames) in enumerate(all_driven):
         for id_ in FAMILIES[name].pedestrians:
             x, y, speed = (track(frames, id_, column) for column in ("x_m", "y_m", "speed_mps"))
+            if len(x) < 3:
+                continue
             assert np.hypot(np.diff(x, 2), np.diff(y, 2)).max() / STEP_S**2 <= limits.walk_disc_mps2 + ROUNDING, seed
             assert speed.max() <= limits.walk_speed_mps
             assert np.hypot(np.diff(x), np.diff(y)).max() <= limits.walk_speed_mps * STEP_S + 1e-9
@@ -123,3 +184,25 @@ def test_pedestrians_accelerate_and_turn_as_a_person_can(episodes: Episodes) -> 
             rate = np.diff(track(frames, id_, "heading_rad")) / STEP_S
             assert np.abs(rate).max() <= limits.heading_rate_radps + 1e-9
             assert np.all(np.maximum(speed[1:], speed[:-1]) * np.abs(rate) <= limits.walk_disc_mps2 + 1e-6)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_vehicle_that_does_not_obey_or_leaps_is_reported(name: FamilyName) -> None:
+    family = FAMILIES[name]
+    layout = family.layout(family.space.from_unit(np.full(family.space.dimension, 0.5)).values)
+    with closing(SumoSimulation(EgoConfig())) as sim:
+        frame = sim.reset(layout, 0)
+        sim.release()
+        adversaries = Adversaries(family, limits_from_odd(family.odd, layout.friction), frame)
+        for _ in range(5):
+            adversaries.command([1.0, 0.2] * len(family.adversaries), sim)
+            frame = sim.step()
+            assert adversaries.keep_limits(frame)
+        adversaries.command([1.0, 0.2] * len(family.adversaries), sim)
+        frame = sim.step()
+        for change in ("speed_mps", "vx_mps", "lateral_mps"):
+            row = frame.ids.index(family.vehicles[0])
+            column = getattr(frame, change).copy()
+            column[row] += 30.0 if column[row] >= 0 else -30.0
+            assert not adversaries.keep_limits(replace(frame, **{change: column})), change
+            adversaries.keep_limits(frame)

@@ -30,7 +30,7 @@ def test_a_straight_road_asks_nothing() -> None:
 def test_a_corner_turns_the_body_over_its_own_length_by_hand() -> None:
     got = bends(corner(0.46), LIMITS)
     assert got.curvature_per_m == pytest.approx([0.0] * 20 + [0.1] * 10 + [0.0] * 11)  # 10 to 14.5 m: 0.46 rad / 4.6 m
-    assert got.ahead_per_m == pytest.approx([0.0] * 12 + [0.1] * 18 + [0.0] * 11)  # from 4 m before
+    assert got.ahead_per_m == pytest.approx([0.0] * 10 + [0.1] * 20 + [0.0] * 11)  # from 5 m before
 
 
 def test_a_bend_is_approached_by_hand() -> None:
@@ -41,8 +41,8 @@ def test_a_bend_is_approached_by_hand() -> None:
     assert limits.cornering_mps2 == pytest.approx(3.0)
     assert limits.approach_mps2 == pytest.approx(3.0)  # 3² + (3 + 1)² = 5²
     cap = bends(corner(0.46), limits).cap_mps
-    assert cap[12] == cap[29] == pytest.approx(math.sqrt(3.0 / 0.1))
-    assert cap[0] == pytest.approx(math.sqrt(30.0 + 2 * 3.0 * 6.0))  # 6 m before
+    assert cap[10] == cap[29] == pytest.approx(math.sqrt(3.0 / 0.1))
+    assert cap[0] == pytest.approx(math.sqrt(30.0 + 2 * 3.0 * 5.0))  # 5 m before
     assert cap[30] > 1000
 
 
