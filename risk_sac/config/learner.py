@@ -89,7 +89,7 @@ class RewardConfig(Settings):
     ttc_scale_s: Positive = 1.0
     rss_weight: NonNegative = 0.1
     """Reward per step in which both RSS margins are violated."""
-    softmin_sharpness: Positive = 10.0
+    softmin_sharpness: Positive = 20.0
     """β of Eq. 7; robustness is in units of each requirement's scale."""
     zero_terminal_potential: bool = True
     """φ = 0 at terminal states, which policy invariance needs; False is Eq. 8 to the letter."""

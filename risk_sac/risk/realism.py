@@ -36,8 +36,8 @@ HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc", "initial_rss
 def jerk_term(accel_mps2: float, previous_accel_mps2: float, limit_mps2: float, step_s: float) -> float:
     """Abrupt control of one adversary, max(|Δa| / dt - ordinary, 0) / (greatest - ordinary), at most 1.
 
-    Choice: the greatest jerk is the actor's own, limit / BUILD_UP_S, and three quarters of it are free: what ordinary drivers do
-    at a light or behind a leader is not what the cost is to speak of.
+    Choice: the greatest jerk is the actor's own, limit / BUILD_UP_S, and three quarters of it are free: what
+    ordinary drivers do at a light or behind a leader is not what the cost is to speak of.
 
     Args:
       accel_mps2: its acceleration.

@@ -55,26 +55,47 @@ def stopping(speed_mps: float, response_s: float, accel_mps2: float, brake_mps2:
 
 
 @compiled
-def same_direction(rear_m: float, front_mps: float, brake_max_mps2: float) -> float:
+def same_direction(rear_mps: float, front_mps: float, parameters: RssParameters) -> float:
     """d_min = [v_r ρ + a ρ²/2 + (v_r + ρ a)² / (2 b_min) − v_f² / (2 b_max)]_+ , m  (Def. 1).
 
     Args:
-      rear_m: way of the vehicle behind until it stands, the first three terms; see `stopping`.
+      rear_mps: v_r, speed of the vehicle behind.
       front_mps: v_f, speed of the one ahead.
-      brake_max_mps2: b_max, with which that one may brake.
+      parameters: see `RssParameters`.
     """
-    return max(rear_m - front_mps * front_mps / (2 * brake_max_mps2), 0.0)
+    p = parameters
+    way = stopping(rear_mps, p.response_s, p.accel_mps2, p.brake_min_mps2)
+    return behind(way, front_mps, p)
 
 
 @compiled
-def approaching(ego_m: float, other_m: float) -> float:
-    """d_min where both respond and brake, [Σ_i stopping_i]_+ , m  (Def. 2, and Def. 6 without μ).
+def behind(way_m: float, front_mps: float, parameters: RssParameters) -> float:
+    """Def. 1 for a vehicle that needs `way_m` to stop."""
+    return max(way_m - front_mps * front_mps / (2 * parameters.brake_max_mps2), 0.0)
+
+
+@compiled
+def opposite_direction(ego_mps: float, other_mps: float, parameters: RssParameters) -> float:
+    """d_min: both respond after ρ and brake with b_min; speeds are magnitudes, m  (Def. 2)."""
+    p = parameters
+    return stopping(ego_mps, p.response_s, p.accel_mps2, p.brake_min_mps2) + stopping(
+        other_mps, p.response_s, p.accel_mps2, p.brake_min_mps2
+    )
+
+
+@compiled
+def lateral(closing_ego_mps: float, closing_other_mps: float, parameters: RssParameters) -> float:
+    """d_min = μ + [Σ_i (v_i + v_i,ρ) ρ/2 + v_i,ρ |v_i,ρ| / (2 b_lat)]_+ , m  (Def. 6).
 
     Args:
-      ego_m: way of the ego towards the other until it stands, see `stopping`.
-      other_m: way of the other towards the ego.
+      closing_ego_mps: the ego's lateral speed towards the other; negative when it moves away.
+      closing_other_mps: the other's towards the ego.
+      parameters: see `RssParameters`.
     """
-    return max(ego_m + other_m, 0.0)
+    p = parameters
+    ego = stopping(closing_ego_mps, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2)
+    other = stopping(closing_other_mps, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2)
+    return p.fluctuation_m + max(ego + other, 0.0)
 
 
 class Margins(NamedTuple):
@@ -129,27 +150,29 @@ def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Marg
 
         if view.x[i] < 0.0:
             way = stopping(max(along, 0.0), p.response_s, accel_x, brake_x)
-            distance = same_direction(way, ego, p.brake_max_mps2)
+            distance = behind(way, ego, p)
         elif along < 0.0:
-            distance = approaching(ego_way, stopping(-along, p.response_s, accel_x, brake_x))
+            distance = ego_way + stopping(-along, p.response_s, accel_x, brake_x)
         else:
-            distance = same_direction(ego_way, along, p.brake_max_mps2)
+            distance = behind(ego_way, along, p)
         clear = abs(view.x[i]) - view.reach[0, i] - distance
         longitudinal[i] = min(max(clear, -LONGITUDINAL_CAP_M), LONGITUDINAL_CAP_M)
 
         side = 1.0 if view.y[i] >= 0.0 else -1.0
-        distance = approaching(
-            stopping(side * view.ego_vy, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2),
-            stopping(-side * across, p.response_s, accel_y, brake_y),
+        distance = max(
+            stopping(side * view.ego_vy, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2)
+            + stopping(-side * across, p.response_s, accel_y, brake_y),
+            0.0,
         )
         clear = abs(view.y[i]) - view.reach[1, i] - distance
         if not walks[i]:
             side = 1.0 if view.separation[3, i] >= 0.0 else -1.0
             ego_closing = side * (view.ego_vy * view.cos[i] - view.ego_vx * view.sin[i])
             closing = side * (along * view.sin[i] - across * view.cos[i])
-            distance = approaching(
-                stopping(ego_closing, p.response_s, accel_y, brake_y),
-                stopping(closing, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2),
+            distance = max(
+                stopping(ego_closing, p.response_s, accel_y, brake_y)
+                + stopping(closing, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2),
+                0.0,
             )
             clear = max(clear, abs(view.separation[3, i]) - view.reach[3, i] - distance)
         clear -= p.fluctuation_m

@@ -45,6 +45,8 @@ def frame_of(
         accel_mps2=np.array([accel_mps2] + [0.0] * (n - 1)),
         length_m=np.full(n, 4.0),
         width_m=np.full(n, 2.0),
+        lane_offset_m=np.zeros(n),
+        link=np.zeros(n, dtype=np.uint8),
         signal=Signal.NONE if math.isinf(stop_line_m) else Signal.RED,
         stop_line_m=stop_line_m,
     )

@@ -17,8 +17,9 @@ from risk_sac.risk.rss import (
     SCALED_HIGH,
     SCALED_LOW,
     RssParameters,
-    approaching,
-    stopping,
+    lateral,
+    opposite_direction,
+    same_direction,
 )
 from risk_sac.types import Frame, Kind, Role, Signal
 
@@ -32,23 +33,6 @@ P = RssParameters(
     lateral_brake_mps2=1.0,
     fluctuation_m=0.1,
 )
-
-
-def way(speed_mps: float, p: RssParameters) -> float:
-    return stopping(speed_mps, p.response_s, p.accel_mps2, p.brake_min_mps2)
-
-
-def same_direction(rear_mps: float, front_mps: float, p: RssParameters) -> float:
-    return rss.same_direction(way(rear_mps, p), front_mps, p.brake_max_mps2)
-
-
-def opposite_direction(ego_mps: float, other_mps: float, p: RssParameters) -> float:
-    return approaching(way(ego_mps, p), way(other_mps, p))
-
-
-def lateral(ego_mps: float, other_mps: float, p: RssParameters) -> float:
-    ways = (stopping(v, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2) for v in (ego_mps, other_mps))
-    return p.fluctuation_m + approaching(*ways)
 
 
 def margins(view: RelativeView, p: RssParameters, *, walks: bool = False) -> tuple[np.ndarray, np.ndarray]:
@@ -182,6 +166,8 @@ def view_of(ego_mps: float, *others: tuple[float, float, float, float, float]) -
         accel_mps2=np.zeros(n),
         length_m=np.full(n, 4.0),
         width_m=np.full(n, 2.0),
+        lane_offset_m=np.zeros(n),
+        link=np.zeros(n, dtype=np.uint8),
         signal=Signal.NONE,
         stop_line_m=math.inf,
     )
@@ -282,7 +268,7 @@ def test_left_and_right_are_alike(ego_mps: float, other: tuple[float, float, flo
         pytest.param(12.0, (20.0, -14.0, math.pi / 2, 0, 0), id="cross traffic waits at its red light"),
         pytest.param(12.0, (20.0, -28.0, math.pi / 2, 0, 8), id="cross traffic brakes for its red light"),
         pytest.param(14.0, (30.0, 3.3, math.pi, -14, 0), id="oncoming in the opposite lane"),
-        pytest.param(4.0, (12.0, -2.0, math.pi - 0.35, -9.4, 3.4), id="oncoming past an ego that begins to turn"),
+        pytest.param(4.0, (20.0, -2.0, math.pi - 0.35, -9.4, 3.4), id="oncoming past an ego that begins to turn"),
         pytest.param(13.0, (19.0, 0.0, 0.0, 13, 0), id="a leader at SUMO's headway of 1 s"),
         pytest.param(14.0, (0.0, 3.2, 0.0, 14, 0), id="beside it in the next lane"),
     ],

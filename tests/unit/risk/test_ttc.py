@@ -33,6 +33,8 @@ def view_of(*others: tuple[float, float, float, float, float], ego_mps: float = 
         width_m=np.full(n, WIDTH_M),
         signal=Signal.NONE,
         stop_line_m=math.inf,
+        lane_offset_m=np.zeros(n),
+        link=np.zeros(n, dtype=np.uint8),
     )
     return relative_view(frame)
 
