@@ -94,12 +94,17 @@ def effective_collision_rate(records: Sequence[EpisodeRecord]) -> float:
     return sum(record.outcome is Outcome.FAILURE for record in records) / max(1, len(records))
 
 
+def preventable(record: EpisodeRecord) -> bool:
+    """Whether the episode ended in a valid collision that the careful driver would have prevented."""
+    return record.outcome is Outcome.FAILURE and record.collision is not None and record.collision.preventable
+
+
 def preventable_collision_rate(records: Sequence[EpisodeRecord]) -> float:
     """PCR: valid collisions of grade `careful` per episode, rejected scenes included; 0 without episodes.
 
     A collision that was never judged counts as not preventable.
     """
-    return sum(_preventable(record) for record in records) / max(1, len(records))
+    return sum(preventable(record) for record in records) / max(1, len(records))
 
 
 def efficiency_score(records: Sequence[EpisodeRecord], horizon_steps: int) -> float:
@@ -285,7 +290,7 @@ class MetricsAccumulator:
         self._steps = self._steps_to_failure = 0
         self._cost = self._distance = 0.0
         self._preventable = self._distinct_preventable = self._artefacts = self._unresponsive = 0
-        self._window: deque[tuple[bool, bool]] = deque(maxlen=WINDOW)  # failed, preventable
+        self._window: deque[tuple[bool, bool]] = deque(maxlen=WINDOW)  # failed, preventably
         self._signatures: Counter[str] = Counter()
         seconds = math.ceil(horizon_steps / STEPS_PER_S)
         self._conflicts, self._contacts = [0] * seconds, [0] * seconds
@@ -312,7 +317,7 @@ class MetricsAccumulator:
         self._steps_to_failure += _steps_to_failure(record, self._horizon_steps)
         self._cost += record.mean_cost * record.steps if record.steps else 0.0
         self._artefacts += record.collision is not None and record.collision.artefact
-        self._window.append((failed, _preventable(record)))
+        self._window.append((failed, preventable(record)))
         self._dual_variable, self._temperature = record.dual_variable, record.temperature
         return self.metrics()
 
@@ -367,7 +372,7 @@ class MetricsAccumulator:
             pcr=self._preventable / max(1, self._episodes),
             pcr_low=pcr_low,
             pcr_high=pcr_high,
-            window_pcr=sum(preventable for _, preventable in self._window) / newest,
+            window_pcr=sum(prevented for _, prevented in self._window) / newest,
             distinct_preventable=self._distinct_preventable,
             artefacts=self._artefacts,
             unresponsive=self._unresponsive,
