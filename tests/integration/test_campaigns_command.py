@@ -60,16 +60,30 @@ def test_submit_watch_shows_the_way_on_one_channel_and_the_results_on_the_other(
 ) -> None:
     assert call(*SUBMIT, "--watch") == 0
     printed = capsys.readouterr()
-    assert "succeeded: 12/12 episodes, 6 failures" in printed.err
+    assert "succeeded: 12/12 episodes, 6 failures, 2 distinct and preventable, ECR " in printed.err
     assert "\x1b" not in printed.err + printed.out
     (row,) = (line for line in printed.out.splitlines() if "random" in line)
-    assert row.split()[:7] == ["low", "random", "2", "12", "6", "0", "0.50"]
+    assert row.split() == ["low", "random", "12", "6", "6", "4", "2", "0.50", "0.17"]
 
 
 def test_failures_above_the_bound_are_exit_status_1(finished: str, call: Callable[..., int]) -> None:
     assert call("results", finished, "--max-ecr", 0.5) == 0
     assert call("results", finished, "--max-ecr", 0.49) == 1
     assert call("watch", finished, "--max-ecr", 0.49) == 1
+
+
+def test_preventable_failures_above_their_bound_are_exit_status_1(
+    finished: str, call: Callable[..., int], capsys: pytest.CaptureFixture[str], service: Service, tmp_path: Path
+) -> None:
+    assert call("results", finished, "--max-ecr", 0.5, "--max-pcr", 0.17) == 0
+    capsys.readouterr()
+    assert call("results", finished, "--max-ecr", 0.5, "--max-pcr", 0.16, "--junit", tmp_path / "j.xml") == 1
+    assert capsys.readouterr().err == "PCR above 0.16: low random 0.167\n"
+    first = next(ElementTree.parse(tmp_path / "j.xml").getroot().iter("failure"))
+    assert first.attrib["message"] == "PCR 0.167 > 0.16: 1 preventable failures in 6 episodes"
+    assert first.text is not None
+    grades = [service.client.get(url).json()["collision"]["judgement"]["grade"] for url in first.text.splitlines()]
+    assert grades == ["careful"]
 
 
 def test_the_bound_holds_with_submit_too(call: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> None:
@@ -184,7 +198,7 @@ def test_what_cannot_run_is_exit_status_2_without_a_traceback(
     assert printed.out == ""
 
 
-@pytest.mark.parametrize("bad", [["--max-ecr", "2"], ["--max-ecr", "x"], ["--timeout", "0"], ["--timeout", "nan"]])
+@pytest.mark.parametrize("bad", [["--max-ecr", "2"], ["--max-pcr", "x"], ["--timeout", "0"], ["--timeout", "nan"]])
 def test_bad_arguments_are_exit_status_2(bad: list[str], call: Callable[..., int]) -> None:
     with pytest.raises(SystemExit, match="2"):
         call("watch", "c1", *bad)
