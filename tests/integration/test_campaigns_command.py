@@ -19,6 +19,7 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.client import Client
+from risk_sac.types import Grade
 from tests.server import Service
 
 SUBMIT = ["submit", "--families", "low", "--methods", "random", "--seeds", "2", "--episodes", "6"]
@@ -84,6 +85,33 @@ def test_preventable_failures_above_their_bound_are_exit_status_1(
     assert first.text is not None
     grades = [service.client.get(url).json()["collision"]["judgement"]["grade"] for url in first.text.splitlines()]
     assert grades == ["careful"]
+
+
+def test_failures_are_filtered_by_their_judgement(finished: str, service: Service) -> None:
+    def found(**wanted: str) -> int:
+        url = f"/v1/campaigns/{finished}/failures"
+        return len(service.client.get(url, params=wanted).raise_for_status().json()["items"])
+
+    assert found() == found(tier="raw") == found(signature="cut-in, straight") == 6
+    assert found(grade="careful") == found(broke="red_light") == found(grade="careful", run="low-random-0") * 2 == 2
+    assert found(grade="ideal") == 4
+    assert found(grade="ideal", broke="red_light") == found(signature="cut-in") == 0
+    with Client(f"http://127.0.0.1:{service.port}") as client:
+        careful = list(client.failures(finished, grade=Grade.CAREFUL, broke="red_light", page=1))
+    assert [failure.index for failure in careful] == [1, 1]
+
+
+def test_results_and_metrics_tell_the_funnel(finished: str, service: Service) -> None:
+    (total,) = service.get(finished, "/results")["totals"]
+    names = ("raw_collisions", "failures", "distinct_failures", "distinct_preventable", "preventable")
+    assert [total[name] for name in names] == [6, 6, 4, 2, 2]
+    assert total["signatures"] == {"cut-in, straight": 6}
+    progress = service.get(finished)["progress"]
+    assert [progress[name] for name in names] == [6, 6, 4, 2, 2]
+    assert progress["window_pcr"] == 0.0  # as the scripted worker says
+    exposed = service.client.get("/metrics").text
+    for name in ("contacts", "failures", "distinct_failures", "preventable_failures", "distinct_preventable_failures"):
+        assert f'risk_sac_{name}_total{{family="low",method="random"}} ' in exposed
 
 
 def test_the_bound_holds_with_submit_too(call: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> None:
