@@ -7,8 +7,21 @@ import numpy as np
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.report import compare, figure_bytes, figure_names, table_csv, table_json, table_markdown, write_report
+from risk_sac.metrics import results_digest
+from risk_sac.records import records_to_json
+from risk_sac.report import (
+    compare,
+    figure_bytes,
+    figure_names,
+    read_run,
+    table_csv,
+    table_json,
+    table_markdown,
+    write_report,
+)
 from risk_sac.report.figures import window_ecr, window_pcr
+from risk_sac.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
+from risk_sac.seal import seal, unseal
 
 
 @pytest.fixture
@@ -71,16 +84,7 @@ def test_page_has_histograms_and_signatures_of_those_who_found_something(compari
 
 
 def test_page_of_runs_from_before_contacts_were_judged_has_no_empty_histograms(spec, runs):
-    old = [
-        replace(
-            run,
-            records=tuple(
-                replace(record, collision=record.collision and replace(record.collision, judgement=None))
-                for record in run.records
-            ),
-        )
-        for run in runs
-    ]
+    old = [replace(run, records=tuple(map(unjudged, run.records))) for run in runs]
     page = table_markdown(compare(spec, old, ""))
     assert "| risk-sac | 8 | 4 | 4 | 3 | 0 | 0.0 % |" in page
     assert "by the time since" not in page
@@ -190,3 +194,46 @@ def test_report_is_written_twice_alike(comparison, tmp_path):
     first = content()
     assert len(first) == 3 + 2 * len(figure_names(comparison))
     assert content() == first
+
+
+NEW_METRICS = (
+    *("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts", "unresponsive"),
+    *("signatures", "conflicts_by_second", "contacts_by_second"),
+)
+
+
+def test_a_run_from_before_contacts_were_judged_can_still_be_read(runs, tmp_path):
+    """Its files have none of the new fields, and its digest was formed without them."""
+    run = next(run for run in runs if run.metrics["search"].preventable)
+    records = [unjudged(record) for record in run.records]
+    results = Results(
+        spec=run.spec,
+        spec_digest=run.spec.digest,
+        finished=True,
+        metrics=run.metrics["search"],
+        digest=results_digest(records),
+        contacts=tuple(Contact.of(record) for record in records if record.collision is not None),
+    )
+    write_results(tmp_path, results)
+    stored = json.loads(unseal((tmp_path / RESULTS).read_bytes()))
+    for name in NEW_METRICS:
+        del stored["metrics"][name]
+    for contact in stored["contacts"]:
+        del contact["episode"]["collision"]["judgement"]
+    (tmp_path / RESULTS).write_bytes(seal(json.dumps(stored, indent=2).encode()))
+    lines = json.loads(records_to_json(records))
+    for record in lines:
+        if record["collision"] is not None:
+            del record["collision"]["judgement"]
+    (tmp_path / EPISODES).write_text("".join(json.dumps(record) + "\n" for record in lines))
+    found = read_run(tmp_path)
+    assert found.records == tuple(records)
+    assert (found.metrics["search"].failures, found.metrics["search"].preventable) == (
+        run.metrics["search"].failures,
+        0,
+    )
+    assert read_results(tmp_path).metrics.pcr_high == 1.0
+
+
+def unjudged(record):
+    return replace(record, collision=record.collision and replace(record.collision, judgement=None))
