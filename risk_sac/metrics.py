@@ -1,4 +1,4 @@
-"""What a run achieved: ECR, ES, ρ̄_c and OFD with their 95 % intervals, and the digest of its records.
+"""What a run achieved: ECR, PCR, ES, ρ̄_c and OFD with their 95 % intervals, and the digest of its records.
 
 Source: RISK-SAC, Sec. IV (evaluation metrics); what the paper leaves open is marked as a choice.
 """
@@ -6,19 +6,21 @@ Source: RISK-SAC, Sec. IV (evaluation metrics); what the paper leaves open is ma
 import hashlib
 import json
 import math
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from risk_sac.errors import NotFinite
-from risk_sac.types import Collision, EpisodeRecord, Floats, Outcome, RunMetrics
+from risk_sac.types import STEP_S, Collision, EpisodeRecord, Floats, Outcome, RunMetrics
 from risk_sac.verdicts.distinct import DistinctFailures
 from risk_sac.verdicts.distinct import distinct_failures as distinct_failures
 
-WINDOW = 100  # episodes of the sliding ECR
+STEPS_PER_S = round(1 / STEP_S)
+WINDOW = 100  # episodes of the sliding ECR and PCR
 NORMAL_QUANTILE = 1.959963984540054  # two-sided 95 %
 RESAMPLES = 10_000
 
@@ -91,6 +93,19 @@ def bootstrap_interval(values: Sequence[float], seed: int) -> tuple[float, float
 def effective_collision_rate(records: Sequence[EpisodeRecord]) -> float:
     """ECR: valid collisions per episode, rejected scenes included; 0 without episodes. Source: Sec. IV."""
     return sum(record.outcome is Outcome.FAILURE for record in records) / max(1, len(records))
+
+
+def preventable(record: EpisodeRecord) -> bool:
+    """Whether the episode ended in a valid collision that the careful driver would have prevented."""
+    return record.outcome is Outcome.FAILURE and record.collision is not None and record.collision.preventable
+
+
+def preventable_collision_rate(records: Sequence[EpisodeRecord]) -> float:
+    """PCR: valid collisions of grade `careful` per episode, rejected scenes included; 0 without episodes.
+
+    A collision that was never judged counts as not preventable.
+    """
+    return sum(preventable(record) for record in records) / max(1, len(records))
 
 
 def efficiency_score(records: Sequence[EpisodeRecord], horizon_steps: int) -> float:
@@ -174,6 +189,59 @@ def results_digest(records: Sequence[EpisodeRecord]) -> str:
     return digest.hexdigest()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Funnel:
+    """From what the ego touched to what is worth a person's time; each count is part of the one before."""
+
+    contacts: int
+    valid: int
+    distinct: int
+    preventable: int  # distinct failures that the careful driver would have prevented
+
+    @classmethod
+    def of(cls, metrics: RunMetrics) -> "Funnel":
+        """The funnel of a run."""
+        return cls(
+            contacts=metrics.raw_collisions,
+            valid=metrics.failures,
+            distinct=metrics.distinct_failures,
+            preventable=metrics.distinct_preventable,
+        )
+
+
+# The counts of a run; several runs have their sums.
+COUNTS = (
+    "episodes",
+    "rejected",
+    "raw_collisions",
+    "failures",
+    "distinct_failures",
+    "preventable",
+    "distinct_preventable",
+    "artefacts",
+    "unresponsive",
+    "environment_steps",
+)
+
+
+def pooled_counts(metrics: Sequence[RunMetrics]) -> dict[str, int]:
+    """`COUNTS`, each summed over the runs; what two runs found alike counts twice."""
+    return {name: sum(getattr(each, name) for each in metrics) for name in COUNTS}
+
+
+def pooled_signatures(metrics: Sequence[RunMetrics]) -> dict[str, int]:
+    """Valid failures per signature over the runs, in the order in which the runs first met them."""
+    pooled: Counter[str] = Counter()
+    for each in metrics:
+        pooled.update(each.signatures)
+    return dict(pooled)
+
+
+def pooled_bins(histograms: Sequence[Sequence[int]]) -> tuple[int, ...]:
+    """Histograms summed bin by bin; one from before there were any is empty."""
+    return tuple(map(sum, zip_longest(*histograms, fillvalue=0)))
+
+
 class MetricsAccumulator:
     """`RunMetrics` kept up to date, at a cost per episode that grows only with the number of failures.
 
@@ -187,7 +255,11 @@ class MetricsAccumulator:
         self._episodes = self._rejected = self._raw_collisions = self._failures = 0
         self._steps = self._steps_to_failure = 0
         self._cost = self._distance = 0.0
-        self._window: deque[bool] = deque(maxlen=WINDOW)
+        self._preventable = self._distinct_preventable = self._artefacts = self._unresponsive = 0
+        self._window: deque[tuple[bool, bool]] = deque(maxlen=WINDOW)  # failed, preventably
+        self._signatures: Counter[str] = Counter()
+        seconds = math.ceil(horizon_steps / STEPS_PER_S)
+        self._conflicts, self._contacts = [0] * seconds, [0] * seconds
         self._features = np.empty((64, len(FEATURES)))  # doubled when full; the first `_failures` rows count
         self._distinct = DistinctFailures()
         self._dual_variable = self._temperature = 0.0
@@ -196,7 +268,7 @@ class MetricsAccumulator:
         """Count one more episode.
 
         Raises:
-            NotFinite: its mean cost is not finite, or an outcome feature is NaN.
+            NotFinite: its mean cost, or when its conflict or contact was, is not finite, or an outcome feature is NaN.
             ValueError: it is a failure without a collision.
         """
         if record.steps and not math.isfinite(record.mean_cost):
@@ -210,7 +282,8 @@ class MetricsAccumulator:
         self._steps += record.steps
         self._steps_to_failure += _steps_to_failure(record, self._horizon_steps)
         self._cost += record.mean_cost * record.steps if record.steps else 0.0
-        self._window.append(failed)
+        self._artefacts += record.collision is not None and record.collision.artefact
+        self._window.append((failed, preventable(record)))
         self._dual_variable, self._temperature = record.dual_variable, record.temperature
         return self.metrics()
 
@@ -218,16 +291,30 @@ class MetricsAccumulator:
         if record.collision is None:
             raise ValueError(f"episode {record.index} is a failure without a collision; wanted its collision record")
         features = outcome_features(record.collision)
+        _require_finite_times(record.collision)  # before anything is counted
         if self._failures == len(self._features):
             self._features = np.concatenate((self._features, np.empty_like(self._features)))
         self._distance += _distances(self._features[: self._failures], features)
         self._features[self._failures] = features
         self._failures += 1
-        self._distinct.add(record.collision)
+        new = self._distinct.add(record.collision)
+        self._preventable += record.collision.preventable
+        self._distinct_preventable += new and record.collision.preventable
+        if record.collision.judgement is not None:
+            self._unresponsive += record.collision.judgement.unresponsive
+            self._signatures[record.collision.judgement.signature] += 1
+            self._conflicts[self._second(record.collision.judgement.conflict_s)] += 1
+            self._contacts[self._second(record.collision.time_s)] += 1
+
+    def _second(self, time_s: float) -> int:
+        """The bin of a time; what began before the release is in the first, and the horizon's end in the last."""
+        return min(max(0, math.floor(time_s)), len(self._contacts) - 1)
 
     def metrics(self) -> RunMetrics:
         """The figures over all episodes added so far."""
         low, high = wilson_interval(self._failures, self._episodes)
+        pcr_low, pcr_high = wilson_interval(self._preventable, self._episodes)
+        newest = max(1, len(self._window))
         pairs = self._failures * (self._failures - 1) / 2
         saved = 1 - self._steps_to_failure / (self._episodes * self._horizon_steps) if self._episodes else 0.0
         return RunMetrics(
@@ -239,7 +326,7 @@ class MetricsAccumulator:
             ecr=self._failures / max(1, self._episodes),
             ecr_low=low,
             ecr_high=high,
-            window_ecr=sum(self._window) / max(1, len(self._window)),
+            window_ecr=sum(failed for failed, _ in self._window) / newest,
             efficiency=saved,
             cost_rate=self._cost / max(1, self._steps),
             dispersion=self._distance / pairs / math.sqrt(len(FEATURES)) if pairs else None,
@@ -247,6 +334,31 @@ class MetricsAccumulator:
             temperature=self._temperature,
             distinct_failures=self._distinct.count,
             steps_per_distinct_failure=self._steps / self._distinct.count if self._distinct.count else None,
+            preventable=self._preventable,
+            pcr=self._preventable / max(1, self._episodes),
+            pcr_low=pcr_low,
+            pcr_high=pcr_high,
+            window_pcr=sum(prevented for _, prevented in self._window) / newest,
+            distinct_preventable=self._distinct_preventable,
+            artefacts=self._artefacts,
+            unresponsive=self._unresponsive,
+            signatures=dict(self._signatures),
+            conflicts_by_second=tuple(self._conflicts),
+            contacts_by_second=tuple(self._contacts),
+        )
+
+
+def _preventable(record: EpisodeRecord) -> bool:
+    return record.outcome is Outcome.FAILURE and record.collision is not None and record.collision.preventable
+
+
+def _require_finite_times(collision: Collision) -> None:
+    times_s = [collision.time_s]
+    if collision.judgement is not None:
+        times_s.append(collision.judgement.conflict_s)
+    if not all(map(math.isfinite, times_s)):
+        raise NotFinite(
+            f"collision with {collision.other_id!r} and its conflict are at {times_s} s; wanted finite times"
         )
 
 
@@ -262,7 +374,9 @@ def _distances(rows: Floats, point: Floats) -> float:
 def _plain(value: object) -> dict[str, Any]:
     """Records and mappings as dicts, shallowly; `json` comes back for what they contain."""
     if is_dataclass(value) and not isinstance(value, type):
-        return {each.name: getattr(value, each.name) for each in fields(value)}
+        plain = {each.name: getattr(value, each.name) for each in fields(value)}
+        # Records from before contacts were judged keep the digest they had.
+        return {name: each for name, each in plain.items() if (name, each) != ("judgement", None)}
     if isinstance(value, Mapping):
         return dict(value)
     raise TypeError(f"{value!r} of {type(value).__name__} has no canonical JSON; wanted a record of plain values")

@@ -1,4 +1,7 @@
-"""Draws one contact as the paper's Fig. 2 does: both paths from above, and what was measured along the way."""
+"""Draws one contact as the paper's Fig. 2 does: both paths from above, and what was measured along the way.
+
+Where the contact was judged, the moment at which the conflict began is marked as well.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -23,6 +26,7 @@ from risk_sac.trace import read_series
 from risk_sac.types import Collision, Floats, Kind, Role
 
 EGO_COLOUR, OTHER_COLOUR, BYSTANDER_COLOUR = "tab:blue", "tab:red", "tab:gray"
+SEEN_COLOUR, CONFLICT_COLOUR, RELEASE_COLOUR = "tab:green", "tab:orange", "tab:purple"  # of instants
 SURFACE_COLOURS = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
 GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the contact, where the two bodies are drawn as well
 VIEW_S, PANELS_S = 3.0, 8.0  # before the contact: what the view from above holds, and the panels
@@ -48,8 +52,26 @@ class Recording:
     @cached_property
     def time_s(self) -> Floats:
         """`T`, negative before the contact."""
-        time: Floats = self["time_s"] - self["time_s"][0] - self.collision.time_s
+        time: Floats = self["time_s"] - self._simulator_release_s - self.collision.time_s
         return time
+
+    @property
+    def _simulator_release_s(self) -> float:
+        """The release by the simulator's clock; the first frame, in what was recorded before there was a release."""
+        return float(self["released_s"] if "released_s" in self.series else self["time_s"][0])
+
+    @property
+    def released_s(self) -> float:
+        """When the adversaries were released."""
+        return -self.collision.time_s
+
+    @property
+    def conflict_s(self) -> float | None:
+        """When the conflict began; None if nobody judged the contact, or if it was before the recording."""
+        if self.collision.judgement is None:
+            return None
+        began_s = self.collision.judgement.conflict_s - self.collision.time_s
+        return began_s if began_s >= self.time_s[0] else None
 
     @cached_property
     def other(self) -> int:
@@ -122,13 +144,29 @@ def _title(family: FamilyName, recording: Recording) -> str:
         f"{family} · episode {recording.contact.id} · {recording.contact.episode.outcome}{reason}\n"
         f"the ego's {collision.ego_zone} at {collision.ego_speed_mps:.1f} m/s, the {collision.other_zone} of "
         f"{collision.other_role} {collision.other_id!r} at {collision.other_speed_mps:.1f} m/s; "
-        f"visible for {collision.visible_for_s:.1f} s"
+        f"visible for {collision.visible_for_s:.1f} s" + _judged(collision)
+    )
+
+
+def _judged(collision: Collision) -> str:
+    """Lines with who would have prevented it, how and where it began, and whether the striker was in the wrong."""
+    judgement = collision.judgement
+    if judgement is None:
+        return ""
+    grade = f"grade {judgement.grade}" if judgement.grade else "no grade"
+    broke = ", ".join(judgement.broke) or "nothing"
+    before_s = collision.time_s - judgement.conflict_s
+    return (
+        f"\n{grade} · {judgement.conflict_type} from {before_s:.1f} s before the contact, {judgement.conflict_s:.1f} s "
+        f"after the release, at ({judgement.conflict_x_m:.1f}, {judgement.conflict_y_m:.1f}) m\n"
+        f"the striker broke {broke}".replace("_", " ")
     )
 
 
 def _extent(recording: Recording) -> tuple[Floats, Floats]:
     """Corners of the ground that both took in the last seconds, grown to a shape that fits the page."""
-    shown = recording.time_s >= -VIEW_S
+    begin_s = recording.conflict_s
+    shown = recording.time_s >= min(-VIEW_S, max(begin_s, -PANELS_S) if begin_s is not None else 0.0)
     pair = [0, recording.other]
     points = np.concatenate([recording[name][shown][:, pair].reshape(1, -1) for name in ("x_m", "y_m")])
     low, high = points.min(axis=1) - MARGIN_M, points.max(axis=1) + MARGIN_M
@@ -150,6 +188,7 @@ def _from_above(axis: Axes, family: FamilyName, recording: Recording) -> None:
     _draw_actor(axis, recording, recording.other, OTHER_COLOUR, GHOSTS_S)
     _draw_actor(axis, recording, 0, EGO_COLOUR, GHOSTS_S)
     _draw_contact_point(axis, recording)
+    _draw_conflict(axis, recording)
     axis.set(xlabel="x, m", ylabel="y, m")
     _legend(axis)
 
@@ -221,6 +260,19 @@ def _draw_contact_point(axis: Axes, recording: Recording) -> None:
     axis.plot(*place, marker="x", color="black", markersize=7, linestyle="none", zorder=5, label="contact")
 
 
+def _draw_conflict(axis: Axes, recording: Recording) -> None:
+    """Where the striker was when the conflict began, and both bodies at that moment."""
+    judgement, begin_s = recording.collision.judgement, recording.conflict_s
+    if judgement is None or begin_s is None:
+        return
+    for actor in (0, recording.other):
+        if np.isfinite(recording.pose(actor, begin_s)).all():
+            style = {"facecolor": "none", "edgecolor": CONFLICT_COLOUR, "linewidth": 1.4, "linestyle": "--"}
+            _draw_body(axis, recording, actor, begin_s, **style)
+    place = judgement.conflict_x_m, judgement.conflict_y_m
+    axis.plot(*place, marker="D", color=CONFLICT_COLOUR, markersize=5, linestyle="none", zorder=5, label="conflict")
+
+
 def _speeds(axis: Axes, recording: Recording) -> None:
     _both(axis, recording, "speed_mps")
     axis.set_ylabel("speed\nm/s")
@@ -265,21 +317,29 @@ def _legend(axis: Axes) -> None:
 
 
 def _mark_instants(axis: Axes, recording: Recording) -> None:
-    """The contact, since when the other was in view, and where it was hidden before."""
+    """The contact, since when the other was in view, where it was hidden before, release and begin of the conflict."""
     axis.axvline(0, color="black", linewidth=0.8, linestyle="--")
     axis.grid(visible=True, linewidth=0.3)
     for start, end in recording.hidden():
         axis.axvspan(start, end, color="0.9", zorder=0)
     first_visible = recording.time_s[-1] - recording.collision.visible_for_s
-    axis.axvline(first_visible, color="tab:green", linewidth=1.0, linestyle=":")
+    _mark(axis, first_visible, "in view", SEEN_COLOUR, row=0)
+    _mark(axis, recording.released_s, "release", RELEASE_COLOUR, row=1)
+    if recording.conflict_s is not None:
+        _mark(axis, recording.conflict_s, "conflict", CONFLICT_COLOUR, row=2)
+
+
+def _mark(axis: Axes, time_s: float, name: str, colour: str, row: int) -> None:
+    """An instant with its name at the top, in a row of its own so that names do not cover each other."""
+    axis.axvline(time_s, color=colour, linewidth=1.0, linestyle=":")
     axis.annotate(
-        "in view",
-        (first_visible, 1),
-        (2, -2),
+        name,
+        (time_s, 1),
+        (2, -2 - 9 * row),
         xycoords=axis.get_xaxis_transform(),
         textcoords="offset points",
         va="top",
         fontsize=7,
-        color="tab:green",
+        color=colour,
         annotation_clip=True,
     )

@@ -20,6 +20,7 @@ from rich.table import Table
 
 from risk_sac.client import Campaign, Client, ClientError, Unreachable
 from risk_sac.results import FAILURES, series_name
+from risk_sac.types import Grade
 from service.settings import ServiceSettings
 
 START_S = 60.0
@@ -139,8 +140,8 @@ def _figures(campaign: Campaign) -> str:
     seen = campaign.progress
     eta = "?" if seen.eta_s is None else f"{seen.eta_s:.0f} s"
     return (
-        f"{seen.raw_collisions} collisions, {seen.failures} valid  "
-        f"ECR {_number(seen.window_ecr)}  λ {_number(seen.dual_variable)}  ETA {eta}"
+        f"{seen.failures} valid, {seen.distinct_preventable} distinct preventable  "
+        f"PCR {_number(seen.window_pcr)}  ETA {eta}"
     )
 
 
@@ -166,7 +167,17 @@ def _run_folder(data_dir: Path, campaign: Json, run_id: str) -> Path:
 
 def _summarise(found: Json, console: Console) -> None:
     table = Table(title="What the search found", box=SIMPLE_HEAD, padding=0)  # 80 columns hold the longest method
-    for name in ("method", "episodes", "raw", "valid", "ECR", "95 %", "ES", "cost", "OFD", "steps\n/dist."):
+    for name in (
+        "method",
+        "epi-\nsodes",
+        "con-\ntacts",
+        "valid",
+        "distinct",
+        "preven-\ntable",
+        "ECR",
+        "PCR",
+        "PCR's\n95 %",
+    ):
         table.add_column(name, justify="left" if name == "method" else "right")
     for total in found["results"]["totals"]:
         table.add_row(
@@ -174,22 +185,22 @@ def _summarise(found: Json, console: Console) -> None:
             str(total["episodes"]),
             str(total["raw_collisions"]),
             str(total["failures"]),
+            str(total["distinct_failures"]),
+            str(total["distinct_preventable"]),
             _number(total["ecr"]),
-            f"{_number(total['ecr_low'])}-{_number(total['ecr_high'])}",
-            _number(total["efficiency"]),
-            _number(total["cost_rate"], 3),
-            _number(total["dispersion"]),
-            _number(total["steps_per_distinct_failure"], 0),
+            _number(total["pcr"]),
+            f"{_number(total['pcr_low'])}-{_number(total['pcr_high'])}",
         )
     console.print(table)
 
 
 def _invite(found: Json, data_dir: Path, console: Console) -> None:
-    """The command that draws the first failure of the first method that found one."""
-    campaign, failures = found["campaign"], found["failures"]
-    first = next((each for run in campaign["runs"] for each in failures if each["run_id"] == run["id"]), None)
-    if first is None:
+    """The command that draws the first preventable failure of the first method that found one, or else any failure."""
+    campaign = found["campaign"]
+    in_order = [each for run in campaign["runs"] for each in found["failures"] if each["run_id"] == run["id"]]
+    if not in_order:
         return
+    first = next(filter(_preventable, in_order), in_order[0])
     program, here = Path(sys.executable).with_name("risk-sac"), Path.cwd()
     program = program.relative_to(here) if program.is_relative_to(here) else program
     folder = _run_folder(data_dir, campaign, first["run_id"])
@@ -202,12 +213,17 @@ def _verdict(found: Json, console: Console) -> int:
     if campaign["state"] != "succeeded":
         console.print(f"campaign {campaign['state']}: {campaign['reason']}", style="bold red", markup=False)
         return 1
-    failures = campaign["progress"]["failures"]
+    failures, worth = (campaign["progress"][name] for name in ("failures", "distinct_preventable"))
     if failures == 0:
         console.print("no valid failure was found; try more --episodes or another --seeds", style="bold red")
         return 1
-    console.print(f"{failures} valid failures of the ego found", style="bold green")
+    console.print(f"{worth} distinct failures found that a careful driver would have prevented", style="bold green")
     return 0
+
+
+def _preventable(failure: Json) -> bool:
+    judgement = failure["collision"] and failure["collision"]["judgement"]
+    return judgement is not None and judgement["grade"] == Grade.CAREFUL
 
 
 def _number(value: float | None, digits: int = 2) -> str:

@@ -5,11 +5,12 @@ import time
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
-from pydantic_core import to_json
+from pydantic_core import from_json, to_json
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
+from risk_sac.metrics import Funnel
 from risk_sac.types import EpisodeRecord, Outcome
 from service.campaigns import RESUMED, State, advance, campaign_state
 from service.database import storage_errors
@@ -93,6 +94,7 @@ class Ledger:
                 run.metrics = _json(event.metrics)
             else:
                 run.evaluation = _json(event.metrics)
+            _tally(run)
             busy_s = self._repeated_s.pop(number)
             run.busy_s += busy_s
             _use(session, run.campaign.project, busy_s)
@@ -107,6 +109,7 @@ class Ledger:
             if result is not None:
                 row.metrics = _json(result.metrics)
                 row.evaluation = None if result.evaluation is None else _json(result.evaluation)
+                _tally(row)
                 row.digest = result.digest
                 row.versions = _json(dict(result.versions))
 
@@ -233,6 +236,13 @@ def _count(run: RunRow, outcome: Outcome, sign: int) -> None:
     run.failures += sign * (outcome is Outcome.FAILURE)
 
 
+def _tally(run: RunRow) -> None:
+    """What only the run itself can count: which failures are distinct is decided by those before them."""
+    phases = [from_json(text) for text in (run.metrics, run.evaluation) if text is not None]
+    for name in ("distinct_failures", "preventable", "distinct_preventable"):
+        setattr(run, name, sum(phase.get(name, 0) for phase in phases))
+
+
 def _fill(row: EpisodeRow, event: EpisodeDone) -> None:
     record: EpisodeRecord = event.record
     row.phase = record.phase
@@ -242,6 +252,11 @@ def _fill(row: EpisodeRow, event: EpisodeDone) -> None:
     row.series = event.series
     row.series_sha256 = event.series_sha256
     row.wall_s = event.wall_s
+    row.funnel = _json(Funnel.of(event.metrics))
+    judgement = record.collision.judgement if record.collision is not None else None
+    row.grade = judgement.grade if judgement is not None and record.outcome is Outcome.FAILURE else None
+    row.signature = judgement.signature if judgement is not None else None
+    row.broke = f",{','.join(judgement.broke)}," if judgement is not None else None
 
 
 def _json(value: object) -> str:

@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import Generic, TypeVar
 
 from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.metrics import Funnel
 from risk_sac.types import EpisodeRecord, RunMetrics
 from service.campaigns import State
 
@@ -30,6 +31,9 @@ class Run:
     rejected: int
     raw_collisions: int
     failures: int
+    distinct_failures: int  # these and what follows are sums of search and evaluation, as the run counted them
+    preventable: int
+    distinct_preventable: int
     busy_s: float  # wall time spent so far, earlier attempts included
     attempts: int  # workers that were started for it
     metrics: RunMetrics | None
@@ -89,6 +93,7 @@ class Episode:
     series: str | None  # file name of its full time series
     series_sha256: str | None  # of that file, as it was written
     wall_s: float
+    funnel: Funnel | None  # of the run's phase, this episode included; None if it is older than that
 
     @property
     def id(self) -> str:

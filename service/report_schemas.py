@@ -12,7 +12,8 @@ Phase = Literal["search", "evaluation"]
 MetricName = Annotated[
     str,
     Field(
-        description="ecr | ecr_last | es | rho_c | ofd | distinct_per_1000_steps; the markdown table defines them.",
+        description="ecr | pcr | ecr_last | pcr_last | es | rho_c | ofd | distinct_per_1000_steps; the markdown table"
+        " defines them.",
         examples=["ecr"],
     ),
 ]
@@ -49,10 +50,20 @@ class Cell(Body):
     seeds: list[int]
     """Of the runs that are counted."""
     episodes: int
+    rejected: int
+    """Infeasible scenes."""
+    raw_collisions: int
+    """Episodes in which the ego touched something."""
     failures: int
     """Valid collisions."""
     distinct_failures: int
     """Sum over the runs; what two runs found alike counts twice."""
+    preventable: int
+    """Valid collisions that the careful driver would have prevented, repetitions included."""
+    distinct_preventable: int
+    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
+    artefacts: int
+    unresponsive: int
     environment_steps: int
     estimates: Mapping[MetricName, Estimate]
     """By the name of the metric."""
@@ -67,6 +78,15 @@ class Cell(Body):
     """Contacts that are no valid failure / episodes."""
     rejected_rate: float
     """Infeasible scenes / episodes."""
+    unresponsive_share: Real
+    """Share of the valid collisions with a visible collision course of 1.5 s or more during which the ego never braked;
+    null without one."""
+    signatures: Mapping[str, int]
+    """Signature → valid collisions."""
+    conflicts_by_second: list[int]
+    """Valid collisions by the second after the adversaries' release in which the conflict began."""
+    contacts_by_second: list[int]
+    """The same by the second of the contact."""
 
 
 class PairedTest(Body):
@@ -151,7 +171,8 @@ class Figure(Body):
     """A figure of the report."""
 
     name: Annotated[str, Field(examples=["ecr_low", "bars_rho_c_evaluation"])]
-    """`ecr_`, `lambda_` and `alpha_` with a family: curves over the search. `bars_` with a metric: all families."""
+    """With a family: `ecr_`, `pcr_`, `lambda_` and `alpha_`, curves over the search; `times_`, histograms of the time
+    from the adversaries' release to conflict and contact. `bars_` with a metric: all families."""
     files: list[FigureFile]
 
 

@@ -1,11 +1,12 @@
 """What a campaign found so far, summed per family and method. Pure.
 
-Live figures of runs that go on; `service.reports` compares those that have finished. The mean ECR and its interval are
-those of the report.
+Live figures of runs that go on; `service.reports` compares those that have finished. Mean ECR and PCR and their
+intervals are those of the report.
 """
 
 from collections.abc import Sequence
 
+from risk_sac.metrics import pooled_bins, pooled_counts, pooled_signatures
 from risk_sac.report.cells import METRICS, estimate
 from risk_sac.types import RunMetrics
 from service.records import Campaign, Run
@@ -23,7 +24,7 @@ def results(campaign: Campaign) -> Results:
     )
 
 
-_ECR = next(metric for metric in METRICS if metric.name == "ecr")
+_ECR, _PCR = (next(metric for metric in METRICS if metric.name == name) for name in ("ecr", "pcr"))
 
 
 def totals(runs: Sequence[Run]) -> list[Total]:
@@ -36,28 +37,30 @@ def totals(runs: Sequence[Run]) -> list[Total]:
 
 
 def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
-    ecr = estimate(_ECR, group)
-    steps = sum(metrics.environment_steps for metrics in group)
-    distinct = sum(metrics.distinct_failures for metrics in group)
+    ecr, pcr = estimate(_ECR, group), estimate(_PCR, group)
+    counts = pooled_counts(group)
+    distinct, failures = counts["distinct_failures"], counts["failures"]
     dispersions = [metrics.dispersion for metrics in group if metrics.dispersion is not None]
     return Total.model_validate(
-        {
+        counts
+        | {
             "family": family,
             "method": method,
             "runs": len(group),
-            "episodes": sum(metrics.episodes for metrics in group),
-            "rejected": sum(metrics.rejected for metrics in group),
-            "raw_collisions": sum(metrics.raw_collisions for metrics in group),
-            "failures": sum(metrics.failures for metrics in group),
-            "environment_steps": steps,
             "ecr": ecr.mean,
             "ecr_low": ecr.low,
             "ecr_high": ecr.high,
+            "pcr": pcr.mean,
+            "pcr_low": pcr.low,
+            "pcr_high": pcr.high,
             "efficiency": _mean([metrics.efficiency for metrics in group]),
             "cost_rate": _mean([metrics.cost_rate for metrics in group]),
             "dispersion": _mean(dispersions) if dispersions else None,
-            "distinct_failures": distinct,
-            "steps_per_distinct_failure": steps / distinct if distinct else None,
+            "steps_per_distinct_failure": counts["environment_steps"] / distinct if distinct else None,
+            "unresponsive_share": counts["unresponsive"] / failures if failures else None,
+            "signatures": pooled_signatures(group),
+            "conflicts_by_second": pooled_bins([metrics.conflicts_by_second for metrics in group]),
+            "contacts_by_second": pooled_bins([metrics.contacts_by_second for metrics in group]),
         }
     )
 

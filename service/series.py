@@ -31,7 +31,8 @@ def load_series(path: Path, sha256: str | None) -> Series:
         content = path.read_bytes()
         _verify(path, content, sha256)
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            return Series.model_validate({name: _plain(name, arrays[name]) for name in Series.model_fields})
+            names = (name for name, field in Series.model_fields.items() if field.is_required() or name in arrays)
+            return Series.model_validate({name: _plain(name, arrays[name]) for name in names})
     except FileNotFoundError as error:
         raise StorageError(f"the time series {path.name!r} is gone") from error
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
@@ -44,12 +45,20 @@ def _verify(path: Path, content: bytes, sha256: str | None) -> None:
         raise StorageError(f"the time series {path.name!r} is damaged: its SHA-256 is {actual}, wanted {sha256}")
 
 
-def _plain(name: str, array: NDArray[Any]) -> list[Any]:
+def _letter(value: float | str) -> str | None:
+    """SUMO's letter of a signal, which may be written as its number."""
+    if isinstance(value, str):
+        return value or None
+    return chr(int(value)) if value > 0 else None
+
+
+def _plain(name: str, array: NDArray[Any]) -> Any:
+    if name == "link":
+        return [[_letter(each) for each in row] for row in array.tolist()]
     if name in _NAMED:
         return [_NAMED[name](int(value)).name.lower() for value in array]
     if array.dtype.kind == "f":
         missing = ~np.isfinite(array)
         array = array.astype(object)
         array[missing] = None
-    values: list[Any] = array.tolist()
-    return values
+    return array.tolist()

@@ -4,12 +4,14 @@ from collections.abc import Mapping
 
 from pydantic import TypeAdapter
 
+from risk_sac.metrics import Funnel
 from risk_sac.types import EpisodeRecord, RunMetrics
 from service.campaigns import State
 from service.records import Campaign, Change, Episode, Run
 from service.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 
 _METRICS: TypeAdapter[RunMetrics] = TypeAdapter(RunMetrics)
+_FUNNEL: TypeAdapter[Funnel] = TypeAdapter(Funnel)
 _RECORD: TypeAdapter[EpisodeRecord] = TypeAdapter(EpisodeRecord)
 _VERSIONS: TypeAdapter[dict[str, str]] = TypeAdapter(dict[str, str])
 
@@ -51,6 +53,9 @@ def run_record(row: RunRow, campaign_id: str) -> Run:
         rejected=row.rejected,
         raw_collisions=row.raw_collisions,
         failures=row.failures,
+        distinct_failures=row.distinct_failures,
+        preventable=row.preventable,
+        distinct_preventable=row.distinct_preventable,
         busy_s=row.busy_s,
         attempts=row.attempts,
         metrics=_metrics(row.metrics),
@@ -77,6 +82,7 @@ def episode_record(row: EpisodeRow) -> Episode:
         series=row.series,
         series_sha256=row.series_sha256,
         wall_s=row.wall_s,
+        funnel=None if row.funnel is None else _FUNNEL.validate_json(row.funnel),
     )
 
 

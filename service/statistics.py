@@ -1,5 +1,6 @@
 """What the service has done and does now, for its monitoring: sums over runs, never over episodes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pydantic_core import from_json
@@ -7,7 +8,7 @@ from sqlalchemy import Engine, func, select
 
 from service.campaigns import State
 from service.database import storage_errors
-from service.tables import CampaignRow, RunRow
+from service.tables import TALLIED, CampaignRow, RunRow
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,8 +19,7 @@ class Tally:
     method: str
     state: State
     runs: int
-    episodes: int
-    failures: int
+    counts: Mapping[str, int]  # `TALLIED`
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +31,7 @@ class AtWork:
     family: str
     method: str
     ecr: float | None  # None before its first episode
+    pcr: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ def read_statistics(engine: Engine) -> Statistics:
       StorageError: it cannot be read.
     """
     campaigns = select(CampaignRow.state, func.count()).group_by(CampaignRow.state)
-    sums = (func.count(), func.sum(RunRow.episodes_done), func.sum(RunRow.failures))
+    sums = (func.count(), *(func.sum(getattr(RunRow, name)) for name in TALLIED))
     tallies = select(RunRow.family, RunRow.method, RunRow.state, *sums)
     at_work = (
         select(CampaignRow.id, RunRow.id, RunRow.family, RunRow.method, RunRow.metrics)
@@ -61,13 +62,13 @@ def read_statistics(engine: Engine) -> Statistics:
         return Statistics(
             campaigns={State(state): count for state, count in connection.execute(campaigns)},
             tallies=tuple(
-                Tally(family, method, State(state), runs, episodes, failures)
-                for family, method, state, runs, episodes, failures in connection.execute(
+                Tally(family, method, State(state), runs, dict(zip(TALLIED, counts, strict=True)))
+                for family, method, state, runs, *counts in connection.execute(
                     tallies.group_by(RunRow.family, RunRow.method, RunRow.state)
                 )
             ),
             at_work=tuple(
-                AtWork(campaign_id, run_id, family, method, _ecr(metrics))
+                AtWork(campaign_id, run_id, family, method, *_rates(metrics))
                 for campaign_id, run_id, family, method, metrics in connection.execute(at_work)
             ),
         )
@@ -83,5 +84,7 @@ def check_readable(engine: Engine) -> None:
         connection.execute(select(CampaignRow.number).limit(1)).first()
 
 
-def _ecr(metrics: str | None) -> float | None:
-    return None if metrics is None else float(from_json(metrics)["ecr"])
+def _rates(metrics: str | None) -> tuple[float | None, float | None]:
+    """ECR and PCR; what was stored before contacts were judged has none of the latter."""
+    known = {} if metrics is None else from_json(metrics)
+    return known.get("ecr"), known.get("pcr")

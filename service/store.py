@@ -4,15 +4,15 @@ import time
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from heapq import merge
 from itertools import islice
 from operator import attrgetter
 
-from sqlalchemy import Select, func, select
+from sqlalchemy import ColumnElement, Select, func, select
 from sqlalchemy.orm import Session, selectinload
 
-from risk_sac.types import Outcome
+from risk_sac.types import Grade, Outcome
 from service.campaigns import FINAL, State
 from service.database import open_database, storage_errors
 from service.errors import NotFoundError, StorageError
@@ -23,6 +23,24 @@ from service.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow, UsageRow
 
 HOUR_S = 3600
 DAY_HOURS = 24
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """Which contacts are asked for, by their judgement; None: any."""
+
+    grade: Grade | None = None
+    broke: str | None = None
+    signature: str | None = None
+
+    def conditions(self) -> Iterator[ColumnElement[bool]]:
+        """As the database takes them."""
+        if self.grade is not None:
+            yield EpisodeRow.grade == self.grade
+        if self.broke is not None:
+            yield EpisodeRow.broke.contains(f",{self.broke},", autoescape=True)
+        if self.signature is not None:
+            yield EpisodeRow.signature == self.signature
 
 
 class Store:
@@ -140,6 +158,7 @@ class Store:
         after: int | None = None,
         run_id: str | None = None,
         outcomes: Collection[Outcome] = (),
+        judged: Judged | None = None,
         project: str | None = None,
     ) -> Page[Episode]:
         """In order of arrival, from the episode just after number `after`; no outcomes means all.
@@ -153,6 +172,7 @@ class Store:
                 query = select(EpisodeRow).where(EpisodeRow.campaign_number == campaign.number)
             else:  # without the campaign's number, which would let the database choose a slower index
                 query = select(EpisodeRow).where(EpisodeRow.run_number == _find_run(session, campaign, run_id))
+            query = query if judged is None else query.where(*judged.conditions())
             return _episode_page(session, query, outcomes, limit, after or 0)
 
     def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> Episode:

@@ -15,11 +15,28 @@ from operator import attrgetter
 from typing import Any
 
 from pydantic_core import to_json
-from sqlalchemy import BigInteger, ForeignKey, Index, Text, event, inspect
+from sqlalchemy import BigInteger, ForeignKey, Index, Text, event, inspect, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, Mapper, mapped_column, relationship
 from sqlalchemy.sql.schema import ScalarElementColumnDefault
 
 from service.errors import StorageError
+
+# What is summed up over runs, per family, method and state.
+TALLIED = (
+    "episodes_done",
+    "raw_collisions",
+    "failures",
+    "distinct_failures",
+    "preventable",
+    "distinct_preventable",
+)
+LATER = {"later": True}  # of a column that came after checksums: summed only where it holds something
+
+
+def _of_judged(name: str, *columns: str) -> Index:
+    """An index that the many episodes without a contact take no room in."""
+    judged = text(f"{columns[1]} IS NOT NULL")
+    return Index(name, *columns, sqlite_where=judged, postgresql_where=judged)
 
 
 class Base(DeclarativeBase):
@@ -68,7 +85,7 @@ class RunRow(Checked, Base):
         Index("runs_queue", "state", "number"),
         Index("runs_families", "family", "campaign_number"),
         Index("runs_methods", "method", "campaign_number"),
-        Index("runs_tallies", "family", "method", "state", "episodes_done", "failures"),  # all that metrics sum up
+        Index("runs_tallies", "family", "method", "state", *TALLIED),  # all that metrics sum up
         {"sqlite_autoincrement": True},
     )
 
@@ -88,6 +105,9 @@ class RunRow(Checked, Base):
     rejected: Mapped[int] = mapped_column(default=0)
     raw_collisions: Mapped[int] = mapped_column(default=0)
     failures: Mapped[int] = mapped_column(default=0)
+    distinct_failures: Mapped[int] = mapped_column(default=0, info=LATER)
+    preventable: Mapped[int] = mapped_column(default=0, info=LATER)
+    distinct_preventable: Mapped[int] = mapped_column(default=0, info=LATER)
     busy_s: Mapped[float] = mapped_column(default=0.0)
     attempts: Mapped[int] = mapped_column(default=0)
     metrics: Mapped[str | None] = mapped_column(Text)
@@ -106,6 +126,7 @@ class EpisodeRow(Checked, Base):
         Index("episodes_pages", "campaign_number", "number"),
         Index("episodes_runs", "run_number", "number"),
         Index("episodes_outcomes", "campaign_number", "outcome", "number"),
+        *(_of_judged(f"episodes_{name}s", "campaign_number", name, "number") for name in ("grade", "signature")),
         {"sqlite_autoincrement": True},
     )
 
@@ -119,6 +140,10 @@ class EpisodeRow(Checked, Base):
     series: Mapped[str | None]
     series_sha256: Mapped[str | None]
     wall_s: Mapped[float]
+    grade: Mapped[str | None] = mapped_column(info=LATER)  # of a valid failure
+    signature: Mapped[str | None] = mapped_column(info=LATER)  # of a contact
+    broke: Mapped[str | None] = mapped_column(info=LATER)  # what its striker broke, between commas: ",red_light,"
+    funnel: Mapped[str | None] = mapped_column(Text, info=LATER)  # of the run's phase, this episode included
     run: Mapped[RunRow] = relationship(lazy="joined", innerjoin=True)
 
 
@@ -147,13 +172,28 @@ class UsageRow(Checked, Base):
 
 
 def checksum(row: Checked) -> int:
-    """CRC-32 of a row's columns but its own and the number that the database gives."""
-    return zlib.crc32(to_json(_summed(inspect(type(row)))(row), inf_nan_mode="strings"))
+    """CRC-32 of a row's columns but its own and the number that the database gives.
+
+    A row from before a column was added keeps its checksum: such columns count only where one of them holds something.
+    """
+    mapper = inspect(type(row))
+    values, added = _summed(mapper)(row), _added(mapper)(row)
+    return zlib.crc32(to_json((*values, *added) if any(added) else values, inf_nan_mode="strings"))
 
 
 @cache
 def _summed(mapper: Mapper[Any]) -> Callable[[Checked], tuple[Any, ...]]:
-    return attrgetter(*(name for name in mapper.columns.keys() if name not in ("number", "checksum")))  # noqa: SIM118
+    return attrgetter(*(name for name in _checked(mapper) if not mapper.columns[name].info))
+
+
+@cache
+def _added(mapper: Mapper[Any]) -> Callable[[Checked], tuple[Any, ...]]:
+    names = [name for name in _checked(mapper) if mapper.columns[name].info]
+    return attrgetter(*names) if names else lambda _: ()
+
+
+def _checked(mapper: Mapper[Any]) -> list[str]:
+    return [name for name in mapper.columns.keys() if name not in ("number", "checksum")]  # noqa: SIM118
 
 
 @event.listens_for(Checked, "before_insert", propagate=True)

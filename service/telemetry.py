@@ -19,6 +19,18 @@ from service.store import Store
 
 BUCKETS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)
 SEARCH = ("family", "method")
+# The funnel, and what preventable failures are counted with repetitions; by the column that is summed up.
+COUNTERS = {
+    "episodes_done": ("risk_sac_episodes", "Finished episodes, rejected scenes included."),
+    "raw_collisions": ("risk_sac_contacts", "Episodes in which the ego touched something."),
+    "failures": ("risk_sac_failures", "Valid failures of the ego."),
+    "distinct_failures": ("risk_sac_distinct_failures", "Valid failures that resemble no earlier one of their run."),
+    "preventable": ("risk_sac_preventable_failures", "Valid failures that the careful driver would have prevented."),
+    "distinct_preventable": (
+        "risk_sac_distinct_preventable_failures",
+        "The distinct ones of the preventable failures.",
+    ),
+}
 
 
 def request_latencies() -> Histogram:
@@ -47,8 +59,7 @@ class Campaigns(Collector):
     def __init__(self, store: Store, manager: Manager) -> None:
         self._store = store
         self._manager = manager
-        self._episodes = _Monotone()
-        self._failures = _Monotone()
+        self._counters = {name: _Monotone() for name in COUNTERS}
 
     def collect(self) -> Iterator[Metric]:
         """All families; without those of the database while it cannot be read."""
@@ -66,19 +77,20 @@ class Campaigns(Collector):
 
     def _stored(self, statistics: Statistics) -> Iterator[Metric]:
         yield from _states(statistics)
-        episodes, failures = Counts[tuple[str, str]](), Counts[tuple[str, str]]()
-        for tally in statistics.tallies:
-            episodes[tally.family, tally.method] += tally.episodes
-            failures[tally.family, tally.method] += tally.failures
-        yield self._episodes.family("risk_sac_episodes", "Finished episodes, rejected scenes included.", episodes)
-        yield self._failures.family("risk_sac_failures", "Valid failures of the ego.", failures)
-        ecr = GaugeMetricFamily(
-            "risk_sac_run_ecr", "Valid failures per episode of a run at work.", labels=["campaign", "run", *SEARCH]
-        )
+        for counted, (name, meaning) in COUNTERS.items():
+            sums = Counts[tuple[str, str]]()
+            for tally in statistics.tallies:
+                sums[tally.family, tally.method] += tally.counts[counted]
+            yield self._counters[counted].family(name, meaning, sums)
+        labels = ["campaign", "run", *SEARCH]
+        ecr = GaugeMetricFamily("risk_sac_run_ecr", "Valid failures per episode of a run at work.", labels=labels)
+        pcr = GaugeMetricFamily("risk_sac_run_pcr", "Preventable failures per episode of a run at work.", labels=labels)
         for run in statistics.at_work:
-            if run.ecr is not None:
-                ecr.add_metric([run.campaign_id, run.id, run.family, run.method], run.ecr)
+            for gauge, rate in ((ecr, run.ecr), (pcr, run.pcr)):
+                if rate is not None:
+                    gauge.add_metric([run.campaign_id, run.id, run.family, run.method], rate)
         yield ecr
+        yield pcr
 
 
 class _Monotone:

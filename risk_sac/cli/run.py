@@ -54,8 +54,9 @@ def _found(metrics: RunMetrics | None) -> str:
     if metrics is None:
         return ""
     return (
-        f"failures {metrics.failures}  contacts {metrics.raw_collisions}  "
-        f"window ECR {metrics.window_ecr:.2f}  λ {metrics.dual_variable:.3f}"
+        f"contacts {metrics.raw_collisions} → valid {metrics.failures} → distinct {metrics.distinct_failures} → "
+        f"preventable {metrics.distinct_preventable}  "
+        f"window ECR {metrics.window_ecr:.2f} PCR {metrics.window_pcr:.2f}  λ {metrics.dual_variable:.3f}"
     )
 
 
@@ -74,12 +75,14 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
     values = asdict(metrics)
     return {
         "episodes": f"{metrics.episodes} ({metrics.rejected} rejected)",
-        "contacts": f"{metrics.raw_collisions}",
-        "valid failures": f"{metrics.failures}",
+        "contacts": f"{metrics.raw_collisions} ({metrics.artefacts} artefacts)",
+        "valid failures": f"{metrics.failures} ({metrics.unresponsive} unresponsive)",
+        "distinct failures": f"{metrics.distinct_failures}",
+        "distinct and preventable": f"{metrics.distinct_preventable}",
         "ECR (95 %)": "{ecr:.3f} ({ecr_low:.3f} to {ecr_high:.3f})".format(**values),
+        "PCR (95 %)": "{pcr:.3f} ({pcr_low:.3f} to {pcr_high:.3f})".format(**values),
         "efficiency ES": f"{metrics.efficiency:.3f}",
         "realism cost per step": f"{metrics.cost_rate:.3f}",
         "dispersion OFD": or_dash(metrics.dispersion, ".3f"),
-        "distinct failures": f"{metrics.distinct_failures}",
         "steps per distinct failure": or_dash(metrics.steps_per_distinct_failure, ".0f"),
     }

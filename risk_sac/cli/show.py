@@ -8,6 +8,7 @@ from rich.table import Table
 
 from risk_sac.cli.console import OK, Commands, console
 from risk_sac.results import Results, read_results
+from risk_sac.types import Judgement
 
 
 def add_show(commands: Commands) -> None:
@@ -35,24 +36,30 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _contacts(results: Results) -> Table:
-    """Fits 80 columns; only the failed rules wrap."""
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for name in ("id", "outcome", "other", "ego\nm/s", "other\nm/s", "ego's zone\non other's", "TTC\ns", "seen\ns"):
+    """Two lines per contact. Fits 80 columns; only the last one wraps."""
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    speeds, zones = "ego's\nother's\nm/s", "ego's\nother's\nzone"
+    for name in ("id", "outcome\ngrade", "other", speeds, zones, "conflict\nbegan at s,\nx y m"):
         table.add_column(name, no_wrap=True)
-    table.add_column("failed rules")
+    table.add_column("failed rules,\nor what the\nother broke")
     for contact in results.contacts:
         collision = contact.episode.collision
         if collision is None:
             continue
+        judgement = collision.judgement
         table.add_row(
             contact.id,
-            contact.episode.outcome,
+            f"{contact.episode.outcome}\n{(judgement and judgement.grade) or ''}",
             collision.other_id,
-            f"{collision.ego_speed_mps:.1f}",
-            f"{collision.other_speed_mps:.1f}",
-            f"{collision.ego_zone} {collision.other_zone}",
-            f"{collision.min_ttc_s:.2f}",
-            f"{collision.visible_for_s:.1f}",
-            contact.episode.reason,
+            f"{collision.ego_speed_mps:.1f}\n{collision.other_speed_mps:.1f}",
+            f"{collision.ego_zone}\n{collision.other_zone}",
+            "" if judgement is None else _conflict(judgement),
+            contact.episode.reason or ("" if judgement is None else ", ".join(judgement.broke).replace("_", " ")),
         )
     return table
+
+
+def _conflict(judgement: Judgement) -> str:
+    """How it began, and when after the release and where on the map."""
+    began = f"{judgement.conflict_s:.1f}, {judgement.conflict_x_m:.0f} {judgement.conflict_y_m:.0f}"
+    return f"{judgement.conflict_type.replace('_', ' ')}\n{began}"

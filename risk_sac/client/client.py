@@ -24,6 +24,7 @@ from risk_sac.client.records import (
 )
 from risk_sac.client.transport import Transport
 from risk_sac.config import CampaignSpec
+from risk_sac.types import Grade
 
 TIMEOUT_S = 30.0  # of silence within one answer
 PATIENCE_S = 10.0  # with a service that does not answer
@@ -128,10 +129,19 @@ class Client:
         return self._get(Results, f"{_path(campaign_id)}/results")
 
     def failures(
-        self, campaign_id: str, *, run: str | None = None, tier: Literal["valid", "raw"] = "valid", page: int = PAGE
+        self,
+        campaign_id: str,
+        *,
+        run: str | None = None,
+        tier: Literal["valid", "raw"] = "valid",
+        grade: Grade | None = None,
+        broke: str | None = None,
+        signature: str | None = None,
+        page: int = PAGE,
     ) -> Iterator[Episode]:
         """Collisions of the ego in the order of their arrival; read page by page as far as they are asked for."""
-        return self._items(Page[Episode], f"{_path(campaign_id)}/failures", {"run": run, "tier": tier, "limit": page})
+        query: Query = {"run": run, "tier": tier, "grade": grade, "broke": broke, "signature": signature, "limit": page}
+        return self._items(Page[Episode], f"{_path(campaign_id)}/failures", query)
 
     def failure(self, campaign_id: str, failure_id: str) -> Failure:
         """One collision with its full time series."""

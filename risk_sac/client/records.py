@@ -40,6 +40,13 @@ class Metrics(Record):
     ecr_low: float | None
     ecr_high: float | None
     distinct_failures: int
+    raw_collisions: int  # all contacts of the ego
+    preventable: int  # valid collisions that the careful driver would have prevented
+    distinct_preventable: int
+    pcr: float | None  # preventable / episodes
+    pcr_low: float | None
+    pcr_high: float | None
+    unresponsive: int  # valid collisions in which the ego never braked for what it saw
 
 
 class Run(Record):
@@ -63,7 +70,11 @@ class Progress(Record):
     episodes_total: int
     failures: int  # valid collisions
     raw_collisions: int  # all contacts of the ego
+    distinct_failures: int
+    preventable: int
+    distinct_preventable: int
     window_ecr: float | None
+    window_pcr: float | None
     dual_variable: float | None  # λ
     eta_s: float | None
 
@@ -125,6 +136,15 @@ class Total(Record):
     dispersion: float | None
     distinct_failures: int
     steps_per_distinct_failure: float | None
+    preventable: int
+    distinct_preventable: int
+    pcr: float | None  # mean over the runs
+    pcr_low: float | None
+    pcr_high: float | None
+    unresponsive: int
+    signatures: Mapping[str, int]  # signature -> valid failures
+    conflicts_by_second: list[int]  # valid failures by the second after the release in which they began
+    contacts_by_second: list[int]  # the same by the second of the contact
 
 
 class Results(Record):
@@ -147,7 +167,8 @@ class Episode(Record):
     outcome: str
     reason: str
     steps: int
-    collision: dict[str, Any] | None
+    collision: dict[str, Any] | None  # with its `judgement`
+    funnel: dict[str, int] | None  # of the run's phase, this episode included
 
 
 class Failure(Episode):

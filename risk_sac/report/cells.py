@@ -4,7 +4,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from risk_sac.config import FamilyName, MethodName
-from risk_sac.metrics import WINDOW, bootstrap_interval, wilson_interval
+from risk_sac.metrics import (
+    WINDOW,
+    bootstrap_interval,
+    pooled_bins,
+    pooled_counts,
+    pooled_signatures,
+    wilson_interval,
+)
 from risk_sac.report.runs import FinishedRun, Phase
 from risk_sac.types import RunMetrics
 
@@ -22,7 +29,15 @@ class Metric:
     value: Callable[[RunMetrics], float | None]
     phases: tuple[Phase, ...] = ("search", "evaluation")
     tested: bool = True  # whether methods are compared by it
-    rate: bool = False  # valid failures per episode: a single run has a Wilson interval
+    trials: Callable[[RunMetrics], int] | None = None  # of a rate: a single run has a Wilson interval over them
+
+
+def _all(metrics: RunMetrics) -> int:
+    return metrics.episodes
+
+
+def _newest(metrics: RunMetrics) -> int:
+    return min(WINDOW, metrics.episodes)
 
 
 def _distinct_rate(metrics: RunMetrics) -> float | None:
@@ -30,7 +45,14 @@ def _distinct_rate(metrics: RunMetrics) -> float | None:
 
 
 METRICS = (
-    Metric(name="ecr", symbol="ECR", meaning="valid failures / episodes", value=lambda m: m.ecr, rate=True),
+    Metric(name="ecr", symbol="ECR", meaning="valid failures / episodes", value=lambda m: m.ecr, trials=_all),
+    Metric(
+        name="pcr",
+        symbol="PCR",
+        meaning="preventable failures / episodes: valid ones that the careful driver would have prevented",
+        value=lambda m: m.pcr,
+        trials=_all,
+    ),
     Metric(
         name="ecr_last",
         symbol=f"ECR last {WINDOW}",
@@ -38,7 +60,16 @@ METRICS = (
         value=lambda m: m.window_ecr,
         phases=("search",),
         tested=False,
-        rate=True,
+        trials=_newest,
+    ),
+    Metric(
+        name="pcr_last",
+        symbol=f"PCR last {WINDOW}",
+        meaning=f"PCR of the last {WINDOW} search episodes, or of all where there are fewer",
+        value=lambda m: m.window_pcr,
+        phases=("search",),
+        tested=False,
+        trials=_newest,
     ),
     Metric(
         name="es",
@@ -86,9 +117,16 @@ class Cell:
     method: MethodName
     phase: Phase
     seeds: tuple[int, ...]  # of the runs that are counted
+    # `metrics.COUNTS`, each summed over the runs; what two of them found alike counts twice.
     episodes: int
+    rejected: int
+    raw_collisions: int
     failures: int
-    distinct_failures: int  # summed over the runs; what two of them found alike counts twice
+    distinct_failures: int
+    preventable: int
+    distinct_preventable: int
+    artefacts: int
+    unresponsive: int
     environment_steps: int
     estimates: Mapping[str, Estimate]  # by `Metric.name`
     steps_per_distinct_failure: float | None
@@ -97,34 +135,37 @@ class Cell:
     artefact_rate: float
     degenerate_rate: float
     rejected_rate: float
+    unresponsive_share: float | None  # of the valid failures; None without one
+    signatures: Mapping[str, int]  # signature -> valid failures
+    conflicts_by_second: tuple[int, ...]  # valid failures by the second after the release in which they began
+    contacts_by_second: tuple[int, ...]  # the same by the second of the contact
 
 
 def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
     """Sums up the runs of one cell, at least one of them, all with episodes in the phase."""
     (family, method) = runs[0].cell
     metrics = [run.metrics[phase] for run in runs]
-    episodes = sum(each.episodes for each in metrics)
-    failures = sum(each.failures for each in metrics)
-    distinct = sum(each.distinct_failures for each in metrics)
-    steps = sum(each.environment_steps for each in metrics)
-    raw = sum(each.raw_collisions for each in metrics)
+    counts = pooled_counts(metrics)
+    episodes, failures, raw = counts["episodes"], counts["failures"], counts["raw_collisions"]
+    distinct, steps = counts["distinct_failures"], counts["environment_steps"]
     cpu_s = sum(run.cpu_s for run in runs)
     return Cell(
         family=family,
         method=method,
         phase=phase,
         seeds=tuple(run.spec.seed for run in runs),
-        episodes=episodes,
-        failures=failures,
-        distinct_failures=distinct,
-        environment_steps=steps,
+        **counts,
         estimates={metric.name: estimate(metric, metrics) for metric in METRICS if phase in metric.phases},
         steps_per_distinct_failure=steps / distinct if distinct else None,
         cpu_s_per_distinct_failure=cpu_s / distinct if distinct and phase == "search" else None,
         raw_rate=raw / episodes,
-        artefact_rate=sum(run.artefacts(phase) for run in runs) / episodes,
+        artefact_rate=counts["artefacts"] / episodes,
         degenerate_rate=(raw - failures) / episodes,
-        rejected_rate=sum(each.rejected for each in metrics) / episodes,
+        rejected_rate=counts["rejected"] / episodes,
+        unresponsive_share=counts["unresponsive"] / failures if failures else None,
+        signatures=pooled_signatures(metrics),
+        conflicts_by_second=pooled_bins([each.conflicts_by_second for each in metrics]),
+        contacts_by_second=pooled_bins([each.contacts_by_second for each in metrics]),
     )
 
 
@@ -137,7 +178,7 @@ def estimate(metric: Metric, metrics: Sequence[RunMetrics]) -> Estimate:
     high: float | None = None
     if len(values) > 1:
         low, high = bootstrap_interval(values, RESAMPLING_SEED)
-    elif metric.rate:
-        trials = metrics[0].episodes if metric.name == "ecr" else min(WINDOW, metrics[0].episodes)
+    elif metric.trials is not None:
+        trials = metric.trials(metrics[0])
         low, high = wilson_interval(round(values[0] * trials), trials)
     return Estimate(mean=sum(values) / len(values), low=low, high=high, runs=len(values))

@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict
 from typing import Any
 
+from risk_sac.metrics import COUNTS
 from risk_sac.report.cells import METRICS, Cell
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.provenance import this_platform
@@ -13,16 +14,14 @@ from risk_sac.report.runs import FinishedRun
 
 FORMAT_VERSION = 1
 _PLAIN = (
-    "episodes",
-    "failures",
-    "distinct_failures",
-    "environment_steps",
+    *COUNTS,
     "steps_per_distinct_failure",
     "cpu_s_per_distinct_failure",
     "raw_rate",
     "artefact_rate",
     "degenerate_rate",
     "rejected_rate",
+    "unresponsive_share",
 )
 
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
-from risk_sac.metrics import WINDOW
+from risk_sac.metrics import WINDOW, preventable
 from risk_sac.report.cells import METRICS, RESAMPLING_SEED, Metric
 from risk_sac.report.comparison import REFERENCE, Comparison
 from risk_sac.report.runs import FinishedRun, Phase
@@ -24,9 +24,9 @@ from risk_sac.types import Floats, Outcome
 Format = Literal["png", "svg"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 RESAMPLES = 2000  # per curve; a band needs less than a table
-BARS = ("ecr", "es", "rho_c", "ofd")
+BARS = ("ecr", "pcr", "es", "rho_c", "ofd")
 SETTLED = 10  # episodes before which a windowed rate is mostly noise
-CURVE_IN, BARS_IN, DPI = (6.4, 3.4), (7.2, 3.2), 200
+CURVE_IN, BARS_IN, TIMES_IN, DPI = (6.4, 3.4), (7.2, 3.2), (7.2, 3.0), 200
 STYLE: dict[Any, Any] = {  # matplotlib types the keys one by one
     "font.size": 9.0,
     "axes.spines.top": False,
@@ -103,8 +103,11 @@ def _figures(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
             if any(_drawn(comparison, family, curve)):
                 figures[f"{curve.name}_{family}"] = partial(_curves, comparison, family, curve)
     for phase in comparison.phases:
+        suffix = "" if phase == "search" else f"_{phase}"
+        for family in comparison.spec.families:
+            if any(sum(cell.contacts_by_second) for cell in comparison.group(family, phase)):
+                figures[f"times_{family}{suffix}"] = partial(_times, comparison, family, phase)
         for metric in (metric for metric in METRICS if metric.name in BARS):
-            suffix = "" if phase == "search" else f"_{phase}"
             figures[f"bars_{metric.name}{suffix}"] = partial(_bars, comparison, metric, phase)
     return figures
 
@@ -124,8 +127,16 @@ class Curve:
 
 def window_ecr(run: FinishedRun) -> Floats:
     """ECR over the newest `WINDOW` episodes, after each episode; over all while there are fewer."""
-    failed = [record.outcome is Outcome.FAILURE for record in run.phase("search")]
-    total = np.concatenate(([0], np.cumsum(failed)))
+    return _window_rate([record.outcome is Outcome.FAILURE for record in run.phase("search")])
+
+
+def window_pcr(run: FinishedRun) -> Floats:
+    """The same of PCR."""
+    return _window_rate([preventable(record) for record in run.phase("search")])
+
+
+def _window_rate(counted: Sequence[bool]) -> Floats:
+    total = np.concatenate(([0], np.cumsum(counted)))
     after = np.arange(1, len(total))
     begin = np.maximum(0, after - WINDOW)
     rates: Floats = (total[after] - total[begin]) / (after - begin)
@@ -137,6 +148,14 @@ CURVES = (
         name="ecr",
         label=f"ECR, newest {WINDOW} episodes",
         values=window_ecr,
+        methods=lambda method: True,
+        top=1.0,
+        first=SETTLED,
+    ),
+    Curve(
+        name="pcr",
+        label=f"PCR, newest {WINDOW} episodes",
+        values=window_pcr,
         methods=lambda method: True,
         top=1.0,
         first=SETTLED,
@@ -239,10 +258,33 @@ def _bars(comparison: Comparison, metric: Metric, phase: Phase) -> Figure:
     return figure
 
 
+def _times(comparison: Comparison, family: FamilyName, phase: Phase) -> Figure:
+    """Histograms of the time from the adversaries' release to the conflict and to the contact."""
+    figure = _empty(TIMES_IN)
+    conflict, contact = figure.subplots(1, 2, sharex=True, sharey=True)
+    counts = []
+    for cell in (cell for cell in comparison.group(family, phase) if any(cell.contacts_by_second)):
+        counts.append(len(cell.seeds))
+        look = LOOKS[cell.method]
+        for axes, bins in ((conflict, cell.conflicts_by_second), (contact, cell.contacts_by_second)):
+            axes.stairs(bins, color=look.colour, linestyle=look.dashes, linewidth=look.width, label=cell.method)
+    conflict.set(xlabel="release to conflict, s", ylabel=f"valid failures ({phase})", ylim=(0, None))
+    contact.set_xlabel("release to contact, s")
+    conflict.margins(x=0)
+    conflict.set_title(f"{family}: sum over {_seeds(counts)}", fontsize=9, loc="left")
+    _legend(figure, conflict)
+    return figure
+
+
 def _canvas(size: tuple[float, float]) -> tuple[Figure, Axes]:
+    figure = _empty(size)
+    return figure, figure.add_subplot()
+
+
+def _empty(size: tuple[float, float]) -> Figure:
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
-    return figure, figure.add_subplot()
+    return figure
 
 
 def _seeds(counts: Sequence[int]) -> str:

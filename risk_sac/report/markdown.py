@@ -1,10 +1,10 @@
 """The comparison as a page to read: tables, tests, and everything needed to judge and repeat them."""
 
 import shlex
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from risk_sac.config import FamilyName, RunSpec
-from risk_sac.metrics import DISTINCT
 from risk_sac.report.cells import METRICS, Cell, Estimate
 from risk_sac.report.comparison import LEVEL, Comparison, PairedTest
 from risk_sac.report.provenance import this_platform
@@ -29,7 +29,13 @@ def table_markdown(comparison: Comparison) -> str:
     sections = [_head(comparison), _missing(comparison)]
     for family in comparison.spec.families:
         for phase in comparison.phases:
-            sections += [_cells(comparison, family, phase), _tests(comparison, family, phase)]
+            sections += [
+                _cells(comparison, family, phase),
+                _funnel(comparison, family, phase),
+                _times(comparison, family, phase),
+                _signatures(comparison, family, phase),
+                _tests(comparison, family, phase),
+            ]
     sections += [_control(comparison), _paper(comparison), _definitions(), _repeat(comparison)]
     return "\n".join(section for section in sections if section)
 
@@ -60,7 +66,7 @@ def _missing(comparison: Comparison) -> str:
 
 def _cells(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     seeds = len(comparison.spec.seeds)
-    columns = ["method", "seeds", *(SYMBOLS[name] for name in SHOWN if _has(phase, name)), "distinct"]
+    columns = ["method", "seeds", *(SYMBOLS[name] for name in SHOWN if _has(phase, name))]
     columns += ["steps / distinct", "CPU s / distinct"] if phase == "search" else ["steps / distinct"]
     columns += ["artefact", "degenerate", "rejected"]
     rows = [_cell(cell, seeds) for cell in comparison.group(family, phase)]
@@ -75,10 +81,57 @@ def _cell(cell: Cell, seeds: int) -> list[str]:
     runs = len(cell.seeds)
     row = [cell.method, str(runs) if runs == seeds else f"{runs} of {seeds}"]
     row += [_estimate(cell.estimates[name], runs) for name in SHOWN if name in cell.estimates]
-    row += [str(cell.distinct_failures), _number(cell.steps_per_distinct_failure, ",.0f")]
+    row.append(_number(cell.steps_per_distinct_failure, ",.0f"))
     if cell.phase == "search":
         row.append(_number(cell.cpu_s_per_distinct_failure, ",.1f"))
     return row + [_percent(rate) for rate in (cell.artefact_rate, cell.degenerate_rate, cell.rejected_rate)]
+
+
+def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
+    """From contacts to what is worth a person's time, summed over seeds."""
+    columns = ["method", "episodes", "contacts", "valid", "distinct", "preventable", "unresponsive"]
+    rows = (
+        [
+            cell.method,
+            *map(str, (cell.episodes, cell.raw_collisions, cell.failures)),
+            *map(str, (cell.distinct_failures, cell.distinct_preventable)),
+            DASH if cell.unresponsive_share is None else _percent(cell.unresponsive_share),
+        ]
+        for cell in comparison.group(family, phase)
+    )
+    return f"### The funnel: {family}, {phase}\n\n" + _table(columns, rows)
+
+
+def _times(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
+    """How long after the release conflicts and contacts come."""
+    cells = [cell for cell in comparison.group(family, phase) if any(cell.contacts_by_second)]
+    if not cells:
+        return ""
+    last = max(place for cell in cells for bins in _both(cell) for place, count in enumerate(bins) if count)
+    columns = ["method", "until", *(f"{second}–{second + 1} s" for second in range(last + 1))]
+    rows = (
+        [cell.method, until, *map(str, bins[: last + 1])]
+        for cell in cells
+        for until, bins in zip(("conflict", "contact"), _both(cell), strict=True)
+    )
+    return f"### Valid failures by the time since the release: {family}, {phase}\n\n" + _table(columns, rows, left=2)
+
+
+def _both(cell: Cell) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    return cell.conflicts_by_second, cell.contacts_by_second
+
+
+def _signatures(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
+    """How often each class of failures was found, the most frequent first."""
+    cells = [cell for cell in comparison.group(family, phase) if cell.signatures]
+    total: Counter[str] = Counter()
+    for cell in cells:
+        total.update(cell.signatures)
+    if not total:
+        return ""
+    columns = ["signature", *(cell.method for cell in cells)]
+    rows = ([name, *(str(cell.signatures.get(name, 0)) for cell in cells)] for name, _ in total.most_common())
+    return f"### Valid failures by signature: {family}, {phase}\n\n" + _table(columns, rows)
 
 
 def _estimate(estimate: Estimate, runs: int) -> str:
@@ -167,13 +220,22 @@ def _definitions() -> str:
         "- mean over seeds and, in brackets, its 95 % interval: percentile bootstrap over seeds, which with fewer than "
         "about ten seeds is narrower than its name; Wilson's for the rates of a single run.",
         "- n of m seeds: the mean is over the n runs that have a value; OFD needs two valid failures.",
-        f"- distinct: valid failures of which no earlier one of the same run, with the same striker and the same zones "
-        f"of contact, lies nearer than {DISTINCT:g} in the distance of OFD; summed over seeds.",
+        "- distinct: valid failures that resemble no earlier one of the same run: another signature, or the same one "
+        "with other outcome features; summed over seeds.",
         "- steps / distinct: environment steps over all seeds / distinct failures over all seeds.",
         "- CPU s / distinct: the same with the processor seconds of the whole runs, evaluation episodes included; a "
         "process's start and what a crashed attempt spent are not.",
         f"- artefact: episodes whose contact was refused by a rule that speaks of the simulator or the control "
         f"({rules}) / episodes.",
+        "- contacts, valid, distinct, preventable: what the ego touched; without artefacts and degenerate contacts; "
+        "each kind once; of these, what the careful driver would have prevented (PCR counts repetitions too). What was "
+        "found before contacts were judged counts as not preventable, and is in no histogram and no signature.",
+        "- careful driver: UN Regulation 157's careful and competent human driver, for pedestrians and crossing "
+        "vehicles after Engström et al. (arXiv 2208.08651), in the ego's place; the striker's motion is kept.",
+        "- unresponsive: valid failures with a visible collision course of at least 1.5 s during which the ego never "
+        "braked / valid failures.",
+        "- time since the release: from when the adversaries are handed to the policy to the beginning of the "
+        "conflict, and to the contact; what began before the release stands in the first second.",
         "- degenerate: all refused contacts / episodes, artefacts among them. rejected: infeasible scenes / episodes.",
         "- difference: mean over the seeds that both methods have a value for, first method minus the other, with a "
         "paired bootstrap 95 % interval.",

@@ -53,10 +53,6 @@ class FinishedRun:
                 found[phase] = accumulator.metrics()
         return found
 
-    def artefacts(self, phase: Phase) -> int:
-        """Contacts that the simulator or the control made."""
-        return sum(record.collision is not None and record.collision.artefact for record in self.phase(phase))
-
 
 def read_run(folder: Path) -> FinishedRun:
     """Reads a finished run back.

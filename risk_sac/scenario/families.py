@@ -70,7 +70,9 @@ def _odd(
             ego_speed_mps=Interval(low=0, high=limit_mps),
             vehicle_speed_mps=Interval(low=0, high=limit_mps * 1.2),
             vehicle_accel_mps2=Interval(low=-8, high=3.5),
-            pedestrian_speed_mps=Interval(low=0, high=3),
+            vehicle_lateral_speed_mps=Interval(low=0, high=1.2),
+            vehicle_lateral_accel_mps2=Interval(low=0, high=1.5),
+            pedestrian_speed_mps=Interval(low=0, high=2),  # walking; who wants them to run says so
             pedestrian_accel_mps2=Interval(low=-1.5, high=1.5),
         ),
     )

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query
 
-from risk_sac.types import Outcome
+from risk_sac.types import Grade, Outcome
 from service import records
 from service.api.access import CurrentCaller
 from service.api.context import Service
@@ -13,6 +13,7 @@ from service.api.responses import INVALID, STORAGE, UNKNOWN
 from service.api.views import episode_body, failure_body, tier_outcomes
 from service.records import Page
 from service.schemas import EpisodePage, Failure
+from service.store import Judged
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
 
@@ -46,6 +47,13 @@ def list_failures(
     caller: CurrentCaller,
     tier: Annotated[Literal["valid", "raw"], Query(description="`raw` adds contacts that a rule refused.")] = "valid",
     run: Annotated[str | None, Query(description="Only failures of this run.")] = None,
+    grade: Annotated[Grade | None, Query(description="Only failures of this grade; `careful`: preventable.")] = None,
+    broke: Annotated[
+        str | None, Query(max_length=40, pattern="^[a-z_]+$", description="Only those whose striker broke this.")
+    ] = None,
+    signature: Annotated[
+        str | None, Query(max_length=300, pattern=r"^[^\x00]*$", description="Only those with exactly this signature.")
+    ] = None,
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> EpisodePage:
@@ -56,6 +64,7 @@ def list_failures(
         after=decode_cursor(cursor),
         run_id=run,
         outcomes=tier_outcomes(tier),
+        judged=Judged(grade=grade, broke=broke, signature=signature),
         project=caller.sees,
     )
     return _episode_page(page)

@@ -65,9 +65,6 @@ def tier_outcomes(tier: str) -> tuple[Outcome, ...]:
 
 def _fields(episode: records.Episode) -> dict[str, object]:
     record = episode.record
-    names = (name for name in Episode.model_fields if name not in ("id", "run_id", "wall_s"))
-    return {name: getattr(record, name) for name in names} | {
-        "id": episode.id,
-        "run_id": episode.run_id,
-        "wall_s": episode.wall_s,
-    }
+    own = ("id", "run_id", "wall_s", "funnel")
+    names = (name for name in Episode.model_fields if name not in own)
+    return {name: getattr(record, name) for name in names} | {name: getattr(episode, name) for name in own}

@@ -3,7 +3,7 @@
 from service.schemas.base import Body, Real
 from service.schemas.campaigns import Campaign, CampaignPage, CampaignSummary, Metrics, Progress, Run
 from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter
-from service.schemas.episodes import Collision, Episode, EpisodePage
+from service.schemas.episodes import Collision, Episode, EpisodePage, Funnel, Judgement, ReferenceOutcome
 from service.schemas.events import StateChange
 from service.schemas.failures import Failure, Series
 from service.schemas.health import Health, Ready
@@ -22,7 +22,9 @@ __all__ = [
     "Families",
     "Family",
     "FieldProblem",
+    "Funnel",
     "Health",
+    "Judgement",
     "Methods",
     "Metrics",
     "NamedMethod",
@@ -31,6 +33,7 @@ __all__ = [
     "Ready",
     "Real",
     "Reason",
+    "ReferenceOutcome",
     "Results",
     "Run",
     "RunResult",

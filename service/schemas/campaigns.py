@@ -1,5 +1,6 @@
 """Campaigns and their runs, and how far they are."""
 
+from collections.abc import Mapping
 from datetime import datetime
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
@@ -25,6 +26,12 @@ class Metrics(Body):
     ecr_high: Real
     window_ecr: Real
     """ECR over the newest 100 episodes."""
+    pcr: Real
+    """Preventable collision rate: valid collisions that the careful driver would have prevented / episodes."""
+    pcr_low: Real
+    pcr_high: Real
+    window_pcr: Real
+    """PCR over the newest 100 episodes."""
     efficiency: Real
     """Exploration efficiency ES in [0, 1]; 1 means a failure at once."""
     cost_rate: Real
@@ -36,9 +43,23 @@ class Metrics(Body):
     temperature: Real
     """α."""
     distinct_failures: int
-    """Valid collisions that resemble no earlier one: another actor, other zones of contact or outcome features."""
+    """Valid collisions that resemble no earlier one: another signature, or other outcome features."""
     steps_per_distinct_failure: Real
     """Environment steps per distinct failure; null without one."""
+    preventable: int
+    """Valid collisions that the careful driver would have prevented, repetitions included."""
+    distinct_preventable: int
+    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
+    artefacts: int
+    """Contacts that the simulator or the control made."""
+    unresponsive: int
+    """Valid collisions with a visible collision course of 1.5 s or more during which the ego never braked."""
+    signatures: Mapping[str, int]
+    """Signature → valid collisions, in the order in which they were first met."""
+    conflicts_by_second: list[int]
+    """Valid collisions by the second after the adversaries' release in which the conflict began."""
+    contacts_by_second: list[int]
+    """The same by the second of the contact."""
 
 
 class Run(Body):
@@ -60,6 +81,9 @@ class Run(Body):
     failures: int
     raw_collisions: int
     rejected: int
+    distinct_failures: int
+    preventable: int
+    distinct_preventable: int
     metrics: Metrics | None
     """Null before the first episode."""
 
@@ -74,8 +98,16 @@ class Progress(Body):
     raw_collisions: int
     """All contacts of the ego."""
     rejected: int
+    distinct_failures: int
+    """Sum over the runs; what two runs found alike counts twice."""
+    preventable: int
+    """Valid collisions that the careful driver would have prevented, repetitions included."""
+    distinct_preventable: int
+    """The distinct ones among them; sum over the runs."""
     window_ecr: Real
     """ECR over each run's newest 100 episodes: mean over the runs at work, or over all once none is."""
+    window_pcr: Real
+    """PCR, averaged the same way."""
     dual_variable: Real
     """λ, averaged the same way."""
     temperature: Real

@@ -14,7 +14,9 @@ class Series(Body):
     """
 
     time_s: Reals
-    """T."""
+    """T, of the simulator."""
+    released_s: Real = None
+    """When the adversaries were handed to the policy, as `time_s` counts; null in older files: at the first step."""
     ids: list[str]
     """n."""
     kind: list[str]
@@ -37,6 +39,11 @@ class Series(Body):
     """T x n; positive to the left."""
     accel_mps2: RealRows
     """T x n."""
+    lane_offset_m: RealRows | None = None
+    """T x n; a vehicle's centre from its lane's centre, positive to the left. Null in older files."""
+    link: list[list[str | None]] | None = None
+    """T x n; SUMO's letter of the signal ahead, such as `g`: green, but has to yield. Null without a signal, and in
+    older files."""
     visible: list[list[bool | None]]
     """T x n; to the ego's sensor. Null for the ego itself, here and in what follows."""
     distance_m: RealRows

@@ -47,6 +47,11 @@ class Total(Body):
     ecr_low: Real
     """95 % interval: Wilson for one run, bootstrap over the seeds for more."""
     ecr_high: Real
+    pcr: Real
+    """Mean over the runs."""
+    pcr_low: Real
+    """95 % interval, as that of the ECR."""
+    pcr_high: Real
     efficiency: Real
     """Mean over the runs."""
     cost_rate: Real
@@ -56,6 +61,20 @@ class Total(Body):
     distinct_failures: int
     """Sum over the runs; what two runs found alike counts twice."""
     steps_per_distinct_failure: Real
+    preventable: int
+    """Sum over the runs, repetitions included."""
+    distinct_preventable: int
+    """Sum over the runs: the last step of the funnel contacts → valid → distinct → preventable."""
+    artefacts: int
+    unresponsive: int
+    unresponsive_share: Real
+    """Of the valid failures; null without one."""
+    signatures: Mapping[str, int]
+    """Signature → valid failures, summed over the runs."""
+    conflicts_by_second: list[int]
+    """Valid failures by the second after the adversaries' release in which the conflict began."""
+    contacts_by_second: list[int]
+    """The same by the second of the contact."""
 
 
 class Results(Body):

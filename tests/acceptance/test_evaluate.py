@@ -60,7 +60,7 @@ def test_report_holds_cells_tests_runs_and_figures(whole: Path) -> None:
     assert [cell["method"] for cell in stored["cells"]] == 2 * ["random", "no-adversary", "sac"]
     assert [cell["episodes"] for cell in stored["cells"]] == 3 * [12] + 3 * [2]
     assert all(cell["seeds"] == [0, 1] for cell in stored["cells"])
-    assert len(stored["tests"]) == 2 * 5 + 2 * 4
+    assert len(stored["tests"]) == 2 * 6 + 2 * 5
     assert len({row["digest"] for row in stored["runs"]}) == RUNS
     assert "libsumo" in stored["versions"]
     assert stored["platform"]["cpu"]

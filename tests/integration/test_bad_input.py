@@ -101,6 +101,10 @@ def test_a_body_of_another_type_is_refused(client):
         ("/v1/campaigns?cursor=AAAA", 422, "cursor"),
         ("/v1/campaigns?cursor=OTk5OTk5OTk5OTk5OTk5OTk5OTk5OTk=", 422, "cursor"),
         ("/v1/campaigns/none/failures?tier=all", 422, "tier"),
+        ("/v1/campaigns/none/failures?grade=good", 422, "grade"),
+        ("/v1/campaigns/none/failures?broke=red%25light", 422, "broke"),
+        ("/v1/campaigns/none/failures?broke=", 422, "broke"),
+        ("/v1/campaigns/none/failures?signature=%00", 422, "signature"),
         ("/v1/campaigns/none/episodes?outcome=crash", 422, "outcome"),
     ],
 )

@@ -19,6 +19,7 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.client import Client
+from risk_sac.types import Grade
 from tests.server import Service
 
 SUBMIT = ["submit", "--families", "low", "--methods", "random", "--seeds", "2", "--episodes", "6"]
@@ -60,16 +61,57 @@ def test_submit_watch_shows_the_way_on_one_channel_and_the_results_on_the_other(
 ) -> None:
     assert call(*SUBMIT, "--watch") == 0
     printed = capsys.readouterr()
-    assert "succeeded: 12/12 episodes, 6 failures" in printed.err
+    assert "succeeded: 12/12 episodes, 6 failures, 2 distinct and preventable, ECR " in printed.err
     assert "\x1b" not in printed.err + printed.out
     (row,) = (line for line in printed.out.splitlines() if "random" in line)
-    assert row.split()[:7] == ["low", "random", "2", "12", "6", "0", "0.50"]
+    assert row.split() == ["low", "random", "12", "6", "6", "4", "2", "0.50", "0.17"]
 
 
 def test_failures_above_the_bound_are_exit_status_1(finished: str, call: Callable[..., int]) -> None:
     assert call("results", finished, "--max-ecr", 0.5) == 0
     assert call("results", finished, "--max-ecr", 0.49) == 1
     assert call("watch", finished, "--max-ecr", 0.49) == 1
+
+
+def test_preventable_failures_above_their_bound_are_exit_status_1(
+    finished: str, call: Callable[..., int], capsys: pytest.CaptureFixture[str], service: Service, tmp_path: Path
+) -> None:
+    assert call("results", finished, "--max-ecr", 0.5, "--max-pcr", 0.17) == 0
+    capsys.readouterr()
+    assert call("results", finished, "--max-ecr", 0.5, "--max-pcr", 0.16, "--junit", tmp_path / "j.xml") == 1
+    assert capsys.readouterr().err == "PCR above 0.16: low random 0.167\n"
+    first = next(ElementTree.parse(tmp_path / "j.xml").getroot().iter("failure"))
+    assert first.attrib["message"] == "PCR 0.167 > 0.16: 1 preventable failures in 6 episodes"
+    assert first.text is not None
+    grades = [service.client.get(url).json()["collision"]["judgement"]["grade"] for url in first.text.splitlines()]
+    assert grades == ["careful"]
+
+
+def test_failures_are_filtered_by_their_judgement(finished: str, service: Service) -> None:
+    def found(**wanted: str) -> int:
+        url = f"/v1/campaigns/{finished}/failures"
+        return len(service.client.get(url, params=wanted).raise_for_status().json()["items"])
+
+    assert found() == found(tier="raw") == found(signature="cut-in, straight") == 6
+    assert found(grade="careful") == found(broke="red_light") == found(grade="careful", run="low-random-0") * 2 == 2
+    assert found(grade="ideal") == 4
+    assert found(grade="ideal", broke="red_light") == found(signature="cut-in") == 0
+    with Client(f"http://127.0.0.1:{service.port}") as client:
+        careful = list(client.failures(finished, grade=Grade.CAREFUL, broke="red_light", page=1))
+    assert [failure.index for failure in careful] == [1, 1]
+
+
+def test_results_and_metrics_tell_the_funnel(finished: str, service: Service) -> None:
+    (total,) = service.get(finished, "/results")["totals"]
+    names = ("raw_collisions", "failures", "distinct_failures", "distinct_preventable", "preventable")
+    assert [total[name] for name in names] == [6, 6, 4, 2, 2]
+    assert total["signatures"] == {"cut-in, straight": 6}
+    progress = service.get(finished)["progress"]
+    assert [progress[name] for name in names] == [6, 6, 4, 2, 2]
+    assert progress["window_pcr"] == 0.0  # as the scripted worker says
+    exposed = service.client.get("/metrics").text
+    for name in ("contacts", "failures", "distinct_failures", "preventable_failures", "distinct_preventable_failures"):
+        assert f'risk_sac_{name}_total{{family="low",method="random"}} ' in exposed
 
 
 def test_the_bound_holds_with_submit_too(call: Callable[..., int], capsys: pytest.CaptureFixture[str]) -> None:
@@ -184,7 +226,7 @@ def test_what_cannot_run_is_exit_status_2_without_a_traceback(
     assert printed.out == ""
 
 
-@pytest.mark.parametrize("bad", [["--max-ecr", "2"], ["--max-ecr", "x"], ["--timeout", "0"], ["--timeout", "nan"]])
+@pytest.mark.parametrize("bad", [["--max-ecr", "2"], ["--max-pcr", "x"], ["--timeout", "0"], ["--timeout", "nan"]])
 def test_bad_arguments_are_exit_status_2(bad: list[str], call: Callable[..., int]) -> None:
     with pytest.raises(SystemExit, match="2"):
         call("watch", "c1", *bad)

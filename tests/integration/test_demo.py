@@ -41,11 +41,32 @@ def test_summary_of_every_method_fits_80_columns(capsys):
         "episodes": 10_000,
         "raw_collisions": 999,
         "failures": 999,
-        **dict.fromkeys(("ecr", "ecr_low", "ecr_high", "efficiency", "cost_rate", "dispersion"), 0.5),
-        "steps_per_distinct_failure": 12_345.0,
+        "distinct_failures": 777,
+        "distinct_preventable": 555,
+        **dict.fromkeys(("ecr", "pcr", "pcr_low", "pcr_high"), 0.5),
     }
     totals = [total | {"method": method} for method in METHODS]
     demo._summarise({"results": {"totals": totals}}, demo.Console(width=80))
     printed = capsys.readouterr().out
     assert "…" not in printed
     assert all(method in printed for method in METHODS)
+    assert printed.count(" 777 ") == printed.count(" 555 ") == len(METHODS)
+    assert "distinct" in printed
+
+
+def test_its_last_line_counts_what_is_worth_a_persons_time_and_no_repeats(capsys):
+    campaign = {"state": "succeeded", "reason": None, "progress": {"failures": 134, "distinct_preventable": 3}}
+    assert demo._verdict({"campaign": campaign}, demo.Console(width=80)) == 0
+    assert capsys.readouterr().out == "3 distinct failures found that a careful driver would have prevented\n"
+
+
+def test_it_offers_to_draw_a_preventable_failure_where_there_is_one(capsys):
+    def failure(index, grade):
+        judgement = None if grade is None else {"grade": grade}
+        return {"run_id": "low-random-0", "index": index, "collision": {"judgement": judgement}}
+
+    campaign = {"id": "c", "runs": [{"id": "low-random-0"}]}
+    failures = [failure(3, None), failure(5, "ideal"), failure(8, "careful")]
+    for known, drawn in ((failures, "000008"), (failures[:2], "000003")):
+        demo._invite({"campaign": campaign, "failures": known}, Path(), demo.Console())
+        assert f" {drawn} --out failure.png" in capsys.readouterr().out

@@ -127,7 +127,8 @@ def test_figures_asked_for_at_once_are_the_files_of_the_report(get, comparison):
     assert [item["name"] for item in listed["items"]] == list(figure_names(comparison))
     files = [file for item in listed["items"] for file in item["files"]]
     with ThreadPoolExecutor(8) as pool:
-        answers = list(pool.map(lambda file: get(file["href"].partition(listed_at(file))[2]), files))
+        # One is drawn at a time, so on a busy machine the last of eight waits long.
+        answers = list(pool.map(lambda file: get(file["href"].partition(listed_at(file))[2], timeout=240), files))
     for file, answer in zip(files, answers, strict=True):
         name = file["href"].rpartition("/")[2].removesuffix(f".{file['format']}")
         assert answer.status_code == 200

@@ -48,6 +48,11 @@ def test_a_stream_tells_all_in_order_and_ends_with_the_campaign(serve):
     failures = [event["data"]["id"] for event in seen if event["event"] == "failure"]
     assert failures == [item["id"] for item in service.get(campaign_id, "/failures", limit=500)["items"]]
     assert len(failures) == 12
+    own = [
+        event["data"]["funnel"] for event in seen if event["data"]["run_id"] == "low-random-0" and "id" in event["data"]
+    ]
+    assert own[1] == own[2] == {"contacts": 1, "valid": 1, "distinct": 1, "preventable": 1}
+    assert own[-1] == {"contacts": 6, "valid": 6, "distinct": 4, "preventable": 2}
     assert seen[-1]["event"] == "state"
     assert (seen[-1]["data"]["run_id"], seen[-1]["data"]["state"]) == (None, "succeeded")
     for run in ("low-random-0", "low-random-1"):

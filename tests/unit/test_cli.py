@@ -6,13 +6,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from risk_sac import cli
+from risk_sac.cli.show import _contacts
 from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.local_run import run
-from risk_sac.results import read_results, write_results
-from risk_sac.types import RunMetrics
+from risk_sac.results import Contact, Results, read_results, write_results
+from risk_sac.types import ConflictType, Grade, RunMetrics
+from tests.judged import judgement
+from tests.unit.test_show import synthetic_contact
 
 SPEC = RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=3))
 
@@ -55,6 +59,35 @@ def test_show_lists_the_contacts(folder: Path, capsys: pytest.CaptureFixture[str
     assert cli.main(["show", str(folder)]) == 0
     printed = capsys.readouterr().out
     assert all(contact.id in printed for contact in read_results(folder).contacts)
+
+
+@pytest.mark.parametrize("grade", [*Grade, None])
+def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(
+    grade: Grade | None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    judged = judgement(
+        grade,
+        conflict_type=ConflictType.CROSSING,
+        broke=("pedestrian_on_red", "wrong_direction"),
+        conflict_s=-11.25,
+        conflict_x_m=-1301.0,
+        conflict_y_m=-1202.5,
+    )
+    episode = synthetic_contact(judged).episode
+    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(Contact.of(episode),))
+    Console(width=80).print(_contacts(results))
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    for word in (grade or "failure", "crossing vehicle", "-11.2, -1301 -1202", "wrong"):
+        assert word in printed
+
+
+def test_the_list_shows_what_nobody_judged(capsys: pytest.CaptureFixture[str]) -> None:
+    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(synthetic_contact(None),))
+    Console(width=80).print(_contacts(results))
+    printed = capsys.readouterr().out
+    assert "failure" in printed
+    assert "None" not in printed
 
 
 @pytest.mark.parametrize("strip", [False, True])

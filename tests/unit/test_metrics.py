@@ -1,4 +1,6 @@
 import dataclasses
+import hashlib
+import json
 import math
 import time
 from types import MappingProxyType
@@ -7,11 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import TypeAdapter
 
 from risk_sac.errors import NotFinite
 from risk_sac.metrics import (
     FEATURES,
     WINDOW,
+    Funnel,
     MetricsAccumulator,
     bootstrap_interval,
     cost_rate,
@@ -20,17 +24,24 @@ from risk_sac.metrics import (
     efficiency_score,
     outcome_dispersion,
     outcome_features,
+    pooled_bins,
+    pooled_counts,
+    pooled_signatures,
+    preventable_collision_rate,
     results_digest,
     wilson_interval,
 )
-from risk_sac.types import Collision, EpisodeRecord, Outcome
+from risk_sac.types import Collision, EpisodeRecord, Grade, Outcome, RunMetrics
+from tests.judged import judgement
 
 HORIZON = 150
 
 
-def collision(ttc=0.3, speed=10.0, offset=0.0, robustness=-1.0, other="adv_0", ego_zone="front", other_zone="rear"):
+def collision(
+    ttc=0.3, speed=10.0, offset=0.0, robustness=-1.0, other="adv_0", ego_zone="front", other_zone="rear", **more
+):
+    values = {"time_s": 3.0, "verdicts": {"warm-up": True}} | more
     return Collision(
-        time_s=3.0,
         other_id=other,
         other_kind="vehicle",
         other_role="adversary",
@@ -48,7 +59,7 @@ def collision(ttc=0.3, speed=10.0, offset=0.0, robustness=-1.0, other="adv_0", e
         ego_peak_braking_mps2=4.5,
         min_robustness=robustness,
         simulator_agrees=True,
-        verdicts={"warm-up": True},
+        **values,
     )
 
 
@@ -82,8 +93,17 @@ def feed(records):
     return accumulator.metrics()
 
 
+any_judgement = st.builds(
+    judgement,
+    grade=st.sampled_from(Grade),
+    conflict_s=st.floats(-5, 20),
+    unresponsive=st.booleans(),
+    signature=st.sampled_from(("cut-in", "pedestrian", "leader")),
+)
 any_collision = st.builds(
     collision,
+    judgement=st.none() | any_judgement,
+    time_s=st.floats(0, 15),
     ttc=st.floats(0, math.inf),
     speed=st.floats(0, 60),
     offset=st.floats(-10, 10),
@@ -185,6 +205,78 @@ def test_window_forgets_all_but_the_newest_100_episodes():
     assert metrics.ecr == pytest.approx(55 / 135)
 
 
+JUDGED = [
+    # Contact at 3.9 s, and the same again, which is not distinct.
+    *[episode(Outcome.FAILURE, 39, hit=collision(time_s=3.9, judgement=judgement(conflict_s=2.5)))] * 2,
+    episode(Outcome.FAILURE, 60, hit=collision(time_s=6.0, other="adv_1", judgement=judgement(Grade.IDEAL, 3.0))),
+    episode(
+        Outcome.FAILURE,
+        150,
+        hit=collision(
+            time_s=15.0,
+            other="adv_2",
+            judgement=judgement(Grade.CAREFUL, -0.4, signature="pedestrian, straight", unresponsive=True),
+        ),
+    ),
+    episode(Outcome.FAILURE, 20, hit=collision(time_s=2.0, other="adv_3")),  # from before contacts were judged
+    # Its striker left the grip of its tyres: an artefact, which nobody judged and whose grade would not count.
+    episode(
+        Outcome.DEGENERATE, 30, hit=collision(verdicts={"inside_grip": False}, judgement=judgement(unresponsive=True))
+    ),
+    episode(Outcome.DEGENERATE, 30, hit=collision(verdicts={"ego_moving": False})),
+    episode(),
+]
+
+
+def test_funnel_literals():
+    metrics = feed(JUDGED)
+    assert Funnel.of(metrics) == Funnel(contacts=7, valid=5, distinct=4, preventable=2)
+    assert (metrics.preventable, metrics.artefacts, metrics.unresponsive) == (3, 1, 1)
+    assert metrics.pcr == metrics.window_pcr == preventable_collision_rate(JUDGED) == 3 / 8
+    # Wilson for 3 of 8 by hand: centre (0.375 + 0.2401)/1.4802 = 0.4155, half width 0.2787.
+    assert (metrics.pcr_low, metrics.pcr_high) == pytest.approx((0.1368, 0.6943), abs=5e-4)
+
+
+def test_signatures_are_counted_in_the_order_in_which_they_were_met():
+    assert list(feed(JUDGED).signatures.items()) == [("cut-in, straight", 3), ("pedestrian, straight", 1)]
+    assert list(feed(JUDGED[::-1]).signatures) == ["pedestrian, straight", "cut-in, straight"]
+
+
+def test_histogram_literals():
+    """2.5 s twice, 3.0 s, and one conflict from before the release; contacts at 3.9 s twice, at 6 and 15 s."""
+    metrics = feed(JUDGED)
+    assert metrics.conflicts_by_second == (1, 0, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+    assert metrics.contacts_by_second == (0, 0, 0, 2, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1)
+
+
+@pytest.mark.parametrize(("horizon_steps", "bins"), [(150, 15), (151, 16), (10, 1), (1, 1), (29, 3), (30, 3)])
+def test_histograms_have_a_bin_for_every_second_that_is_begun(horizon_steps, bins):
+    metrics = MetricsAccumulator(horizon_steps).metrics()
+    assert metrics.conflicts_by_second == metrics.contacts_by_second == (0,) * bins
+
+
+def test_window_of_preventable_failures_forgets_too():
+    failure = episode(Outcome.FAILURE, 10, hit=collision(judgement=judgement()))
+    records = [failure] * 50 + [episode()] * 80 + [failure, episode(Outcome.FAILURE, 10)] * 5
+    metrics = feed(records)
+    assert (metrics.window_ecr, metrics.window_pcr) == (0.2, 0.15)
+    assert metrics.window_pcr == preventable_collision_rate(records[-WINDOW:])
+
+
+def test_runs_are_pooled_by_sums_and_signatures_keep_their_order():
+    metrics = [feed(JUDGED), feed(JUDGED[3:])]
+    counts = pooled_counts(metrics)
+    assert (counts["episodes"], counts["raw_collisions"], counts["failures"]) == (13, 11, 7)
+    assert (counts["distinct_failures"], counts["preventable"], counts["distinct_preventable"]) == (6, 4, 3)
+    assert (counts["artefacts"], counts["unresponsive"], counts["environment_steps"]) == (2, 2, 518 + 380)
+    assert list(pooled_signatures(metrics).items()) == [("cut-in, straight", 3), ("pedestrian, straight", 2)]
+
+
+def test_histograms_of_runs_from_before_there_were_any_add_nothing():
+    assert pooled_bins([(1, 2), (), (3, 0, 1)]) == (4, 2, 1)
+    assert pooled_bins([(), ()]) == pooled_bins([]) == ()
+
+
 # Edge cases
 
 
@@ -193,6 +285,8 @@ def test_run_without_episodes():
     assert (metrics.ecr, metrics.ecr_low, metrics.ecr_high, metrics.window_ecr) == (0, 0, 1, 0)
     assert (metrics.efficiency, metrics.cost_rate, metrics.dispersion) == (0, 0, None)
     assert (metrics.distinct_failures, metrics.steps_per_distinct_failure) == (0, None)
+    assert (metrics.pcr, metrics.pcr_low, metrics.pcr_high, metrics.window_pcr) == (0, 0, 1, 0)
+    assert preventable_collision_rate([]) == 0
 
 
 def test_run_of_rejected_scenes_only_earns_no_efficiency():
@@ -211,6 +305,9 @@ def test_bad_records_are_refused_and_leave_the_figures_alone():
     before = accumulator.metrics()
     with pytest.raises(NotFinite, match="outcome features"):
         accumulator.add(episode(Outcome.FAILURE, 10, hit=collision(ttc=math.nan)))
+    for times in ({"time_s": math.nan}, {"judgement": judgement(conflict_s=-math.inf)}):
+        with pytest.raises(NotFinite, match="finite times"):
+            accumulator.add(episode(Outcome.FAILURE, 10, hit=collision(**times)))
     with pytest.raises(NotFinite, match="mean_cost"):
         accumulator.add(episode(cost=math.nan))
     with pytest.raises(ValueError, match="without a collision"):
@@ -232,6 +329,13 @@ def test_figures_stay_in_their_ranges(records):
     assert 0 <= metrics.efficiency <= 1
     assert 0 <= metrics.cost_rate <= 1
     assert metrics.dispersion is None or 0 <= metrics.dispersion <= 1
+    assert 0 <= metrics.pcr_low <= metrics.pcr <= metrics.pcr_high <= 1
+    assert 0 <= metrics.window_pcr <= metrics.window_ecr
+    assert metrics.pcr <= metrics.ecr
+    funnel = Funnel.of(metrics)
+    assert funnel.contacts >= funnel.valid >= funnel.distinct >= funnel.preventable >= 0
+    assert metrics.unresponsive <= metrics.failures
+    assert metrics.distinct_preventable <= metrics.preventable
 
 
 @settings(deadline=None)
@@ -242,6 +346,13 @@ def test_incremental_equals_batch(records):
     features = np.array([outcome_features(hit) for hit in hits]).reshape(-1, len(FEATURES))
     assert metrics.ecr == effective_collision_rate(records)
     assert metrics.window_ecr == effective_collision_rate(records[-WINDOW:])
+    assert metrics.pcr == preventable_collision_rate(records)
+    assert metrics.window_pcr == preventable_collision_rate(records[-WINDOW:])
+    distinct = [hits[position] for position in distinct_failures(hits)]
+    assert metrics.distinct_preventable == sum(hit.preventable for hit in distinct)
+    judged = [hit for hit in hits if hit.judgement is not None]
+    assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(judged)
+    assert sum(metrics.signatures.values()) == len(judged)
     assert metrics.efficiency == pytest.approx(efficiency_score(records, HORIZON), abs=1e-12)
     assert metrics.cost_rate == pytest.approx(cost_rate(records), abs=1e-12)
     assert metrics.distinct_failures == len(distinct_failures(hits))
@@ -280,6 +391,26 @@ def test_many_failures_stay_cheap_to_add():
 def test_digest_is_the_hash_of_canonical_json():
     assert results_digest([]) == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"
     assert results_digest(RUN) == results_digest(list(RUN))
+
+
+def test_records_from_before_contacts_were_judged_keep_their_digest():
+    # As the version before wrote it: of this very record, by hand.
+    old = json.loads(json.dumps(dataclasses.asdict(RUN[0])))
+    del old["collision"]["judgement"]
+    line = json.dumps(old, sort_keys=True, separators=(",", ":")).encode() + b"\n"
+    assert results_digest([RUN[0]]) == hashlib.sha256(line).hexdigest()
+    judged = dataclasses.replace(RUN[0], collision=dataclasses.replace(RUN[0].collision, judgement=judgement()))
+    assert results_digest([judged]) != results_digest([RUN[0]])
+
+
+def test_metrics_from_before_contacts_were_judged_can_still_be_read():
+    stored = dataclasses.asdict(feed(RUN))
+    new = ("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts")
+    for name in (*new, "unresponsive", "signatures", "conflicts_by_second", "contacts_by_second"):
+        del stored[name]
+    metrics = TypeAdapter(RunMetrics).validate_json(json.dumps(stored))
+    assert (metrics.failures, metrics.preventable, metrics.pcr_low, metrics.pcr_high) == (2, 0, 0, 1)
+    assert Funnel.of(metrics) == Funnel(contacts=3, valid=2, distinct=2, preventable=0)
 
 
 def test_digest_does_not_depend_on_the_order_or_kind_of_mappings():

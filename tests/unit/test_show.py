@@ -1,4 +1,5 @@
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from risk_sac.scenario.space import SceneSpace
 from risk_sac.show import Recording, draw, draw_recording
 from risk_sac.trace import write_series
 from risk_sac.train import train
-from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
+from risk_sac.types import Collision, ConflictType, EpisodeRecord, Judgement, Outcome, RunMetrics, SeriesFile
+from tests.judged import judgement
 
 
 def png_size(file: Path) -> tuple[int, int]:
@@ -24,8 +26,17 @@ def png_size(file: Path) -> tuple[int, int]:
     return width, height
 
 
-def synthetic_contact() -> Contact:
-    """The ego drives east at 10 m/s into a pedestrian who walks north; the contact is 1.95 s after the start."""
+JUDGED = judgement(
+    conflict_type=ConflictType.PEDESTRIAN,
+    conflict_s=0.75,
+    conflict_x_m=302.0,
+    conflict_y_m=-3.25,
+    broke=("pedestrian_on_red",),
+)
+
+
+def synthetic_contact(judged: Judgement | None = JUDGED) -> Contact:
+    """The ego drives east at 10 m/s into a pedestrian who walks north; the contact is 1.95 s after the release."""
     space: SceneSpace = FAMILIES["mixed"].space
     collision = Collision(
         time_s=1.95,
@@ -47,6 +58,7 @@ def synthetic_contact() -> Contact:
         min_robustness=-1.0,
         simulator_agrees=True,
         verdicts={"ego_moving": True},
+        judgement=judged,
     )
     episode = EpisodeRecord(
         index=7,
@@ -106,6 +118,76 @@ def test_pose_at_the_contact_lies_between_the_frames() -> None:
     assert recording.pose(recording.other, -0.95) == pytest.approx((302, -3.0, np.pi / 2))
 
 
+def with_release() -> dict[str, NDArray[np.generic]]:
+    """The same with 1.5 s before the release, in which the ego drives as it does after and all others stand."""
+    series, early = synthetic_series(), 15
+    rows = len(series["time_s"])
+    longer = {
+        name: np.concatenate((np.repeat(values[:1], early, axis=0), values)) if len(values) == rows else values
+        for name, values in series.items()
+    }
+    t = np.arange(early + rows) * 0.1 - 1.5
+    x_m = longer["x_m"].copy()
+    x_m[:, 0] = 280 + 10 * t
+    return longer | {"time_s": t + 1.6, "x_m": x_m, "released_s": np.array(1.6)}
+
+
+def test_frames_before_the_release_come_before_it() -> None:
+    recording = Recording(synthetic_contact(), with_release())
+    assert len(recording.time_s) == 36
+    assert (recording.time_s[0], recording.time_s[-1]) == pytest.approx((-3.45, 0.05))
+    assert recording.time_s[15] == pytest.approx(recording.released_s) == -1.95
+    assert recording.pose(0, 0.0) == pytest.approx((280 + 19.5, -1.65, 0.0))
+    assert recording.pose(0, -2.95) == pytest.approx((270, -1.65, 0.0))
+
+
+def test_the_conflict_begins_as_long_before_the_contact_as_its_judgement_says() -> None:
+    for series in (synthetic_series(), with_release()):
+        assert Recording(synthetic_contact(), series).conflict_s == pytest.approx(-1.2)
+    early = replace(JUDGED, conflict_s=-1.0)  # before the release
+    assert Recording(synthetic_contact(early), with_release()).conflict_s == pytest.approx(-2.95)
+    assert Recording(synthetic_contact(early), synthetic_series()).conflict_s is None  # which began at the release
+    assert Recording(synthetic_contact(None), synthetic_series()).conflict_s is None
+
+
+@pytest.mark.parametrize("conflict_s", [0.75, -1.0])
+def test_release_and_conflict_are_marked_in_every_panel_and_the_conflict_from_above(conflict_s: float) -> None:
+    contact = synthetic_contact(replace(JUDGED, conflict_s=conflict_s))
+    view, *panels = draw_recording("mixed", Recording(contact, with_release())).axes
+    for panel in panels:
+        upright = [float(np.ravel(line.get_xdata())[0]) for line in panel.lines if line.get_linestyle() == ":"]
+        assert upright == pytest.approx([-0.95, -1.95, conflict_s - 1.95])
+        assert [text.get_text() for text in panel.texts] == ["in view", "release", "conflict"]
+    (mark,) = (line for line in view.lines if line.get_label() == "conflict")
+    assert (np.ravel(mark.get_xdata())[0], np.ravel(mark.get_ydata())[0]) == (302.0, -3.25)
+    ghosts = [patch for patch in view.patches if patch.get_linestyle() == "--"]
+    centres = [patch.get_path().vertices[:-1].mean(axis=0) for patch in ghosts]
+    pedestrian_y = -4 + max(conflict_s, 0)
+    np.testing.assert_allclose(centres, [(280 + 10 * conflict_s, -1.65), (302, pedestrian_y)])
+    low, high = view.get_xlim()
+    assert low < 280 + 10 * conflict_s < high
+
+
+def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke() -> None:
+    figure = draw_recording("mixed", Recording(synthetic_contact(), with_release()))
+    assert figure.get_suptitle().splitlines()[2:] == [
+        "grade careful · pedestrian from 1.2 s before the contact, 0.8 s after the release, at (302.0, -3.2) m",
+        "the striker broke pedestrian on red",
+    ]
+    nothing = replace(JUDGED, grade=None, broke=())
+    title = draw_recording("mixed", Recording(synthetic_contact(nothing), with_release())).get_suptitle()
+    assert title.splitlines()[2].startswith("no grade · pedestrian from")
+    assert title.endswith("the striker broke nothing")
+
+
+def test_a_contact_that_nobody_judged_is_drawn_without_a_conflict() -> None:
+    figure = draw_recording("mixed", Recording(synthetic_contact(None), synthetic_series()))
+    view, *panels = figure.axes
+    assert len(figure.get_suptitle().splitlines()) == 2
+    assert "conflict" not in [line.get_label() for line in view.lines]
+    assert [text.get_text() for text in panels[0].texts] == ["in view", "release"]
+
+
 def test_hidden_span_ends_where_the_other_comes_into_view() -> None:
     recording = Recording(synthetic_contact(), synthetic_series())
     assert [tuple(np.round(span, 6)) for span in recording.hidden()] == [(-1.95, -0.85)]
@@ -125,7 +207,7 @@ def test_contact_and_first_sight_are_marked_in_every_panel() -> None:
 def test_both_bodies_and_both_paths_are_drawn() -> None:
     view, *_ = draw_recording("mixed", Recording(synthetic_contact(), synthetic_series())).axes
     labels = [text.get_text() for text in view.get_legend().get_texts()]
-    assert labels == ["pedestrian (adversary)", "ego", "contact"]
+    assert labels == ["pedestrian (adversary)", "ego", "contact", "conflict"]
     paths = [line for line in view.lines if len(np.ravel(line.get_xdata())) == 21]
     assert len(paths) == 3
 

@@ -10,9 +10,9 @@ from risk_sac.cli.console import COULD_NOT_RUN, Commands
 COMMANDS = (add_submit, add_list, add_watch, add_results, add_cancel, add_delete)
 EPILOG = """exit status:
   0    fine
-  1    the ECR of a family and method, as `results` shows it, is above --max-ecr; the ECR itself is compared, whatever
-       its 95 % interval, and controls such as no-adversary count like any other method
-  2    it could not run: the campaign failed, was cancelled or (with --max-ecr) has not ended; the service refuses or
+  1    the ECR of a family and method, as `results` shows it, is above --max-ecr, or its PCR above --max-pcr; the rate
+       itself is compared, whatever its 95 % interval, and controls such as no-adversary count like any other method
+  2    it could not run: the campaign failed, was cancelled or (with a bound) has not ended; the service refuses or
        does not answer; the time is up; an argument is wrong
   130  interrupted; the campaign goes on
 

@@ -6,20 +6,20 @@ from junitparser import Error, Failure, Skipped
 from junitparser.junitparser import FinalResult
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
-from risk_sac.cli.campaigns.gate import exceeds
+from risk_sac.cli.campaigns.gate import Bounds, exceeded
 from risk_sac.cli.text import printable
-from risk_sac.client import Results, RunResult
+from risk_sac.client import Metrics, Results, RunResult
 
 
-def junit(results: Results, url: str, max_ecr: float | None, failures: Mapping[str, Sequence[str]]) -> JUnitXml:
+def junit(results: Results, url: str, bounds: Bounds, failures: Mapping[str, Sequence[str]]) -> JUnitXml:
     """The report of a campaign.
 
-    A run has failed where its own ECR lies above the bound, and is an error where it failed or was cancelled.
+    A run has failed where a rate of its own lies above its bound, and is an error where it failed or was cancelled.
 
     Args:
       results: of the campaign.
       url: of the campaign, for whoever reads the report.
-      max_ecr: bound on the ECR of each run; None sets none.
+      bounds: on the rates of each run.
       failures: ids of the first failures of a run, by its id.
     """
     report = JUnitXml("risk-sac")
@@ -29,34 +29,49 @@ def junit(results: Results, url: str, max_ecr: float | None, failures: Mapping[s
         properties = {"campaign": results.campaign_id, "url": url, **_versions(runs)}
         for name, value in properties.items():
             suite.add_property(printable(name), printable(value))
-        suite.add_testcases([_case(run, url, max_ecr, failures.get(run.id, ())) for run in runs])
+        suite.add_testcases([_case(run, url, bounds, failures.get(run.id, ())) for run in runs])
         report.add_testsuite(suite)
     report.update_statistics()
     return report
 
 
-def _case(run: RunResult, url: str, max_ecr: float | None, failures: Sequence[str]) -> TestCase:
+def _case(run: RunResult, url: str, bounds: Bounds, failures: Sequence[str]) -> TestCase:
     case = TestCase(f"seed {run.seed}", printable(f"{run.family}.{run.method}"), round(run.busy_s, 3))
     for name, value in (("run", run.id), ("spec_digest", run.spec_digest), ("digest", run.digest)):
         if value is not None:
             case.add_property(name, printable(value))
-    result = _result(run, max_ecr)
+    if run.metrics is not None:
+        case.add_property("funnel", _funnel(run.metrics))
+    result = _result(run, bounds)
     if result is not None:
         result.text = printable("\n".join(f"{url}/failures/{failure}" for failure in failures))
         case.append(result)
     return case
 
 
-def _result(run: RunResult, max_ecr: float | None) -> FinalResult | None:
+def _result(run: RunResult, bounds: Bounds) -> FinalResult | None:
     """None where all is fine."""
     if run.state in ("failed", "cancelled"):
         return Error(printable(f"{run.state}: {run.reason}" if run.reason else run.state), run.state)
     if run.state != "succeeded":
-        return Skipped(f"{run.state}: its ECR can still change")
-    if run.metrics is not None and exceeds(run.metrics, max_ecr):
-        found = f"{run.metrics.failures} valid failures in {run.metrics.episodes} episodes"
-        return Failure(f"ECR {run.metrics.ecr:.3f} > {max_ecr:g}: {found}", "ecr")
-    return None
+        return Skipped(f"{run.state}: its rates can still change")
+    above = exceeded(run.metrics, bounds)
+    if run.metrics is None or not above:
+        return None
+    counts = {"ECR": f"{run.metrics.failures} valid", "PCR": f"{run.metrics.preventable} preventable"}
+    found = (
+        f"{name} {above[name]:.3f} > {bound:g}: {counts[name]} failures in {run.metrics.episodes} episodes"
+        for name, bound in bounds.items()
+        if name in above
+    )
+    return Failure("; ".join(found), " ".join(above).lower())
+
+
+def _funnel(metrics: Metrics) -> str:
+    return (
+        f"{metrics.raw_collisions} contacts, {metrics.failures} valid, {metrics.distinct_failures} distinct, "
+        f"{metrics.distinct_preventable} preventable"
+    )
 
 
 def _versions(runs: Sequence[RunResult]) -> dict[str, str]:

@@ -10,7 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.campaigns.gate import exceeds
+from risk_sac.cli.campaigns.gate import Bounds, exceeded
 from risk_sac.cli.console import console, or_dash
 from risk_sac.cli.text import on_one_line
 from risk_sac.client import CampaignSummary, Results
@@ -37,7 +37,9 @@ def figures(campaign: CampaignSummary) -> str:
     progress = campaign.progress
     eta = "?" if progress.eta_s is None else f"{progress.eta_s:.0f} s"
     reason = f"; {campaign.state}, {on_one_line(campaign.reason)}" if campaign.reason else ""
-    return f"{progress.failures} failures, ECR {or_dash(progress.window_ecr, '.2f')}, ETA {eta}{reason}"
+    found = f"{progress.failures} failures, {progress.distinct_preventable} distinct and preventable"
+    rates = f"ECR {or_dash(progress.window_ecr, '.2f')}, PCR {or_dash(progress.window_pcr, '.2f')}"
+    return f"{found}, {rates}, ETA {eta}{reason}"
 
 
 def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
@@ -59,29 +61,34 @@ def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
     return table
 
 
-def results_table(results: Results, max_ecr: float | None) -> Table:
-    """One row per family and method; those with an ECR above the bound are red and say so. 80 columns hold it."""
+def results_table(results: Results, bounds: Bounds) -> Table:
+    """Per family and method the funnel, and its rates above their intervals; rates above a bound are red and say so.
+
+    80 columns hold it.
+    """
     partial = "" if results.complete else ", so far"
     table = Table(title=f"{results.campaign_id} {results.state}{partial}", box=SIMPLE_HEAD, padding=0)
     for name in ("family", "method"):
         table.add_column(name, no_wrap=True)
-    for name in ("runs", "episodes", "failures", "distinct", "ECR", "95 %", ""):
+    for name in ("epi-\nsodes", "con-\ntacts", "valid", "dis-\ntinct", "preven-\ntable", "ECR\n95 %", "PCR\n95 %"):
         table.add_column(name, no_wrap=True, justify="right")
     for total in results.totals:
-        above = exceeds(total, max_ecr)
+        above = exceeded(total, bounds)
         table.add_row(
             total.family,
-            total.method,
-            str(total.runs),
-            str(total.episodes),
-            str(total.failures),
-            str(total.distinct_failures),
-            or_dash(total.ecr, ".2f"),
-            f"{or_dash(total.ecr_low, '.2f')}-{or_dash(total.ecr_high, '.2f')}",
-            "above" if above else "",
+            f"{total.method}\n{total.runs} run{'' if total.runs == 1 else 's'}",
+            *map(str, (total.episodes, total.raw_collisions, total.failures)),
+            *map(str, (total.distinct_failures, total.distinct_preventable)),
+            _rate(total.ecr, total.ecr_low, total.ecr_high, above="ECR" in above),
+            _rate(total.pcr, total.pcr_low, total.pcr_high, above="PCR" in above),
             style="red" if above else None,
         )
     return table
+
+
+def _rate(rate: float | None, low: float | None, high: float | None, *, above: bool) -> str:
+    interval = f"{or_dash(low, '.2f')}-{or_dash(high, '.2f')}"
+    return f"{or_dash(rate, '.2f')}\n{interval}" + ("\nabove" if above else "")
 
 
 def _plain(answer: Answer) -> Any:

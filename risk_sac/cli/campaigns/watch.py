@@ -5,12 +5,13 @@ import itertools
 import math
 from pathlib import Path
 
-from risk_sac.cli.campaigns.gate import exceeds, rate, verdict
+from risk_sac.cli.campaigns.gate import Bounds, exceeded, rate, verdict
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.cli.campaigns.output import print_answer, results_table
 from risk_sac.cli.campaigns.progress import shown
 from risk_sac.cli.console import Commands, complain
 from risk_sac.client import Client, Results
+from risk_sac.types import Grade
 
 NAMED_FAILURES = 5  # of a run, in a JUnit report
 
@@ -71,31 +72,32 @@ def _results(options: argparse.Namespace) -> int:
 
 
 def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
-    results = client.results(campaign_id)
+    results, bounds = client.results(campaign_id), Bounds.of(options)
     if options.junit is not None:
-        _report(client, results, options)
-    print_answer(options, results, results_table(results, options.max_ecr))
+        _report(client, results, bounds, options.junit)
+    print_answer(options, results, results_table(results, bounds))
     for run in results.runs:
         if run.state == "failed":
             complain(f"{run.id}: {run.reason}")
-    status, reason = verdict(results, options.max_ecr)
+    status, reason = verdict(results, bounds)
     if reason:
         complain(reason)
     return status
 
 
-def _report(client: Client, results: Results, options: argparse.Namespace) -> None:
-    url = client.url_of(results.campaign_id)
-    failures = {
-        run.id: [each.id for each in itertools.islice(client.failures(results.campaign_id, run=run.id), NAMED_FAILURES)]
-        for run in results.runs
-        if exceeds(run.metrics, options.max_ecr)
-    }
-    junit(results, url, options.max_ecr, failures).write(str(options.junit), pretty=True)
+def _report(client: Client, results: Results, bounds: Bounds, file: Path) -> None:
+    failures = {}
+    for run in results.runs:
+        if above := exceeded(run.metrics, bounds):
+            grade = None if "ECR" in above else Grade.CAREFUL  # what is too much
+            found = client.failures(results.campaign_id, run=run.id, grade=grade)
+            failures[run.id] = [each.id for each in itertools.islice(found, NAMED_FAILURES)]
+    junit(results, client.url_of(results.campaign_id), bounds, failures).write(str(file), pretty=True)
 
 
 def _add_gate_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-ecr", type=rate, metavar="X", help="exit with 1 where an ECR is above it")
+    parser.add_argument("--max-pcr", type=rate, metavar="X", help="exit with 1 where a PCR is above it")
     parser.add_argument(
         "--junit", type=Path, metavar="FILE.xml", help="report for CI: a suite per family, a case per run"
     )

@@ -3,6 +3,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from risk_sac.cli.campaigns.gate import Bounds
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.client import Results
 
@@ -13,6 +14,13 @@ METRICS = {
     "ecr_low": 0.1,
     "ecr_high": 0.4,
     "distinct_failures": 4,
+    "raw_collisions": 12,
+    "preventable": 6,
+    "distinct_preventable": 2,
+    "pcr": 0.15,
+    "pcr_low": 0.05,
+    "pcr_high": 0.3,
+    "unresponsive": 0,
 }
 RUN = {
     "id": "low-sac-0",
@@ -28,11 +36,12 @@ RUN = {
     "versions": {"libsumo": "1.28.0"},
     "busy_s": 12.5,
 }
+BOUNDS = Bounds(ecr=0.1)
 URL = "http://host/v1/campaigns/c1"
 
 
 def report(
-    *runs: dict[str, Any], max_ecr: float | None = 0.1, failures: Mapping[str, Sequence[str]] | None = None
+    *runs: dict[str, Any], bounds: Bounds = BOUNDS, failures: Mapping[str, Sequence[str]] | None = None
 ) -> ElementTree.Element:
     results = Results.model_validate(
         {
@@ -44,7 +53,7 @@ def report(
         }
     )
     written = io.BytesIO()
-    junit(results, URL, max_ecr, failures or {}).write(written, pretty=True)
+    junit(results, URL, bounds, failures or {}).write(written, pretty=True)
     return ElementTree.fromstring(written.getvalue())
 
 
@@ -71,9 +80,22 @@ def test_a_run_above_the_bound_fails_and_names_its_first_failures() -> None:
     assert failure.text == f"{URL}/failures/low-sac-0-train-3\n{URL}/failures/low-sac-0-train-9"
 
 
+def test_a_run_above_the_bound_on_preventable_failures_says_so() -> None:
+    (failure,) = report({}, bounds=Bounds(ecr=0.5, pcr=0.1)).iter("failure")
+    assert (failure.attrib["type"], failure.attrib["message"]) == (
+        "pcr",
+        "PCR 0.150 > 0.1: 6 preventable failures in 40 episodes",
+    )
+    (both,) = report({}, bounds=Bounds(ecr=0.2, pcr=0.1)).iter("failure")
+    assert both.attrib["type"] == "ecr pcr"
+    assert both.attrib["message"] == (
+        "ECR 0.250 > 0.2: 10 valid failures in 40 episodes; PCR 0.150 > 0.1: 6 preventable failures in 40 episodes"
+    )
+
+
 def test_a_run_at_the_bound_and_a_run_without_one_pass() -> None:
-    assert not list(report({}, max_ecr=0.25).iter("failure"))
-    assert not list(report({}, max_ecr=None).iter("failure"))
+    assert not list(report({}, bounds=Bounds(ecr=0.25, pcr=0.15)).iter("failure"))
+    assert not list(report({}, bounds=Bounds()).iter("failure"))
 
 
 def test_a_run_that_failed_or_was_cancelled_is_an_error_and_one_that_goes_on_is_skipped() -> None:
@@ -91,7 +113,8 @@ def test_a_run_that_failed_or_was_cancelled_is_an_error_and_one_that_goes_on_is_
 def test_digests_versions_and_where_to_look_are_properties() -> None:
     root = report({}, {"seed": 1, "versions": {"libsumo": "1.29.0"}})
     assert properties(root[0]) == {"campaign": "c1", "url": URL, "version.libsumo": "1.28.0, 1.29.0"}
-    assert properties(root[0][1]) == {"run": "low-sac-0", "spec_digest": "aa", "digest": "bb"}
+    funnel = "12 contacts, 10 valid, 4 distinct, 2 preventable"
+    assert properties(root[0][1]) == {"run": "low-sac-0", "spec_digest": "aa", "digest": "bb", "funnel": funnel}
 
 
 def test_whatever_a_reason_holds_the_report_is_well_formed() -> None:

@@ -13,7 +13,11 @@ PROGRESS = {
     "episodes_total": 4,
     "failures": 0,
     "raw_collisions": 0,
+    "distinct_failures": 0,
+    "preventable": 0,
+    "distinct_preventable": 0,
     "window_ecr": None,
+    "window_pcr": None,
     "dual_variable": None,
     "eta_s": None,
 }

@@ -5,10 +5,11 @@ import pytest
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.metrics import results_digest
 from risk_sac.report import FinishedRun
-from risk_sac.types import Collision, EpisodeRecord, Outcome
+from risk_sac.types import Collision, EpisodeRecord, Grade, Judgement, Outcome
+from tests.judged import judgement
 
 
-def collision(speed: float = 10.0, other: str = "lead", broken: str = "") -> Collision:
+def collision(speed: float = 10.0, other: str = "lead", broken: str = "", judged: Judgement | None = None) -> Collision:
     return Collision(
         time_s=3.0,
         other_id=other,
@@ -29,14 +30,19 @@ def collision(speed: float = 10.0, other: str = "lead", broken: str = "") -> Col
         min_robustness=-1.0,
         simulator_agrees=True,
         verdicts={rule: rule != broken for rule in ("inside_limits", "ego_moving")},
+        judgement=judged,
     )
 
 
 OUTCOMES = {
     ".": (Outcome.SAFE, None),
     "r": (Outcome.REJECTED, None),
-    "f": (Outcome.FAILURE, collision()),
-    "F": (Outcome.FAILURE, collision(speed=20.0)),  # another failure than f
+    "f": (Outcome.FAILURE, collision(judged=judgement(conflict_s=1.5))),
+    # Another failure than f, which no careful driver would have prevented.
+    "F": (
+        Outcome.FAILURE,
+        collision(speed=20.0, judged=judgement(Grade.IDEAL, -0.5, unresponsive=True, signature="leader, straight")),
+    ),
     "a": (Outcome.DEGENERATE, collision(broken="inside_limits")),
     "d": (Outcome.DEGENERATE, collision(broken="ego_moving")),
 }

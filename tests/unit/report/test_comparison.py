@@ -42,6 +42,24 @@ def test_a_cell_is_the_mean_over_seeds_and_sums_over_seeds(comparison):
     assert found.rejected_rate == 1 / 8
 
 
+def test_the_funnel_and_pcr_are_those_of_all_seeds(comparison):
+    found = cell(comparison, "risk-sac")
+    assert (found.raw_collisions, found.failures) == (4, 4)
+    assert (found.distinct_failures, found.preventable, found.distinct_preventable) == (3, 3, 2)  # F counts in neither
+    pcr = found.estimates["pcr"]
+    assert (pcr.mean, pcr.low, pcr.high) == (0.375, 0.25, 0.5)  # 2/4 and 1/4
+    assert (found.unresponsive, found.unresponsive_share) == (1, 1 / 4)
+    assert cell(comparison, "no-adversary").unresponsive_share is None
+
+
+def test_histograms_and_signatures_are_summed_over_the_seeds(comparison):
+    found = cell(comparison, "risk-sac")
+    assert found.signatures == {"cut-in, straight": 3, "leader, straight": 1}
+    assert (found.conflicts_by_second[:3], sum(found.conflicts_by_second)) == ((1, 3, 0), 4)  # -0.5 s and 1.5 s
+    assert (found.contacts_by_second[:4], sum(found.contacts_by_second)) == ((0, 0, 0, 4), 4)
+    assert len(found.contacts_by_second) == len(found.conflicts_by_second) == HORIZON / 10
+
+
 def test_dispersion_is_taken_over_the_seeds_that_have_one(comparison):
     ofd = cell(comparison, "risk-sac").estimates["ofd"]
     assert (ofd.mean, ofd.runs) == (pytest.approx(2 / 3 * 0.5 / 2), 1)  # two pairs of three differ by half a range
@@ -59,7 +77,7 @@ def test_artefacts_are_the_contacts_nobody_is_to_blame_for(comparison):
 def test_evaluation_has_neither_seconds_nor_a_last_window(comparison):
     found = cell(comparison, "risk-sac", "evaluation")
     assert found.estimates["ecr"].mean == 0.5
-    assert "ecr_last" not in found.estimates
+    assert not {"ecr_last", "pcr_last"} & found.estimates.keys()
     assert found.steps_per_distinct_failure == 100
     assert found.cpu_s_per_distinct_failure is None
 
@@ -68,6 +86,9 @@ def test_one_seed_has_wilsons_interval(spec, runs):
     alone = spec.model_copy(update={"seeds": (0,)})
     ecr = cell(compare(alone, runs, ""), "risk-sac").estimates["ecr"]
     assert (ecr.low, ecr.high) == wilson_interval(3, 4)
+    for name in ("pcr", "pcr_last"):
+        pcr = cell(compare(alone, runs, ""), "risk-sac").estimates[name]
+        assert (pcr.low, pcr.high) == wilson_interval(2, 4)
 
 
 def test_runs_are_tested_in_pairs_of_a_seed(comparison):
@@ -81,7 +102,7 @@ def test_runs_are_tested_in_pairs_of_a_seed(comparison):
 
 def test_holm_corrects_over_family_and_phase(comparison):
     search = [test for test in comparison.tests if test.phase == "search"]
-    assert len(search) == 2 * 5
+    assert len(search) == 2 * 6
     with_p = [test for test in search if test.p is not None]
     assert all(test.p_holm >= test.p for test in with_p)
     ofd = [test for test in search if test.metric == "ofd"]

@@ -3,10 +3,25 @@ import io
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.report import compare, figure_bytes, figure_names, table_csv, table_json, table_markdown, write_report
+from risk_sac.metrics import results_digest
+from risk_sac.records import records_to_json
+from risk_sac.report import (
+    compare,
+    figure_bytes,
+    figure_names,
+    read_run,
+    table_csv,
+    table_json,
+    table_markdown,
+    write_report,
+)
+from risk_sac.report.figures import window_ecr, window_pcr
+from risk_sac.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
+from risk_sac.seal import seal, unseal
 
 
 @pytest.fixture
@@ -23,12 +38,11 @@ def test_page_has_command_digest_tables_and_the_paper(comparison, spec):
     page = table_markdown(comparison)
     assert "```\nrisk-sac evaluate --out d\n```" in page
     assert spec.digest in page
-    section = page[page.index("## low, search") : page.index("### risk-sac against the others: low, search")]
-    first, second = [each for each in section.splitlines() if each.startswith("| ")][2:4]
-    assert first.startswith("| risk-sac | 2 | 0.500 [0.250, 0.750] |")
-    assert "| 0.167 (1 of 2 seeds) | 3 | 117 | 40.0 | 0.0 % | 0.0 % | 12.5 % |" in first
+    _, _, first, second, *_ = section(page, "## low, search")
+    assert first.startswith("| risk-sac | 2 | 0.500 [0.250, 0.750] | 0.375 [0.250, 0.500] |")
+    assert "| 0.167 (1 of 2 seeds) | 117 | 40.0 | 0.0 % | 0.0 % | 12.5 % |" in first
     assert second.startswith("| sac | 2 | 0.125")
-    assert "| – | 1 |" in second
+    assert "| – | 400 |" in second
     assert line(page, "| low | search | 0.50").split(" | ")[3] == "0.97"
     assert "| low | search | 8 | 12.5 % |" in page
     assert "risk-sac run --spec d/spec.yaml --family low --method risk-sac --seed 0 --out repeated" in page
@@ -36,10 +50,57 @@ def test_page_has_command_digest_tables_and_the_paper(comparison, spec):
     assert "## Missing" not in page
 
 
+def section(page, title):
+    """The rows of the table below a title."""
+    return [each for each in page[page.index(title) :].split("\n\n")[1].splitlines() if each.startswith("| ")]
+
+
+def test_page_has_the_funnel_of_every_method(comparison):
+    assert section(table_markdown(comparison), "### The funnel: low, search\n") == [
+        "| method | episodes | contacts | valid | distinct | preventable | unresponsive |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: |",
+        "| risk-sac | 8 | 4 | 4 | 3 | 2 | 25.0 % |",
+        "| sac | 8 | 3 | 1 | 1 | 1 | 0.0 % |",
+        "| no-adversary | 8 | 1 | 0 | 0 | 0 | – |",
+    ]
+
+
+def test_page_has_histograms_and_signatures_of_those_who_found_something(comparison):
+    page = table_markdown(comparison)
+    assert section(page, "### Valid failures by the time since the release: low, search\n") == [
+        "| method | until | 0–1 s | 1–2 s | 2–3 s | 3–4 s |",
+        "| --- | --- | ---: | ---: | ---: | ---: |",
+        "| risk-sac | conflict | 1 | 3 | 0 | 0 |",
+        "| risk-sac | contact | 0 | 0 | 0 | 4 |",
+        "| sac | conflict | 0 | 1 | 0 | 0 |",
+        "| sac | contact | 0 | 0 | 0 | 1 |",
+    ]
+    assert section(page, "### Valid failures by signature: low, search\n") == [
+        "| signature | risk-sac | sac |",
+        "| --- | ---: | ---: |",
+        "| cut-in, straight | 3 | 1 |",
+        "| leader, straight | 1 | 0 |",
+    ]
+
+
+def test_page_of_runs_from_before_contacts_were_judged_has_no_empty_histograms(spec, runs):
+    old = [replace(run, records=tuple(map(unjudged, run.records))) for run in runs]
+    page = table_markdown(compare(spec, old, ""))
+    assert "| risk-sac | 8 | 4 | 4 | 3 | 0 | 0.0 % |" in page
+    assert "by the time since" not in page
+    assert "by signature" not in page
+    assert not [name for name in figure_names(compare(spec, old, "")) if name.startswith("times_")]
+
+
+def test_page_names_the_rules_that_make_an_artefact(comparison):
+    page = table_markdown(comparison)
+    assert "(conflict_after_release, ego_model_saw, inside_grip, inside_limits, no_spawn_overlap, " in page
+
+
 def test_page_says_what_two_pairs_cannot_show(comparison):
     page = table_markdown(comparison)
     assert (
-        "The smallest p that 2 pairs can give is 0.5; corrected over 8 tests it is at best 1. So no corrected" in page
+        "The smallest p that 2 pairs can give is 0.5; corrected over 10 tests it is at best 1. So no corrected" in page
     )
     assert "that takes 9 seeds" in page
 
@@ -72,6 +133,9 @@ def test_json_is_strict_and_complete(comparison, spec):
     assert row["spec_digest"] == comparison.runs[0].spec.digest
     assert row["metrics"]["search"]["failures"] == 3
     assert row["metrics"]["evaluation"]["failures"] == 1
+    assert row["metrics"]["search"]["signatures"] == {"cut-in, straight": 2, "leader, straight": 1}
+    assert stored["cells"][0]["contacts_by_second"][:4] == [0, 0, 0, 4]
+    assert stored["cells"][0]["signatures"] == {"cut-in, straight": 3, "leader, straight": 1}
 
 
 def test_csv_has_a_row_per_cell_and_phase(comparison):
@@ -84,6 +148,8 @@ def test_csv_has_a_row_per_cell_and_phase(comparison):
         "1",
     )
     assert rows[3]["ecr_last"] == ""
+    names = ("raw_collisions", "failures", "distinct_failures", "distinct_preventable", "pcr", "unresponsive_share")
+    assert [rows[0][name] for name in names] == ["4", "4", "3", "2", "0.375", "0.25"]
 
 
 def test_versions_that_differ_are_all_named(spec, runs):
@@ -93,19 +159,26 @@ def test_versions_that_differ_are_all_named(spec, runs):
 
 def test_figures_are_those_that_have_something_to_show(comparison, spec, runs):
     assert set(figure_names(comparison)) == {
-        *("ecr_low", "lambda_low", "alpha_low"),
-        *(f"bars_{name}{phase}" for name in ("ecr", "es", "rho_c", "ofd") for phase in ("", "_evaluation")),
+        *("ecr_low", "pcr_low", "lambda_low", "alpha_low", "times_low", "times_low_evaluation"),
+        *(f"bars_{name}{phase}" for name in ("ecr", "pcr", "es", "rho_c", "ofd") for phase in ("", "_evaluation")),
     }
     control = spec.model_copy(update={"methods": ("no-adversary",)})
     assert "lambda_low" not in figure_names(compare(control, runs, ""))
     assert figure_names(compare(spec, [], "")) == ()
 
 
+@pytest.mark.parametrize("name", ["ecr_low", "pcr_low", "times_low"])
 @pytest.mark.parametrize(("format_", "magic"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
-def test_the_same_comparison_gives_the_same_picture(comparison, format_, magic):
-    picture = figure_bytes(comparison, "ecr_low", format_)
+def test_the_same_comparison_gives_the_same_picture(comparison, name, format_, magic):
+    picture = figure_bytes(comparison, name, format_)
     assert picture.startswith(magic)
-    assert picture == figure_bytes(comparison, "ecr_low", format_)
+    assert picture == figure_bytes(comparison, name, format_)
+
+
+def test_sliding_pcr_by_hand(comparison):
+    run = comparison.of_cell("low", "risk-sac")[0]  # two that a careful driver prevents, one that only the bound does
+    np.testing.assert_allclose(window_ecr(run), [1, 1, 1, 3 / 4])
+    np.testing.assert_allclose(window_pcr(run), [1, 1, 2 / 3, 2 / 4])
 
 
 def test_unknown_figure_names_those_there_are(comparison):
@@ -121,3 +194,46 @@ def test_report_is_written_twice_alike(comparison, tmp_path):
     first = content()
     assert len(first) == 3 + 2 * len(figure_names(comparison))
     assert content() == first
+
+
+NEW_METRICS = (
+    *("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts", "unresponsive"),
+    *("signatures", "conflicts_by_second", "contacts_by_second"),
+)
+
+
+def test_a_run_from_before_contacts_were_judged_can_still_be_read(runs, tmp_path):
+    """Its files have none of the new fields, and its digest was formed without them."""
+    run = next(run for run in runs if run.metrics["search"].preventable)
+    records = [unjudged(record) for record in run.records]
+    results = Results(
+        spec=run.spec,
+        spec_digest=run.spec.digest,
+        finished=True,
+        metrics=run.metrics["search"],
+        digest=results_digest(records),
+        contacts=tuple(Contact.of(record) for record in records if record.collision is not None),
+    )
+    write_results(tmp_path, results)
+    stored = json.loads(unseal((tmp_path / RESULTS).read_bytes()))
+    for name in NEW_METRICS:
+        del stored["metrics"][name]
+    for contact in stored["contacts"]:
+        del contact["episode"]["collision"]["judgement"]
+    (tmp_path / RESULTS).write_bytes(seal(json.dumps(stored, indent=2).encode()))
+    lines = json.loads(records_to_json(records))
+    for record in lines:
+        if record["collision"] is not None:
+            del record["collision"]["judgement"]
+    (tmp_path / EPISODES).write_text("".join(json.dumps(record) + "\n" for record in lines))
+    found = read_run(tmp_path)
+    assert found.records == tuple(records)
+    assert (found.metrics["search"].failures, found.metrics["search"].preventable) == (
+        run.metrics["search"].failures,
+        0,
+    )
+    assert read_results(tmp_path).metrics.pcr_high == 1.0
+
+
+def unjudged(record):
+    return replace(record, collision=record.collision and replace(record.collision, judgement=None))

@@ -8,6 +8,7 @@ from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
 from service.events import EpisodeDone
 from service.ledger import Ledger
 from service.store import Store
+from tests.judged import judgement
 
 
 @pytest.fixture
@@ -29,6 +30,17 @@ def metrics() -> RunMetrics:
         temperature=0.2,
         distinct_failures=1,
         steps_per_distinct_failure=400.0,
+        preventable=1,
+        pcr=0.25,
+        pcr_low=0.05,
+        pcr_high=0.7,
+        window_pcr=0.25,
+        distinct_preventable=1,
+        artefacts=1,
+        unresponsive=0,
+        signatures={"cut-in, straight": 1},
+        conflicts_by_second=(0, 0, 1, 0),
+        contacts_by_second=(0, 0, 0, 1),
     )
 
 
@@ -55,6 +67,7 @@ def episode(metrics: RunMetrics) -> Callable[..., EpisodeDone]:
         min_robustness=-math.inf,
         simulator_agrees=True,
         verdicts={"feasible": True},
+        judgement=judgement(),
     )
 
     def build(index: int, outcome: Outcome = Outcome.SAFE, phase: str = "train", wall_s: float = 0.5) -> EpisodeDone:

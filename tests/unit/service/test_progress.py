@@ -26,6 +26,9 @@ RUN = Run(
     rejected=0,
     raw_collisions=0,
     failures=0,
+    distinct_failures=0,
+    preventable=0,
+    distinct_preventable=0,
     busy_s=0.0,
     attempts=1,
     metrics=None,
@@ -67,11 +70,14 @@ def test_runs_that_ended_early_leave_no_work():
 def test_progress_counts_all_runs_and_shows_those_at_work(ledger, metrics):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random")))
     ended = replace(RUN, state=State.SUCCEEDED, episodes_done=100, failures=5, raw_collisions=9, metrics=metrics)
-    at_work = replace(RUN, episodes_done=50, failures=1, metrics=replace(metrics, dual_variable=0.9, window_ecr=0.1))
+    ended = replace(ended, distinct_failures=4, preventable=3, distinct_preventable=2)
+    present = replace(metrics, dual_variable=0.9, window_ecr=0.1, window_pcr=0.05)
+    at_work = replace(RUN, episodes_done=50, failures=1, distinct_failures=1, metrics=present)
     shown = progress(replace(campaign, state=State.RUNNING, runs=(ended, at_work)), workers=1)
     assert (shown.episodes_done, shown.episodes_total) == (150, 200)
     assert (shown.failures, shown.raw_collisions) == (6, 9)
-    assert (shown.dual_variable, shown.window_ecr) == (0.9, 0.1)
+    assert (shown.distinct_failures, shown.preventable, shown.distinct_preventable) == (5, 3, 2)
+    assert (shown.dual_variable, shown.window_ecr, shown.window_pcr) == (0.9, 0.1, 0.05)
     final = progress(replace(campaign, state=State.SUCCEEDED, runs=(ended, ended)), workers=1)
     assert (final.dual_variable, final.eta_s) == (0.3, 0.0)
 

@@ -1,10 +1,12 @@
 import dataclasses
+import json
 
 import numpy as np
 import pytest
 
+from risk_sac.metrics import Funnel
 from risk_sac.trace import PER_ACTOR, PER_OTHER, write_series
-from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
+from risk_sac.types import Collision, EpisodeRecord, Judgement, Outcome, ReferenceOutcome, RunMetrics
 from service import schemas
 from service.api.views import episode_body
 from service.errors import StorageError
@@ -17,16 +19,40 @@ from service.series import load_series
     [
         (RunMetrics, schemas.Metrics, set()),
         (Collision, schemas.Collision, set()),
-        (EpisodeRecord, schemas.Episode, {"id", "run_id", "wall_s"}),
+        (Judgement, schemas.Judgement, set()),
+        (ReferenceOutcome, schemas.ReferenceOutcome, set()),
+        (Funnel, schemas.Funnel, set()),
+        (EpisodeRecord, schemas.Episode, {"id", "run_id", "wall_s", "funnel"}),
     ],
 )
 def test_a_body_has_every_field_of_its_record(record, body, added):
     assert {field.name for field in dataclasses.fields(record)} | added == set(body.model_fields)
 
 
+def shown(record, funnel=None):
+    return episode_body(
+        Episode(number=1, run_id="r", record=record, series=None, series_sha256=None, wall_s=0.5, funnel=funnel)
+    )
+
+
+def test_a_contact_says_who_would_have_prevented_it(episode):
+    body = shown(episode(3, Outcome.FAILURE).record, Funnel(contacts=4, valid=3, distinct=2, preventable=1))
+    found = json.loads(body.model_dump_json())
+    judged = found["collision"]["judgement"]
+    assert (judged["grade"], judged["conflict_type"], judged["conflict_s"]) == ("careful", "cut_in", 2.5)
+    assert judged["broke"] == ["red_light", "speeding"]
+    assert judged["drivers"]["bound"] == {"avoids": True, "impact_speed_mps": 0.0}
+    assert found["funnel"] == {"contacts": 4, "valid": 3, "distinct": 2, "preventable": 1}
+
+
+def test_a_contact_from_before_there_were_judgements_has_none(episode):
+    record = episode(3, Outcome.FAILURE).record
+    body = shown(dataclasses.replace(record, collision=dataclasses.replace(record.collision, judgement=None)))
+    assert (body.collision.judgement, body.funnel) == (None, None)
+
+
 def test_numbers_that_are_not_finite_are_null(episode):
-    event = episode(3, Outcome.FAILURE)
-    body = episode_body(Episode(number=1, run_id="r", record=event.record, series=None, series_sha256=None, wall_s=0.5))
+    body = shown(episode(3, Outcome.FAILURE).record)
     assert body.min_ttc_s is None
     assert body.collision.min_ttc_s is None
     assert body.collision.min_robustness is None
@@ -63,6 +89,30 @@ def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
     assert series.signal == ["none", "red", "green"]
     assert series.robustness == [[1.0], [None], [-1.0]]
     assert len(series.actions[0]) == 4
+
+
+def test_a_series_from_before_the_release_was_recorded_lacks_it(tmp_path):
+    write_series(tmp_path / "a.npz", arrays())
+    series = load_series(tmp_path / "a.npz", None)
+    assert (series.released_s, series.lane_offset_m, series.link) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    "link",
+    [
+        np.array([[ord("G"), 0], [ord("g"), 0], [ord("r"), 0]], dtype=np.uint8),
+        np.array([[ord("G"), np.nan], [ord("g"), np.nan], [ord("r"), 0]]),
+        np.array([["G", ""], ["g", ""], ["r", ""]]),
+    ],
+)
+def test_a_series_says_when_the_release_was_and_which_signal_lies_ahead(tmp_path, link):
+    rows = np.array([[0.1, np.nan], [0.2, 0.0], [0.3, 0.0]])
+    written = arrays() | {"released_s": np.array(1.5), "lane_offset_m": rows, "link": link}
+    write_series(tmp_path / "a.npz", written)
+    series = load_series(tmp_path / "a.npz", None)
+    assert series.released_s == 1.5
+    assert series.lane_offset_m == [[0.1, None], [0.2, 0.0], [0.3, 0.0]]
+    assert series.link == [["G", None], ["g", None], ["r", None]]
 
 
 def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):

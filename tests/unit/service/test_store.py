@@ -1,20 +1,25 @@
 import math
 import sqlite3
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
 from risk_sac.config import CampaignSpec
-from risk_sac.types import Outcome
+from risk_sac.metrics import Funnel
+from risk_sac.types import Grade, Outcome
 from service import database
 from service.campaigns import State
 from service.errors import ConflictError, NotFoundError, StorageError, TransitionError
 from service.events import Finished
 from service.ledger import Ledger
-from service.store import Store
+from service.store import Judged, Store
 from service.tables import Base
+from tests.judged import judgement
 
+BEFORE_JUDGEMENTS = Path(__file__).with_name("before_judgements.sql")
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
 
 
@@ -313,6 +318,129 @@ def test_a_database_that_lost_an_episode_is_not_opened(store, ledger, episode, d
         connection.exec_driver_sql("DELETE FROM episodes")
     with pytest.raises(StorageError, match="run 'low-risk-sac-3' lacks episodes"):
         Store(database_url)
+
+
+def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    numbers = [start(store, ledger) for _ in range(2)]
+    kinds = [
+        judgement(),
+        judgement(Grade.IDEAL, broke=()),
+        judgement(Grade.UNAVOIDABLE, broke=("wrong_direction",), signature="crossing, 50 % hidden"),
+        judgement(Grade.CAREFUL, broke=("speeding",)),
+        None,
+    ]
+    for number in numbers:
+        for index, kind in enumerate(kinds):
+            ledger.add_episode(number, judged(episode(index, Outcome.FAILURE), kind))
+        ledger.add_episode(number, judged(episode(5, Outcome.DEGENERATE), judgement(None)))
+        ledger.add_episode(number, episode(6))
+
+    def found(run_id=None, **wanted):
+        outcomes = (Outcome.FAILURE, Outcome.DEGENERATE)
+        page = store.episodes(campaign.id, limit=50, run_id=run_id, outcomes=outcomes, judged=Judged(**wanted))
+        return [item.record.index for item in page.items]
+
+    assert found() == [0, 1, 2, 3, 4, 5] * 2
+    assert found(grade=Grade.CAREFUL) == [0, 3] * 2
+    assert found(grade=Grade.CAREFUL, run_id="low-random-3") == [0, 3]
+    assert found(grade=Grade.UNAVOIDABLE) == [2, 2]
+    assert found(broke="speeding") == [0, 3, 5] * 2
+    assert found(broke="red_light", grade=Grade.CAREFUL) == [0, 0]
+    assert found(broke="red-light") == found(broke="redXlight") == found(broke="red") == []
+    assert found(signature="crossing, 50 % hidden") == [2, 2]
+    assert found(signature="crossing") == []
+    first = store.episodes(campaign.id, limit=1, judged=Judged(grade=Grade.CAREFUL))
+    rest = store.episodes(campaign.id, limit=9, after=first.last, judged=Judged(grade=Grade.CAREFUL))
+    assert [item.record.index for item in (*first.items, *rest.items)] == [0, 3] * 2
+
+
+def test_a_filter_by_grade_or_signature_uses_its_index(store):
+    if store.engine.dialect.name != "sqlite":
+        pytest.skip("PostgreSQL plans by the size of its tables")
+    with store.engine.connect() as connection:
+        for column in ("grade", "signature"):
+            query = (
+                f"SELECT * FROM episodes WHERE campaign_number = 1 AND {column} = 'x' AND number > 3 ORDER BY number"
+            )
+            (plan,) = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {query}").all()
+            assert f"USING INDEX episodes_{column}s (campaign_number=? AND {column}=? AND number>?)" in plan[-1]
+
+
+def test_a_run_has_the_sums_of_what_its_phases_counted(store, ledger, episode, metrics):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    ledger.add_episode(number, episode(0, Outcome.FAILURE))
+    assert tallies(store, campaign) == (1, 1, 1)
+    counted = replace(metrics, distinct_failures=4, preventable=3, distinct_preventable=2)
+    evaluated = episode(0, Outcome.FAILURE, phase="evaluate").model_copy(update={"metrics": counted})
+    ledger.add_episode(number, evaluated)
+    assert tallies(store, campaign) == (5, 4, 3)
+    done = Finished(finished=True, metrics=counted, evaluation=counted, digest="d", versions={}, wall_s=1.0)
+    ledger.end_run(number, State.SUCCEEDED, result=done)
+    assert tallies(store, campaign) == (8, 6, 4)
+
+
+def tallies(store, campaign):
+    run = store.campaign(campaign.id).runs[0]
+    return run.distinct_failures, run.preventable, run.distinct_preventable
+
+
+def judged(event, kind):
+    collision = replace(event.record.collision, judgement=kind)
+    return event.model_copy(update={"record": replace(event.record, collision=collision)})
+
+
+def test_an_episode_comes_with_the_funnel_at_its_time(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    ledger.add_episode(start(store, ledger), episode(0))
+    (stored,) = store.episodes(campaign.id, limit=10).items
+    assert stored.funnel == Funnel(contacts=2, valid=1, distinct=1, preventable=1)
+
+
+def test_a_database_from_before_contacts_were_judged_is_brought_up_to_date(tmp_path):
+    """Written by the version before: five episodes of one run, whose two phases have one distinct failure each."""
+    old = sqlite3.connect(tmp_path / "test.db")
+    old.executescript(BEFORE_JUDGEMENTS.read_text(encoding="utf-8"))
+    old.close()
+    store = Store(f"sqlite:///{tmp_path}/test.db")  # which verifies all campaigns and runs
+    (campaign,) = store.campaigns(limit=2).items
+    found, waiting = campaign.runs
+    assert (found.failures, found.distinct_failures, found.preventable, found.distinct_preventable) == (2, 2, 0, 0)
+    assert (waiting.distinct_failures, waiting.metrics) == (0, None)
+    assert (found.metrics.distinct_failures, found.metrics.preventable, found.metrics.signatures) == (1, 0, {})
+    episodes = store.episodes(campaign.id, limit=9).items
+    assert [each.record.collision is not None for each in episodes] == [False, True, True, False, True]
+    assert {each.funnel for each in episodes} == {None}
+    assert episodes[1].record.collision.judgement is None
+    assert store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.CAREFUL)).items == ()
+    with store.engine.begin() as connection:
+        assert connection.exec_driver_sql("SELECT count(*) FROM episodes WHERE checksum IS NULL").scalar() == 0
+        assert connection.exec_driver_sql("SELECT count(*) FROM runs WHERE checksum IS NULL").scalar() == 0
+        connection.exec_driver_sql("UPDATE episodes SET grade = 'careful' WHERE number = 2")
+    with pytest.raises(StorageError, match="row 2 of the table 'episodes' is damaged"):
+        store.episodes(campaign.id, limit=9)
+    store.close()
+
+
+def test_a_run_that_was_damaged_before_is_not_sealed_anew(tmp_path):
+    old = sqlite3.connect(tmp_path / "test.db")
+    old.executescript(BEFORE_JUDGEMENTS.read_text(encoding="utf-8"))
+    old.execute("UPDATE runs SET failures = 3")
+    old.commit()
+    old.close()
+    with pytest.raises(StorageError, match="of the table 'runs' is damaged"):
+        Store(f"sqlite:///{tmp_path}/test.db")
+
+
+@pytest.mark.parametrize("change", ["grade = NULL", "broke = NULL", "signature = 'x'", "funnel = NULL"])
+def test_a_judgement_that_changed_on_the_disk_is_noticed(store, ledger, episode, change):
+    campaign = ledger.create(SPEC)
+    ledger.add_episode(start(store, ledger), episode(0, Outcome.FAILURE))
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql(f"UPDATE episodes SET {change}")
+    with pytest.raises(StorageError, match="row 1 of the table 'episodes' is damaged"):
+        store.episodes(campaign.id, limit=1)
 
 
 def test_the_migrations_lead_to_the_tables(store):

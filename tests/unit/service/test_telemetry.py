@@ -45,12 +45,28 @@ def test_what_is_stored_is_counted(store, ledger, episode, scrape):
     assert seen["risk_sac_episodes_total", "low", "random"] == 4
     assert seen["risk_sac_episodes_total", "low", "sac"] == 0
     assert seen["risk_sac_failures_total", "low", "random"] == 2
+    assert seen["risk_sac_contacts_total", "low", "random"] == 2
+    for name in ("distinct", "preventable", "distinct_preventable"):  # as its metrics say
+        assert seen[f"risk_sac_{name}_failures_total", "low", "random"] == 1
+        assert seen[f"risk_sac_{name}_failures_total", "low", "sac"] == 0
     assert seen["risk_sac_run_ecr", *sorted([campaign.id, first.id, "low", "random"])] == 0.25  # as its metrics say
-    assert not [key for key in seen if key[0] == "risk_sac_run_ecr" and second.id in key]  # no episode yet
+    assert seen["risk_sac_run_pcr", *sorted([campaign.id, first.id, "low", "random"])] == 0.25
+    for gauge in ("risk_sac_run_ecr", "risk_sac_run_pcr"):
+        assert not [key for key in seen if key[0] == gauge and second.id in key]  # no episode yet
     assert (seen["risk_sac_runs", "running"], seen["risk_sac_runs", "queued"]) == (2, 2)
     assert (seen["risk_sac_campaigns", "running"], seen["risk_sac_campaigns", "failed"]) == (1, 0)
     assert seen[("risk_sac_storage_available",)] == 1
     assert seen[("process_resident_memory_bytes",)] > 0
+
+
+def test_a_run_from_before_contacts_were_judged_has_an_ecr_alone(store, ledger, episode, scrape):
+    run = ledger.create(SPEC).runs[0]
+    ledger.start_run(run.number)
+    ledger.add_episode(run.number, episode(0))
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE runs SET metrics = '{\"ecr\": 0.5}' WHERE metrics IS NOT NULL")
+    rates = {key[0]: value for key, value in scrape().items() if key[0].startswith("risk_sac_run_")}
+    assert rates == {"risk_sac_run_ecr": 0.5}
 
 
 def test_counters_do_not_fall_when_a_campaign_is_deleted(store, ledger, episode, scrape):
