@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from risk_sac.jit import compiled
-from risk_sac.risk.rss import RssParameters, approaching, same_direction, stopping
+from risk_sac.risk.rss import RssParameters, lateral, opposite_direction, same_direction
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.verdicts.along import Along
 from risk_sac.verdicts.course import CORRIDOR_M
@@ -81,18 +81,13 @@ def rss(situation: Situation) -> float:
     ahead, speed = situation.along, situation.speed_mps
     if ahead.behind_m > 0.0:
         return 0.0
-    own_way = stopping(speed, RSS.response_s, RSS.accel_mps2, RSS.brake_min_mps2)
     if ahead.speed_mps < 0.0:
-        other_way = stopping(-ahead.speed_mps, RSS.response_s, RSS.accel_mps2, RSS.brake_min_mps2)
-        wanted = approaching(own_way, other_way)
+        wanted = opposite_direction(speed, -ahead.speed_mps, RSS)
     else:
-        wanted = same_direction(own_way, ahead.speed_mps, RSS.brake_max_mps2)
+        wanted = same_direction(speed, ahead.speed_mps, RSS)
     side = 1.0 if ahead.across_m > 0.0 else -1.0
     clear = abs(ahead.across_m) - situation.half_width_m - situation.other_half_width_m
-    sideways = RSS.fluctuation_m + approaching(
-        stopping(0.0, RSS.response_s, RSS.lateral_accel_mps2, RSS.lateral_brake_mps2),
-        stopping(-side * situation.other_lateral_mps, RSS.response_s, RSS.lateral_accel_mps2, RSS.lateral_brake_mps2),
-    )
+    sideways = lateral(0.0, -side * situation.other_lateral_mps, RSS)
     return RSS.brake_min_mps2 if ahead.gap_m < wanted and clear < sideways else 0.0
 
 

@@ -140,7 +140,7 @@ def meet_pedestrian(
 
 
 def has_the_distance(speed_mps: float, warning_s: float) -> bool:
-    """Whether the ego can stop at 4.5 m/s², or at what the build-up leaves of it, within what it covers in that time."""
+    """Whether the ego can stop at 4.5 m/s² within what it covers in that time, its reaction and the build-up included."""
     return speed_mps * warning_s >= speed_mps * (REACTION_S + BUILD_UP_S) + speed_mps**2 / 9.0 + 2.5
 
 
