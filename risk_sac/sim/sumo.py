@@ -84,6 +84,7 @@ class SumoSimulation:
         self._walkers: dict[str, Walker] = {}
         self._lanes: dict[tuple[tuple[str, ...], str], tuple[float, float, float]] = {}
         self._paths = Paths()
+        self._net = ""
 
     def reset(self, layout: Layout, seed: int) -> Frame:
         """Sets up an episode and returns its first frame; SUMO drives everybody until `release`.
@@ -112,8 +113,10 @@ class SumoSimulation:
         self._roles |= {start.id: start.role for start in layout.pedestrians}
         self._previous: dict[str, tuple[float, float]] = {}
         self._routes = {start.id: start.route for start in (layout.ego, *layout.vehicles)}
-        self._lanes.clear()  # another net may use the same names
-        self._paths.clear()
+        if layout.net != self._net:  # another one may use the same names
+            self._net = layout.net
+            self._lanes.clear()
+            self._paths.clear()
         self._describe_actors()
         self._start_drivers()
         self._limit_mps: float = libsumo.lane.getMaxSpeed(

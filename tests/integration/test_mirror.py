@@ -140,7 +140,7 @@ def meet_pedestrian(
 
 
 def has_the_distance(speed_mps: float, warning_s: float) -> bool:
-    """Whether the ego can stop at 4.5 m/s² within what it covers in that time, its reaction and the build-up included."""
+    """Whether what the ego covers in that time suffices for its reaction and for stopping at 4.5 m/s²."""
     return speed_mps * warning_s >= speed_mps * (REACTION_S + BUILD_UP_S) + speed_mps**2 / 9.0 + 2.5
 
 
