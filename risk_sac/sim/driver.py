@@ -76,9 +76,18 @@ class Driver:
                 libsumo.vehicle.setSpeed(self._vehicle, self.cruise_mps)
                 self.telling = False
             return
+        self._hold_to(self._accel_mps2, speed, float(frame.accel_mps2[row]))
+
+    def brake(self, frame: Frame, row: int, braking_mps2: float) -> None:
+        """Makes it brake at least so hard in the next step, whatever it was told."""
+        accel = -min(braking_mps2, self._emergency_mps2)
+        if self._accel_mps2 is None or accel < self._accel_mps2:
+            self._hold_to(accel, float(frame.speed_mps[row]), float(frame.accel_mps2[row]))
+
+    def _hold_to(self, wanted_mps2: float, speed: float, accel_mps2: float) -> None:
+        """Tells SUMO the speed after a step of this acceleration, or of what the build-up leaves of it."""
         self.telling = True
-        braking_so_far = min(float(frame.accel_mps2[row]), 0.0)
-        accel = max(self._accel_mps2, braking_so_far - JERK_MPS3 * STEP_S)
+        accel = max(wanted_mps2, min(accel_mps2, 0.0) - JERK_MPS3 * STEP_S)
         libsumo.vehicle.setSpeedMode(self._vehicle, EMERGENCY_MODE if accel < -NORMAL_DECEL_MPS2 else SAFE_MODE)
         libsumo.vehicle.setSpeed(self._vehicle, max(speed + accel * STEP_S, 0.0))
 
