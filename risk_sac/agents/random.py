@@ -6,7 +6,6 @@ import numpy as np
 
 from risk_sac.agents.replay import Transition, Vector
 
-
 REDRAWN = 0.1  # share of steps in which an adversary's action is drawn anew: it holds for a second on average
 
 

@@ -56,6 +56,8 @@ METHODS: dict[MethodName, Method] = {
     "bo-only": Method(
         agent="scripted", scenes="botorch", summary="Control: BoTorch scenes, and adversaries that follow one script."
     ),
-    "random": Method(agent="random", summary="Control: Sobol scenes and uniformly random actions, held for a second on average."),
+    "random": Method(
+        agent="random", summary="Control: Sobol scenes and uniformly random actions, held for a second on average."
+    ),
     "no-adversary": Method(agent="none", summary="Control: nobody attacks; what remains is the artefact rate."),
 }

@@ -7,7 +7,6 @@ Its code is SUMO's: the distance is ours, what speed it is worth is said by the 
 import math
 
 import libsumo
-import numpy as np
 
 from risk_sac.sim.lookout import Bodies, targets
 from risk_sac.sim.paths import Along
@@ -95,11 +94,10 @@ class Driver:
         """
         gap, lead = targets(*along, row, speed, self._accel, limit_mps, bodies, candidate)
         wanted = math.inf
-        for i in np.flatnonzero(gap < math.inf):
-            distance, lead_mps = float(gap[i]), float(lead[i])
-            wanted = min(
-                wanted, self._worth(speed, distance - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0), lead_mps)
-            )
+        for gap_m, lead_mps in zip(gap.tolist(), lead.tolist(), strict=True):
+            if gap_m < math.inf:
+                room_m = gap_m - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0)
+                wanted = min(wanted, self._worth(speed, room_m, lead_mps))
         if wanted >= speed + self._accel * STEP_S or 0.0 <= self.cruise_mps <= wanted:
             return None
         return max((wanted - speed) / STEP_S, -self._emergency_mps2)
