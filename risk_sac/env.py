@@ -30,14 +30,15 @@ from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.trace import Measures, Trace
-from risk_sac.types import STEP_S, Collision, Frame, Kind, Role, Scene
+from risk_sac.types import STEP_S, Bools, Collision, Frame, Kind, Role, Scene
 from risk_sac.verdicts.artefact import Handling, artefact_verdicts
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import judge
 from risk_sac.verdicts.online import conflicts_now
-from risk_sac.verdicts.path import polyline
+from risk_sac.verdicts.path import Path, polyline
 from risk_sac.verdicts.validity import validity_verdicts
+from risk_sac.verdicts.wheel import CarefulReflex
 
 logger = logging.getLogger(__name__)
 
@@ -118,6 +119,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """
         if self._controlled:
             self._adversaries.command(action.clip(-1.0, 1.0).tolist(), self._sim)
+        if self._reflex is not None:
+            self._sim.brake(self._reflex.braking(self._frame, self._ego_path(), self._in_sight()))
         before, self._frame = self._frame, self._sim.step()
         previous, self._measures = self._measures, self._measure(self._frame, before)
         self._steps += 1
@@ -174,6 +177,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             roadway=layout.roadway,
         )
         sumo_seed = int(self.np_random.integers(2**31 - 1))
+        self._reflex = CarefulReflex(self._ground) if self.problem.ego.profile == "careful" else None
         self._monitor.reset()
         self._perception.reset()
         self._trace = Trace(self._monitor.names)
@@ -215,9 +219,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             raise InfeasibleScene(f"scene of {scene.family!r} breaks {rule}: {dict(scene.values)}", reason=rule)
 
     def _careful_driver_in_conflict(self) -> bool:
-        seen = np.concatenate(([True], self._measures.assessment.seen))
-        path = polyline(*self._sim.ego_path(), float(self._frame.heading_rad[0]))
-        return bool(conflicts_now(self._frame, path, seen, self._ground).any())
+        return bool(conflicts_now(self._frame, self._ego_path(), self._in_sight(), self._ground).any())
+
+    def _ego_path(self) -> Path:
+        return polyline(*self._sim.ego_path(), float(self._frame.heading_rad[0]))
+
+    def _in_sight(self) -> Bools:
+        return np.concatenate(([True], self._measures.assessment.seen))
 
     def _in_contact(self) -> set[str]:
         """Who touches somebody other than the ego."""

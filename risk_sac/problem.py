@@ -15,6 +15,7 @@ from risk_sac.scenario.odd import intersect, narrow, requirements_from_odd
 from risk_sac.scenario.space import SceneSpace
 from risk_sac.types import STEP_S
 
+RSS_RESPONSE_S = 0.5  # of any ego: a scene is no less dangerous, nor fair, because a slower driver is in it
 RSS_BRAKING_MPS2 = 6.0  # a firm braking: a driver's whose car would stop by 8 and more
 
 
@@ -62,7 +63,7 @@ class Problem:
             space=narrow(family.space, odd),
             ego=spec.ego,
             requirements=(*shipped, *spec.requirements),
-            rss=_rss_parameters(odd, spec.ego),
+            rss=_rss_parameters(odd),
         )
 
     @property
@@ -78,8 +79,8 @@ class Problem:
         return float("inf") if limit is None else limit.high
 
 
-def _rss_parameters(odd: Odd, ego: EgoConfig) -> RssParameters:
-    """RSS under the ODD: the ego's delay, and the braking that a driver can be relied on to do, and has to expect.
+def _rss_parameters(odd: Odd) -> RssParameters:
+    """RSS under the ODD: a driver's delay, whoever drives, and the braking that a driver can be relied on to do, and has to expect.
 
     Choice: both are RSS_BRAKING_MPS2 or the worst grip of the road that all share. SUMO's drivers keep a headway of 1 s
     and trust the one ahead to brake no harder than they do themselves; that they stop by 4.5 m/s² behind a
@@ -89,7 +90,7 @@ def _rss_parameters(odd: Odd, ego: EgoConfig) -> RssParameters:
     limits = limits_from_odd(odd, friction.low if friction else 1.0)
     grip = friction.low * GRAVITY_MPS2 if friction else GRAVITY_MPS2
     return RssParameters(
-        response_s=ego.reaction_time_s,
+        response_s=RSS_RESPONSE_S,
         brake_min_mps2=min(RSS_BRAKING_MPS2, grip),
         brake_max_mps2=min(RSS_BRAKING_MPS2, limits.brake_mps2),
     )

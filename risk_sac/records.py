@@ -5,6 +5,7 @@ from pydantic import TypeAdapter
 from risk_sac.types import EpisodeRecord
 
 _RECORDS = TypeAdapter(list[EpisodeRecord])
+_RECORD = TypeAdapter(EpisodeRecord)
 
 
 def records_to_json(records: list[EpisodeRecord]) -> str:
@@ -15,3 +16,8 @@ def records_to_json(records: list[EpisodeRecord]) -> str:
 def records_from_json(text: str) -> list[EpisodeRecord]:
     """The inverse of `records_to_json`."""
     return _RECORDS.validate_json(text)
+
+
+def records_from_lines(content: bytes) -> list[EpisodeRecord]:
+    """The records of an episodes.jsonl."""
+    return [_RECORD.validate_json(line) for line in content.splitlines()]

@@ -5,6 +5,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 
+from risk_sac.cli.audit import add_audit
 from risk_sac.cli.campaigns import add_campaigns
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
 from risk_sac.cli.evaluate import add_evaluate
@@ -14,7 +15,7 @@ from risk_sac.cli.serve import add_serve
 from risk_sac.cli.show import add_show
 from risk_sac.errors import ConfigError, RiskSacError
 
-COMMANDS = (add_run, add_evaluate, add_show, add_serve, add_campaigns, add_keys)
+COMMANDS = (add_run, add_evaluate, add_audit, add_show, add_serve, add_campaigns, add_keys)
 EPILOG = """exit status, but of `campaigns`, which says its own: 0 done; 1 failed; 2 a wrong setting or argument;
 130 interrupted, and the same command goes on."""
 

@@ -26,10 +26,11 @@ class SensorConfig(Settings):
 class EgoConfig(Settings):
     """SUMO's default driver, with a driver's delay and a driver's view.
 
-    The profile `perfect` reacts within one simulation step and sees everything.
+    The profile `perfect` reacts within one simulation step and sees everything. The profile `careful` is the default
+    with the careful driver's braking on top, by whom preventable failures are judged.
     """
 
-    profile: Literal["default", "perfect"] = "default"
+    profile: Literal["default", "perfect", "careful"] = "default"
     car_following: CarFollowing = "Krauss"
     reaction_time_s: Annotated[float, Field(ge=0.1, le=3.0)] = 0.5
     """Time between two decisions (SUMO's actionStepLength), s; a multiple of 0.1."""

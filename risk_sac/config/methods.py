@@ -22,8 +22,8 @@ class Method(Settings):
     """One row of the table of methods."""
 
     agent: Literal["sac", "ddpg", "scripted", "random", "none"]
-    """`scripted`: cuts in and brakes, or keeps on; `random`: uniform actions, held for a while; `none`: SUMO drives the adversary
-    vehicles, pedestrians stand."""
+    """`scripted`: cuts in and brakes, or keeps on; `random`: uniform actions, held for a while; `none`: SUMO drives
+    the adversary vehicles, pedestrians stand."""
     lagrangian: bool = False
     """Whether λ follows the realism cost; without it λ stays 0."""
     shaping: bool = False
@@ -56,8 +56,6 @@ METHODS: dict[MethodName, Method] = {
     "bo-only": Method(
         agent="scripted", scenes="botorch", summary="Control: BoTorch scenes, and adversaries that follow one script."
     ),
-    "random": Method(
-        agent="random", summary="Control: Sobol scenes and uniformly random actions, held for a second on average."
-    ),
+    "random": Method(agent="random", summary="Control: Sobol scenes and random actions, held for a second on average."),
     "no-adversary": Method(agent="none", summary="Control: nobody attacks; what remains is the artefact rate."),
 }

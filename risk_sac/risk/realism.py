@@ -117,7 +117,10 @@ def soft_cost(
 ) -> float:
     """Soft realism cost of one step, C_soft(s, a) of (5).
 
-    C_soft = 1/3 · max_k jerk_k + 1/3 · max_k excess_k + 1/3 · max_k closeness_k
+    C_soft = 1/2 · max_k jerk_k + 1/4 · max_k excess_k + 1/4 · max_k closeness_k
+
+    Choice: jerk counts double. It is what tells commands from driving: under its bound an acceleration that is
+    jerked about hardly leaves the middle.
 
     Choice: over the adversaries the worst counts, not the mean, or one adversary could behave as it liked in
     the shadow of others that do nothing.
@@ -139,7 +142,7 @@ def soft_cost(
         jerk = max(jerk, jerk_term(accel_mps2[k], previous_accel_mps2[k], limit_mps2[k], step_s))
         excess = max(excess, acceleration_term(accel_mps2[k], lateral_accel_mps2[k], limit_mps2[k]))
         closeness = max(closeness, closeness_term(gap_m[k], previous_gap_m[k], step_s))
-    return (jerk + excess + closeness) / 3.0
+    return jerk / 2.0 + (excess + closeness) / 4.0
 
 
 @compiled

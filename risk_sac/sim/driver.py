@@ -74,8 +74,18 @@ class Driver:
                 libsumo.vehicle.setSpeed(self._vehicle, self.cruise_mps)
                 self.telling = False
             return
+        self._hold_to(self.wanted_mps2, speed_mps, accel_mps2)
+
+    def brake(self, speed_mps: float, accel_mps2: float, braking_mps2: float) -> None:
+        """Makes it brake at least so hard in the next step, whatever it was told."""
+        accel = -min(braking_mps2, self._emergency_mps2)
+        if self.wanted_mps2 is None or accel < self.wanted_mps2:
+            self._hold_to(accel, speed_mps, accel_mps2)
+
+    def _hold_to(self, wanted_mps2: float, speed_mps: float, accel_mps2: float) -> None:
+        """Tells SUMO the speed after a step of this acceleration, or of what the build-up leaves of it."""
         self.telling = True
-        accel = max(self.wanted_mps2, min(accel_mps2, 0.0) - JERK_MPS3 * STEP_S)
+        accel = max(wanted_mps2, min(accel_mps2, 0.0) - JERK_MPS3 * STEP_S)
         libsumo.vehicle.setSpeedMode(self._vehicle, EMERGENCY_MODE if accel < -NORMAL_DECEL_MPS2 else SAFE_MODE)
         libsumo.vehicle.setSpeed(self._vehicle, max(speed_mps + accel * STEP_S, 0.0))
 

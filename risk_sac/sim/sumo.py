@@ -165,6 +165,7 @@ class SumoSimulation:
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
         self._layout = layout
         self._belief = NOTHING_HIDDEN
+        self._reflex_mps2 = 0.0
         self._signal = layout.signal
         self._walk_signals: list[tuple[Area, int]] = []
         if layout.signal is not None:
@@ -206,6 +207,10 @@ class SumoSimulation:
                 libsumo.vehicle.setSpeed(id_, command.speed_mps)
                 libsumo.vehicle.changeSublane(id_, command.lateral_mps * STEP_S)
         self._walkers.update(walkers)
+
+    def brake(self, braking_mps2: float) -> None:
+        """Lets the ego brake at least so hard in the next step."""
+        self._reflex_mps2 = braking_mps2
 
     def believe(self, belief: Belief) -> None:
         """Makes the ego blind to the hidden actors, and lets it reckon with those it remembers.
@@ -257,6 +262,8 @@ class SumoSimulation:
             known = np.array([id_ not in self._belief.hidden for id_ in frame.ids])
             ego.wanted_mps2 = self._decide(ego, 0, self._as_believed(look.bodies), known)
         ego.tell(frame.ego_speed_mps, float(frame.accel_mps2[0]))
+        if self._reflex_mps2:
+            ego.brake(frame.ego_speed_mps, float(frame.accel_mps2[0]), self._reflex_mps2)
         if not self._walkers:
             return
         for row, id_ in enumerate(self._vehicles):
