@@ -19,7 +19,7 @@ from risk_sac.geometry import overlapping_pairs
 from risk_sac.observation import LIMIT, Encoder
 from risk_sac.problem import Problem
 from risk_sac.risk.publish import assess, publish, worst_rss_margin
-from risk_sac.risk.realism import broken_hard_rule, lateral_accel, soft_cost
+from risk_sac.risk.realism import Motion, adversaries_cost, broken_hard_rule
 from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S
@@ -247,22 +247,12 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """C_soft of Eq. 5 over the adversaries."""
         if before.ids != frame.ids:  # somebody left the net, far from the ego: compare those who stayed
             return 0.0
-        adversary = self._adversaries.rows(frame)
-        others = adversary - 1
-        return soft_cost(
-            frame.accel_mps2[adversary],
-            before.accel_mps2[adversary],
-            lateral_accel(
-                frame.lateral_mps[adversary],
-                before.lateral_mps[adversary],
-                frame.heading_rad[adversary] - before.heading_rad[adversary],
-                frame.speed_mps[adversary],
-                frame.kind[adversary] == Kind.PEDESTRIAN,
-                STEP_S,
-            ),
+        return adversaries_cost(
+            self._adversaries.rows(frame),
             self._adversaries.accel_limits(frame),
-            now.assessment.view.gap[others],
-            previous.assessment.view.gap[others],
+            frame.kind == int(Kind.PEDESTRIAN),
+            _motion(frame, now),
+            _motion(before, previous),
             STEP_S,
         )
 
@@ -326,6 +316,11 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return self._encoder.encode(
             self._frame, m.assessment.view, m.assessment.seen, m.robustness, self._unit_scene, time_left
         )
+
+
+def _motion(frame: Frame, measures: Measures) -> Motion:
+    f = frame
+    return Motion(f.accel_mps2, f.lateral_mps, f.heading_rad, f.speed_mps, measures.assessment.view.gap)
 
 
 def make_default(family: FamilyName) -> RiskSacEnv:

@@ -10,9 +10,10 @@ would mean nothing.
 Source: RISK-SAC, Sec. III-B.
 """
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from risk_sac.jit import compiled
 from risk_sac.types import Bools, Floats
@@ -30,6 +31,16 @@ MIN_INITIAL_TTC_S = 1.0  # a shorter one leaves a default driver (0.5 s delay) n
 MIN_INITIAL_GAP_M = 0.5  # bodies placed closer than traffic ever stands
 
 HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc", "initial_rss", "initial_conflict"]
+
+
+class Motion(NamedTuple):
+    """What the cost looks at in a frame of `n` actors."""
+
+    accel_mps2: Floats
+    lateral_mps: Floats
+    heading_rad: Floats
+    speed_mps: Floats
+    gap_m: Floats  # n - 1, from the ego's body to the others'
 
 
 @compiled
@@ -132,6 +143,38 @@ def soft_cost(
         excess = max(excess, acceleration_term(accel_mps2[k], lateral_accel_mps2[k], limit_mps2[k]))
         closeness = max(closeness, closeness_term(gap_m[k], previous_gap_m[k], step_s))
     return jerk / 2.0 + (excess + closeness) / 4.0
+
+
+@compiled
+def adversaries_cost(
+    rows: NDArray[np.intp], limit_mps2: Floats, walks: Bools, now: Motion, before: Motion, step_s: float
+) -> float:
+    """C_soft of the adversaries between two frames of the same `n` actors.
+
+    Args:
+      rows: of the adversaries in the frames.
+      limit_mps2: greatest absolute acceleration of each adversary.
+      walks: `n`, who is a pedestrian.
+      now: how everybody moves.
+      before: the same one step before.
+      step_s: dt.
+    """
+    return soft_cost(
+        now.accel_mps2[rows],
+        before.accel_mps2[rows],
+        lateral_accel(
+            now.lateral_mps[rows],
+            before.lateral_mps[rows],
+            now.heading_rad[rows] - before.heading_rad[rows],
+            now.speed_mps[rows],
+            walks[rows],
+            step_s,
+        ),
+        limit_mps2,
+        now.gap_m[rows - 1],
+        before.gap_m[rows - 1],
+        step_s,
+    )
 
 
 def broken_hard_rule(

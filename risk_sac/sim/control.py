@@ -204,9 +204,9 @@ class Adversaries:
         intended = sim.intended_accel()
         vehicles = {}
         for k, (id_, control) in enumerate(self._vehicles.items()):
-            room, along = sim.room(id_), sim.path(id_)
-            if room is not None and along is not None:
-                vehicles[id_] = control.step(first[k], second[k], room, along, intended.get(id_, 0.0))
+            place = sim.place(id_)
+            if place is not None:
+                vehicles[id_] = control.step(first[k], second[k], *place, intended[id_])
         k = len(self._vehicles)
         walkers = {
             id_: control.step(first[k + j], second[k + j]) for j, (id_, control) in enumerate(self._pedestrians.items())

@@ -7,11 +7,10 @@ Its code is SUMO's: the distance is ours, what speed it is worth is said by the 
 import math
 
 import libsumo
-import numpy as np
 
 from risk_sac.sim.lookout import Bodies, targets
 from risk_sac.sim.paths import Along
-from risk_sac.types import STEP_S, Bools, Frame
+from risk_sac.types import STEP_S, Bools
 
 NORMAL_DECEL_MPS2 = 4.5  # what SUMO assumes of a leader, and its default for passenger cars
 JERK_MPS3 = 12.65  # at which a braking builds up (UN R157, the careful driver)
@@ -31,6 +30,7 @@ class Driver:
     Attributes:
       telling: whether it is held to a speed at present.
       cruise_mps: the speed it is told to keep where nothing else binds; below 0 SUMO chooses.
+      wanted_mps2: the acceleration that it decided on; None: it has nothing to be told.
     """
 
     def __init__(
@@ -49,59 +49,65 @@ class Driver:
         self._period = round(reaction_s / STEP_S)
         self._emergency_mps2 = emergency_mps2
         self._step = 0
-        self._accel_mps2: float | None = None  # None: nothing to tell
+        self.wanted_mps2: float | None = None
         self.telling = False
         get = libsumo.vehicle
         get.setSpeed(vehicle, cruise_mps)
         self._accel, self._min_gap = get.getAccel(vehicle), get.getMinGap(vehicle)
 
-    def tell(self, row: int, frame: Frame, bodies: Bodies, along: Along, limit_mps: float, candidate: Bools) -> None:
+    @property
+    def due(self) -> bool:
+        """Whether it decides anew in this step."""
+        return self._step % self._period == 0
+
+    def tell(self, speed_mps: float, accel_mps2: float) -> None:
         """Tells SUMO how fast the vehicle may drive in the next step.
 
         Args:
-          row: of the vehicle in the frame.
-          frame: all actors now.
-          bodies: theirs.
-          along: the vehicle on its path.
-          limit_mps: of its lane.
-          candidate: `n` actors of the frame; whom it knows of and looks out for.
+          speed_mps: its own now.
+          accel_mps2: in the step before.
         """
-        speed = float(frame.speed_mps[row])
-        if self._step % self._period == 0:
-            self._accel_mps2 = self.decide(row, speed, bodies, along, limit_mps, candidate)
         self._step += 1
-        if self._accel_mps2 is None:
+        if self.wanted_mps2 is None:
             if self.telling:
                 libsumo.vehicle.setSpeedMode(self._vehicle, SAFE_MODE)
                 libsumo.vehicle.setSpeed(self._vehicle, self.cruise_mps)
                 self.telling = False
             return
-        self._hold_to(self._accel_mps2, speed, float(frame.accel_mps2[row]))
+        self._hold_to(self.wanted_mps2, speed_mps, accel_mps2)
 
-    def brake(self, frame: Frame, row: int, braking_mps2: float) -> None:
+    def brake(self, speed_mps: float, accel_mps2: float, braking_mps2: float) -> None:
         """Makes it brake at least so hard in the next step, whatever it was told."""
         accel = -min(braking_mps2, self._emergency_mps2)
-        if self._accel_mps2 is None or accel < self._accel_mps2:
-            self._hold_to(accel, float(frame.speed_mps[row]), float(frame.accel_mps2[row]))
+        if self.wanted_mps2 is None or accel < self.wanted_mps2:
+            self._hold_to(accel, speed_mps, accel_mps2)
 
-    def _hold_to(self, wanted_mps2: float, speed: float, accel_mps2: float) -> None:
+    def _hold_to(self, wanted_mps2: float, speed_mps: float, accel_mps2: float) -> None:
         """Tells SUMO the speed after a step of this acceleration, or of what the build-up leaves of it."""
         self.telling = True
         accel = max(wanted_mps2, min(accel_mps2, 0.0) - JERK_MPS3 * STEP_S)
         libsumo.vehicle.setSpeedMode(self._vehicle, EMERGENCY_MODE if accel < -NORMAL_DECEL_MPS2 else SAFE_MODE)
-        libsumo.vehicle.setSpeed(self._vehicle, max(speed + accel * STEP_S, 0.0))
+        libsumo.vehicle.setSpeed(self._vehicle, max(speed_mps + accel * STEP_S, 0.0))
 
     def decide(
         self, row: int, speed: float, bodies: Bodies, along: Along, limit_mps: float, candidate: Bools
     ) -> float | None:
-        """The acceleration that its model wants for the nearest of the targets; None where none binds."""
+        """The acceleration that its model wants for the nearest of the targets; None where none binds.
+
+        Args:
+          row: its own among the bodies.
+          speed: its own.
+          bodies: of all `n` actors.
+          along: the vehicle on its path.
+          limit_mps: of its lane.
+          candidate: `n`, whom it knows of and looks out for.
+        """
         gap, lead = targets(*along, row, speed, self._accel, limit_mps, bodies, candidate)
         wanted = math.inf
-        for i in np.flatnonzero(gap < math.inf):
-            distance, lead_mps = float(gap[i]), float(lead[i])
-            wanted = min(
-                wanted, self._worth(speed, distance - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0), lead_mps)
-            )
+        for gap_m, lead_mps in zip(gap.tolist(), lead.tolist(), strict=True):
+            if gap_m < math.inf:
+                room_m = gap_m - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0)
+                wanted = min(wanted, self._worth(speed, room_m, lead_mps))
         if wanted >= speed + self._accel * STEP_S or 0.0 <= self.cruise_mps <= wanted:
             return None
         return max((wanted - speed) / STEP_S, -self._emergency_mps2)

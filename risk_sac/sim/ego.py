@@ -35,6 +35,12 @@ class Glimpse(NamedTuple):
     vx_mps: float
     vy_mps: float
 
+    @classmethod
+    def of(cls, frame: Frame, row: int) -> "Glimpse":
+        """An actor of a frame."""
+        x_m, y_m, heading_rad, vx_mps, vy_mps = (float(getattr(frame, name)[row]) for name in cls._fields[1:])
+        return cls(frame.time_s, x_m, y_m, heading_rad, vx_mps, vy_mps)
+
     def moved_on(self, time_s: float) -> "Glimpse":
         """Where it is expected to be, if it keeps its velocity."""
         ahead_s = time_s - self.time_s
@@ -60,7 +66,7 @@ class Perception:
     def __init__(self, memory_s: float) -> None:
         self._memory_s = memory_s
         self._in_view_since: dict[str, float] = {}
-        self._last_seen: dict[str, Glimpse] = {}
+        self._last_seen: dict[str, tuple[Frame, int]] = {}  # and the row in it
 
     def reset(self) -> None:
         """Forgets the previous episode."""
@@ -77,21 +83,15 @@ class Perception:
         now, last_seen = frame.time_s, self._last_seen
         hidden, expected = [], {}
         for row, (id_, in_sight) in enumerate(zip(frame.ids[1:], seen.tolist(), strict=True), start=1):
-            glimpse = last_seen.get(id_)
-            if glimpse is None or now - glimpse.time_s > FLICKER_S + TIME_TOLERANCE_S:
+            seen_in = last_seen.get(id_)
+            unseen_s = math.inf if seen_in is None else now - seen_in[0].time_s
+            if unseen_s > FLICKER_S + TIME_TOLERANCE_S:
                 self._in_view_since.pop(id_, None)
             if in_sight:
-                last_seen[id_] = Glimpse(
-                    now,
-                    float(frame.x_m[row]),
-                    float(frame.y_m[row]),
-                    float(frame.heading_rad[row]),
-                    float(frame.vx_mps[row]),
-                    float(frame.vy_mps[row]),
-                )
+                last_seen[id_] = frame, row
                 self._in_view_since.setdefault(id_, now)
-            elif glimpse is not None and now - glimpse.time_s <= self._memory_s + TIME_TOLERANCE_S:
-                expected[id_] = glimpse.moved_on(now)
+            elif seen_in is not None and unseen_s <= self._memory_s + TIME_TOLERANCE_S:
+                expected[id_] = Glimpse.of(*seen_in).moved_on(now)
             else:
                 hidden.append(id_)
         return Belief(frozenset(hidden), expected)

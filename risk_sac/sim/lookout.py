@@ -10,6 +10,7 @@ fast as it may: so one that has stopped for a pedestrian does not start before t
 """
 
 import math
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ MARGIN_M = 0.375  # on either side of the vehicle's body: the room in which a la
 YIELDING_MPS2 = 2.5  # of crossing traffic; SUMO's drivers, who stop well before the junction, never need more for it
 SAME_WAY_COS = 0.5
 MOVING_MPS = 0.5
+NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 
 
 class Bodies(NamedTuple):
@@ -52,6 +54,39 @@ class Bodies(NamedTuple):
             frame.width_m / 2,
             frame.kind == int(Kind.VEHICLE),
         )
+
+
+class Lookout:
+    """A frame as drivers look at it; what it takes is worked out when the first of them looks."""
+
+    def __init__(self, frame: Frame) -> None:
+        """Looks at nothing yet."""
+        self._frame = frame
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """All actors."""
+        return Bodies.of(self._frame)
+
+    @cached_property
+    def pedestrians(self) -> Bools:
+        """Which of them are pedestrians."""
+        return ~self.bodies.vehicle
+
+    @cached_property
+    def near(self) -> list[bool]:
+        """Who has a pedestrian within `NEAR_M`."""
+        near: list[bool] = _near(self._frame.x_m, self._frame.y_m, self.pedestrians).tolist()
+        return near
+
+
+@compiled
+def _near(x: Floats, y: Floats, pedestrian: Bools) -> Bools:
+    near = np.zeros(len(x), dtype=np.bool_)
+    for k in np.flatnonzero(pedestrian):
+        for i in range(len(x)):
+            near[i] |= math.hypot(x[i] - x[k], y[i] - y[k]) < NEAR_M
+    return near
 
 
 @compiled

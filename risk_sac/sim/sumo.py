@@ -23,7 +23,7 @@ from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Area, Layout, VehicleStart
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
 from risk_sac.sim.ego import NOTHING_HIDDEN, Belief, Glimpse
-from risk_sac.sim.lookout import Bodies
+from risk_sac.sim.lookout import Bodies, Lookout
 from risk_sac.sim.paths import Along, Paths
 from risk_sac.types import STEP_S, Bools, Floats, Frame, Kind, Role, Signal
 
@@ -37,7 +37,6 @@ EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passe
 # So that the commanded lateral speed is the one driven; its limits are those of `risk_sac.sim.control`.
 STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFactor": "1"}
 LISTED_WITHIN_S = 0.3
-NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
 CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
@@ -196,6 +195,7 @@ class SumoSimulation:
         self._role = np.array([self._roles[id_] for id_ in self._ids], dtype=np.int8)
         get = libsumo.vehicle
         self._length = np.array([get.getLength(v) for v in self._vehicles] + [PEDESTRIAN_SIZE_M] * walking)
+        self._attackers = [(row, v) for row, v in enumerate(self._vehicles) if self._roles[v] is Role.ADVERSARY]
         self._half_lengths = [get.getLength(v) / 2 for v in self._vehicles]
         self._width = np.array([get.getWidth(v) for v in self._vehicles] + [PEDESTRIAN_SIZE_M] * walking)
 
@@ -257,19 +257,20 @@ class SumoSimulation:
 
     def _tell_drivers(self) -> None:
         """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians near them."""
-        frame = self._frame
-        bodies = Bodies.of(frame)
-        known = np.array([id_ not in self._belief.hidden for id_ in frame.ids])
-        self._tell(self._ego_driver, 0, self._as_believed(bodies), known)
+        frame, look, ego = self._frame, self._lookout, self._ego_driver
+        if ego.due:
+            known = np.array([id_ not in self._belief.hidden for id_ in frame.ids])
+            ego.wanted_mps2 = self._decide(ego, 0, self._as_believed(look.bodies), known)
+        ego.tell(frame.ego_speed_mps, float(frame.accel_mps2[0]))
         if self._reflex_mps2:
-            self._ego_driver.brake(frame, 0, self._reflex_mps2)
+            ego.brake(frame.ego_speed_mps, float(frame.accel_mps2[0]), self._reflex_mps2)
         if not self._walkers:
             return
-        near = _near_pedestrians(bodies)
-        for row, id_ in enumerate(frame.ids):
+        for row, id_ in enumerate(self._vehicles):
             driver = self._drivers.get(id_)
-            if driver is not None and (near[row] or driver.telling):
-                self._tell(driver, row, bodies, ~bodies.vehicle)
+            if driver is not None and (look.near[row] or driver.telling):
+                driver.wanted_mps2 = self._decide(driver, row, look.bodies, look.pedestrians)
+                driver.tell(float(frame.speed_mps[row]), float(frame.accel_mps2[row]))
 
     def _as_believed(self, bodies: Bodies) -> Bodies:
         """The bodies where the ego expects them: of whom it does not see it knows no better."""
@@ -282,8 +283,9 @@ class SumoSimulation:
                 getattr(believed, name)[row] = getattr(glimpse, name)
         return believed
 
-    def _tell(self, driver: Driver, row: int, bodies: Bodies, candidates: Bools) -> None:
-        driver.tell(row, self._frame, bodies, self.along(self._frame.ids[row]), self._limit_mps, candidates)
+    def _decide(self, driver: Driver, row: int, bodies: Bodies, candidates: Bools) -> float | None:
+        speed, along = float(self._frame.speed_mps[row]), self.along(self._vehicles[row])
+        return driver.decide(row, speed, bodies, along, self._limit_mps, candidates)
 
     def intended_accel(self) -> dict[str, float]:
         """What the drivers of the released vehicles would do if nobody commanded them, m/s².
@@ -291,10 +293,9 @@ class SumoSimulation:
         They keep the speed they started with, or go slower where SUMO's models or a pedestrian in their way want that.
         SUMO's wish is that of the step before, which is the newest it tells.
         """
-        frame, bodies = self._frame, Bodies.of(self._frame)
-        near = _near_pedestrians(bodies)
+        frame, look = self._frame, self._lookout
         found = {}
-        for row, id_ in enumerate(frame.ids):
+        for row, id_ in enumerate(self._vehicles):
             driver = self._released.get(id_)
             if driver is None:
                 continue
@@ -302,8 +303,8 @@ class SumoSimulation:
             models = (libsumo.vehicle.getSpeedWithoutTraCI(id_) - speed) / STEP_S + accel
             wanted = min(models, max(driver.cruise_mps - speed, 0.0) / STEP_S)
             told = None
-            if near[row]:
-                told = driver.decide(row, speed, bodies, self.along(id_), self._limit_mps, ~bodies.vehicle)
+            if self._walkers and look.near[row]:
+                told = self._decide(driver, row, look.bodies, look.pedestrians)
             found[id_] = wanted if told is None else min(wanted, told)
         return found
 
@@ -323,10 +324,6 @@ class SumoSimulation:
         y = np.concatenate((self._frame.y_m[:1], path.y_m[ahead] + offset_m * cos))
         return x, y
 
-    def path(self, vehicle: str) -> Along | None:
-        """Where a vehicle is on its path; None once it left the net."""
-        return self.along(vehicle) if vehicle in self._vehicles else None
-
     def lists_collision(self, other: str) -> bool:
         """Whether SUMO lists a collision of the ego with a vehicle, now or if it goes on for `LISTED_WITHIN_S`.
 
@@ -340,18 +337,20 @@ class SumoSimulation:
             libsumo.simulationStep()
         return any({c.collider, c.victim} == pair for c in libsumo.simulation.getCollisions())
 
-    def room(self, vehicle: str) -> Room | None:
-        """How far `vehicle` may move sideways; None once it left the net.
+    def place(self, vehicle: str) -> tuple[Room, Along] | None:
+        """How far `vehicle` may move sideways, and where it is on its path; None once it left the net.
 
         The lanes that its route goes on from end at a wall: SUMO halts a vehicle dead at the end of any other.
         """
         if vehicle not in self._vehicles:
             return None
-        get = libsumo.vehicle
-        right_lanes, left_lanes, lane_width = self._lane(self._routes[vehicle], get.getLaneID(vehicle))
-        offset = get.getLateralLanePosition(vehicle)
-        spare = (lane_width - get.getWidth(vehicle)) / 2 - EDGE_M
-        return Room(left_m=left_lanes + spare - offset, right_m=right_lanes + spare + offset)
+        get, route = libsumo.vehicle, self._routes[vehicle]
+        lane, row = get.getLaneID(vehicle), self._vehicles.index(vehicle)
+        right_lanes, left_lanes, lane_width = self._lane(route, lane)
+        offset = float(self._frame.lane_offset_m[row])
+        spare = (lane_width - float(self._width[row])) / 2 - EDGE_M
+        room = Room(left_m=left_lanes + spare - offset, right_m=right_lanes + spare + offset)
+        return room, Along(self._paths.of(route, lane), get.getLanePosition(vehicle), offset)
 
     def _lane(self, route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
         """Width of the lanes right and left of `lane` that lead on along `route`, and its own."""
@@ -395,7 +394,7 @@ class SumoSimulation:
         x_m, y_m, heading_rad, vx_mps, vy_mps, speed_mps, lateral_mps, accel_mps2, lane_offset_m = (
             np.array(rows).reshape(-1, 9).T
         )
-        signal, stop_line_m = self._next_signal()
+        ahead = () if self._signal is None else libsumo.vehicle.getNextTLS(self._vehicles[0])
         self._frame = Frame(
             time_s=libsumo.simulation.getTime(),
             ids=self._ids,
@@ -411,48 +410,33 @@ class SumoSimulation:
             accel_mps2=accel_mps2,
             length_m=self._length,
             width_m=self._width,
-            signal=signal,
-            stop_line_m=stop_line_m,
+            signal=COLOURS.get(ahead[0][3].lower(), Signal.NONE) if ahead else Signal.NONE,
+            stop_line_m=ahead[0][2] if ahead else math.inf,
             lane_offset_m=lane_offset_m,
-            link=self._links(),
+            link=self._links(ahead[0][3] if ahead else ""),
             simulator_collisions=tuple((c.collider, c.victim) for c in libsumo.simulation.getCollisions()),
             teleported=libsumo.simulation.getStartingTeleportIDList(),
         )
+        self._lookout = Lookout(self._frame)
         return self._frame
 
-    def _links(self) -> NDArray[np.uint8]:
+    def _links(self, ego: str) -> NDArray[np.uint8]:
         """The letter of the signal ahead of the ego and of each adversary; a pedestrian's is that of its crossing."""
         links = np.zeros(len(self._ids), dtype=np.uint8)
         if self._signal is None:
             return links
-        for row, id_ in enumerate(self._ids):
-            if self._roles[id_] is not Role.BACKGROUND and id_ not in self._walkers:
-                ahead = libsumo.vehicle.getNextTLS(id_)
-                links[row] = ord(ahead[0][3]) if ahead else 0
-        state = libsumo.trafficlight.getRedYellowGreenState(self._signal) if self._walkers else ""
+        letters = [(0, ego)] if ego else []
+        for row, id_ in self._attackers:
+            ahead = libsumo.vehicle.getNextTLS(id_)
+            if ahead:
+                letters.append((row, ahead[0][3]))
         for row, walker in enumerate(self._walkers.values(), start=len(self._vehicles)):
             for area, index in self._walk_signals:
                 if area.contains(walker.x_m, walker.y_m):
-                    links[row] = ord(state[index])
+                    letters.append((row, libsumo.trafficlight.getRedYellowGreenState(self._signal)[index]))
+        for row, letter in letters:
+            links[row] = ord(letter)
         return links
-
-    def _next_signal(self) -> tuple[Signal, float]:
-        if self._signal is None:
-            return Signal.NONE, math.inf
-        ahead = libsumo.vehicle.getNextTLS(self._vehicles[0])
-        if not ahead:
-            return Signal.NONE, math.inf
-        _, _, distance_m, state = ahead[0]
-        return COLOURS.get(state.lower(), Signal.NONE), distance_m
-
-
-def _near_pedestrians(bodies: Bodies) -> Bools:
-    """Who has a pedestrian within `NEAR_M`."""
-    if bodies.vehicle.all():
-        return np.zeros(len(bodies.vehicle), dtype=np.bool_)
-    away = (each[:, None] - each[~bodies.vehicle] for each in (bodies.x_m, bodies.y_m))
-    near: Bools = np.hypot(*away).min(axis=1) < NEAR_M
-    return near
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:

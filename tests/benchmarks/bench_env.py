@@ -16,8 +16,9 @@ import pytest
 
 from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.sim import sumo
+from risk_sac.sim import driver, paths, sumo
 
+CALLERS = (sumo, driver, paths)  # the modules that import libsumo
 STEP_RATIO = 3.0
 RESET_MS = 15.0
 EPISODES, ROUNDS = 8, 5
@@ -49,12 +50,10 @@ class Recorder:
 
 @contextmanager
 def recording(calls: list[Call]) -> Iterator[None]:
-    genuine = sumo.libsumo
-    sumo.libsumo = Recorder(genuine, calls)  # type: ignore[assignment]
-    try:
+    with pytest.MonkeyPatch.context() as patch:
+        for module in CALLERS:
+            patch.setattr(module, "libsumo", Recorder(libsumo, calls))
         yield
-    finally:
-        sumo.libsumo = genuine
 
 
 def actions_of(env: RiskSacEnv, seed: int, steps: int) -> list[np.ndarray]:
@@ -93,9 +92,6 @@ def cpu_of_env(env: RiskSacEnv, seed: int, actions: list[np.ndarray], steps: int
 
 def cpu_of_calls(setup: list[Call], steps: list[list[Call]]) -> float:
     """The same episode from a flat list of calls."""
-    for person in libsumo.person.getIDList():
-        libsumo.person.remove(person)
-    libsumo.simulationStep()
     for function, args, kwargs in setup:
         function(*args, **kwargs)
     flat = [call for step in steps for call in step]
