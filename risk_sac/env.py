@@ -270,7 +270,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             spawn_overlap=self._spawn_overlap,
             inside_limits=self._inside_limits,
             touched_before=other in self._touched,
-            ego_model_saw=True,
+            ego_model_saw=simulator_agrees is not False,  # of a pedestrian, it was told the oracle's own box
         )
         verdicts = {
             **artefact_verdicts(evidence, striker, conflict, handling),
