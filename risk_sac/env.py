@@ -257,8 +257,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         )
 
     def _judge(self, contact: Contact) -> Collision:
-        frame, measures = self._frame, self._trace.measures
-        warning = measures[self._trace.released : -WARNING_STEPS]
+        frame, measures = self._frame, self._trace.measures[self._trace.released :]
+        warning = measures[:-WARNING_STEPS]
         other = frame.ids[contact.other]
         evidence = self.evidence()
         striker = evidence.column(other)

@@ -80,6 +80,8 @@ def frame_of(time_s: float, bumpers: list[list[float]]) -> Frame:
         width_m=np.full(2, WIDTH_M),
         signal=Signal.NONE,
         stop_line_m=math.inf,
+        lane_offset_m=np.zeros(2),
+        link=np.zeros(2, dtype=np.uint8),
     )
 
 

@@ -2,11 +2,15 @@ import math
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from itertools import combinations
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from shapely import Point, Polygon
+from shapely import box as shapely_box
+from shapely.affinity import rotate, translate
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.env import RiskSacEnv, make_default, register_envs
@@ -14,9 +18,10 @@ from risk_sac.errors import InfeasibleScene, SceneError
 from risk_sac.problem import Problem
 from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.types import Collision, Scene
+from risk_sac.types import Collision, Frame, Kind, Scene
 
 NAMES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
+LEAD_IN_STEPS = 15
 each_family = pytest.mark.parametrize("family", NAMES)
 Outcome = tuple[np.ndarray, float, bool, bool, dict[str, object]]
 
@@ -83,10 +88,14 @@ def test_another_seed_gives_another_episode(family: FamilyName) -> None:
 
 @each_family
 def test_one_scene_under_two_seeds_starts_alike_and_then_differs(family: FamilyName) -> None:
+    starts, episodes = [], []
     with closing(make_default(family)) as env:
-        one, other = (episode(env, seed, scene=middle(family)) for seed in (1, 2))
-        assert np.allclose(one[0][0], other[0][0], atol=0.1)  # but for a first step of SUMO's noise
-        assert not same(one, other)
+        for seed in (1, 2):
+            episodes.append(episode(env, seed, scene=middle(family)))
+            starts.append(env.trace.frames[0])
+    for name in ("x_m", "y_m", "heading_rad", "speed_mps"):
+        assert np.array_equal(getattr(starts[0], name), getattr(starts[1], name)), name
+    assert not same(*episodes)
 
 
 @each_family
@@ -117,30 +126,126 @@ def test_the_time_left_runs_down_to_zero(low: RiskSacEnv) -> None:
     assert outcomes[1][0][-1] == pytest.approx(1 - 1 / 150)
 
 
-def test_a_scene_whose_bodies_overlap_is_infeasible(low: RiskSacEnv) -> None:
+def refusal(env: RiskSacEnv, scene: Scene) -> str | None:
+    """The rule of C_hard that a scene breaks."""
+    try:
+        env.reset(seed=0, options={"scene": scene})
+    except InfeasibleScene as error:
+        return error.reason
+    return None
+
+
+# In the second and a half before the release the ego brakes for whom it sees: what is left then counts.
+STANDING = {"ego_speed_mps": 0.0, "lead_speed_mps": 0.0}
+TOWARDS_STANDING = {"ego_speed_mps": 16.0, "lead_speed_mps": 0.0}
+LEADERS: list[tuple[dict[str, float], str | None]] = [
+    ({"lead_gap_m": -2.0, **STANDING}, "initial_overlap"),
+    ({"lead_gap_m": 0.3, **STANDING}, "initial_gap"),
+    ({"lead_gap_m": 0.7, **STANDING}, None),
+    ({"lead_gap_m": 15.0, **TOWARDS_STANDING}, "initial_overlap"),  # it has run into the leader by then
+    ({"lead_gap_m": 20.0, **TOWARDS_STANDING}, "initial_ttc"),  # 1.95 m ahead at 4.9 m/s, still braking
+    ({"lead_gap_m": 8.0, "ego_speed_mps": 16.0, "lead_speed_mps": 6.0}, "initial_rss"),  # 0.96 m behind 6 m/s
+    ({"lead_gap_m": 30.0, **TOWARDS_STANDING}, "initial_conflict"),  # braking, with a TTC below 2 s
+    ({"lead_gap_m": 60.0, **TOWARDS_STANDING}, None),
+]
+
+
+@pytest.mark.parametrize(("changes", "rule"), LEADERS, ids=[f"{c['lead_gap_m']} m, {r}" for c, r in LEADERS])
+def test_a_scene_is_refused_by_what_it_has_come_to_at_the_release(
+    low: RiskSacEnv, changes: dict[str, float], rule: str | None
+) -> None:
     family = FAMILIES["low"]
-    tight = replace(family.space, parameters=tuple(replace(p, low=-100, high=100) for p in family.space.parameters))
-    low.problem = replace(low.problem, space=tight)
-    with pytest.raises(InfeasibleScene) as overlap:
-        low.reset(seed=0, options={"scene": middle("low", lead_gap_m=-2.0)})
-    assert overlap.value.reason == "initial_overlap"
-    with pytest.raises(InfeasibleScene) as gap:
-        low.reset(seed=0, options={"scene": middle("low", lead_gap_m=0.3)})
-    assert gap.value.reason == "initial_gap"
+    wide = replace(family.space, parameters=tuple(replace(p, low=-100, high=100) for p in family.space.parameters))
+    low.problem = replace(low.problem, space=wide)
+    assert refusal(low, middle("low", **changes)) == rule
 
 
-def test_a_scene_that_collides_by_itself_is_infeasible(low: RiskSacEnv) -> None:
-    scene = middle("low", lead_gap_m=8.0, ego_speed_mps=16.0, lead_speed_mps=6.0)  # 8 m closed at 10 m/s
-    with pytest.raises(InfeasibleScene, match="initial_ttc") as error:
-        low.reset(seed=0, options={"scene": scene})
-    assert error.value.reason == "initial_ttc"
+# Ego at 12.6 m/s, 30 m before the zebra; the pedestrian at the kerb, at 1.4 m/s: both are there in three seconds.
+MEETING = {
+    "crossing": 0.0,
+    "ego_speed_mps": 10.0,
+    "ego_distance_m": 30.0,
+    "occluder_distance_m": 25.0,
+    "occluder_speed_mps": 5.0,
+    "pedestrian_offset_m": 0.0,
+    "pedestrian_setback_m": 0.3,
+    "pedestrian_speed_mps": 1.4,
+    "friction": 1.0,
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "rule"),
+    [
+        ({}, "initial_conflict"),
+        ({"ego_distance_m": 38.0, "pedestrian_setback_m": 1.3}, "initial_conflict"),
+        ({"ego_distance_m": 38.0, "pedestrian_setback_m": 1.5}, None),
+        ({"pedestrian_speed_mps": 0.0}, None),
+        ({"ego_distance_m": 25.0}, None),
+        ({"occluder_distance_m": 10.0}, None),
+    ],
+    ids=["at the kerb", "0.9 s from it", "1.1 s from it", "standing", "behind the ego by then", "hidden"],
+)
+def test_a_scene_is_refused_if_the_careful_driver_already_sees_a_pedestrian_coming(
+    changes: dict[str, float], rule: str | None
+) -> None:
+    with closing(make_default("mixed")) as env:
+        assert refusal(env, middle("mixed", **(MEETING | changes))) == rule
 
 
 def test_a_refused_scene_leaves_the_environment_usable(low: RiskSacEnv) -> None:
     expected = episode(low, 3)
-    with pytest.raises(InfeasibleScene):
-        low.reset(seed=0, options={"scene": middle("low", lead_gap_m=8.0, ego_speed_mps=16.0, lead_speed_mps=6.0)})
+    assert refusal(low, middle("low", lead_gap_m=8.0, ego_speed_mps=16.0, lead_speed_mps=6.0)) == "initial_rss"
     assert same(episode(low, 3), expected)
+
+
+@each_family
+def test_scenes_that_are_let_in_are_plausible_and_fair(family: FamilyName) -> None:
+    with closing(make_default(family)) as env:
+        for seed in range(30):
+            env.reset(seed=seed)
+            (frame, measures), released = (env.trace.frames[-1], env.trace.measures[-1]), env.trace.released
+            boxes = [box(*pose) for pose in zip(*bodies(frame), strict=True)]
+            apart = [a.distance(b) for a, b in combinations(boxes, 2)]
+            assert min(apart) > 0.0, seed
+            assert min(boxes[0].distance(other) for other in boxes[1:]) >= 0.5, seed
+            assert measures.signals["ttc_s"] >= 1.0, seed
+            assert released == len(env.trace.frames) - 1 == LEAD_IN_STEPS
+            for row in np.flatnonzero(frame.kind == Kind.PEDESTRIAN):
+                place = Point(frame.x_m[row], frame.y_m[row])
+                layout = FAMILIES[family].layout(env.problem.space.from_unit(env._unit_scene).values)
+                assert not any(a.contains(place.x, place.y) for a in layout.roadway), seed
+
+
+def bodies(frame: Frame) -> tuple[np.ndarray, ...]:
+    return frame.x_m, frame.y_m, frame.heading_rad, frame.length_m, frame.width_m
+
+
+def box(x: float, y: float, heading: float, length: float, width: float) -> Polygon:
+    turned = rotate(shapely_box(-length / 2, -width / 2, length / 2, width / 2), heading, (0, 0), use_radians=True)
+    return translate(turned, x, y)
+
+
+@each_family
+def test_nobody_attacks_before_the_release(family: FamilyName) -> None:
+    with closing(make_default(family)) as env:
+        starts = []
+        for action in (-1.0, 1.0):
+            env.reset(seed=4)
+            env.step(np.full(env.action_size, action, dtype=np.float32))
+            starts.append(env.trace.frames[: LEAD_IN_STEPS + 1])
+        for one, other in zip(*starts, strict=True):
+            assert all(map(np.array_equal, bodies(one), bodies(other)))
+        frames = starts[0]
+    layout = FAMILIES[family].layout(env.problem.space.from_unit(env._unit_scene).values)
+    for walker in layout.pedestrians:
+        row = frames[0].ids.index(walker.id)
+        moved_m = walker.speed_mps * 1.5
+        expected = (
+            walker.x_m + moved_m * math.cos(walker.heading_rad),
+            walker.y_m + moved_m * math.sin(walker.heading_rad),
+        )
+        assert (frames[-1].x_m[row], frames[-1].y_m[row]) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -208,7 +313,8 @@ def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low: Ri
             bonus = 0.0
             if terminated and collision is not None:
                 bonus = config.valid_collision if collision.valid else -config.degenerate_collision
-            assert reward == pytest.approx(reward_by_hand(series, step, config, bonus), abs=1e-9)
+            at = LEAD_IN_STEPS + step
+            assert reward == pytest.approx(reward_by_hand(series, at, config, bonus), abs=1e-9)
 
 
 def test_a_contact_pays_its_bonus_only_if_it_is_valid(low: RiskSacEnv) -> None:
@@ -228,7 +334,8 @@ def test_a_contact_is_recorded_with_its_facts(low: RiskSacEnv) -> None:
     assert series["distance_m"][-1, other] == 0.0
     assert 0.0 < collision.time_s <= (len(outcomes) - 1) * 0.1 + 1e-9
     assert collision.ego_speed_mps == pytest.approx(series["speed_mps"][-1, 0])
-    assert collision.ego_peak_braking_mps2 == pytest.approx(max(0.0, -series["accel_mps2"][:, 0].min()))
+    after = series["accel_mps2"][LEAD_IN_STEPS:, 0]
+    assert collision.ego_peak_braking_mps2 == pytest.approx(max(0.0, -after.min()))
     assert -LONGITUDINAL_CAP_M <= collision.min_rss_margin_m <= LONGITUDINAL_CAP_M
     assert collision.other_role in ("adversary", "background")
     assert len(collision.verdicts) >= 8
@@ -239,13 +346,29 @@ def test_the_trace_holds_every_frame_of_the_episode(family: FamilyName) -> None:
     with closing(make_default(family)) as env:
         outcomes = episode(env, 2)
         series = env.trace.series()
-    assert len(series["time_s"]) == len(outcomes)
-    assert series["actions"].shape == (len(outcomes), env.action_size)
-    assert np.isnan(series["actions"][0]).all()
-    np.testing.assert_allclose(np.diff(series["time_s"]), 0.1)
-    np.testing.assert_allclose(series["soft_min"], [o[4]["robustness"] for o in outcomes])
+    frames = LEAD_IN_STEPS + len(outcomes)
+    assert len(series["time_s"]) == frames
+    assert series["actions"].shape == (frames, env.action_size)
+    assert np.isnan(series["actions"][: LEAD_IN_STEPS + 1]).all()
+    assert not np.isnan(series["actions"][LEAD_IN_STEPS + 1 :]).any()
+    since_release_s = series["time_s"] - series["released_s"]
+    np.testing.assert_allclose(since_release_s, np.arange(-LEAD_IN_STEPS, len(outcomes)) * 0.1, atol=1e-9)
+    after = series["soft_min"][LEAD_IN_STEPS:]
+    np.testing.assert_allclose(after, [o[4]["robustness"] for o in outcomes])
     assert np.nanmax(np.abs(series["rss_lateral_m"])) <= LATERAL_CAP_M
-    assert env.min_robustness == series["soft_min"].min()
+    assert env.min_robustness == after.min()
+    assert env.min_ttc_s == series["least_ttc_s"][LEAD_IN_STEPS:].min()
+
+
+@each_family
+def test_what_happened_before_the_release_does_not_count(family: FamilyName) -> None:
+    with closing(make_default(family)) as env:
+        env.reset(seed=2)
+        before = env.trace.measures[0]
+        worse = replace(before, soft_min=-9.0, signals=before.signals | {"ttc_s": 0.0})
+        env.trace.measures[0] = worse
+        assert env.min_robustness > -9.0
+        assert env.min_ttc_s > 0.0
 
 
 @each_family
@@ -258,7 +381,8 @@ def test_without_control_actions_are_ignored(family: FamilyName) -> None:
         series = env.trace.series()
     for id_ in FAMILIES[family].pedestrians:
         column = series["ids"].tolist().index(id_)
-        assert np.ptp(series["x_m"][:, column]) == 0.0
+        assert np.ptp(series["x_m"][LEAD_IN_STEPS:, column]) == 0.0
+        assert np.ptp(series["y_m"][LEAD_IN_STEPS:, column]) == 0.0
 
 
 def test_actions_beyond_the_bounds_count_as_the_bounds(low: RiskSacEnv) -> None:

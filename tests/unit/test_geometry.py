@@ -35,6 +35,8 @@ def frame_of(rows: Rows) -> Frame:
         width_m=columns[4],
         signal=Signal.NONE,
         stop_line_m=math.inf,
+        lane_offset_m=np.zeros(n),
+        link=np.zeros(n, dtype=np.uint8),
     )
 
 

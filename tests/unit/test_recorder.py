@@ -11,7 +11,7 @@ from risk_sac.train import CHECKPOINT
 SPEC = RunSpec(
     family="low",
     method="random",
-    seed=3,
+    seed=30,
     budget=Budget(episodes=8),
     learner=LearnerConfig(checkpoint_every=2),
 )

@@ -106,11 +106,15 @@ def test_mixed_scenes_place_everybody_before_the_chosen_crossing(sim: SumoSimula
         frame = sim.reset(layout, seed)
         near_edge = (700.0 if scene.values["crossing"] >= 0.5 else 300.0) - 2.0
         front = frame.x_m + frame.length_m / 2
-        assert near_edge - front[0] == pytest.approx(scene.values["ego_distance_m"], abs=0.1)
+        xi = scene.values
+        # The scene says where they are at the release, 1.5 s later.
+        assert near_edge - front[0] == pytest.approx(xi["ego_distance_m"] + 1.5 * xi["ego_speed_mps"], abs=0.1)
         occluder = frame.ids.index("occluder")
-        assert near_edge - front[occluder] == pytest.approx(scene.values["occluder_distance_m"], abs=0.1)
+        before = xi["occluder_distance_m"] + 1.5 * xi["occluder_speed_mps"]
+        assert near_edge - front[occluder] == pytest.approx(before, abs=0.1)
         walker = layout.pedestrians[0]
-        assert walker.x_m - near_edge - 2.0 == pytest.approx(scene.values["pedestrian_offset_m"])
+        assert walker.x_m - near_edge - 2.0 == pytest.approx(xi["pedestrian_offset_m"])
+        assert walker.y_m == pytest.approx(-6.55 - xi["pedestrian_setback_m"] - 1.5 * xi["pedestrian_speed_mps"])
         assert any(a.contains(walker.x_m, -1.0) for a in layout.crossings)
 
 
@@ -121,8 +125,13 @@ def test_dense_approaches_meet_at_the_intersection(sim: SumoSimulation) -> None:
     for id_ in ("ego", "oncoming", "from_left", "from_right"):
         i = frame.ids.index(id_)
         front_m = max(abs(frame.x_m[i]), abs(frame.y_m[i])) - frame.length_m[i] / 2  # along its leg
-        assert front_m == pytest.approx(scene.values[f"{id_}_distance_m"] + 250.0 - APPROACH_M, abs=0.1)
-    assert frame.stop_line_m == pytest.approx(scene.values["ego_distance_m"], abs=0.1)
+        before = scene.values[f"{id_}_distance_m"] + 1.5 * scene.values[f"{id_}_speed_mps"]
+        assert front_m == pytest.approx(before + 250.0 - APPROACH_M, abs=0.1)
+    expected = scene.values["ego_distance_m"] + 1.5 * scene.values["ego_speed_mps"]
+    assert frame.stop_line_m == pytest.approx(expected, abs=0.1)
+    walker = layout.pedestrians[0]
+    speed, setback = scene.values["pedestrian_speed_mps"], scene.values["pedestrian_setback_m"]
+    assert walker.x_m == pytest.approx(8.05 + setback + 1.5 * speed)
 
 
 def test_the_signal_offset_moves_the_cycle(sim: SumoSimulation) -> None:
