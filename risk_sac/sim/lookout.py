@@ -107,7 +107,11 @@ def project(path: Path, x: float, y: float) -> tuple[float, float, float]:
         distance = math.hypot(beyond, across)
         if distance < best:
             best, heading = distance, path.heading_rad[i]
-            station = path.station_m[i] + min(max(along, 0.0 if i > 0 else along), length if i < last else along)
+            if i > 0:
+                along = max(along, 0.0)
+            if i < last:
+                along = min(along, length)
+            station = path.station_m[i] + along
             offset = across
     return station, offset, heading
 

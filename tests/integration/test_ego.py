@@ -18,11 +18,13 @@ from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, PedestrianStart, VehicleStart
+from risk_sac.sim.ego import NOTHING_HIDDEN, Belief, Glimpse
 from risk_sac.sim.sumo import SumoSimulation, VehicleCommand
 from risk_sac.types import Floats, Frame, Role
 
 LANE_Y_M = -1.65  # the ego's lane on the mixed road
 GREEN_S, NEVER = 0.0, 10_000
+ACTOR_HIDDEN = Belief(hidden=frozenset({"actor"}), expected={})
 MIXED = FAMILIES["mixed"].layout(FAMILIES["mixed"].space.from_unit(np.full(10, 0.5)).values)
 DENSE_SPACE = FAMILIES["dense"].space
 
@@ -57,9 +59,10 @@ def on_the_mixed_road(ego: VehicleStart, *vehicles: VehicleStart, walker: tuple[
 def drive(sim: SumoSimulation, layout: Layout, *, seen_from: int = 0, steps: int = 110) -> list[Frame]:
     """Frames of a run in which `actor` is hidden before step `seen_from`; adversary vehicles keep their speed."""
     frames = [sim.reset(layout, 1)]
+    sim.release()
     kept = {v.id: VehicleCommand(v.speed_mps, 0.0) for v in layout.vehicles if v.role is Role.ADVERSARY}
     for step in range(steps):
-        sim.hide(frozenset() if step >= seen_from else frozenset({"actor"}))
+        sim.believe(NOTHING_HIDDEN if step >= seen_from else ACTOR_HIDDEN)
         sim.apply(kept, {})
         frames.append(sim.step())
     return frames
@@ -146,6 +149,41 @@ def test_a_pedestrian_off_the_road_does_not_stop_the_ego(sim: SumoSimulation) ->
     assert np.array_equal(path(frames), path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO))))
 
 
+def with_a_memory(sim: SumoSimulation, layout: Layout, x_m: float, y_m: float) -> list[Frame]:
+    """Frames of a run in which the ego believes a standing `actor` to be there, wherever it is."""
+    frames = [sim.reset(layout, 1)]
+    for _ in range(110):
+        sim.believe(Belief(frozenset(), {"actor": Glimpse(frames[-1].time_s, x_m, y_m, 0.0, 0.0, 0.0)}))
+        frames.append(sim.step())
+    return frames
+
+
+def test_a_remembered_pedestrian_is_braked_for_where_it_is_expected(sim: SumoSimulation) -> None:
+    frames = with_a_memory(sim, on_the_mixed_road(MIDBLOCK_EGO, walker=(190.0, -8.0)), 190.0, LANE_Y_M)
+    there = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, walker=(190.0, LANE_Y_M)))
+    assert np.array_equal(path(frames), path(there))
+    assert frames[-1].x_m[0] < 190.0
+
+
+@pytest.mark.parametrize("aside_m", [-6.0, 6.0])
+def test_a_remembered_pedestrian_is_not_braked_for_where_it_is(sim: SumoSimulation, aside_m: float) -> None:
+    layout = on_the_mixed_road(MIDBLOCK_EGO, walker=(190.0, LANE_Y_M))
+    frames = with_a_memory(sim, layout, 190.0, LANE_Y_M + aside_m)
+    assert np.array_equal(path(frames), path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO))))
+    assert least_gap(frames) == 0.0
+
+
+@pytest.mark.parametrize("friction", [0.6, 1.0])
+def test_braking_builds_up_to_the_grip_by_its_jerk(friction: float) -> None:
+    layout = replace(on_the_mixed_road(MIDBLOCK_EGO, walker=(155.0, LANE_Y_M)), friction=friction)
+    with closing(SumoSimulation(EgoConfig(reaction_time_s=0.1))) as sim:
+        frames = drive(sim, layout, seen_from=25, steps=60)
+    accel = np.array([float(f.accel_mps2[0]) for f in frames])
+    assert accel[26:30] - accel[25] == pytest.approx([-1.265, -2.53, -3.795, -5.06], abs=1e-6)
+    assert np.diff(np.maximum(-accel[25:], 0.0)).max() <= 1.265 + 1e-6  # before that, SUMO is free to dawdle
+    assert accel.min() == pytest.approx(-min(friction * 9.81, 9.0), abs=1e-6)
+
+
 MODELS = pytest.mark.parametrize("model", ["IDM", "ACC"])  # without dawdling, whose noise another vehicle would shift
 
 
@@ -176,26 +214,25 @@ def test_the_ego_brakes_from_the_moment_a_vehicle_ahead_comes_into_view(model: s
     assert differs[0] > 25
 
 
-def red_light_runner() -> VehicleStart:
-    """Comes from the west, and arrives in the middle of the intersection together with the ego."""
-    return VehicleStart(
-        id="actor",
-        role=Role.ADVERSARY,
-        route=("from_west", "to_east"),
-        lane=2,
-        position_m=dense().ego.position_m + 16.0,
-        speed_mps=11.0,
-    )
+def red_light_runner(route: tuple[str, ...]) -> VehicleStart:
+    """Arrives in the middle of the intersection together with the ego."""
+    position_m = dense().ego.position_m + (22.0 if route[0] == "from_west" else 10.0)  # the east is further away
+    return VehicleStart(id="actor", role=Role.ADVERSARY, route=route, lane=2, position_m=position_m, speed_mps=11.0)
 
 
-def test_a_visible_vehicle_at_the_junction_is_braked_for(sim: SumoSimulation) -> None:
-    seen, alone = drive(sim, dense(red_light_runner()), steps=90), drive(sim, dense(), steps=90)
+each_side = pytest.mark.parametrize("route", [("from_west", "to_east"), ("from_east", "to_west")])
+
+
+@each_side
+def test_a_visible_vehicle_at_the_junction_is_braked_for(sim: SumoSimulation, route: tuple[str, ...]) -> None:
+    seen, alone = drive(sim, dense(red_light_runner(route)), steps=90), drive(sim, dense(), steps=90)
     assert peak_braking(seen) > peak_braking(alone) + 3.0
     assert least_gap(seen) > 0.5
 
 
-def test_a_hidden_vehicle_at_the_junction_changes_nothing(sim: SumoSimulation) -> None:
-    hidden = drive(sim, dense(red_light_runner()), seen_from=NEVER, steps=90)
+@each_side
+def test_a_hidden_vehicle_at_the_junction_changes_nothing(sim: SumoSimulation, route: tuple[str, ...]) -> None:
+    hidden = drive(sim, dense(red_light_runner(route)), seen_from=NEVER, steps=90)
     assert np.array_equal(path(hidden), path(drive(sim, dense(), steps=90)))
     assert least_gap(hidden) == 0.0
 
@@ -207,6 +244,7 @@ def behind_a_braking_leader(config: EgoConfig) -> list[Frame]:
     lead = replace(low.vehicles[0], position_m=ego.position_m + 24.6, speed_mps=14.0, id="actor")
     with closing(SumoSimulation(config)) as sim:
         frames, speed = [sim.reset(replace(low, ego=ego, vehicles=(lead,), friction=1.0), 1)], 14.0
+        sim.release()
         for step in range(100):
             speed = max(speed - 0.8, 0.0) if step >= 10 else speed
             sim.apply({"actor": VehicleCommand(speed, 0.0)}, {})

@@ -93,8 +93,8 @@ def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs() -> None:
     assert refused.value.position == 0
 
 
-def test_rss_answers_with_the_egos_reaction_time_and_the_worst_friction() -> None:
-    assert problem(ego=EgoConfig(reaction_time_s=1.0)).rss.response_s == 1.0
+def test_rss_asks_the_same_of_any_ego_and_reckons_with_the_worst_friction() -> None:
+    assert {problem(ego=EgoConfig(reaction_time_s=t)).rss.response_s for t in (0.1, 0.5, 1.0)} == {0.5}
     assert problem(
         odd=Odd(environment=Environment(friction=Interval(low=0.6, high=1)))
     ).rss.brake_min_mps2 == pytest.approx(0.6 * 9.81)

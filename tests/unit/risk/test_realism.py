@@ -62,11 +62,11 @@ def test_closeness_costs_what_is_both_near_and_sudden() -> None:
     assert closeness_term(0.0, 9.0, 0.1) == 1.0
 
 
-def test_soft_cost_is_the_mean_of_the_worst_terms() -> None:
+def test_soft_cost_is_the_mean_of_the_worst_terms_in_which_jerk_counts_double() -> None:
     # jerk 0.5 of the first, excess 0.5 and no jerk of the second, closeness 0.375 of the second
     columns = [[1.75, -6.25], [0.0, -6.25], [0.0, 0.0], [8.0, 8.0], [20.0, 0.5], [20.0, 1.25]]
     cost = soft_cost(*map(np.array, columns), 0.1)
-    assert cost == pytest.approx((0.5 + 0.5 + 0.375) / 3)
+    assert cost == pytest.approx((2 * 0.5 + 0.5 + 0.375) / 4)
 
 
 def test_without_adversaries_nothing_costs() -> None:

@@ -1,0 +1,214 @@
+"""Whom a driver has to stop for or to follow, by hand, on a straight road along x."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from shapely import LineString, Point
+
+from risk_sac.sim.lookout import MARGIN_M, Bodies, Lookout, project, targets
+from risk_sac.sim.paths import Path
+from risk_sac.types import Kind
+from tests.roads import road
+from tests.unit.sim.contacts import CAR, WALKER, WIDTH_M, Actor, frames
+
+FRONT_M, SPEED_MPS, ACCEL_MPS2, LIMIT_MPS = 20.0, 10.0, 2.6, 13.89
+CORRIDOR_M = WIDTH_M / 2 + MARGIN_M  # 1.3
+EGO: Actor = (FRONT_M - 2.3, 0.0, 0.0, SPEED_MPS, 0.0, CAR)
+sides = pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
+
+
+def bodies(*actors: Actor) -> Bodies:
+    _, frame = frames(*actors, share=1.0)
+    return Bodies.of(frame)
+
+
+class Target(NamedTuple):
+    gap_m: float
+    lead_mps: float
+
+
+def target(other: Actor, path: Path | None = None, speed_mps: float = SPEED_MPS, offset_m: float = 0.0) -> Target:
+    """What the other is to a driver 20 m down the path."""
+    known = np.ones(2, dtype=np.bool_)
+    both = bodies(EGO, other)
+    gap, lead = targets(path or road(), FRONT_M, offset_m, 0, speed_mps, ACCEL_MPS2, LIMIT_MPS, both, known)
+    assert gap[0] == math.inf
+    return Target(float(gap[1]), float(lead[1]))
+
+
+def walker(x: float, y: float, vy: float = 0.0) -> Actor:
+    return (x, y, math.pi / 2, 0.0, vy, WALKER)
+
+
+NOBODY = Target(math.inf, 0.0)
+
+
+@sides
+@pytest.mark.parametrize(
+    ("x", "aside_m", "expected"),
+    [
+        (50.0, 0.0, Target(29.75, 0.0)),
+        (50.0, CORRIDOR_M + 0.24, Target(29.75, 0.0)),
+        (50.0, CORRIDOR_M + 0.26, NOBODY),
+        (75.0, 0.0, Target(54.75, 0.0)),
+        (77.0, 0.0, NOBODY),  # the limit of 13.89 m/s takes it 55.56 m in 4 s
+        (20.25, 0.0, Target(0.0, 0.0)),  # at its bumper
+        (19.0, CORRIDOR_M, NOBODY),  # beside it already
+    ],
+)
+def test_who_stands_in_the_corridor_is_stopped_for(x: float, aside_m: float, expected: Target, side: int) -> None:
+    assert target(walker(x, side * aside_m)) == pytest.approx(expected)
+
+
+# At 10 m/s and 2.6 m/s² at the most, some part of the ego is at x = 50 from 2.3 to 3.4 s on.
+@sides
+@pytest.mark.parametrize(
+    ("enters_s", "expected"),
+    [(0.0, NOBODY), (0.3, Target(29.75, 0.0)), (2.5, Target(29.75, 0.0)), (3.3, Target(29.75, 0.0)), (3.6, NOBODY)],
+)
+def test_who_walks_into_the_corridor_is_stopped_for_if_both_are_there_together(
+    enters_s: float, expected: Target, side: int
+) -> None:
+    aside_m = CORRIDOR_M + 0.25 + 1.4 * enters_s - 1e-6
+    assert target(walker(50.0, side * aside_m, -side * 1.4)) == pytest.approx(expected)
+
+
+@sides
+def test_a_driver_that_has_stopped_waits_until_the_pedestrian_has_left_its_corridor(side: int) -> None:
+    # From the middle it takes 1.1 s, in which the car would be 1.6 m further.
+    assert target(walker(21.5, 0.0, side * 1.4), speed_mps=0.0) == pytest.approx(Target(1.25, 0.0))
+    assert target(walker(22.0, 0.0, side * 1.4), speed_mps=0.0) == NOBODY
+    assert target(walker(21.5, side * 1.3, side * 1.4), speed_mps=0.0) == NOBODY
+
+
+@sides
+def test_who_walks_away_is_no_target(side: int) -> None:
+    assert target(walker(50.0, side * 2.0, side * 1.4)) == NOBODY
+
+
+@sides
+def test_the_corridor_is_where_the_vehicle_is_in_its_lane(side: int) -> None:
+    beside = walker(50.0, side * 2.0)
+    assert target(beside) == NOBODY
+    assert target(beside, offset_m=side * 0.5) == pytest.approx(Target(29.75, 0.0))
+
+
+def test_a_leader_is_followed() -> None:
+    assert target((32.3, 0.0, 0.0, 8.0, 0.0, CAR), speed_mps=13.0) == pytest.approx(Target(10.0, 8.0))
+
+
+def test_a_leader_that_is_not_caught_up_with_needs_no_telling() -> None:
+    assert target((52.3, 0.0, 0.0, 13.0, 0.0, CAR)) == NOBODY
+
+
+def test_who_comes_from_behind_keeps_the_distance_itself() -> None:
+    assert target((EGO[0] - 7.0, 0.0, 0.0, 20.0, 0.0, CAR)) == NOBODY
+
+
+@sides
+@pytest.mark.parametrize(
+    ("sideways_mps", "expected"), [(0.0, NOBODY), (0.5, NOBODY), (1.2, Target(5.0, 8.0))], ids=["keeps", "drifts", "in"]
+)
+def test_who_cuts_in_within_two_seconds_is_followed(sideways_mps: float, expected: Target, side: int) -> None:
+    # In the corridor after 0.9 s at 1.2 m/s, and not in 2 s at 0.5 m/s.
+    assert target((27.3, side * 3.3, 0.0, 8.0, -side * sideways_mps, CAR)) == pytest.approx(expected)
+
+
+@sides
+@pytest.mark.parametrize(
+    ("enters_s", "expected"),
+    [(1.0, Target(19.075, 0.0)), (1.1, Target(19.075, 0.0)), (1.3, NOBODY)],
+)
+def test_crossing_traffic_is_stopped_for_once_it_would_have_to_brake_hard(
+    enters_s: float, expected: Target, side: int
+) -> None:
+    # From 6 m/s it stops by 2.5 m/s² in 7.2 m, which it covers in 1.2 s.
+    y = side * (CORRIDOR_M + 2.3 + 6.0 * enters_s - 1e-6)
+    assert target((40.0, y, -side * math.pi / 2, 0.0, -side * 6.0, CAR)) == pytest.approx(expected)
+
+
+@sides
+def test_a_car_that_stands_across_or_tilted_is_stopped_for(side: int) -> None:
+    assert target((40.0, side * 1.0, math.pi / 2, 0.0, 0.0, CAR)) == pytest.approx(Target(19.075, 0.0))
+    tilt = math.radians(15)
+    reach_m = 2.3 * math.cos(tilt) + WIDTH_M / 2 * math.sin(tilt)
+    assert target((40.0, side * 2.0, side * tilt, 0.0, 0.0, CAR)) == pytest.approx(Target(20.0 - reach_m, 0.0))
+    aside_m = CORRIDOR_M + 2.3 * math.sin(tilt) + WIDTH_M / 2 * math.cos(tilt)
+    assert target((40.0, side * (aside_m + 0.01), side * tilt, 0.0, 0.0, CAR)) == NOBODY
+
+
+def test_nobody_but_the_candidates_counts() -> None:
+    both = bodies(EGO, walker(50.0, 0.0))
+    gap, _ = targets(
+        road(), FRONT_M, 0.0, 0, SPEED_MPS, ACCEL_MPS2, LIMIT_MPS, both, np.array([True, False], dtype=np.bool_)
+    )
+    assert gap.tolist() == [math.inf, math.inf]
+
+
+@settings(max_examples=100)
+@given(
+    st.floats(10, 90),
+    st.floats(-10, 10),
+    st.floats(-math.pi, math.pi),
+    st.floats(0, 10),
+    st.sampled_from((CAR, WALKER)),
+    st.sampled_from((None, 8.0, 20.0)),
+    st.floats(0, 13),
+)
+def test_the_mirrored_scene_has_the_mirrored_targets(
+    x: float, y: float, heading: float, pace: float, kind: Kind, radius: float | None, speed: float
+) -> None:
+    vx, vy = pace * math.cos(heading), pace * math.sin(heading)
+    left = target((x, y, heading, vx, vy, kind), road(radius), speed)
+    right = target((x, -y, -heading, vx, -vy, kind), road(radius, left=False), speed)
+    assert left == pytest.approx(right)
+
+
+CORNER = Path(
+    np.array([0.0, 10.0, 10.0]),
+    np.array([0.0, 0.0, 10.0]),
+    np.array([0.0, 10.0, 20.0]),
+    np.array([0.0, 1, 1]) * np.pi / 2,
+)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "expected"),
+    [
+        (4.0, 1.0, (4.0, 1.0, 0.0)),
+        (-3.0, -1.0, (-3.0, -1.0, 0.0)),  # before the start
+        (12.0, 5.0, (15.0, -2.0, math.pi / 2)),
+        (9.0, 13.0, (23.0, 1.0, math.pi / 2)),  # beyond the end
+        (12.0, -1.0, (10.0, -1.0, 0.0)),  # outside the corner, as far from either side
+        (12.0, -0.5, (10.0, -0.5, 0.0)),
+    ],
+)
+def test_places_beside_a_corner_by_hand(x: float, y: float, expected: tuple[float, float, float]) -> None:
+    assert project(CORNER, x, y) == pytest.approx(expected)
+
+
+@settings(max_examples=100)
+@given(st.floats(5, 150), st.floats(-60, 60), st.sampled_from((8.0, 20.0, 40.0)), st.booleans())
+def test_the_nearest_place_is_the_one_that_shapely_finds(x: float, y: float, radius: float, left: bool) -> None:
+    path = road(radius, left=left)
+    line = LineString(np.column_stack((path.x_m, path.y_m)))
+    assume(0.0 < line.project(Point(x, y)) < line.length)  # its ends do not go on
+    station, offset, _ = project(path, x, y)
+    if 0.0 <= station <= line.length:
+        nearest_m = line.distance(Point(x, y))
+        assert Point(x, y).distance(line.interpolate(station)) == pytest.approx(nearest_m, abs=1e-6)
+    assert abs(offset) <= line.distance(Point(x, y)) + 1e-6
+
+
+def test_who_has_a_pedestrian_within_forty_metres() -> None:
+    _, frame = frames(
+        (0.0, 39.9, 0.0, 0.0, 0.0, CAR), (40.1, 0.0, 0.0, 0.0, 0.0, CAR), (0.0, 0.0, 0.0, 0.0, 0.0, WALKER), share=1.0
+    )
+    assert Lookout(frame).near == [True, False, True]
+    assert Lookout(frame).pedestrians.tolist() == [False, False, True]
+    _, frame = frames(EGO, share=1.0)
+    assert Lookout(frame).near == [False]

@@ -1,0 +1,93 @@
+"""Predicted paths beside what SUMO's drivers then drive, on every net."""
+
+import math
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
+
+import libsumo
+import numpy as np
+import pytest
+
+from risk_sac.config import EgoConfig
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.layout import Layout, VehicleStart
+from risk_sac.sim.lookout import project
+from risk_sac.sim.paths import AHEAD_M, Paths
+from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.types import Role
+
+LEGS = ("south", "east", "north", "west")  # counter-clockwise
+ROUTES = (
+    [("low", ("road",), lane, 200.0) for lane in (0, 1, 2)]
+    + [
+        ("mixed", route, lane, 300.0 if route[0] == "e2" else 250.0)
+        for route in (("e1", "e2"), ("e2", "e3"), ("w3", "w2"), ("w2", "w1"))
+        for lane in (1, 2)
+    ]
+    + [
+        ("dense", (f"from_{leg}", f"to_{LEGS[(LEGS.index(leg) + turn) % 4]}"), 1 if turn == 1 else 2, 190.0)
+        for leg in LEGS
+        for turn in (1, 2, 3)  # right, straight on, left
+    ]
+)
+
+
+@pytest.fixture(scope="module")
+def sim() -> Iterator[SumoSimulation]:
+    with closing(SumoSimulation(EgoConfig())) as simulation:
+        yield simulation
+
+
+def alone(family: str, route: tuple[str, ...], lane: int, position_m: float) -> Layout:
+    space = FAMILIES[family].space
+    layout = FAMILIES[family].layout(space.from_unit(np.full(space.dimension, 0.5)).values)
+    ego = VehicleStart(id="ego", role=Role.EGO, route=route, lane=lane, position_m=position_m, speed_mps=8.0)
+    return replace(layout, ego=ego, vehicles=(), pedestrians=())
+
+
+@pytest.mark.parametrize(
+    ("family", "route", "lane", "position_m"), ROUTES, ids=[f"{r[0]} {r[1]} {r[2]}" for r in ROUTES]
+)
+def test_a_vehicle_drives_along_its_path(
+    sim: SumoSimulation, family: str, route: tuple[str, ...], lane: int, position_m: float
+) -> None:
+    frame = sim.reset(alone(family, route, lane, position_m), 0)
+    path, station_m, offset_m = sim.along("ego")
+    np.testing.assert_allclose(np.hypot(np.diff(path.x_m), np.diff(path.y_m)), np.diff(path.station_m))
+    assert path.station_m[0] == 0.0
+    assert path.station_m[-1] >= min(AHEAD_M, 1.0)
+    assert abs(offset_m) < 0.5
+    libsumo.vehicle.setLaneChangeMode("ego", 0)
+    before_m = 0.0
+    for _ in range(200):
+        front = [
+            float(c[0]) + 2.3 * f(float(frame.heading_rad[0]))
+            for c, f in ((frame.x_m, math.cos), (frame.y_m, math.sin))
+        ]
+        at_m, aside_m, _ = project(path, *front)
+        assert abs(aside_m) < 0.73, at_m  # within its lane of 3.3 m; it is 1.85 m wide
+        assert at_m >= before_m - 0.1
+        before_m = at_m
+        frame = sim.step()
+    assert before_m > station_m + 50.0 or frame.signal.name == "RED"
+
+
+@pytest.mark.parametrize("turn", [1, 2, 3], ids=["right", "straight", "left"])
+def test_the_intersection_looks_the_same_from_every_leg(sim: SumoSimulation, turn: int) -> None:
+    turned = []
+    for leg in LEGS:
+        route = f"from_{leg}", f"to_{LEGS[(LEGS.index(leg) + turn) % 4]}"
+        sim.reset(alone("dense", route, 1 if turn == 1 else 2, 190.0), 0)
+        path = sim.along("ego").path
+        turned.append(math.remainder(float(path.heading_rad[-1] - path.heading_rad[0]), math.tau))
+    assert turned == pytest.approx([{1: -math.pi / 2, 2: 0.0, 3: math.pi / 2}[turn]] * 4, abs=0.02)
+
+
+def test_a_path_is_made_once_and_forgotten_with_its_net(sim: SumoSimulation) -> None:
+    sim.reset(alone("mixed", ("e1", "e2"), 2, 250.0), 0)
+    paths = Paths()
+    first = paths.of(("e1", "e2"), "e1_2")
+    assert paths.of(("e1", "e2"), "e1_2") is first
+    paths.clear()
+    assert paths.of(("e1", "e2"), "e1_2") is not first

@@ -1,0 +1,175 @@
+"""The simulation's verbs, by what SUMO then does."""
+
+import math
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
+
+import libsumo
+import numpy as np
+import pytest
+
+from risk_sac.config import EgoConfig
+from risk_sac.errors import SimulationError
+from risk_sac.scenario.families import FAMILIES, Family
+from risk_sac.scenario.layout import Layout, PedestrianStart
+from risk_sac.sim.sumo import SumoSimulation, VehicleCommand, Walker
+from risk_sac.types import Frame, Role
+
+LEAD_IN_STEPS = 15
+each_family = pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
+
+
+@pytest.fixture(scope="module")
+def sim() -> Iterator[SumoSimulation]:
+    with closing(SumoSimulation(EgoConfig())) as simulation:
+        yield simulation
+
+
+def middle(family: Family, **changes: float) -> Layout:
+    scene = family.space.from_unit(np.full(family.space.dimension, 0.5))
+    return family.layout(dict(scene.values) | changes)
+
+
+def speed(frame: Frame, id_: str) -> float:
+    return float(frame.speed_mps[frame.ids.index(id_)])
+
+
+@each_family
+def test_sumo_knows_no_pedestrians(sim: SumoSimulation, family: Family) -> None:
+    frame = sim.reset(middle(family), 0)
+    assert libsumo.person.getIDCount() == 0
+    assert frame.ids[len(libsumo.vehicle.getIDList()) :] == family.pedestrians
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("speed_mps", [6.0, 10.0, 14.0])
+def test_before_the_release_an_adversary_keeps_the_speed_of_the_scene(
+    sim: SumoSimulation, side: str, speed_mps: float
+) -> None:
+    layout = middle(FAMILIES["low"], **{f"{side}_speed_mps": speed_mps, "lead_gap_m": 50.0})
+    sim.reset(layout, 0)
+    assert [speed(sim.step(), side) for _ in range(LEAD_IN_STEPS)] == pytest.approx([speed_mps] * LEAD_IN_STEPS)
+
+
+def test_before_the_release_an_adversary_stops_for_whom_sumo_s_models_see(sim: SumoSimulation) -> None:
+    layout = middle(FAMILIES["low"], left_speed_mps=14.0)
+    left = next(v for v in layout.vehicles if v.id == "left")
+    parked = replace(left, id="parked", role=Role.BACKGROUND, position_m=left.position_m + 30.0, speed_mps=0.0)
+    sim.reset(replace(layout, vehicles=(left, parked)), 0)
+    libsumo.vehicle.setSpeed("parked", 0.0)
+    libsumo.vehicle.setLaneChangeMode("left", 0)
+    frames = [sim.step() for _ in range(60)]
+    assert speed(frames[-1], "left") < 0.1
+    assert not any(f.simulator_collisions for f in frames)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_only_after_the_release_a_command_is_driven_whatever_is_in_the_way(sim: SumoSimulation, side: str) -> None:
+    def driven(*, released: bool) -> float:
+        layout = middle(FAMILIES["low"], **{f"{side}_speed_mps": 10.0})
+        sim.reset(layout, 0)
+        if released:
+            sim.release()
+        sim.apply({side: VehicleCommand(25.0, 0.0)}, {})
+        return speed(sim.step(), side)
+
+    assert driven(released=True) == 25.0
+    assert driven(released=False) < 11.0
+
+
+@each_family
+def test_the_release_alone_changes_nobody_s_size(sim: SumoSimulation, family: Family) -> None:
+    frame = sim.reset(middle(family), 0)
+    sim.release()
+    vehicles = [id_ for id_ in frame.ids if id_ not in family.pedestrians]
+    assert [libsumo.vehicle.getLength(v) for v in vehicles] == frame.length_m[: len(vehicles)].tolist()
+    assert [libsumo.vehicle.getWidth(v) for v in vehicles] == frame.width_m[: len(vehicles)].tolist()
+
+
+def with_walkers(*starts: PedestrianStart) -> Layout:
+    return replace(middle(FAMILIES["mixed"]), pedestrians=starts)
+
+
+def pedestrian(id_: str, heading: float, speed_mps: float) -> PedestrianStart:
+    return PedestrianStart(id=id_, role=Role.ADVERSARY, x_m=500.0, y_m=-9.0, heading_rad=heading, speed_mps=speed_mps)
+
+
+def test_walkers_walk_on_and_halt_by_hand(sim: SumoSimulation) -> None:
+    sim.reset(with_walkers(pedestrian("up", math.pi / 2, 1.5), pedestrian("back", math.pi, 1.0)), 0)
+    for _ in range(2):
+        sim.walk_on()
+    frame = sim.step()
+    assert frame.x_m[-2:] == pytest.approx([500.0, 499.8])
+    assert frame.y_m[-2:] == pytest.approx([-8.7, -9.0])
+    assert frame.speed_mps[-2:].tolist() == [1.5, 1.0]
+    assert frame.vy_mps[-2:] == pytest.approx([1.5, 0.0], abs=1e-9)
+    sim.halt_walkers()
+    sim.walk_on()
+    halted = sim.step()
+    assert halted.speed_mps[-2:].tolist() == [0.0, 0.0]
+    assert np.array_equal(halted.x_m[-2:], frame.x_m[-2:])
+    assert np.array_equal(halted.heading_rad[-2:], frame.heading_rad[-2:])
+
+
+def test_a_walker_is_where_it_is_told(sim: SumoSimulation) -> None:
+    sim.reset(with_walkers(pedestrian("walker", math.pi / 2, 1.5)), 0)
+    sim.apply({}, {"walker": Walker(123.0, -4.0, 0.5, 0.8, 0.3)})
+    frame = sim.step()
+    state = [float(getattr(frame, n)[-1]) for n in ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")]
+    assert state == [123.0, -4.0, 0.5, 0.8, 0.3]
+
+
+def test_room_is_what_is_left_of_the_road_on_both_sides(sim: SumoSimulation) -> None:
+    frame = sim.reset(middle(FAMILIES["low"]), 0)
+    width = 3.3
+    for id_, lanes_right in (("right", 0), ("lead", 1), ("left", 2)):
+        row = frame.ids.index(id_)
+        offset = float(frame.lane_offset_m[row])
+        place = sim.place(id_)
+        assert place is not None
+        room, along = place
+        spare = (width - float(frame.width_m[row])) / 2 - 0.01
+        assert room.right_m == pytest.approx(lanes_right * width + spare + offset)
+        assert room.left_m == pytest.approx((2 - lanes_right) * width + spare - offset)
+        assert along.station_m == pytest.approx(float(frame.x_m[row]) + 2.3)
+        assert along == sim.along(id_)
+
+
+def test_who_left_the_net_has_no_place(sim: SumoSimulation) -> None:
+    sim.reset(middle(FAMILIES["low"]), 0)
+    assert sim.place("nobody") is None
+
+
+@pytest.mark.parametrize("family", ["mixed", "dense"])
+def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim: SumoSimulation, family: str) -> None:
+    adversary = FAMILIES[family].vehicles[0]
+
+    def intended(ahead_m: float) -> float:
+        layout = middle(FAMILIES[family], occluder_speed_mps=8.0, oncoming_speed_mps=8.0, oncoming_distance_m=60.0)
+        only = next(v for v in layout.vehicles if v.id == adversary)
+        frame = sim.reset(replace(layout, vehicles=(only,), pedestrians=()), 0)
+        row = frame.ids.index(adversary)
+        x, y, heading = (float(c[row]) for c in (frame.x_m, frame.y_m, frame.heading_rad))
+        walker = PedestrianStart(
+            id="pedestrian",
+            role=Role.ADVERSARY,
+            x_m=x + ahead_m * math.cos(heading),
+            y_m=y + ahead_m * math.sin(heading),
+            heading_rad=0.0,
+            speed_mps=0.0,
+        )
+        sim.reset(replace(layout, vehicles=(only,), pedestrians=(walker,)), 0)
+        sim.release()
+        return sim.intended_accel()[adversary]
+
+    assert intended(12.0) < -4.0
+    assert intended(39.0) > -0.5
+    assert intended(-12.0) > -0.5
+
+
+def test_what_sumo_refuses_is_reported(sim: SumoSimulation) -> None:
+    layout = middle(FAMILIES["low"])
+    with pytest.raises(SimulationError, match=r"low/low\.net\.xml"):
+        sim.reset(replace(layout, ego=replace(layout.ego, route=("nowhere",))), 0)
+    assert sim.reset(layout, 0).ids[0] == "ego"
