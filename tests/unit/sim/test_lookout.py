@@ -15,7 +15,7 @@ from risk_sac.types import Kind
 from tests.roads import road
 from tests.unit.sim.contacts import CAR, WALKER, WIDTH_M, Actor, frames
 
-FRONT_M, SPEED_MPS, ACCEL_MPS2, LIMIT_MPS = 20.0, 10.0, 2.6, 13.89
+FRONT_M, SPEED_MPS, ACCEL_MPS2 = 20.0, 10.0, 2.6
 CORRIDOR_M = WIDTH_M / 2 + MARGIN_M  # 1.3
 EGO: Actor = (FRONT_M - 2.3, 0.0, 0.0, SPEED_MPS, 0.0, CAR)
 sides = pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
@@ -35,7 +35,7 @@ def target(other: Actor, path: Path | None = None, speed_mps: float = SPEED_MPS,
     """What the other is to a driver 20 m down the path."""
     known = np.ones(2, dtype=np.bool_)
     both = bodies(EGO, other)
-    gap, lead = targets(path or road(), FRONT_M, offset_m, 0, speed_mps, ACCEL_MPS2, LIMIT_MPS, both, known)
+    gap, lead = targets(path or road(), FRONT_M, offset_m, 0, speed_mps, ACCEL_MPS2, both, known)
     assert gap[0] == math.inf
     return Target(float(gap[1]), float(lead[1]))
 
@@ -143,9 +143,7 @@ def test_a_car_that_stands_across_or_tilted_is_stopped_for(side: int) -> None:
 
 def test_nobody_but_the_candidates_counts() -> None:
     both = bodies(EGO, walker(50.0, 0.0))
-    gap, _ = targets(
-        road(), FRONT_M, 0.0, 0, SPEED_MPS, ACCEL_MPS2, LIMIT_MPS, both, np.array([True, False], dtype=np.bool_)
-    )
+    gap, _ = targets(road(), FRONT_M, 0.0, 0, SPEED_MPS, ACCEL_MPS2, both, np.array([True, False], dtype=np.bool_))
     assert gap.tolist() == [math.inf, math.inf]
 
 
@@ -173,6 +171,7 @@ CORNER = Path(
     np.array([0.0, 0.0, 10.0]),
     np.array([0.0, 10.0, 20.0]),
     np.array([0.0, 1, 1]) * np.pi / 2,
+    np.full(3, 13.89),
 )
 
 
@@ -212,3 +211,16 @@ def test_who_has_a_pedestrian_within_forty_metres() -> None:
     assert Lookout(frame).pedestrians.tolist() == [False, False, True]
     _, frame = frames(EGO, share=1.0)
     assert Lookout(frame).near == [False]
+
+
+def test_a_bend_that_is_taken_slowly_makes_a_late_pedestrian_a_target() -> None:
+    path = road()
+    slow = path._replace(limit_mps=np.where(path.station_m < 60.0, 13.89, 6.0))
+    late = walker(75.0, -6.0, 1.4)  # in the corridor after 3.3 s, when a driver that kept 13 m/s would be at 63 m
+    quick, bend = (target(late, each, speed_mps=13.0) for each in (path, slow))
+    assert quick.gap_m < math.inf
+    behind = walker(40.0, -6.0, 1.4)  # passed at 13 m/s, and met at 6
+    assert target(behind, path, speed_mps=13.0) == NOBODY
+    crawl = path._replace(limit_mps=np.where(path.station_m < 30.0, 13.89, 4.0))
+    assert target(behind, crawl, speed_mps=13.0).gap_m == pytest.approx(19.75)
+    assert bend.gap_m == pytest.approx(quick.gap_m)
