@@ -86,7 +86,7 @@ def test_page_has_histograms_and_signatures_of_those_who_found_something(compari
 def test_page_of_runs_from_before_contacts_were_judged_has_no_empty_histograms(spec, runs):
     old = [replace(run, records=tuple(map(unjudged, run.records))) for run in runs]
     page = table_markdown(compare(spec, old, ""))
-    assert "| risk-sac | 8 | 4 | 4 | 3 | 0 | 0.0 % |" in page
+    assert "| risk-sac | 8 | 4 | 4 | 2 | 0 | 0.0 % |" in page  # unjudged ones differ by striker and speeds alone
     assert "by the time since" not in page
     assert "by signature" not in page
     assert not [name for name in figure_names(compare(spec, old, "")) if name.startswith("times_")]
