@@ -17,7 +17,8 @@ class Control:
     ego: EgoConfig
 
 
-# From the worst ego to the best: each but the last two differs from the one before in one thing.
+# From the slowest driver to the best, and beside them two that share the default's reaction time: one that sees all,
+# and one with the careful driver's braking on top.
 LADDER = (
     Control(name="reaction 1.0 s", attack="random", ego=EgoConfig(reaction_time_s=1.0)),
     Control(name="reaction 0.5 s", attack="random", ego=EgoConfig()),
