@@ -24,6 +24,7 @@ from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.scenario.families import LEAD_IN_S
+from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries
@@ -75,6 +76,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self.observation_space = gym.spaces.Box(-LIMIT, LIMIT, (self.observation_size,), np.float32)
 
     # The state of an episode, set by `_start`.
+    layout: Layout  # where everybody started
     _adversaries: Adversaries
     _frame: Frame
     _measures: Measures
@@ -166,7 +168,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _start(self, scene: Scene) -> tuple[Observation, dict[str, Any]]:
         self._unit_scene = self.problem.space.to_unit(scene)
-        layout = self.problem.family.layout(scene.values)
+        layout = self.layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
         self._ground = Ground(
             friction=layout.friction,
@@ -258,7 +260,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         frame, measures = self._frame, self._trace.measures[self._trace.released :]
         warning = measures[:-WARNING_STEPS]
         other = frame.ids[contact.other]
-        evidence = self._evidence()
+        evidence = self.evidence()
         striker = evidence.column(other)
         conflict = find_conflict(evidence, striker)
         visible_for_s = self._perception.in_view_for(other, frame.time_s)
@@ -268,7 +270,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             spawn_overlap=self._spawn_overlap,
             inside_limits=self._inside_limits,
             touched_before=other in self._touched,
-            ego_model_saw=True,
+            ego_model_saw=simulator_agrees is not False,  # of a pedestrian, it was told the oracle's own box
         )
         verdicts = {
             **artefact_verdicts(evidence, striker, conflict, handling),
@@ -303,7 +305,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict),
         )
 
-    def _evidence(self) -> Evidence:
+    def evidence(self) -> Evidence:
+        """What a judge may look at, of the episode so far."""
         seen = [np.concatenate(([True], measures.assessment.seen)) for measures in self._trace.measures]
         return Evidence.of(self._trace.frames, seen, self._released_s, self._ground)
 

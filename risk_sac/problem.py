@@ -80,7 +80,7 @@ class Problem:
 
 
 def _rss_parameters(odd: Odd) -> RssParameters:
-    """RSS under the ODD: a driver's delay, whoever drives, and the braking that a driver can be relied on to do, and has to expect.
+    """RSS under the ODD: a driver's delay, and the braking it can be relied on to do, and has to expect of others.
 
     Choice: both are RSS_BRAKING_MPS2 or the worst grip of the road that all share. SUMO's drivers keep a headway of 1 s
     and trust the one ahead to brake no harder than they do themselves; that they stop by 4.5 m/s² behind a

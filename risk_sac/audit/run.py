@@ -66,7 +66,7 @@ def run(parts: Sequence[Part], folder: Path, seed: int, jobs: int, done: Callabl
     missing = [part for part in parts if not (folder / part.file).exists()]
     done(len(parts) - len(missing), len(parts))
     spawn = multiprocessing.get_context("spawn")  # libsumo does not survive a fork
-    with ProcessPoolExecutor(jobs, mp_context=spawn, max_tasks_per_child=20) as pool:
+    with ProcessPoolExecutor(jobs, mp_context=spawn) as pool:
         futures = {pool.submit(play, part.family, part.control, seed, part.first, part.count): part for part in missing}
         for count, future in enumerate(as_completed(futures), start=1):
             file = folder / futures[future].file

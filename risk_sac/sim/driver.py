@@ -89,9 +89,7 @@ class Driver:
         libsumo.vehicle.setSpeedMode(self._vehicle, EMERGENCY_MODE if accel < -NORMAL_DECEL_MPS2 else SAFE_MODE)
         libsumo.vehicle.setSpeed(self._vehicle, max(speed_mps + accel * STEP_S, 0.0))
 
-    def decide(
-        self, row: int, speed: float, bodies: Bodies, along: Along, limit_mps: float, candidate: Bools
-    ) -> float | None:
+    def decide(self, row: int, speed: float, bodies: Bodies, along: Along, candidate: Bools) -> float | None:
         """The acceleration that its model wants for the nearest of the targets; None where none binds.
 
         Args:
@@ -99,10 +97,9 @@ class Driver:
           speed: its own.
           bodies: of all `n` actors.
           along: the vehicle on its path.
-          limit_mps: of its lane.
           candidate: `n`, whom it knows of and looks out for.
         """
-        gap, lead = targets(*along, row, speed, self._accel, limit_mps, bodies, candidate)
+        gap, lead = targets(*along, row, speed, self._accel, bodies, candidate)
         wanted = math.inf
         for gap_m, lead_mps in zip(gap.tolist(), lead.tolist(), strict=True):
             if gap_m < math.inf:

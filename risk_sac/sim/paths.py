@@ -19,6 +19,7 @@ class Path(NamedTuple):
     y_m: Floats
     station_m: Floats  # length of the line up to each point; 0 at the first
     heading_rad: Floats  # of the segment that begins at the point; the last point repeats the one before
+    limit_mps: Floats  # the fastest that SUMO's drivers take it; bends are slow
 
 
 class Along(NamedTuple):
@@ -75,10 +76,13 @@ def _next_lane(route: Sequence[str], lane: str) -> str | None:
 
 
 def _path(lanes: Sequence[str]) -> Path:
-    points = np.array([point for lane in lanes for point in libsumo.lane.getShape(lane)])
-    apart = np.hypot(*np.diff(points, axis=0).T) > SAME_POINT_M
-    points = points[np.concatenate(([True], apart))]
+    shapes = [libsumo.lane.getShape(lane) for lane in lanes]
+    points = np.array([point for shape in shapes for point in shape])
+    limit = np.repeat([libsumo.lane.getMaxSpeed(lane) for lane in lanes], [len(shape) for shape in shapes])
+    # Where lanes meet there are two points; the one that stays is the first of the lane that follows.
+    apart = np.append(np.hypot(*np.diff(points, axis=0).T) > SAME_POINT_M, True)
+    points, limit = points[apart], limit[apart]
     steps = np.diff(points, axis=0)
     station = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
     heading = np.arctan2(steps[:, 1], steps[:, 0])
-    return Path(points[:, 0].copy(), points[:, 1].copy(), station, np.append(heading, heading[-1]))
+    return Path(points[:, 0].copy(), points[:, 1].copy(), station, np.append(heading, heading[-1]), limit)

@@ -118,9 +118,6 @@ class SumoSimulation:
             self._paths.clear()
         self._describe_actors()
         self._start_drivers()
-        self._limit_mps: float = libsumo.lane.getMaxSpeed(
-            libsumo.vehicle.getLaneID(layout.ego.id)
-        )  # of all roads alike
         return self._read()
 
     def release(self) -> None:
@@ -285,7 +282,7 @@ class SumoSimulation:
 
     def _decide(self, driver: Driver, row: int, bodies: Bodies, candidates: Bools) -> float | None:
         speed, along = float(self._frame.speed_mps[row]), self.along(self._vehicles[row])
-        return driver.decide(row, speed, bodies, along, self._limit_mps, candidates)
+        return driver.decide(row, speed, bodies, along, candidates)
 
     def intended_accel(self) -> dict[str, float]:
         """What the drivers of the released vehicles would do if nobody commanded them, m/s².

@@ -15,7 +15,7 @@ from risk_sac.types import Kind
 from tests.roads import road
 from tests.unit.sim.contacts import CAR, WALKER, WIDTH_M, Actor, frames
 
-FRONT_M, SPEED_MPS, ACCEL_MPS2, LIMIT_MPS = 20.0, 10.0, 2.6, 13.89
+FRONT_M, SPEED_MPS, ACCEL_MPS2 = 20.0, 10.0, 2.6
 CORRIDOR_M = WIDTH_M / 2 + MARGIN_M  # 1.3
 EGO: Actor = (FRONT_M - 2.3, 0.0, 0.0, SPEED_MPS, 0.0, CAR)
 sides = pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
@@ -35,7 +35,7 @@ def target(other: Actor, path: Path | None = None, speed_mps: float = SPEED_MPS,
     """What the other is to a driver 20 m down the path."""
     known = np.ones(2, dtype=np.bool_)
     both = bodies(EGO, other)
-    gap, lead = targets(path or road(), FRONT_M, offset_m, 0, speed_mps, ACCEL_MPS2, LIMIT_MPS, both, known)
+    gap, lead = targets(path or road(), FRONT_M, offset_m, 0, speed_mps, ACCEL_MPS2, both, known)
     assert gap[0] == math.inf
     return Target(float(gap[1]), float(lead[1]))
 
@@ -54,8 +54,8 @@ NOBODY = Target(math.inf, 0.0)
         (50.0, 0.0, Target(29.75, 0.0)),
         (50.0, CORRIDOR_M + 0.24, Target(29.75, 0.0)),
         (50.0, CORRIDOR_M + 0.26, NOBODY),
-        (75.0, 0.0, Target(54.75, 0.0)),
-        (77.0, 0.0, NOBODY),  # the limit of 13.89 m/s takes it 55.56 m in 4 s
+        (72.0, 0.0, Target(51.75, 0.0)),
+        (73.5, 0.0, NOBODY),  # speeding up to the limit of 13.89 m/s, it comes 52.6 m far in 4 s
         (20.25, 0.0, Target(0.0, 0.0)),  # at its bumper
         (19.0, CORRIDOR_M, NOBODY),  # beside it already
     ],
@@ -143,9 +143,7 @@ def test_a_car_that_stands_across_or_tilted_is_stopped_for(side: int) -> None:
 
 def test_nobody_but_the_candidates_counts() -> None:
     both = bodies(EGO, walker(50.0, 0.0))
-    gap, _ = targets(
-        road(), FRONT_M, 0.0, 0, SPEED_MPS, ACCEL_MPS2, LIMIT_MPS, both, np.array([True, False], dtype=np.bool_)
-    )
+    gap, _ = targets(road(), FRONT_M, 0.0, 0, SPEED_MPS, ACCEL_MPS2, both, np.array([True, False], dtype=np.bool_))
     assert gap.tolist() == [math.inf, math.inf]
 
 
@@ -173,6 +171,7 @@ CORNER = Path(
     np.array([0.0, 0.0, 10.0]),
     np.array([0.0, 10.0, 20.0]),
     np.array([0.0, 1, 1]) * np.pi / 2,
+    np.full(3, 13.89),
 )
 
 
@@ -212,3 +211,12 @@ def test_who_has_a_pedestrian_within_forty_metres() -> None:
     assert Lookout(frame).pedestrians.tolist() == [False, False, True]
     _, frame = frames(EGO, share=1.0)
     assert Lookout(frame).near == [False]
+
+
+def test_whom_it_passes_at_its_speed_it_may_meet_at_that_of_a_bend() -> None:
+    x = np.arange(0.0, 200.0, 10.0)
+    straight = Path(x, np.zeros_like(x), x, np.zeros_like(x), np.full_like(x, 13.89))
+    slow = straight._replace(limit_mps=np.where(x < 30.0, 13.89, 4.0))
+    late = walker(40.0, -6.0, 1.4)  # in the corridor after 3.2 s: at 13 m/s the ego is past, at 4 m/s it is there
+    assert target(late, straight, speed_mps=13.0) == NOBODY
+    assert target(late, slow, speed_mps=13.0).gap_m == pytest.approx(19.75)

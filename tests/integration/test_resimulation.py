@@ -1,0 +1,167 @@
+"""A reference driver's verdict holds in SUMO, too, with that driver at the wheel.
+
+The verdict moves boxes along recorded paths. Here SUMO moves the ego along its lanes and over its junctions at the
+reference driver's speeds, while the striker goes where it was recorded.
+"""
+
+import math
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass, replace
+
+import libsumo
+import numpy as np
+import pytest
+
+from risk_sac.agents.random import RandomAgent
+from risk_sac.config import EgoConfig, FamilyName
+from risk_sac.env import RiskSacEnv, make_default
+from risk_sac.geometry import box_view, contact_point, zone
+from risk_sac.scenario.layout import Layout
+from risk_sac.scenario.limits import GRAVITY_MPS2
+from risk_sac.sim.sumo import STEERED, SumoSimulation
+from risk_sac.types import STEP_S, Collision, Frame
+from risk_sac.verdicts.conflict import Conflict, find_conflict
+from risk_sac.verdicts.course import touches
+from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S, careful, ideal
+from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.reference import reference_outcomes, replayed_contact_s
+from risk_sac.verdicts.rollout import STANDING_MPS
+
+EPISODES = 120
+FINE = 10  # looks between two steps
+AGREE = 0.99
+
+Pose = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Struck:
+    """A contact of a random episode, valid or not."""
+
+    layout: Layout
+    evidence: Evidence
+    striker: int
+    conflict: Conflict
+    collision: Collision
+
+
+def contacts(env: RiskSacEnv, episodes: int) -> Iterator[Struck]:
+    for seed in range(episodes):
+        observation, _ = env.reset(seed=7000 + seed)
+        agent = RandomAgent(env.action_size, seed)
+        ended, info = False, {}
+        while not ended:
+            observation, _, terminated, truncated, info = env.step(agent.act(observation))
+            ended = terminated or truncated
+        if "collision" not in info:
+            continue
+        evidence = env.evidence()
+        striker = evidence.column(info["collision"].other_id)
+        conflict = find_conflict(evidence, striker)
+        yield Struck(env.layout, evidence, striker, conflict, info["collision"])
+
+
+def speeds(struck: Struck, driver: str) -> list[float]:
+    """Of the reference driver, step by step: as recorded until it perceives, then its own."""
+    evidence = struck.evidence
+    perceives_s = CAREFUL_PERCEIVES_S if driver == "careful" else 0.0
+    grip = evidence.ground.friction * GRAVITY_MPS2
+    driven = evidence.speed_mps[: struck.conflict.frame + round(perceives_s / STEP_S) + 1, 0].tolist()
+    tick = STEP_S / 100
+    for step in range(80):
+        speed = driven[-1]
+        for k in range(100):
+            braking = careful(step * STEP_S + (k + 0.5) * tick, grip) if driver == "careful" else ideal(grip)
+            speed = max(speed - braking * tick, 0.0)
+        driven.append(speed)
+    return driven
+
+
+def pose(before: Frame, frame: Frame, share: float) -> Pose:
+    """The ego's, between two frames."""
+    turn = math.remainder(frame.heading_rad[0] - before.heading_rad[0], math.tau)
+    x, y = (float(b[0] + share * (f[0] - b[0])) for b, f in ((before.x_m, frame.x_m), (before.y_m, frame.y_m)))
+    return x, y, float(before.heading_rad[0] + share * turn)
+
+
+def strikers_pose(struck: Struck, at: float) -> Pose:
+    """The striker's at a fraction of a frame; after the contact it keeps its velocity."""
+    e, column, last = struck.evidence, struck.striker, len(struck.evidence.time_s) - 1
+    k = min(int(at), last)
+    share, ahead_s = at - k, (at - last) * STEP_S
+    x, y, heading = (a[:, column] for a in (e.x_m, e.y_m, np.unwrap(e.heading_rad, axis=0)))
+    if k < last:
+        return tuple(float(a[k] + share * (a[k + 1] - a[k])) for a in (x, y, heading))  # type: ignore[return-value]
+    return (
+        float(x[-1] + ahead_s * e.vx_mps[-1, column]),
+        float(y[-1] + ahead_s * e.vy_mps[-1, column]),
+        float(heading[-1]),
+    )
+
+
+def struck_side(
+    ego: Pose, other: Pose, half_length: float, half_width: float, other_half_length: float, other_half_width: float
+) -> str:
+    cos, sin = math.cos(ego[2]), math.sin(ego[2])
+    dx, dy, turn = other[0] - ego[0], other[1] - ego[1], other[2] - ego[2]
+    place = dx * cos + dy * sin, dy * cos - dx * sin, 0.0, 0.0, math.cos(turn), math.sin(turn)
+    body = other_half_length, other_half_width
+    view = box_view(*(np.array([value]) for value in (*place, *body)), 0.0, 0.0, half_length, half_width)
+    return zone(*contact_point(view), half_length, half_width)
+
+
+def avoids(sim: SumoSimulation, struck: Struck, driver: str) -> bool:
+    """Whether the driver, with SUMO's ego under it, does not touch, stands when struck, or is struck from behind."""
+    evidence = struck.evidence
+    driven, last = speeds(struck, driver), len(evidence.time_s) - 1
+    if struck.conflict.frame + round(CAREFUL_PERCEIVES_S / STEP_S) >= last and driver == "careful":
+        return bool(evidence.speed_mps[-1, 0] <= STANDING_MPS)  # struck before it perceives
+    frame = sim.reset(replace(struck.layout, vehicles=(), pedestrians=()), 1)
+    libsumo.vehicle.setSpeedMode("ego", 0)
+    libsumo.vehicle.setLaneChangeMode("ego", 0)
+    for name, value in STEERED.items():
+        libsumo.vehicle.setParameter("ego", f"laneChangeModel.{name}", value)
+    half_length, half_width = float(frame.length_m[0]) / 2, float(frame.width_m[0]) / 2
+    size = float(evidence.length_m[struck.striker]) / 2, float(evidence.width_m[struck.striker]) / 2
+    way_m, recorded_m, aside_m = (
+        0.0,
+        *(
+            np.concatenate(([0.0], np.cumsum(values[1:, 0]) * STEP_S))
+            for values in (evidence.speed_mps, evidence.lateral_mps)
+        ),
+    )
+    for step, speed in enumerate(driven[1:], start=1):
+        # Its path is kept, not its lateral speed: who is slower moves aside later.
+        to = np.interp((way_m, way_m + speed * STEP_S), recorded_m, aside_m)
+        way_m += speed * STEP_S
+        libsumo.vehicle.setSpeed("ego", speed)
+        libsumo.vehicle.changeSublane("ego", float(to[1] - to[0]))
+        before, frame = frame, sim.step()
+        for k in range(1, FINE + 1):
+            ego, other = pose(before, frame, k / FINE), strikers_pose(struck, step - 1 + k / FINE)
+            if touches(*ego, half_length, half_width, *other, *size):
+                return speed <= STANDING_MPS or struck_side(ego, other, half_length, half_width, *size) == "rear"
+        if speed <= STANDING_MPS and step > struck.conflict.frame:
+            return True
+    return True
+
+
+@pytest.mark.parametrize("family", ["low", "mixed", "dense"])
+def test_verdicts_are_those_of_the_driver_at_the_wheel(family: FamilyName) -> None:
+    with closing(make_default(family)) as env:
+        found = list(contacts(env, EPISODES))
+    assert found
+    for struck in found:
+        replayed_s = replayed_contact_s(struck.evidence, struck.striker)
+        assert replayed_s == pytest.approx(struck.collision.time_s, abs=0.1)
+    with closing(SumoSimulation(EgoConfig())) as sim:
+        pairs = [
+            (
+                avoids(sim, struck, driver),
+                reference_outcomes(struck.evidence, struck.striker, struck.conflict)[driver].avoids,
+            )
+            for struck in found
+            for driver in ("careful", "ideal")
+        ]
+    assert sum(here == there for here, there in pairs) >= AGREE * len(pairs) - 1, pairs
