@@ -23,7 +23,7 @@ PHASES = 10  # of the ego's reaction in which attacks begin: who is about to dec
 def scenes(family: FamilyName, space_middle: Scene) -> Iterator[Scene]:
     """A neighbour at several distances ahead; a walker that stands at the kerb, at several distances of the ego."""
     if family == "low":
-        for offset_m in np.linspace(4.0, 16.0, 7):
+        for offset_m in np.linspace(4.0, 16.0, 13):
             for speed_mps in (10.0, 13.0, 16.0):
                 changes = {"ego_speed_mps": speed_mps, "left_speed_mps": speed_mps, "left_offset_m": float(offset_m)}
                 far = {"lead_gap_m": 50.0, "lead_speed_mps": speed_mps, "right_offset_m": -15.0, "right_speed_mps": 6.0}

@@ -342,6 +342,20 @@ def test_a_contact_is_recorded_with_its_facts(low: RiskSacEnv) -> None:
 
 
 @each_family
+def test_sumo_is_asked_about_vehicles_alone_and_early_conflicts_are_artefacts(family: FamilyName) -> None:
+    with closing(make_default(family)) as env:
+        collisions = [c for c in map(collision_of, first_contacts(env, 3)) if c is not None]
+    assert len(collisions) == 3
+    for collision in collisions:
+        assert (collision.simulator_agrees is None) == (collision.other_kind == "pedestrian")
+        assert collision.judgement is not None
+        began_s = collision.judgement.conflict_s
+        assert began_s <= collision.time_s + 0.1
+        assert collision.verdicts["conflict_after_release"] == (began_s >= 1.0 - 1e-6)
+        assert collision.artefact or collision.verdicts["conflict_after_release"]
+
+
+@each_family
 def test_the_trace_holds_every_frame_of_the_episode(family: FamilyName) -> None:
     with closing(make_default(family)) as env:
         outcomes = episode(env, 2)

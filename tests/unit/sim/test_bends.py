@@ -17,10 +17,12 @@ radii = st.floats(6, 60)
 
 def corner(turn_rad: float) -> Path:
     """10 m straight, a corner, 10 m straight."""
-    heading = np.array([0.0, turn_rad, turn_rad])
-    return Path(
-        np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), heading, np.full(3, 13.89)
-    )  # points do not matter
+    return with_headings(0.0, turn_rad, turn_rad)
+
+
+def with_headings(*heading_rad: float) -> Path:
+    """Two pieces of 10 m; points and speeds do not matter."""
+    return Path(np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), np.array(heading_rad), np.full(3, 13.89))
 
 
 def test_a_straight_road_asks_nothing() -> None:
@@ -77,8 +79,7 @@ def test_left_and_right_bends_ask_the_same(radius: float, turn: float, piece: fl
 
 
 def test_a_heading_that_passes_pi_is_no_bend() -> None:
-    heading = np.array([math.pi - 0.01, -math.pi + 0.01, -math.pi + 0.01])
-    got = bends(Path(np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), heading, np.full(3, 13.89)), LIMITS)
+    got = bends(with_headings(math.pi - 0.01, -math.pi + 0.01, -math.pi + 0.01), LIMITS)
     assert max(got.curvature_per_m) == pytest.approx(0.02 / BODY_M)
 
 

@@ -1,0 +1,52 @@
+import numpy as np
+
+from risk_sac.agents.random import RandomAgent
+
+NOTHING = np.zeros(1, dtype=np.float32)
+ADVERSARIES = 3
+
+
+def played(agent: RandomAgent, steps: int) -> np.ndarray:
+    """`steps x adversaries x 2`."""
+    return np.array([agent.act(NOTHING) for _ in range(steps)]).reshape(steps, ADVERSARIES, 2)
+
+
+def test_actions_are_uniform_and_in_the_space() -> None:
+    actions = played(RandomAgent(2 * ADVERSARIES, seed=0), 20_000)
+    assert actions.dtype == np.float32
+    assert np.abs(actions).max() <= 1.0
+    shares, _ = np.histogram(actions, bins=4, range=(-1, 1))
+    np.testing.assert_allclose(shares / actions.size, 0.25, atol=0.02)
+
+
+def test_each_adversarys_action_is_held_for_a_second_on_average_and_changes_as_a_whole() -> None:
+    actions = played(RandomAgent(2 * ADVERSARIES, seed=1), 20_000)
+    changed = np.diff(actions, axis=0) != 0.0
+    assert np.array_equal(changed[..., 0], changed[..., 1])
+    np.testing.assert_allclose(changed[..., 0].mean(axis=0), 0.1, atol=0.01)
+    both = (changed[:, 0, 0] & changed[:, 1, 0]).mean()  # each by itself: 0.1 · 0.1
+    np.testing.assert_allclose(both, 0.01, atol=0.004)
+
+
+def test_an_action_once_given_stays_as_it_is() -> None:
+    agent = RandomAgent(2 * ADVERSARIES, seed=2)
+    first = agent.act(NOTHING)
+    kept = first.copy()
+    played(agent, 50)
+    assert np.array_equal(first, kept)
+
+
+def test_a_restored_agent_goes_on_as_the_one_that_was_saved() -> None:
+    agent = RandomAgent(2 * ADVERSARIES, seed=3)
+    played(agent, 7)
+    state = agent.state()
+    expected = played(agent, 100)
+    restored = RandomAgent(2 * ADVERSARIES, seed=4)
+    restored.load(state)
+    assert np.array_equal(played(restored, 100), expected)
+
+
+def test_the_same_seed_plays_the_same() -> None:
+    one, again, other = (played(RandomAgent(2 * ADVERSARIES, seed=s), 30) for s in (5, 5, 6))
+    assert np.array_equal(one, again)
+    assert not np.array_equal(one, other)
