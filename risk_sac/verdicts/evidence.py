@@ -58,7 +58,7 @@ class Evidence:
     accel_mps2: Floats
     lane_offset_m: Floats  # from the lane SUMO has the vehicle on; NaN where it was not recorded
     link: Letters  # SUMO's letter of the signal ahead, of the crossing for a pedestrian; 0: none
-    known: Bools  # in the ego's sight, or remembered
+    known: Bools  # in the ego's sight
     ground: Ground = Ground()
     lane_heading_rad: Floats | None = None  # T x n: the direction of the lane an actor is on, where it is known
     step_s: float = STEP_S
