@@ -289,7 +289,7 @@ def test_watch_outlives_a_server_that_is_killed_and_restarted(
 
 
 def test_a_terminal_shows_a_bar_for_each_run_at_work(service: Service) -> None:
-    campaign = service.post(seeds=[0, 1], budget={"episodes": 40})
+    campaign = service.post(seeds=[0, 1], budget={"episodes": 100})
     ours, theirs = os.openpty()
     url = f"http://127.0.0.1:{service.port}"
     command = [sys.executable, "-m", "risk_sac", "campaigns", "watch", campaign, "--url", url]
