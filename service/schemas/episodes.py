@@ -83,7 +83,8 @@ class Collision(Body):
     """How long the ego had seen the other before contact."""
     ego_peak_braking_mps2: Real
     min_robustness: Real
-    simulator_agrees: bool
+    simulator_agrees: bool | None
+    """Whether SUMO lists the collision within 0.3 s; null for pedestrians, whom it does not know."""
     verdicts: Mapping[str, bool]
     """Validity rule → passed."""
     judgement: Judgement | None

@@ -1,8 +1,10 @@
 import dataclasses
 import json
+import typing
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
 from risk_sac.metrics import Funnel
 from risk_sac.trace import PER_ACTOR, PER_OTHER, write_series
@@ -13,8 +15,7 @@ from service.errors import StorageError
 from service.records import Episode
 from service.series import load_series
 
-
-@pytest.mark.parametrize(
+each_record = pytest.mark.parametrize(
     ("record", "body", "added"),
     [
         (RunMetrics, schemas.Metrics, set()),
@@ -25,6 +26,16 @@ from service.series import load_series
         (EpisodeRecord, schemas.Episode, {"id", "run_id", "wall_s", "funnel"}),
     ],
 )
+
+
+@each_record
+def test_what_may_be_none_in_a_record_may_be_null_in_its_body(record, body, added):
+    for name, hint in typing.get_type_hints(record).items():
+        if type(None) in typing.get_args(hint):
+            assert TypeAdapter(body.model_fields[name].annotation).validate_python(None) is None, name
+
+
+@each_record
 def test_a_body_has_every_field_of_its_record(record, body, added):
     assert {field.name for field in dataclasses.fields(record)} | added == set(body.model_fields)
 
