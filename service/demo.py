@@ -213,11 +213,11 @@ def _verdict(found: Json, console: Console) -> int:
     if campaign["state"] != "succeeded":
         console.print(f"campaign {campaign['state']}: {campaign['reason']}", style="bold red", markup=False)
         return 1
-    failures, worth = (campaign["progress"][name] for name in ("failures", "distinct_preventable"))
-    if failures == 0:
+    distinct, worth = (campaign["progress"][name] for name in ("distinct_failures", "distinct_preventable"))
+    if distinct == 0:
         console.print("no valid failure was found; try more --episodes or another --seeds", style="bold red")
         return 1
-    console.print(f"{worth} distinct failures found that a careful driver would have prevented", style="bold green")
+    console.print(f"distinct failures: {distinct}; a careful driver would have prevented: {worth}", style="bold green")
     return 0
 
 

@@ -55,9 +55,9 @@ def test_summary_of_every_method_fits_80_columns(capsys):
 
 
 def test_its_last_line_counts_what_is_worth_a_persons_time_and_no_repeats(capsys):
-    campaign = {"state": "succeeded", "reason": None, "progress": {"failures": 134, "distinct_preventable": 3}}
+    campaign = {"state": "succeeded", "reason": None, "progress": {"distinct_failures": 14, "distinct_preventable": 3}}
     assert demo._verdict({"campaign": campaign}, demo.Console(width=80)) == 0
-    assert capsys.readouterr().out == "3 distinct failures found that a careful driver would have prevented\n"
+    assert capsys.readouterr().out == "distinct failures: 14; a careful driver would have prevented: 3\n"
 
 
 def test_it_offers_to_draw_a_preventable_failure_where_there_is_one(capsys):
