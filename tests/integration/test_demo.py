@@ -18,7 +18,7 @@ def test_a_demo_that_cannot_be_posted_says_so_and_leaves_no_service(tmp_path, ca
 
 def test_the_command_it_ends_with_draws_a_failure(tmp_path, capsys, monkeypatch):
     data_dir = tmp_path / "my data"
-    arguments = ["--family", "low", "--methods", "random", "--episodes", "60", "--seeds", "0", "1"]
+    arguments = ["--family", "low", "--methods", "bo-only", "--episodes", "40", "--seeds", "78"]
     assert main([*arguments, "--out", str(tmp_path / "demo.json"), "--data-dir", str(data_dir)]) == 0
     found = json.loads((tmp_path / "demo.json").read_text())
     assert all((data_dir / failure["series"]).is_file() for failure in found["failures"])
