@@ -16,10 +16,8 @@ NORMAL_DECEL_MPS2 = 4.5  # what SUMO assumes of a leader, and its default for pa
 JERK_MPS3 = 12.65  # at which a braking builds up (UN R157, the careful driver)
 BUILD_UP_S = NORMAL_DECEL_MPS2 / JERK_MPS3  # which its model, whose braking steps, does not reckon with
 OWN_CHOICE_MPS = -1.0  # SUMO's word for the speed that its models choose
-SAFE_MODE, EMERGENCY_MODE = (
-    31,
-    26,
-)  # SUMO holds told speeds to its normal deceleration, unless its checks of speed are off
+SAFE_MODE = 31  # all of SUMO's checks; told speeds are then held to the normal deceleration
+EMERGENCY_MODE = 26  # without those of safe speed and of deceleration
 
 
 class Driver:
