@@ -12,19 +12,9 @@ from numpy.typing import NDArray
 from risk_sac.durable import replace_file
 from risk_sac.risk.publish import Assessment
 from risk_sac.types import Bools, Floats, Frame, SeriesFile
+from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
 
-PER_ACTOR = (
-    "x_m",
-    "y_m",
-    "heading_rad",
-    "vx_mps",
-    "vy_mps",
-    "speed_mps",
-    "lateral_mps",
-    "accel_mps2",
-    "lane_offset_m",
-    "link",
-)
+PER_ACTOR = (*MOTION, "link")
 
 
 @dataclass(frozen=True, slots=True)
