@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.errors import InfeasibleScene, SimulationError
-from risk_sac.geometry import overlapping_pairs
+from risk_sac.geometry import overlapping_pairs, relative_view
 from risk_sac.observation import LIMIT, Encoder
 from risk_sac.problem import Problem
 from risk_sac.risk.publish import assess, publish, worst_rss_margin
-from risk_sac.risk.realism import Motion, adversaries_cost, broken_hard_rule
+from risk_sac.risk.realism import adversaries_cost, broken_hard_rule
 from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S
@@ -128,7 +128,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._steps += 1
         self._inside_limits &= not self._controlled or self._adversaries.keep_limits(self._frame)
         self._teleported |= bool(self._frame.teleported)
-        contact = find_contact(before, self._frame, self._measures.assessment.view)
+        contact = None
+        if self._measures.assessment.touched:
+            contact = find_contact(before, self._frame, relative_view(self._frame))
         self._trace.append(self._frame, self._measures, action)
         collision = None if contact is None else self._judge(contact)
         self._touched |= self._in_contact()
@@ -208,13 +210,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _check_feasible(self, scene: Scene) -> None:
         """C_hard of Eq. 5, when the adversaries are released."""
-        view = self._measures.assessment.view
-        self._spawn_overlap = bool(view.overlap.any() or self._in_contact())
+        assessment = self._measures.assessment
+        self._spawn_overlap = assessment.touched or bool(self._in_contact())
         rule = broken_hard_rule(
             self._spawn_overlap,
-            float(view.gap.min()),
-            self._measures.signals["ttc_s"],
-            worst_rss_margin(self._measures.assessment),
+            float(assessment.gap_m.min()),
+            assessment.least.ttc_s,
+            worst_rss_margin(assessment),
             in_conflict=self._careful_driver_in_conflict(),
         )
         if rule is not None:
@@ -231,9 +233,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _in_contact(self) -> set[str]:
         """Who touches somebody other than the ego."""
-        f = self._frame
-        pairs = overlapping_pairs(f.x_m, f.y_m, f.heading_rad, f.length_m, f.width_m)
-        return {f.ids[i] for pair in pairs if pair[0] > 0 for i in pair}
+        pairs = overlapping_pairs(self._frame.state)
+        return {self._frame.ids[i] for pair in pairs if pair[0] > 0 for i in pair}
 
     def _measure(self, frame: Frame, before: Frame | None) -> Measures:
         assessment = assess(frame, self.problem.rss, self._sight)
@@ -250,9 +251,11 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return adversaries_cost(
             self._adversaries.rows(frame),
             self._adversaries.accel_limits(frame),
-            frame.kind == int(Kind.PEDESTRIAN),
-            _motion(frame, now),
-            _motion(before, previous),
+            frame.kind,
+            frame.state,
+            now.assessment.gap_m,
+            before.state,
+            previous.assessment.gap_m,
             STEP_S,
         )
 
@@ -313,14 +316,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.problem.family.horizon_steps
         m = self._measures
-        return self._encoder.encode(
-            self._frame, m.assessment.view, m.assessment.seen, m.robustness, self._unit_scene, time_left
-        )
-
-
-def _motion(frame: Frame, measures: Measures) -> Motion:
-    f = frame
-    return Motion(f.accel_mps2, f.lateral_mps, f.heading_rad, f.speed_mps, measures.assessment.view.gap)
+        return self._encoder.encode(self._frame, m.assessment, m.robustness, self._unit_scene, time_left)
 
 
 def make_default(family: FamilyName) -> RiskSacEnv:

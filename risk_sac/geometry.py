@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.jit import compiled
-from risk_sac.types import Bools, Floats, Frame
+from risk_sac.types import HEADING, LENGTH, VX, VY, WIDTH, Bools, Floats, Frame, X, Y
 
 NO_MOTION = 1e-9  # m/s or m; keeps the sweeps' divisions finite, far below anything that matters
 
@@ -42,16 +42,14 @@ class RelativeView(NamedTuple):
 
 def relative_view(frame: Frame) -> RelativeView:
     """Expresses every other actor of `frame` in the ego's frame."""
-    return frame_view(
-        frame.x_m, frame.y_m, frame.heading_rad, frame.vx_mps, frame.vy_mps, frame.length_m, frame.width_m
-    )
+    return frame_view(frame.state)
 
 
 @compiled
-def frame_view(
-    x: Floats, y: Floats, heading: Floats, vx: Floats, vy: Floats, length: Floats, width: Floats
-) -> RelativeView:
-    """`relative_view` of the arrays of a frame, `n + 1` each with the ego in front."""
+def frame_view(state: Floats) -> RelativeView:
+    """`relative_view` of a frame's state."""
+    x, y, heading, vx, vy = state[X], state[Y], state[HEADING], state[VX], state[VY]
+    length, width = state[LENGTH], state[WIDTH]
     cos_ego, sin_ego = math.cos(heading[0]), math.sin(heading[0])
     dx, dy = x[1:] - x[0], y[1:] - y[0]
     dvx, dvy = vx[1:] - vx[0], vy[1:] - vy[0]
@@ -232,8 +230,9 @@ def _crosses(view: RelativeView, wall: int, px: float, py: float) -> bool:
 
 
 @compiled
-def overlapping_pairs(x: Floats, y: Floats, heading: Floats, length: Floats, width: Floats) -> list[tuple[int, int]]:
-    """Pairs i < j of `n` boxes that touch or overlap, in any frame of reference."""
+def overlapping_pairs(state: Floats) -> list[tuple[int, int]]:
+    """Pairs i < j of the actors in a frame's state whose bodies touch or overlap."""
+    x, y, heading, length, width = state[X], state[Y], state[HEADING], state[LENGTH], state[WIDTH]
     pairs = [(0, 0) for _ in range(0)]  # an empty list whose type the compiler can tell
     for i in range(len(x)):
         cos, sin = math.cos(heading[i]), math.sin(heading[i])

@@ -8,11 +8,11 @@ history: without it the shaped reward would not be Markov.
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.geometry import RelativeView
 from risk_sac.jit import compiled
+from risk_sac.risk.publish import AHEAD, ASIDE, CLOSING_X, CLOSING_Y, COS, GAP, SEEN, SIN, Assessment
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.scenario.families import Family
-from risk_sac.types import Bools, Floats, Frame
+from risk_sac.types import ACCEL, LATERAL, SPEED, Floats, Frame
 
 PER_ADVERSARY = 10
 PER_EGO = 8
@@ -30,77 +30,65 @@ class Encoder:
         self._ids: tuple[str, ...] = ()
 
     def encode(
-        self,
-        frame: Frame,
-        view: RelativeView,
-        visible: Bools,
-        robustness: Floats,
-        unit_scene: Floats,
-        time_left: float,
+        self, frame: Frame, assessment: Assessment, robustness: Floats, unit_scene: Floats, time_left: float
     ) -> NDArray[np.float32]:
         """The observation, `size`, each entry in [-LIMIT, LIMIT]; an adversary that left the net is all zeros."""
         if frame.ids is not self._ids:
             self._ids = frame.ids
             self._rows = np.array([frame.ids.index(a) if a in frame.ids else 0 for a in self._adversaries])
-        result = np.zeros(self.size)
-        _fill(
-            result,
+        return _encoded(
+            self.size,
             self._rows,
-            view,
-            visible,
-            frame.speed_mps,
-            frame.accel_mps2,
-            frame.lateral_mps[0],
+            assessment.others,
+            frame.state,
             frame.stop_line_m,
             int(frame.signal),
             unit_scene,
             robustness,
             time_left,
         )
-        return result.astype(np.float32)
 
 
 @compiled
-def _fill(
-    result: Floats,
+def _encoded(
+    size: int,
     rows: NDArray[np.int64],
-    view: RelativeView,
-    visible: Bools,
-    speed_mps: Floats,
-    accel_mps2: Floats,
-    ego_lateral_mps: float,
+    others: Floats,
+    state: Floats,
     stop_line_m: float,
     signal: int,
     unit_scene: Floats,
     robustness: Floats,
     time_left: float,
-) -> None:
+) -> NDArray[np.float32]:
+    result = np.zeros(size)
     for slot in range(len(rows)):
         row = rows[slot]
         if row == 0:  # left the net; 0 is the ego itself
             continue
         i, at = row - 1, slot * PER_ADVERSARY
-        result[at] = view.x[i] / X_M
-        result[at + 1] = view.y[i] / Y_M
-        result[at + 2] = view.vx[i] / SPEED_MPS
-        result[at + 3] = view.vy[i] / LATERAL_MPS
-        result[at + 4] = view.cos[i]
-        result[at + 5] = view.sin[i]
-        result[at + 6] = speed_mps[row] / SPEED_MPS
-        result[at + 7] = accel_mps2[row] / ACCEL_MPS2
-        result[at + 8] = view.gap[i] / GAP_M
-        result[at + 9] = visible[i]
+        result[at] = others[AHEAD, i] / X_M
+        result[at + 1] = others[ASIDE, i] / Y_M
+        result[at + 2] = others[CLOSING_X, i] / SPEED_MPS
+        result[at + 3] = others[CLOSING_Y, i] / LATERAL_MPS
+        result[at + 4] = others[COS, i]
+        result[at + 5] = others[SIN, i]
+        result[at + 6] = state[SPEED, row] / SPEED_MPS
+        result[at + 7] = state[ACCEL, row] / ACCEL_MPS2
+        result[at + 8] = others[GAP, i] / GAP_M
+        result[at + 9] = others[SEEN, i]
     at = len(rows) * PER_ADVERSARY
-    result[at] = speed_mps[0] / SPEED_MPS
-    result[at + 1] = accel_mps2[0] / ACCEL_MPS2
-    result[at + 2] = ego_lateral_mps / LATERAL_MPS
+    result[at] = state[SPEED, 0] / SPEED_MPS
+    result[at + 1] = state[ACCEL, 0] / ACCEL_MPS2
+    result[at + 2] = state[LATERAL, 0] / LATERAL_MPS
     result[at + 3] = stop_line_m / X_M
     result[at + 4 + signal] = 1.0
     at += PER_EGO
-    for values in (unit_scene, robustness / ROBUSTNESS_CLIP):
-        for value in values:
-            result[at] = value
-            at += 1
+    for value in unit_scene:
+        result[at] = value
+        at += 1
+    for value in robustness:
+        result[at] = value / ROBUSTNESS_CLIP
+        at += 1
     result[at] = time_left
-    for k in range(len(result)):
-        result[k] = min(max(result[k], -LIMIT), LIMIT)
+    return np.minimum(np.maximum(result, -LIMIT), LIMIT).astype(np.float32)

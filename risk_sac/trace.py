@@ -28,7 +28,7 @@ class Measures:
 
 
 PER_OTHER: dict[str, Callable[[Assessment], Floats | Bools]] = {
-    "distance_m": lambda assessment: assessment.view.gap,
+    "distance_m": lambda assessment: assessment.gap_m,
     "ttc_s": lambda assessment: assessment.ttc_s,
     "rss_longitudinal_m": lambda assessment: assessment.rss_longitudinal_m,
     "rss_lateral_m": lambda assessment: assessment.rss_lateral_m,

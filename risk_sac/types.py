@@ -50,35 +50,53 @@ class Scene:
     values: Mapping[str, float]
 
 
+# Rows of a frame's state. Compiled code takes the whole of it: each array that it is handed costs as much as a loop.
+X, Y, HEADING, VX, VY, SPEED, LATERAL, ACCEL, OFFSET, LENGTH, WIDTH = range(11)
+
+
+class Row:
+    """One row of a frame's state, read by name."""
+
+    def __init__(self, index: int) -> None:
+        self.index = index
+
+    def __get__(self, frame: "Frame", owner: type) -> Floats:
+        """The row, `n`; a view."""
+        row: Floats = frame.state[self.index]
+        return row
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """All actors after one simulation step; every array has `n` entries and index 0 is the ego."""
+    """All actors after one simulation step; every array has `n` columns and the first is the ego's."""
 
     time_s: float
     ids: tuple[str, ...]
     kind: NDArray[np.int8]
     role: NDArray[np.int8]
-    x_m: Floats
-    y_m: Floats
-    heading_rad: Floats
-    vx_mps: Floats  # velocity over the last step, east
-    vy_mps: Floats  # north
-    speed_mps: Floats  # along the lane or the walking direction, never negative
-    lateral_mps: Floats  # across the lane, positive to the left
-    accel_mps2: Floats
-    length_m: Floats
-    width_m: Floats
+    state: Floats  # rows x n: those below
     signal: Signal
     stop_line_m: float  # ego's front bumper to its next signal's stop line; negative once past; inf without one
-    lane_offset_m: Floats  # a vehicle's centre from its lane's centre, positive to the left; 0 of pedestrians
     link: NDArray[np.uint8]  # SUMO's letter of the signal ahead, such as ord("g"): green, but has to yield; 0: none
     simulator_collisions: tuple[tuple[str, str], ...] = ()  # SUMO's own list, a cross-check only
     teleported: tuple[str, ...] = ()
 
+    x_m = Row(X)
+    y_m = Row(Y)
+    heading_rad = Row(HEADING)
+    vx_mps = Row(VX)  # velocity over the last step, east
+    vy_mps = Row(VY)  # north
+    speed_mps = Row(SPEED)  # along the lane or the walking direction, never negative
+    lateral_mps = Row(LATERAL)  # across the lane, positive to the left
+    accel_mps2 = Row(ACCEL)
+    lane_offset_m = Row(OFFSET)  # a vehicle's centre from its lane's centre, positive to the left; 0 of pedestrians
+    length_m = Row(LENGTH)
+    width_m = Row(WIDTH)
+
     @property
     def ego_speed_mps(self) -> float:
         """Speed of the ego."""
-        return float(self.speed_mps[0])
+        return float(self.state[SPEED, 0])
 
 
 class Outcome(StrEnum):

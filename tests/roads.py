@@ -30,7 +30,7 @@ def road(
     station, x, y = (
         np.concatenate(([0.0], np.cumsum(v))) for v in (length, length * np.cos(heading), length * np.sin(heading))
     )
-    return Path(x, y, station, np.append(heading, heading[-1]), np.full(len(x), LIMIT_MPS))
+    return Path.of(x, y, station, np.append(heading, heading[-1]), np.full(len(x), LIMIT_MPS))
 
 
 def arc_m(radius_m: float, turn_rad: float = math.pi / 2) -> tuple[float, float]:

@@ -19,14 +19,9 @@ CROSSED_ON_RED_M = -1.0
 VEHICLE, PEDESTRIAN = int(Kind.VEHICLE), int(Kind.PEDESTRIAN)  # compiled code knows no enums of int8
 
 
-@compiled
-def in_charge(view: RelativeView) -> Bools:
-    """The actors the ego answers for, `n`: ahead of it or alongside.
-
-    Choice: whoever comes from behind must keep the distance (RSS, rule 1), so TTC and RSS do not count
-    them; otherwise tailgating the ego would look like a risk the ego takes.
-    """
-    return view.x > -view.ego_half_length
+# Rows of an assessment, one column for each of the `n` actors other than the ego, in its frame as in `RelativeView`.
+AHEAD, ASIDE, CLOSING_X, CLOSING_Y, COS, SIN, GAP, SEEN = range(8)
+TTC, RSS_LONGITUDINAL, RSS_LATERAL, RSS_SCALED, CHARGED = range(8, 13)
 
 
 class LeastMargins(NamedTuple):
@@ -39,81 +34,103 @@ class LeastMargins(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """What one frame says about risk; arrays hold the `n` actors other than the ego."""
+    """What one frame says about risk; each array has an entry for each of the `n` actors other than the ego."""
 
-    view: RelativeView
-    seen: Bools  # in the ego's sight
-    ttc_s: Floats
-    rss_longitudinal_m: Floats
-    rss_lateral_m: Floats
-    rss_margin: Floats  # scaled
+    others: Floats  # the rows above x n
     least: LeastMargins
+    touched: bool  # whether the ego touches anybody
+
+    @property
+    def gap_m(self) -> Floats:
+        """Distance between the bodies."""
+        gap: Floats = self.others[GAP]
+        return gap
+
+    @property
+    def seen(self) -> Bools:
+        """Who is in the ego's sight."""
+        seen: Bools = self.others[SEEN] != 0.0
+        return seen
+
+    @property
+    def ttc_s(self) -> Floats:
+        """Time to collision."""
+        ttc: Floats = self.others[TTC]
+        return ttc
+
+    @property
+    def rss_longitudinal_m(self) -> Floats:
+        """See `risk_sac.risk.rss.Margins`."""
+        margin: Floats = self.others[RSS_LONGITUDINAL]
+        return margin
+
+    @property
+    def rss_lateral_m(self) -> Floats:
+        """See `risk_sac.risk.rss.Margins`."""
+        margin: Floats = self.others[RSS_LATERAL]
+        return margin
 
 
 def assess(frame: Frame, rss: RssParameters, sight: Sight) -> Assessment:
     """All measures of a frame, in one compiled call."""
-    return _assess(
-        frame.x_m,
-        frame.y_m,
-        frame.heading_rad,
-        frame.vx_mps,
-        frame.vy_mps,
-        frame.length_m,
-        frame.width_m,
-        frame.kind,
-        rss,
-        sight,
-    )
+    others, least, touched = _assess(frame.state, frame.kind, rss, *sight)
+    return Assessment(others, LeastMargins(*least), touched)
 
 
 @compiled
 def _assess(
-    x: Floats,
-    y: Floats,
-    heading: Floats,
-    vx: Floats,
-    vy: Floats,
-    length: Floats,
-    width: Floats,
-    kind: NDArray[np.int8],
-    rss: RssParameters,
-    sight: Sight,
-) -> Assessment:
-    view = frame_view(x, y, heading, vx, vy, length, width)
+    state: Floats, kind: NDArray[np.int8], rss: RssParameters, reach_m: float, half_view_rad: float, occlusion: bool
+) -> tuple[Floats, tuple[float, float, float, float], bool]:
+    view = frame_view(state)
     ttc_s = time_to_collision(view)
     rss_margins = margins(view, kind[1:] == PEDESTRIAN, rss)
-    return Assessment(
-        view,
-        in_sight(view, kind[1:] == VEHICLE, sight),
-        ttc_s,
-        rss_margins.longitudinal_m,
-        rss_margins.lateral_m,
-        rss_margins.scaled,
-        least_margins(view, kind, ttc_s, rss_margins.scaled),
-    )
+    seen = in_sight(view, kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion))
+    charged = in_charge(view)
+    n = len(charged)
+    others = np.empty((CHARGED + 1, n))
+    touched = False
+    for i in range(n):
+        touched |= view.overlap[i]
+        others[AHEAD, i], others[ASIDE, i] = view.x[i], view.y[i]
+        others[CLOSING_X, i], others[CLOSING_Y, i] = view.vx[i], view.vy[i]
+        others[COS, i], others[SIN, i], others[GAP, i] = view.cos[i], view.sin[i], view.gap[i]
+        others[SEEN, i], others[TTC, i], others[CHARGED, i] = seen[i], ttc_s[i], charged[i]
+        others[RSS_LONGITUDINAL, i] = rss_margins.longitudinal_m[i]
+        others[RSS_LATERAL, i] = rss_margins.lateral_m[i]
+        others[RSS_SCALED, i] = rss_margins.scaled[i]
+    return others, least_margins(others, kind), touched
 
 
 @compiled
-def least_margins(view: RelativeView, kind: NDArray[np.int8], ttc_s: Floats, rss_margin: Floats) -> LeastMargins:
-    """See `LeastMargins`; TTC and RSS over those the ego answers for, gaps over all."""
+def in_charge(view: RelativeView) -> Bools:
+    """The actors the ego answers for, `n`: ahead of it or alongside.
+
+    Choice: whoever comes from behind must keep the distance (RSS, rule 1), so TTC and RSS do not count
+    them; otherwise tailgating the ego would look like a risk the ego takes.
+    """
+    return view.x > -view.ego_half_length
+
+
+@compiled
+def least_margins(others: Floats, kind: NDArray[np.int8]) -> tuple[float, float, float, float]:
+    """`LeastMargins`; TTC and RSS over those the ego answers for, gaps over all."""
     ttc, rss = TTC_CAP_S, SCALED_HIGH
     pedestrian, vehicle = PEDESTRIAN_GAP_CAP_M, GAP_CAP_M
-    charge = in_charge(view)
-    for i in range(len(charge)):
-        if charge[i]:
-            ttc = min(ttc, ttc_s[i])
-            rss = min(rss, rss_margin[i])
+    for i in range(others.shape[1]):
+        if others[CHARGED, i] != 0.0:
+            ttc = min(ttc, others[TTC, i])
+            rss = min(rss, others[RSS_SCALED, i])
         if kind[i + 1] == PEDESTRIAN:
-            pedestrian = min(pedestrian, view.gap[i])
+            pedestrian = min(pedestrian, others[GAP, i])
         else:
-            vehicle = min(vehicle, view.gap[i])
-    return LeastMargins(ttc, rss, pedestrian, vehicle)
+            vehicle = min(vehicle, others[GAP, i])
+    return ttc, rss, pedestrian, vehicle
 
 
 def worst_rss_margin(assessment: Assessment) -> float:
     """Smallest RSS margin: of each actor the ego answers for, the larger of the two, since it takes both, m."""
     margin = np.maximum(assessment.rss_longitudinal_m, assessment.rss_lateral_m)
-    return float(margin.min(where=in_charge(assessment.view), initial=LONGITUDINAL_CAP_M))
+    return float(margin.min(where=assessment.others[CHARGED] != 0.0, initial=LONGITUDINAL_CAP_M))
 
 
 def publish(frame: Frame, before: Frame | None, least: LeastMargins) -> dict[str, float]:

@@ -10,13 +10,13 @@ would mean nothing.
 Source: RISK-SAC, Sec. III-B.
 """
 
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.jit import compiled
-from risk_sac.types import Bools, Floats
+from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, Bools, Floats, Kind
 
 BUILD_UP_S = 0.4  # in which an emergency braking builds up from nothing to an actor's limit
 ORDINARY_JERK = 0.75  # share of the jerk that this takes, up to which a driver counts as ordinary
@@ -30,17 +30,9 @@ CLOSING_SCALE_MPS = 15.0  # closing speed at which the closeness term saturates;
 MIN_INITIAL_TTC_S = 1.0  # a shorter one leaves a default driver (0.5 s delay) no chance: the scene itself collides
 MIN_INITIAL_GAP_M = 0.5  # bodies placed closer than traffic ever stands
 
+PEDESTRIAN = int(Kind.PEDESTRIAN)  # compiled code knows no enums of int8
+
 HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc", "initial_rss", "initial_conflict"]
-
-
-class Motion(NamedTuple):
-    """What the cost looks at in a frame of `n` actors."""
-
-    accel_mps2: Floats
-    lateral_mps: Floats
-    heading_rad: Floats
-    speed_mps: Floats
-    gap_m: Floats  # n - 1, from the ego's body to the others'
 
 
 @compiled
@@ -147,32 +139,41 @@ def soft_cost(
 
 @compiled
 def adversaries_cost(
-    rows: NDArray[np.intp], limit_mps2: Floats, walks: Bools, now: Motion, before: Motion, step_s: float
+    rows: NDArray[np.intp],
+    limit_mps2: Floats,
+    kind: NDArray[np.int8],
+    state: Floats,
+    gap_m: Floats,
+    previous: Floats,
+    previous_gap_m: Floats,
+    step_s: float,
 ) -> float:
-    """C_soft of the adversaries between two frames of the same `n` actors.
+    """C_soft of the adversaries between two frames of the same actors.
 
     Args:
-      rows: of the adversaries in the frames.
+      rows: columns of the adversaries in the frames.
       limit_mps2: greatest absolute acceleration of each adversary.
-      walks: `n`, who is a pedestrian.
-      now: how everybody moves.
-      before: the same one step before.
+      kind: `n`, of every actor.
+      state: of the frame now.
+      gap_m: `n - 1`, from the ego's body to the others'.
+      previous: state one step before.
+      previous_gap_m: the gaps one step before.
       step_s: dt.
     """
     return soft_cost(
-        now.accel_mps2[rows],
-        before.accel_mps2[rows],
+        state[ACCEL][rows],
+        previous[ACCEL][rows],
         lateral_accel(
-            now.lateral_mps[rows],
-            before.lateral_mps[rows],
-            now.heading_rad[rows] - before.heading_rad[rows],
-            now.speed_mps[rows],
-            walks[rows],
+            state[LATERAL][rows],
+            previous[LATERAL][rows],
+            state[HEADING][rows] - previous[HEADING][rows],
+            state[SPEED][rows],
+            kind[rows] == PEDESTRIAN,
             step_s,
         ),
         limit_mps2,
-        now.gap_m[rows - 1],
-        before.gap_m[rows - 1],
+        gap_m[rows - 1],
+        previous_gap_m[rows - 1],
         step_s,
     )
 

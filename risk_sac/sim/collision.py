@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from risk_sac.geometry import RelativeView, box_view, contact_point, zone
-from risk_sac.types import Frame
+from risk_sac.jit import compiled
+from risk_sac.types import HEADING, LENGTH, VX, VY, WIDTH, Floats, Frame, X, Y
 
 BISECTIONS = 10  # of 0.1 s: locates the contact to 0.1 ms
 
@@ -45,38 +46,42 @@ def find_contact(before: Frame | None, frame: Frame, view: RelativeView) -> Cont
     touching = np.flatnonzero(view.overlap)
     if before is None or before.ids != frame.ids:
         return _describe(frame, int(touching[0]) + 1, frame, 1.0)
-    share, other = min((_first_touch(before, frame, int(i) + 1), int(i) + 1) for i in touching)
+    share, other = min((_first_touch(before.state, frame.state, int(i) + 1), int(i) + 1) for i in touching)
     return _describe(before, other, frame, share)
 
 
-def _first_touch(before: Frame, frame: Frame, other: int) -> float:
+@compiled
+def _first_touch(before: Floats, now: Floats, other: int) -> float:
     """Share of the step, in (0, 1], after which the ego first touches `other`."""
     low, high = 0.0, 1.0
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        if _pair_view(before, frame, 0, other, middle).overlap[0]:
+        if _seen_from_ego(before, now, other, middle).overlap[0]:
             high = middle
         else:
             low = middle
     return high
 
 
-def _pose(before: Frame, frame: Frame, index: int, share: float) -> tuple[float, float, float]:
-    turn = math.remainder(frame.heading_rad[index] - before.heading_rad[index], math.tau)
+@compiled
+def _pose(before: Floats, now: Floats, actor: int, share: float) -> tuple[float, float, float]:
+    turn = now[HEADING, actor] - before[HEADING, actor]
+    turn -= math.tau * round(turn / math.tau)
     return (
-        float(before.x_m[index] + share * (frame.x_m[index] - before.x_m[index])),
-        float(before.y_m[index] + share * (frame.y_m[index] - before.y_m[index])),
-        float(before.heading_rad[index] + share * turn),
+        before[X, actor] + share * (now[X, actor] - before[X, actor]),
+        before[Y, actor] + share * (now[Y, actor] - before[Y, actor]),
+        before[HEADING, actor] + share * turn,
     )
 
 
-def _pair_view(before: Frame, frame: Frame, one: int, other: int, share: float) -> RelativeView:
-    """`other` seen from `one`, `share` of the way between two frames."""
-    x0, y0, h0 = _pose(before, frame, one, share)
-    x1, y1, h1 = _pose(before, frame, other, share)
+@compiled
+def _seen_from_ego(before: Floats, now: Floats, other: int, share: float) -> RelativeView:
+    """`other` alone in the ego's frame, `share` of the way between two states."""
+    x0, y0, h0 = _pose(before, now, 0, share)
+    x1, y1, h1 = _pose(before, now, other, share)
     cos0, sin0 = math.cos(h0), math.sin(h0)
-    vx, vy = float(frame.vx_mps[one]), float(frame.vy_mps[one])
-    dvx, dvy = frame.vx_mps[other] - vx, frame.vy_mps[other] - vy
+    vx, vy = now[VX, 0], now[VY, 0]
+    dvx, dvy = now[VX, other] - vx, now[VY, other] - vy
     return box_view(
         np.array([(x1 - x0) * cos0 + (y1 - y0) * sin0]),
         np.array([(y1 - y0) * cos0 - (x1 - x0) * sin0]),
@@ -84,17 +89,17 @@ def _pair_view(before: Frame, frame: Frame, one: int, other: int, share: float) 
         np.array([dvy * cos0 - dvx * sin0]),
         np.array([math.cos(h1 - h0)]),
         np.array([math.sin(h1 - h0)]),
-        frame.length_m[other : other + 1] / 2,
-        frame.width_m[other : other + 1] / 2,
+        np.array([now[LENGTH, other] / 2]),
+        np.array([now[WIDTH, other] / 2]),
         vx * cos0 + vy * sin0,
         vy * cos0 - vx * sin0,
-        float(frame.length_m[one]) / 2,
-        float(frame.width_m[one]) / 2,
+        now[LENGTH, 0] / 2,
+        now[WIDTH, 0] / 2,
     )
 
 
 def _describe(before: Frame, other: int, frame: Frame, share: float) -> Contact:
-    view = _pair_view(before, frame, 0, other, share)
+    view = _seen_from_ego(before.state, frame.state, other, share)
     x, y = contact_point(view)
     cos, sin = float(view.cos[0]), float(view.sin[0])
     dx, dy = x - float(view.x[0]), y - float(view.y[0])

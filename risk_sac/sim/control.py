@@ -9,13 +9,15 @@ causes a jolt.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.jit import compiled
 from risk_sac.scenario.families import Family
 from risk_sac.scenario.limits import Limits
-from risk_sac.sim.bends import BODY_M, Bends, bends
+from risk_sac.sim.bends import BODY_M, CAP, HERE, SOON, bends, index
 from risk_sac.sim.paths import Along, Path
 from risk_sac.sim.sumo import Room, SumoSimulation, VehicleCommand, Walker
 from risk_sac.types import STEP_S, Floats, Frame
@@ -25,6 +27,7 @@ EDGE_M = 0.03  # of the road that is kept free: what a car overshoots by that br
 SKID = 0.98  # who is too fast for a curve keeps a fifth of its grip for braking, or it would never slow down
 
 
+@compiled
 def _taper(distance: float, rate: float) -> float:
     """Largest value that falls to 0 by at most `rate` per second while its sum over steps stays within `distance`.
 
@@ -38,8 +41,31 @@ def _taper(distance: float, rate: float) -> float:
     return full * change / 2.0 + total / (full + 1)
 
 
+@compiled
 def _clip(value: float, low: float, high: float) -> float:
     return low if value < low else high if value > high else value
+
+
+class Bounds(NamedTuple):
+    """What compiled code knows of a vehicle's `Limits`; named as there."""
+
+    speed_mps: float
+    accel_mps2: float
+    brake_mps2: float
+    grip_mps2: float
+    jerk_mps3: float
+    lateral_mps: float
+    lateral_accel_mps2: float
+    curvature_per_m: float
+    cornering_mps2: float
+    slip: float
+    preview_s: float  # as long as it takes to get from full acceleration to the braking that bends are approached with
+
+    @classmethod
+    def of(cls, limits: Limits) -> "Bounds":
+        """Those of some limits."""
+        preview_s = (limits.accel_mps2 + limits.approach_mps2) / limits.jerk_mps3
+        return cls(**{name: getattr(limits, name) for name in cls._fields[:-1]}, preview_s=preview_s)
 
 
 @dataclass(slots=True)
@@ -53,15 +79,14 @@ class VehicleControl:
     speed_mps: float
     accel_mps2: float = 0.0
     lateral_mps: float = 0.0
+    _bounds: Floats = field(init=False)
     _path: Path | None = field(init=False, default=None)
-    _bends: Bends = field(init=False)  # of that path
-    _at: int = field(init=False, default=0)  # where on them
+    _bends: Floats = field(init=False)  # of that path
+    _at_m: float = field(init=False, default=0.0)  # where on it
     _behind_per_m: float = field(init=False, default=0.0)  # bend before that path, which the body has yet to leave
-    _preview_s: float = field(init=False)
 
     def __post_init__(self) -> None:
-        # As long as it takes to get from full acceleration to the braking that bends are approached with.
-        self._preview_s = (self.limits.accel_mps2 + self.limits.approach_mps2) / self.limits.jerk_mps3
+        self._bounds = np.array(Bounds.of(self.limits))
 
     def step(self, drive: float, steer: float, room: Room, along: Along, intended_mps2: float = 0.0) -> VehicleCommand:
         """One step of 0.1 s.
@@ -73,55 +98,104 @@ class VehicleControl:
           along: where it is on the path it takes if it does not steer.
           intended_mps2: what its driver would do if nobody commanded it.
         """
-        curvature, ahead, cap = self._look_ahead(along)
-        before = self.speed_mps
-        self._accelerate(drive, intended_mps2, curvature, ahead, cap)
-        self._steer(steer, room, max(self.limits.curvature_per_m - curvature, CORRECTION_PER_M), before)
-        return VehicleCommand(self.speed_mps, self.lateral_mps)
-
-    def _look_ahead(self, along: Along) -> tuple[float, float, float]:
-        """Curvature here, the largest just ahead, and the speed that bends allow where it will be shortly."""
         if along.path is not self._path:
             if self._path is not None:
-                self._behind_per_m = self._bends.ahead_per_m[self._at]
+                self._behind_per_m = float(self._bends[SOON, index(self._bends, self._at_m)])
             self._path, self._bends = along.path, bends(along.path, self.limits)
-        self._at = self._bends.index(along.station_m)
-        behind = self._behind_per_m if along.station_m < BODY_M else 0.0
-        preview = self._bends.index(along.station_m + self.speed_mps * self._preview_s)
-        curvature = max(self._bends.curvature_per_m[self._at], behind)
-        cap = min(self._bends.cap_mps[self._at], self._bends.cap_mps[preview])
-        return curvature, max(self._bends.ahead_per_m[self._at], behind), cap
+        self._at_m = along.station_m
+        self.speed_mps, self.accel_mps2, self.lateral_mps = _drive(
+            self._bounds,
+            self._bends,
+            along.station_m,
+            self._behind_per_m,
+            self.speed_mps,
+            self.accel_mps2,
+            self.lateral_mps,
+            drive,
+            steer,
+            room.left_m,
+            room.right_m,
+            intended_mps2,
+        )
+        return VehicleCommand(self.speed_mps, self.lateral_mps)
 
-    def _accelerate(self, drive: float, intended_mps2: float, curvature: float, ahead: float, cap_mps: float) -> None:
-        limits, speed = self.limits, self.speed_mps
-        # Choice: the less a command says, the more the driver's own intention counts. Doing nothing is then to drive on
-        # as anybody would, and not to run into whoever stands ahead or over a red light.
-        wanted = drive * (limits.accel_mps2 if drive >= 0 else limits.brake_mps2) + (1.0 - abs(drive)) * intended_mps2
-        bend = max(curvature * speed**2, min(ahead * speed**2, limits.cornering_mps2))
-        across = min(bend + limits.lateral_accel_mps2, SKID * limits.grip_mps2)
-        grip = math.sqrt(limits.grip_mps2**2 - across**2)
-        low = max(-limits.brake_mps2, -grip, -_taper(speed, limits.jerk_mps3))
-        high = min(limits.accel_mps2, grip, _taper(limits.speed_mps - speed, limits.jerk_mps3))
-        high = max(min(high, (cap_mps - speed) / self._preview_s), low)
-        change = limits.jerk_mps3 * STEP_S
-        self.accel_mps2 = _clip(_clip(wanted, low, high), self.accel_mps2 - change, self.accel_mps2 + change)
-        self.speed_mps = _clip(speed + self.accel_mps2 * STEP_S, 0.0, limits.speed_mps)
 
-    def _steer(self, steer: float, room: Room, curvature: float, before_mps: float) -> None:
-        """Moves across the lane as a car can: on a path whose curvature is bounded, so not at a standstill.
+@compiled
+def _drive(
+    bounds: Floats,
+    bends: Floats,
+    station_m: float,
+    behind_per_m: float,
+    speed: float,
+    accel: float,
+    lateral: float,
+    drive: float,
+    steer: float,
+    left_m: float,
+    right_m: float,
+    intended: float,
+) -> tuple[float, float, float]:
+    """Speed, acceleration and lateral speed of the next step."""
+    b = bounds
+    limits = Bounds(b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7], b[8], b[9], b[10])
+    at, soon = index(bends, station_m), index(bends, station_m + speed * limits.preview_s)
+    behind = behind_per_m if station_m < BODY_M else 0.0
+    curvature, ahead = max(bends[HERE, at], behind), max(bends[SOON, at], behind)
+    cap = min(bends[CAP, at], bends[CAP, soon])
+    accel = _accelerate(limits, speed, accel, drive, intended, curvature, ahead, cap)
+    after = _clip(speed + accel * STEP_S, 0.0, limits.speed_mps)
+    left_over = max(limits.curvature_per_m - curvature, CORRECTION_PER_M)
+    return after, accel, _steer(limits, speed, after, lateral, steer, left_m, right_m, left_over)
 
-        Keeping its heading, a car that brakes loses lateral speed with the longitudinal; `limits.slip` is such that
-        this alone is within the limit on lateral acceleration, and both bounds below always leave something.
-        """
-        limits, speed = self.limits, self.speed_mps
-        rate = min(limits.lateral_accel_mps2, CORRECTION_PER_M * speed**2)
-        room_m = (room.left_m if steer >= 0 else room.right_m) - EDGE_M
-        reach = min(limits.lateral_mps, limits.slip * speed, _taper(room_m, rate))
-        wanted = _clip(steer * limits.lateral_mps, -reach, reach)
-        same_heading = self.lateral_mps * speed / before_mps if before_mps > 0.0 else 0.0
-        turn, change = curvature * speed**2 * STEP_S, limits.lateral_accel_mps2 * STEP_S
-        wanted = _clip(wanted, same_heading - turn, same_heading + turn)
-        self.lateral_mps = _clip(wanted, self.lateral_mps - change, self.lateral_mps + change)
+
+@compiled
+def _accelerate(
+    limits: Bounds,
+    speed: float,
+    accel: float,
+    drive: float,
+    intended: float,
+    curvature: float,
+    ahead: float,
+    cap_mps: float,
+) -> float:
+    # Choice: the less a command says, the more the driver's own intention counts. Doing nothing is then to drive on
+    # as anybody would, and not to run into whoever stands ahead or over a red light.
+    wanted = drive * (limits.accel_mps2 if drive >= 0 else limits.brake_mps2) + (1.0 - abs(drive)) * intended
+    bend = max(curvature * speed**2, min(ahead * speed**2, limits.cornering_mps2))
+    across = min(bend + limits.lateral_accel_mps2, SKID * limits.grip_mps2)
+    grip = math.sqrt(limits.grip_mps2**2 - across**2)
+    low = max(-limits.brake_mps2, -grip, -_taper(speed, limits.jerk_mps3))
+    high = min(limits.accel_mps2, grip, _taper(limits.speed_mps - speed, limits.jerk_mps3))
+    high = max(min(high, (cap_mps - speed) / limits.preview_s), low)
+    change = limits.jerk_mps3 * STEP_S
+    return _clip(_clip(wanted, low, high), accel - change, accel + change)
+
+
+@compiled
+def _steer(
+    limits: Bounds,
+    before: float,
+    speed: float,
+    lateral: float,
+    steer: float,
+    left_m: float,
+    right_m: float,
+    curvature: float,
+) -> float:
+    """Moves across the lane as a car can: on a path whose curvature is bounded, so not at a standstill.
+
+    Keeping its heading, a car that brakes loses lateral speed with the longitudinal; `limits.slip` is such that
+    this alone is within the limit on lateral acceleration, and both bounds below always leave something.
+    """
+    rate = min(limits.lateral_accel_mps2, CORRECTION_PER_M * speed**2)
+    room_m = (left_m if steer >= 0 else right_m) - EDGE_M
+    reach = min(limits.lateral_mps, limits.slip * speed, _taper(room_m, rate))
+    wanted = _clip(steer * limits.lateral_mps, -reach, reach)
+    same_heading = lateral * speed / before if before > 0.0 else 0.0
+    turn, change = curvature * speed**2 * STEP_S, limits.lateral_accel_mps2 * STEP_S
+    wanted = _clip(wanted, same_heading - turn, same_heading + turn)
+    return _clip(wanted, lateral - change, lateral + change)
 
 
 @dataclass(slots=True)

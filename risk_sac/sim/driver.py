@@ -8,9 +8,9 @@ import math
 
 import libsumo
 
-from risk_sac.sim.lookout import Bodies, targets
+from risk_sac.sim.lookout import targets
 from risk_sac.sim.paths import Along
-from risk_sac.types import STEP_S, Bools
+from risk_sac.types import STEP_S, Bools, Floats
 
 NORMAL_DECEL_MPS2 = 4.5  # what SUMO assumes of a leader, and its default for passenger cars
 JERK_MPS3 = 12.65  # at which a braking builds up (UN R157, the careful driver)
@@ -87,22 +87,27 @@ class Driver:
         libsumo.vehicle.setSpeedMode(self._vehicle, EMERGENCY_MODE if accel < -NORMAL_DECEL_MPS2 else SAFE_MODE)
         libsumo.vehicle.setSpeed(self._vehicle, max(speed_mps + accel * STEP_S, 0.0))
 
-    def decide(self, row: int, speed: float, bodies: Bodies, along: Along, candidate: Bools) -> float | None:
+    def decide(
+        self, own: int, speed: float, along: Along, state: Floats, vehicle: Bools, candidate: Bools
+    ) -> float | None:
         """The acceleration that its model wants for the nearest of the targets; None where none binds.
 
         Args:
-          row: its own among the bodies.
-          speed: its own.
-          bodies: of all `n` actors.
+          own: its column among the actors.
+          speed: its own, m/s.
           along: the vehicle on its path.
+          state: of all `n` actors.
+          vehicle: `n`, who is a vehicle.
           candidate: `n`, whom it knows of and looks out for.
         """
-        gap, lead = targets(*along, row, speed, self._accel, bodies, candidate)
+        path, station_m, offset_m = along
+        found = targets(path.points, station_m, offset_m, own, self._accel, state, vehicle, candidate)
+        if not len(found):
+            return None
         wanted = math.inf
-        for gap_m, lead_mps in zip(gap.tolist(), lead.tolist(), strict=True):
-            if gap_m < math.inf:
-                room_m = gap_m - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0)
-                wanted = min(wanted, self._worth(speed, room_m, lead_mps))
+        for _, gap_m, lead_mps in found.tolist():
+            room_m = gap_m - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0)
+            wanted = min(wanted, self._worth(speed, room_m, lead_mps))
         if wanted >= speed + self._accel * STEP_S or 0.0 <= self.cruise_mps <= wanted:
             return None
         return max((wanted - speed) / STEP_S, -self._emergency_mps2)

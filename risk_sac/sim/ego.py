@@ -1,12 +1,14 @@
 """What the ego perceives: a line-of-sight sensor and the memory of who was seen since when."""
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
+
+import numpy as np
 
 from risk_sac.config import SensorConfig
 from risk_sac.geometry import Sight
-from risk_sac.types import Bools, Frame
+from risk_sac.jit import compiled
+from risk_sac.types import HEADING, VX, VY, Bools, Floats, Frame, X, Y
 
 
 def sight(sensor: SensorConfig | None, visibility_m: float) -> Sight:
@@ -25,36 +27,17 @@ TIME_TOLERANCE_S = 1e-6  # SUMO counts milliseconds, we add floats
 FLICKER_S = 0.5  # out of sight for no longer, an actor was in view without a break
 
 
-class Glimpse(NamedTuple):
-    """An actor as it was last seen."""
-
-    time_s: float
-    x_m: float
-    y_m: float
-    heading_rad: float
-    vx_mps: float
-    vy_mps: float
-
-    @classmethod
-    def of(cls, frame: Frame, row: int) -> "Glimpse":
-        """An actor of a frame."""
-        x_m, y_m, heading_rad, vx_mps, vy_mps = (float(getattr(frame, name)[row]) for name in cls._fields[1:])
-        return cls(frame.time_s, x_m, y_m, heading_rad, vx_mps, vy_mps)
-
-    def moved_on(self, time_s: float) -> "Glimpse":
-        """Where it is expected to be, if it keeps its velocity."""
-        ahead_s = time_s - self.time_s
-        return self._replace(time_s=time_s, x_m=self.x_m + ahead_s * self.vx_mps, y_m=self.y_m + ahead_s * self.vy_mps)
+# Rows of the memory, one column for each actor: when it was last seen, and since when without a break, s, NaN if not;
+# then the first rows of its state when it was last seen.
+SEEN_S, SINCE_S, THEN = 0, 1, 2
+MOTION = (X, Y, HEADING, VX, VY)
 
 
 class Belief(NamedTuple):
-    """What the ego makes of what it does not see."""
+    """What the ego makes of the `n` actors of a frame."""
 
-    hidden: frozenset[str]  # of whom it knows nothing
-    expected: Mapping[str, Glimpse]  # whom it remembers
-
-
-NOTHING_HIDDEN = Belief(frozenset(), {})
+    known: Bools  # of the rest it knows nothing
+    expected: Floats  # position, heading and velocity, `5 x n`, of those it remembers; NaN of the rest
 
 
 class Perception:
@@ -65,13 +48,12 @@ class Perception:
 
     def __init__(self, memory_s: float) -> None:
         self._memory_s = memory_s
-        self._in_view_since: dict[str, float] = {}
-        self._last_seen: dict[str, tuple[Frame, int]] = {}  # and the row in it
+        self.reset()
 
     def reset(self) -> None:
         """Forgets the previous episode."""
-        self._in_view_since.clear()
-        self._last_seen.clear()
+        self._ids: tuple[str, ...] = ()
+        self._memory = np.empty((THEN + len(MOTION), 0))
 
     def update(self, frame: Frame, seen: Bools) -> Belief:
         """Looks at a frame.
@@ -80,27 +62,48 @@ class Perception:
           frame: all actors, the ego first.
           seen: which of the others are in sight.
         """
-        now, last_seen = frame.time_s, self._last_seen
-        hidden, expected = [], {}
-        for row, (id_, in_sight) in enumerate(zip(frame.ids[1:], seen.tolist(), strict=True), start=1):
-            seen_in = last_seen.get(id_)
-            unseen_s = math.inf if seen_in is None else now - seen_in[0].time_s
-            if unseen_s > FLICKER_S + TIME_TOLERANCE_S:
-                self._in_view_since.pop(id_, None)
-            if in_sight:
-                last_seen[id_] = frame, row
-                self._in_view_since.setdefault(id_, now)
-            elif seen_in is not None and unseen_s <= self._memory_s + TIME_TOLERANCE_S:
-                expected[id_] = Glimpse.of(*seen_in).moved_on(now)
-            else:
-                hidden.append(id_)
-        return Belief(frozenset(hidden), expected)
+        if frame.ids is not self._ids:
+            self._memory = np.array([self._of(id_) for id_ in frame.ids]).T.copy()
+            self._ids = frame.ids
+        self._memory, known, expected = _look(self._memory, frame.state, seen, frame.time_s, self._memory_s)
+        return Belief(known, expected)
+
+    def _of(self, id_: str) -> Floats:
+        if id_ not in self._ids:
+            return np.full(len(self._memory), np.nan)
+        column: Floats = self._memory[:, self._ids.index(id_)]
+        return column
 
     def in_view_for(self, id_: str, time_s: float) -> float:
         """How long `id_` has been in sight without a break, s; 0 if it is not."""
-        since = self._in_view_since.get(id_)
-        return 0.0 if since is None else time_s - since
+        since_s = float(self._of(id_)[SINCE_S])
+        return 0.0 if math.isnan(since_s) else time_s - since_s
 
     def ever_seen(self, id_: str) -> bool:
-        """Whether `id_` has been in sight at any time in this episode."""
-        return id_ in self._last_seen
+        """Whether `id_` has been in sight at any time in this episode, and has not left the net since."""
+        return not math.isnan(self._of(id_)[SEEN_S])
+
+
+@compiled
+def _look(memory: Floats, state: Floats, seen: Bools, now_s: float, memory_s: float) -> tuple[Floats, Bools, Floats]:
+    """The memory after a look at a frame, who is known, and where those are expected who are out of sight."""
+    n = state.shape[1]
+    memory = memory.copy()
+    known, expected = np.ones(n, dtype=np.bool_), np.full((len(MOTION), n), np.nan)
+    for i in range(1, n):
+        unseen_s = now_s - memory[SEEN_S, i]  # NaN: never seen
+        if not unseen_s <= FLICKER_S + TIME_TOLERANCE_S:
+            memory[SINCE_S, i] = np.nan
+        if seen[i - 1]:
+            memory[SEEN_S, i] = now_s
+            if math.isnan(memory[SINCE_S, i]):
+                memory[SINCE_S, i] = now_s
+            for k, row in enumerate(MOTION):
+                memory[THEN + k, i] = state[row, i]
+        elif unseen_s <= memory_s + TIME_TOLERANCE_S:
+            expected[:, i] = memory[THEN:, i]
+            expected[0, i] += unseen_s * memory[THEN + 3, i]  # it goes on as it did
+            expected[1, i] += unseen_s * memory[THEN + 4, i]
+        else:
+            known[i] = False
+    return memory, known, expected

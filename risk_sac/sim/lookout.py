@@ -11,13 +11,17 @@ fast as it may: so one that has stopped for a pedestrian does not start before t
 
 import math
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from risk_sac.jit import compiled
-from risk_sac.sim.paths import Path
-from risk_sac.types import Bools, Floats, Frame, Kind
+from risk_sac.sim.paths import COS as PATH_COS
+from risk_sac.sim.paths import HEADING as PATH_HEADING
+from risk_sac.sim.paths import LIMIT, STATION
+from risk_sac.sim.paths import SIN as PATH_SIN
+from risk_sac.sim.paths import X as PATH_X
+from risk_sac.sim.paths import Y as PATH_Y
+from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, Frame, Kind, X, Y
 
 LOOK_S = 4.0  # how far ahead a collision course counts
 CUT_IN_LOOK_S = 2.0  # the same for whoever drives in the vehicle's own direction, whose sideways motion is soon over
@@ -29,33 +33,6 @@ MOVING_MPS = 0.5
 NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 
 
-class Bodies(NamedTuple):
-    """All `n` actors of a frame, as a driver looks at them."""
-
-    x_m: Floats
-    y_m: Floats
-    heading_rad: Floats
-    vx_mps: Floats
-    vy_mps: Floats
-    half_length_m: Floats
-    half_width_m: Floats
-    vehicle: Bools  # the rest are pedestrians
-
-    @classmethod
-    def of(cls, frame: Frame) -> "Bodies":
-        """Those of a frame."""
-        return cls(
-            frame.x_m,
-            frame.y_m,
-            frame.heading_rad,
-            frame.vx_mps,
-            frame.vy_mps,
-            frame.length_m / 2,
-            frame.width_m / 2,
-            frame.kind == int(Kind.VEHICLE),
-        )
-
-
 class Lookout:
     """A frame as drivers look at it; what it takes is worked out when the first of them looks."""
 
@@ -64,41 +41,51 @@ class Lookout:
         self._frame = frame
 
     @cached_property
-    def bodies(self) -> Bodies:
-        """All actors."""
-        return Bodies.of(self._frame)
+    def vehicle(self) -> Bools:
+        """Who is a vehicle; the rest are pedestrians."""
+        vehicle: Bools = self._frame.kind == int(Kind.VEHICLE)
+        return vehicle
 
     @cached_property
     def pedestrians(self) -> Bools:
-        """Which of them are pedestrians."""
-        return ~self.bodies.vehicle
+        """Who is a pedestrian."""
+        return ~self.vehicle
 
     @cached_property
     def near(self) -> list[bool]:
         """Who has a pedestrian within `NEAR_M`."""
-        near: list[bool] = _near(self._frame.x_m, self._frame.y_m, self.pedestrians).tolist()
+        near: list[bool] = _near(self._frame.state, self.vehicle).tolist()
         return near
 
 
 @compiled
-def _near(x: Floats, y: Floats, pedestrian: Bools) -> Bools:
-    near = np.zeros(len(x), dtype=np.bool_)
-    for k in np.flatnonzero(pedestrian):
-        for i in range(len(x)):
-            near[i] |= math.hypot(x[i] - x[k], y[i] - y[k]) < NEAR_M
+def _near(state: Floats, vehicle: Bools) -> Bools:
+    x, y, n = state[X], state[Y], len(vehicle)
+    near = np.zeros(n, dtype=np.bool_)
+    for k in range(n):
+        if not vehicle[k]:
+            for i in range(n):
+                near[i] |= math.hypot(x[i] - x[k], y[i] - y[k]) < NEAR_M
     return near
 
 
 @compiled
-def project(path: Path, x: float, y: float) -> tuple[float, float, float]:
+def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
     """Station, offset to the left, and heading of the nearest place on a path; its ends go on straight."""
-    best, station, offset, heading = math.inf, 0.0, 0.0, 0.0
-    last = len(path.x_m) - 2
+    path_x, path_y, path_station, path_cos, path_sin = (
+        points[PATH_X],
+        points[PATH_Y],
+        points[STATION],
+        points[PATH_COS],
+        points[PATH_SIN],
+    )
+    best, nearest, station, offset = math.inf, 0, 0.0, 0.0
+    last = points.shape[1] - 2
     for i in range(last + 1):
-        cos, sin = math.cos(path.heading_rad[i]), math.sin(path.heading_rad[i])
-        dx, dy = x - path.x_m[i], y - path.y_m[i]
+        cos, sin = path_cos[i], path_sin[i]
+        dx, dy = x - path_x[i], y - path_y[i]
         along, across = dx * cos + dy * sin, dy * cos - dx * sin
-        length = path.station_m[i + 1] - path.station_m[i]
+        length = path_station[i + 1] - path_station[i]
         beyond = 0.0
         if along < 0.0 and i > 0:
             beyond = -along
@@ -106,18 +93,18 @@ def project(path: Path, x: float, y: float) -> tuple[float, float, float]:
             beyond = along - length
         distance = math.hypot(beyond, across)
         if distance < best:
-            best, heading = distance, path.heading_rad[i]
+            best, nearest = distance, i
             if i > 0:
                 along = max(along, 0.0)
             if i < last:
                 along = min(along, length)
-            station = path.station_m[i] + along
+            station = path_station[i] + along
             offset = across
-    return station, offset, heading
+    return station, offset, points[PATH_HEADING, nearest]
 
 
 @compiled
-def foreseen(path: Path, front_m: float, speed_mps: float, accel_mps2: float) -> Floats:
+def foreseen(points: Floats, front_m: float, speed_mps: float, accel_mps2: float) -> Floats:
     """Where a driver's front bumper will be at each tick of LOOK_S if it speeds up by `accel_mps2`, `ticks`.
 
     It goes no faster than SUMO's drivers take the path, and so slowly through a bend: who passes before somebody at its
@@ -125,13 +112,14 @@ def foreseen(path: Path, front_m: float, speed_mps: float, accel_mps2: float) ->
     """
     ticks = round(LOOK_S / TICK_S) + 1
     front = np.empty(ticks)
-    station, speed, point, last = front_m, speed_mps, 0, len(path.station_m) - 1
+    stations, limit_mps = points[STATION], points[LIMIT]
+    station, speed, point, last = front_m, speed_mps, 0, len(stations) - 1
     for k in range(ticks):
         front[k] = station
-        while point < last and path.station_m[point + 1] <= station:
+        while point < last and stations[point + 1] <= station:
             point += 1
-        speed = min(speed, path.limit_mps[point])
-        faster = min(speed + accel_mps2 * TICK_S, path.limit_mps[point])
+        speed = min(speed, limit_mps[point])
+        faster = min(speed + accel_mps2 * TICK_S, limit_mps[point])
         station += (speed + faster) / 2 * TICK_S
         speed = faster
     return front
@@ -139,43 +127,45 @@ def foreseen(path: Path, front_m: float, speed_mps: float, accel_mps2: float) ->
 
 @compiled
 def targets(
-    path: Path,
+    points: Floats,
     front_m: float,
     offset_m: float,
     own: int,
-    speed_mps: float,
     accel_mps2: float,
-    bodies: Bodies,
+    state: Floats,
+    vehicle: Bools,
     candidate: Bools,
-) -> tuple[Floats, Floats]:
+) -> Floats:
     """What a driver has to stop for or to follow.
 
     Args:
-      path: where it will drive.
+      points: of the path that it will drive.
       front_m: station of its front bumper on the path.
       offset_m: of its middle from the path.
-      own: its row among the bodies.
-      speed_mps: its own.
+      own: its column among the actors.
       accel_mps2: the most it accelerates.
-      bodies: all `n` actors.
+      state: of all `n` actors of a frame.
+      vehicle: `n`, who is a vehicle; the rest are pedestrians.
       candidate: `n`, whom the driver knows of and looks out for.
 
     Returns:
-      Distance from the front bumper to the body, m, inf for those that are no target; and the speed at which it
-      leads, m/s, 0 for those that the driver has to stop for. Both `n`.
+      `targets x 3`: column of the actor; distance from the front bumper to the body, m; and the speed at which it
+      leads, m/s, 0 for those that the driver has to stop for.
     """
-    x, y, heading, vx, vy, half_length, half_width, vehicle = bodies
+    x, y, heading, vx, vy = state[X], state[Y], state[HEADING], state[VX], state[VY]
+    half_length, half_width = state[LENGTH] / 2, state[WIDTH] / 2
     n = len(x)
-    gap, lead = np.full(n, np.inf), np.zeros(n)
+    found, count = np.empty((n, 3)), 0
+    speed_mps = state[SPEED, own]
     length_m, width_m = 2.0 * half_length[own], 2.0 * half_width[own]
     corridor = width_m / 2 + MARGIN_M
-    kept, fastest = foreseen(path, front_m, speed_mps, 0.0), foreseen(path, front_m, speed_mps, accel_mps2)
+    kept, fastest = foreseen(points, front_m, speed_mps, 0.0), foreseen(points, front_m, speed_mps, accel_mps2)
     reach = fastest[-1] - front_m + length_m
     for i in range(n):
         speed = math.hypot(vx[i], vy[i])
         if i == own or not candidate[i]:
             continue
-        s_now, _, way = project(path, x[i], y[i])
+        s_now, _, way = project(points, x[i], y[i])
         if abs(s_now - front_m) > reach + speed * LOOK_S:
             continue
         v_along = vx[i] * math.cos(way) + vy[i] * math.sin(way)
@@ -186,7 +176,7 @@ def targets(
         inside_since, nearest = -1.0, math.inf
         for k in range(round(look / TICK_S) + 1):
             t = k * TICK_S
-            s, d, way = project(path, x[i] + vx[i] * t, y[i] + vy[i] * t)
+            s, d, way = project(points, x[i] + vx[i] * t, y[i] + vy[i] * t)
             turn = heading[i] - way
             cos, sin = abs(math.cos(turn)), abs(math.sin(turn))
             if abs(d - offset_m) > corridor + half_length[i] * sin + half_width[i] * cos:
@@ -202,10 +192,11 @@ def targets(
                 nearest = min(nearest, s - extent)
         if nearest == math.inf:
             continue
+        gap, lead = max(nearest - front_m, 0.0), 0.0
         if same_way:
             turn = heading[i] - way
             extent = half_length[i] * abs(math.cos(turn)) + half_width[i] * abs(math.sin(turn))
-            gap[i], lead[i] = max(s_now - extent - front_m, 0.0), v_along
-        else:
-            gap[i] = max(nearest - front_m, 0.0)
-    return gap, lead
+            gap, lead = max(s_now - extent - front_m, 0.0), v_along
+        found[count, 0], found[count, 1], found[count, 2] = i, gap, lead
+        count += 1
+    return found[:count]

@@ -1,6 +1,7 @@
 """Where a vehicle will drive: the centre line of its lanes along its route, junctions included."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import libsumo
@@ -12,14 +13,24 @@ AHEAD_M = 120.0  # of road beyond a lane's own end: at 16 m/s more than anybody 
 SAME_POINT_M = 1e-3
 
 
-class Path(NamedTuple):
-    """A polyline of `p` points from the start of a lane on."""
+# Rows of a path's points.
+X, Y = 0, 1
+STATION = 2  # length of the line up to each point, m; 0 at the first
+HEADING = 3  # of the segment that begins at the point, rad; the last point repeats the one before
+LIMIT = 4  # the fastest that SUMO's drivers take it, m/s; bends are slow
+COS, SIN = 5, 6  # of the heading
 
-    x_m: Floats
-    y_m: Floats
-    station_m: Floats  # length of the line up to each point; 0 at the first
-    heading_rad: Floats  # of the segment that begins at the point; the last point repeats the one before
-    limit_mps: Floats  # the fastest that SUMO's drivers take it; bends are slow
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """A polyline from the start of a lane on."""
+
+    points: Floats  # the rows above x `p`
+
+    @classmethod
+    def of(cls, x_m: Floats, y_m: Floats, station_m: Floats, heading_rad: Floats, limit_mps: Floats) -> "Path":
+        """Of `p` points each."""
+        return cls(np.array((x_m, y_m, station_m, heading_rad, limit_mps, np.cos(heading_rad), np.sin(heading_rad))))
 
 
 class Along(NamedTuple):
@@ -85,4 +96,4 @@ def _path(lanes: Sequence[str]) -> Path:
     steps = np.diff(points, axis=0)
     station = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
     heading = np.arctan2(steps[:, 1], steps[:, 0])
-    return Path(points[:, 0].copy(), points[:, 1].copy(), station, np.append(heading, heading[-1]), limit)
+    return Path.of(points[:, 0], points[:, 1], station, np.append(heading, heading[-1]), limit)

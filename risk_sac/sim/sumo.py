@@ -13,6 +13,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from typing import NamedTuple
 
 import libsumo
 import numpy as np
@@ -20,12 +21,35 @@ from numpy.typing import NDArray
 
 from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
+from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Area, Layout, VehicleStart
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
-from risk_sac.sim.ego import NOTHING_HIDDEN, Belief, Glimpse
-from risk_sac.sim.lookout import Bodies, Lookout
-from risk_sac.sim.paths import Along, Paths
-from risk_sac.types import STEP_S, Bools, Floats, Frame, Kind, Role, Signal
+from risk_sac.sim.ego import MOTION, Belief
+from risk_sac.sim.lookout import Lookout
+from risk_sac.sim.paths import HEADING as PATH_HEADING
+from risk_sac.sim.paths import STATION, Along, Paths
+from risk_sac.sim.paths import X as PATH_X
+from risk_sac.sim.paths import Y as PATH_Y
+from risk_sac.types import (
+    ACCEL,
+    HEADING,
+    LATERAL,
+    LENGTH,
+    OFFSET,
+    SPEED,
+    STEP_S,
+    VX,
+    VY,
+    WIDTH,
+    Bools,
+    Floats,
+    Frame,
+    Kind,
+    Role,
+    Signal,
+    X,
+    Y,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -58,16 +82,14 @@ class Walker:
     accel_mps2: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class VehicleCommand:
+class VehicleCommand(NamedTuple):
     """What an adversary vehicle does during the next step."""
 
     speed_mps: float
     lateral_mps: float
 
 
-@dataclass(frozen=True, slots=True)
-class Room:
+class Room(NamedTuple):
     """Lateral room of a vehicle on its road, from its sides to the edges of the drivable lanes."""
 
     left_m: float
@@ -110,13 +132,13 @@ class SumoSimulation:
         self._vehicles = [start.id for start in (layout.ego, *layout.vehicles)]
         self._roles = {start.id: start.role for start in (layout.ego, *layout.vehicles)}
         self._roles |= {start.id: start.role for start in layout.pedestrians}
-        self._previous: dict[str, tuple[float, float]] = {}
         self._routes = {start.id: start.route for start in (layout.ego, *layout.vehicles)}
         if layout.net != self._net:  # another one may use the same names
             self._net = layout.net
             self._lanes.clear()
             self._paths.clear()
         self._describe_actors()
+        self._told = np.full((len(self._ids), 7), np.nan)
         self._start_drivers()
         return self._read()
 
@@ -161,7 +183,7 @@ class SumoSimulation:
             self._insert(start, f"background_{start.body}")
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
         self._layout = layout
-        self._belief = NOTHING_HIDDEN
+        self._belief: Belief | None = None
         self._reflex_mps2 = 0.0
         self._signal = layout.signal
         self._walk_signals: list[tuple[Area, int]] = []
@@ -191,18 +213,17 @@ class SumoSimulation:
         self._kind = np.array([Kind.VEHICLE] * driving + [Kind.PEDESTRIAN] * walking, dtype=np.int8)
         self._role = np.array([self._roles[id_] for id_ in self._ids], dtype=np.int8)
         get = libsumo.vehicle
-        self._length = np.array([get.getLength(v) for v in self._vehicles] + [PEDESTRIAN_SIZE_M] * walking)
+        self._row = {id_: row for row, id_ in enumerate(self._vehicles)}
         self._attackers = [(row, v) for row, v in enumerate(self._vehicles) if self._roles[v] is Role.ADVERSARY]
-        self._half_lengths = [get.getLength(v) / 2 for v in self._vehicles]
-        self._width = np.array([get.getWidth(v) for v in self._vehicles] + [PEDESTRIAN_SIZE_M] * walking)
+        bodies = [(get.getLength(v), get.getWidth(v)) for v in self._vehicles]
+        self._bodies = np.array(bodies + [(PEDESTRIAN_SIZE_M, PEDESTRIAN_SIZE_M)] * walking).T
 
     def apply(self, vehicles: Mapping[str, VehicleCommand], walkers: Mapping[str, Walker]) -> None:
         """Hands the adversaries their commands for the next step; vehicles that left the net are skipped."""
-        present = self._vehicles
-        for id_, command in vehicles.items():
-            if id_ in present:
-                libsumo.vehicle.setSpeed(id_, command.speed_mps)
-                libsumo.vehicle.changeSublane(id_, command.lateral_mps * STEP_S)
+        for id_, (speed_mps, lateral_mps) in vehicles.items():
+            if id_ in self._row:
+                libsumo.vehicle.setSpeed(id_, speed_mps)
+                libsumo.vehicle.changeSublane(id_, lateral_mps * STEP_S)
         self._walkers.update(walkers)
 
     def brake(self, braking_mps2: float) -> None:
@@ -214,10 +235,10 @@ class SumoSimulation:
 
         Its car-following and junction models, that is: SUMO's lane-change model has no list of vehicles to ignore.
         """
-        before, self._belief = self._belief.hidden, belief
-        if belief.hidden == before:
+        before, self._belief = self._belief, belief
+        if before is not None and before.known.tobytes() == belief.known.tobytes():
             return
-        vehicles = " ".join(sorted(id_ for id_ in belief.hidden if id_ not in self._walkers))
+        vehicles = " ".join(id_ for id_, known in zip(self._vehicles, belief.known, strict=False) if not known)
         ego = self._vehicles[0]
         libsumo.vehicle.setParameter(ego, "carFollowModel.ignoreIDs", vehicles)
         libsumo.vehicle.setParameter(ego, "junctionModel.ignoreIDs", vehicles)
@@ -237,6 +258,7 @@ class SumoSimulation:
             gone = set(libsumo.simulation.getArrivedIDList())
             if self._vehicles[0] in gone:
                 raise SimulationError("the ego left the net before the horizon; lengthen its route")
+            self._told = self._told[[id_ not in gone for id_ in self._ids]]
             self._vehicles = [id_ for id_ in self._vehicles if id_ not in gone]
             self._describe_actors()
         return self._read()
@@ -254,35 +276,35 @@ class SumoSimulation:
 
     def _tell_drivers(self) -> None:
         """Tells the ego of everybody it knows of, and the others that SUMO drives of the pedestrians near them."""
-        frame, look, ego = self._frame, self._lookout, self._ego_driver
+        look, ego = self._lookout, self._ego_driver
+        speed, accel = self._speed_and_accel[0]
         if ego.due:
-            known = np.array([id_ not in self._belief.hidden for id_ in frame.ids])
-            ego.wanted_mps2 = self._decide(ego, 0, self._as_believed(look.bodies), known)
-        ego.tell(frame.ego_speed_mps, float(frame.accel_mps2[0]))
+            ego.wanted_mps2 = self._decide(ego, 0, *self._as_believed())
+        ego.tell(speed, accel)
         if self._reflex_mps2:
-            ego.brake(frame.ego_speed_mps, float(frame.accel_mps2[0]), self._reflex_mps2)
+            ego.brake(speed, accel, self._reflex_mps2)
         if not self._walkers:
             return
         for row, id_ in enumerate(self._vehicles):
             driver = self._drivers.get(id_)
             if driver is not None and (look.near[row] or driver.telling):
-                driver.wanted_mps2 = self._decide(driver, row, look.bodies, look.pedestrians)
-                driver.tell(float(frame.speed_mps[row]), float(frame.accel_mps2[row]))
+                driver.wanted_mps2 = self._decide(driver, row, self._frame.state, look.pedestrians)
+                driver.tell(*self._speed_and_accel[row])
 
-    def _as_believed(self, bodies: Bodies) -> Bodies:
-        """The bodies where the ego expects them: of whom it does not see it knows no better."""
-        if not self._belief.expected:
-            return bodies
-        believed = bodies._replace(**{name: getattr(bodies, name).copy() for name in Glimpse._fields[1:]})
-        for id_, glimpse in self._belief.expected.items():
-            row = self._frame.ids.index(id_)
-            for name in Glimpse._fields[1:]:
-                getattr(believed, name)[row] = getattr(glimpse, name)
-        return believed
+    def _as_believed(self) -> tuple[Floats, Bools]:
+        """All actors where the ego expects them, for of whom it does not see it knows no better; and whom it knows."""
+        state, belief = self._frame.state, self._belief
+        if belief is None:
+            return state, np.ones(len(self._ids), dtype=np.bool_)
+        remembered = np.isfinite(belief.expected[0])
+        if remembered.any():
+            state = state.copy()
+            state[np.ix_(MOTION, remembered)] = belief.expected[:, remembered]
+        return state, belief.known
 
-    def _decide(self, driver: Driver, row: int, bodies: Bodies, candidates: Bools) -> float | None:
-        speed, along = float(self._frame.speed_mps[row]), self.along(self._vehicles[row])
-        return driver.decide(row, speed, bodies, along, candidates)
+    def _decide(self, driver: Driver, row: int, state: Floats, candidates: Bools) -> float | None:
+        speed, along = self._speed_and_accel[row][0], self.along(self._vehicles[row])
+        return driver.decide(row, speed, along, state, self._lookout.vehicle, candidates)
 
     def intended_accel(self) -> dict[str, float]:
         """What the drivers of the released vehicles would do if nobody commanded them, m/s².
@@ -290,18 +312,18 @@ class SumoSimulation:
         They keep the speed they started with, or go slower where SUMO's models or a pedestrian in their way want that.
         SUMO's wish is that of the step before, which is the newest it tells.
         """
-        frame, look = self._frame, self._lookout
+        look = self._lookout
         found = {}
-        for row, id_ in enumerate(self._vehicles):
-            driver = self._released.get(id_)
-            if driver is None:
+        for id_, driver in self._released.items():
+            row = self._row.get(id_)
+            if row is None:  # left the net
                 continue
-            speed, accel = float(frame.speed_mps[row]), float(frame.accel_mps2[row])
+            speed, accel = self._speed_and_accel[row]
             models = (libsumo.vehicle.getSpeedWithoutTraCI(id_) - speed) / STEP_S + accel
             wanted = min(models, max(driver.cruise_mps - speed, 0.0) / STEP_S)
             told = None
             if self._walkers and look.near[row]:
-                told = self._decide(driver, row, look.bodies, look.pedestrians)
+                told = self._decide(driver, row, self._frame.state, look.pedestrians)
             found[id_] = wanted if told is None else min(wanted, told)
         return found
 
@@ -315,10 +337,10 @@ class SumoSimulation:
         """The ego's way ahead: x and y of points, its centre first."""
         ego = self._vehicles[0]
         path, station_m, offset_m = self.along(ego)
-        ahead = path.station_m > station_m
-        sin, cos = np.sin(path.heading_rad[ahead]), np.cos(path.heading_rad[ahead])
-        x = np.concatenate((self._frame.x_m[:1], path.x_m[ahead] - offset_m * sin))
-        y = np.concatenate((self._frame.y_m[:1], path.y_m[ahead] + offset_m * cos))
+        ahead = path.points[:, path.points[STATION] > station_m]
+        sin, cos = np.sin(ahead[PATH_HEADING]), np.cos(ahead[PATH_HEADING])
+        x = np.concatenate((self._frame.x_m[:1], ahead[PATH_X] - offset_m * sin))
+        y = np.concatenate((self._frame.y_m[:1], ahead[PATH_Y] + offset_m * cos))
         return x, y
 
     def lists_collision(self, other: str) -> bool:
@@ -339,14 +361,15 @@ class SumoSimulation:
 
         The lanes that its route goes on from end at a wall: SUMO halts a vehicle dead at the end of any other.
         """
-        if vehicle not in self._vehicles:
+        row = self._row.get(vehicle)
+        if row is None:
             return None
         get, route = libsumo.vehicle, self._routes[vehicle]
-        lane, row = get.getLaneID(vehicle), self._vehicles.index(vehicle)
+        lane = get.getLaneID(vehicle)
         right_lanes, left_lanes, lane_width = self._lane(route, lane)
-        offset = float(self._frame.lane_offset_m[row])
-        spare = (lane_width - float(self._width[row])) / 2 - EDGE_M
-        room = Room(left_m=left_lanes + spare - offset, right_m=right_lanes + spare + offset)
+        offset = self._offsets[row]
+        spare = (lane_width - float(self._bodies[1, row])) / 2 - EDGE_M
+        room = Room(left_lanes + spare - offset, right_lanes + spare + offset)
         return room, Along(self._paths.of(route, lane), get.getLanePosition(vehicle), offset)
 
     def _lane(self, route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
@@ -370,46 +393,27 @@ class SumoSimulation:
         get_speed, get_lateral = libsumo.vehicle.getSpeed, libsumo.vehicle.getLateralSpeed
         get_accel = libsumo.vehicle.getAcceleration
         get_offset = libsumo.vehicle.getLateralLanePosition
-        rows: list[float] = []  # flat: numpy converts nested sequences at half the speed
-        previous = self._previous
-        for id_, half in zip(self._vehicles, self._half_lengths, strict=True):
+        told: list[float] = []  # flat: numpy converts nested sequences at half the speed
+        self._speed_and_accel, self._offsets = [], []
+        for id_ in self._vehicles:
             x, y = get_position(id_)
-            heading = math.radians(90.0 - get_angle(id_))
-            cos, sin = math.cos(heading), math.sin(heading)
-            speed = get_speed(id_)
-            if id_ in previous:  # the velocity that was driven: SUMO's angle lags behind a lateral move
-                before = previous[id_]
-                vx, vy = (x - before[0]) / STEP_S, (y - before[1]) / STEP_S
-            else:
-                vx, vy = speed * cos, speed * sin
-            previous[id_] = (x, y)
-            lateral, offset = get_lateral(id_), get_offset(id_)
-            rows += (x - half * cos, y - half * sin, heading, vx, vy, speed, lateral, get_accel(id_), offset)
+            speed, accel, offset = get_speed(id_), get_accel(id_), get_offset(id_)
+            told += (x, y, get_angle(id_), speed, get_lateral(id_), accel, offset)
+            self._speed_and_accel.append((speed, accel))
+            self._offsets.append(offset)
         for w in self._walkers.values():
-            vx, vy = w.speed_mps * math.cos(w.heading_rad), w.speed_mps * math.sin(w.heading_rad)
-            rows += (w.x_m, w.y_m, w.heading_rad, vx, vy, w.speed_mps, 0.0, w.accel_mps2, 0.0)
-        x_m, y_m, heading_rad, vx_mps, vy_mps, speed_mps, lateral_mps, accel_mps2, lane_offset_m = (
-            np.array(rows).reshape(-1, 9).T
-        )
+            told += (w.x_m, w.y_m, w.heading_rad, w.speed_mps, 0.0, w.accel_mps2, 0.0)
+        before, self._told = self._told, np.array(told).reshape(-1, 7)
+        state = _state(self._told, before, self._bodies, len(self._vehicles))
         ahead = () if self._signal is None else libsumo.vehicle.getNextTLS(self._vehicles[0])
         self._frame = Frame(
             time_s=libsumo.simulation.getTime(),
             ids=self._ids,
             kind=self._kind,
             role=self._role,
-            x_m=x_m,
-            y_m=y_m,
-            heading_rad=heading_rad,
-            vx_mps=vx_mps,
-            vy_mps=vy_mps,
-            speed_mps=speed_mps,
-            lateral_mps=lateral_mps,
-            accel_mps2=accel_mps2,
-            length_m=self._length,
-            width_m=self._width,
+            state=state,
             signal=COLOURS.get(ahead[0][3].lower(), Signal.NONE) if ahead else Signal.NONE,
             stop_line_m=ahead[0][2] if ahead else math.inf,
-            lane_offset_m=lane_offset_m,
             link=self._links(ahead[0][3] if ahead else ""),
             simulator_collisions=tuple((c.collider, c.victim) for c in libsumo.simulation.getCollisions()),
             teleported=libsumo.simulation.getStartingTeleportIDList(),
@@ -434,6 +438,35 @@ class SumoSimulation:
         for row, letter in letters:
             links[row] = ord(letter)
         return links
+
+
+@compiled
+def _state(told: Floats, before: Floats, bodies: Floats, vehicles: int) -> Floats:
+    """The state of a frame.
+
+    Args:
+      told: `n x 7`, of each actor x, y, angle, speed, lateral speed, acceleration, and offset from its lane. SUMO's own
+        of vehicles: front bumpers and compass degrees.
+      before: the same in the step before, NaN where there was none.
+      bodies: `2 x n`, length and width.
+      vehicles: how many actors, the first of them, are vehicles.
+    """
+    n = len(told)
+    state = np.empty((WIDTH + 1, n))
+    for i in range(n):
+        x, y, heading, speed, half = told[i, 0], told[i, 1], told[i, 2], told[i, 3], 0.0
+        if i < vehicles:
+            heading, half = math.radians(90.0 - heading), bodies[0, i] / 2
+        cos, sin = math.cos(heading), math.sin(heading)
+        state[VX, i], state[VY, i] = speed * cos, speed * sin
+        if i < vehicles and not math.isnan(before[i, 0]):
+            # The velocity that was driven: SUMO's angle lags behind a lateral move.
+            state[VX, i], state[VY, i] = (x - before[i, 0]) / STEP_S, (y - before[i, 1]) / STEP_S
+        state[X, i], state[Y, i], state[HEADING, i] = x - half * cos, y - half * sin, heading
+        for k, row in enumerate((SPEED, LATERAL, ACCEL, OFFSET)):
+            state[row, i] = told[i, 3 + k]
+        state[LENGTH, i], state[WIDTH, i] = bodies[0, i], bodies[1, i]
+    return state
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:

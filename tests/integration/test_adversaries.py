@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +16,7 @@ from risk_sac.sim.control import Adversaries
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.train import train
 from risk_sac.types import STEP_S, EpisodeRecord, Floats, Frame, RunMetrics, SeriesFile
+from tests.builders import moved
 
 ROUNDING = 0.02  # of SUMO's positions and speeds, divided by the step where a derivative is taken
 WINDOW = 9  # steps, 0.8 s, over which an acceleration is fitted to positions: SUMO's lanes have corners
@@ -204,5 +204,5 @@ def test_a_vehicle_that_does_not_obey_or_leaps_is_reported(name: FamilyName) -> 
             row = frame.ids.index(family.vehicles[0])
             column = getattr(frame, change).copy()
             column[row] += 30.0 if column[row] >= 0 else -30.0
-            assert not adversaries.keep_limits(replace(frame, **{change: column})), change
+            assert not adversaries.keep_limits(moved(frame, **{change: column})), change
             adversaries.keep_limits(frame)

@@ -18,13 +18,12 @@ from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, PedestrianStart, VehicleStart
-from risk_sac.sim.ego import NOTHING_HIDDEN, Belief, Glimpse
 from risk_sac.sim.sumo import SumoSimulation, VehicleCommand
 from risk_sac.types import Floats, Frame, Role
+from tests.builders import belief_of
 
 LANE_Y_M = -1.65  # the ego's lane on the mixed road
 GREEN_S, NEVER = 0.0, 10_000
-ACTOR_HIDDEN = Belief(hidden=frozenset({"actor"}), expected={})
 MIXED = FAMILIES["mixed"].layout(FAMILIES["mixed"].space.from_unit(np.full(10, 0.5)).values)
 DENSE_SPACE = FAMILIES["dense"].space
 
@@ -62,7 +61,7 @@ def drive(sim: SumoSimulation, layout: Layout, *, seen_from: int = 0, steps: int
     sim.release()
     kept = {v.id: VehicleCommand(v.speed_mps, 0.0) for v in layout.vehicles if v.role is Role.ADVERSARY}
     for step in range(steps):
-        sim.believe(NOTHING_HIDDEN if step >= seen_from else ACTOR_HIDDEN)
+        sim.believe(belief_of(frames[-1], hidden=() if step >= seen_from else ("actor",)))
         sim.apply(kept, {})
         frames.append(sim.step())
     return frames
@@ -153,7 +152,7 @@ def with_a_memory(sim: SumoSimulation, layout: Layout, x_m: float, y_m: float) -
     """Frames of a run in which the ego believes a standing `actor` to be there, wherever it is."""
     frames = [sim.reset(layout, 1)]
     for _ in range(110):
-        sim.believe(Belief(frozenset(), {"actor": Glimpse(frames[-1].time_s, x_m, y_m, 0.0, 0.0, 0.0)}))
+        sim.believe(belief_of(frames[-1], expected={"actor": (x_m, y_m, 0.0, 0.0, 0.0)}))
         frames.append(sim.step())
     return frames
 

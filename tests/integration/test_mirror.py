@@ -17,6 +17,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.geometry import relative_view
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, PedestrianStart, VehicleStart
+from risk_sac.sim.paths import STATION
 from risk_sac.sim.sumo import SumoSimulation, Walker
 from risk_sac.types import STEP_S, Frame, Role
 
@@ -94,10 +95,11 @@ def drive(sim: SumoSimulation, steps: int, before_step: Callable[[float], None])
 def pose(sim: SumoSimulation, station_m: float, aside_m: float) -> tuple[float, float, float]:
     """Place and heading of a point beside the ego's path, positive to its left."""
     path = sim.along("ego").path
-    i = min(max(int(np.searchsorted(path.station_m, station_m)) - 1, 0), len(path.x_m) - 2)
-    heading, along = path.heading_rad[i], station_m - path.station_m[i]
+    i = min(max(int(np.searchsorted(path.points[STATION], station_m)) - 1, 0), path.points.shape[1] - 2)
+    x_m, y_m, start_m, heading = path.points[:4, i]
+    along = station_m - start_m
     cos, sin = math.cos(heading), math.sin(heading)
-    return path.x_m[i] + along * cos - aside_m * sin, path.y_m[i] + along * sin + aside_m * cos, heading
+    return x_m + along * cos - aside_m * sin, y_m + along * sin + aside_m * cos, heading
 
 
 def meet_pedestrian(

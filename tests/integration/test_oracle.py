@@ -16,9 +16,9 @@ from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import agrees
 from risk_sac.sim.control import Adversaries
-from risk_sac.sim.ego import Belief
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Frame
+from tests.builders import belief_of
 
 LOW = FAMILIES["low"]
 
@@ -44,7 +44,7 @@ def episode(sim: SumoSimulation, seed: int, *, steering: bool, blind: bool) -> I
             action[1::2] = 0.0
         if blind:
             action[0] = -1.0  # the leader stands in its way
-            sim.believe(Belief(hidden=frozenset(frame.ids[1:]), expected={}))
+            sim.believe(belief_of(frame, hidden=frame.ids[1:]))
         adversaries.command(action.tolist(), sim)
         frame = sim.step()
         yield frame

@@ -5,7 +5,6 @@ scene runs in a process of its own.
 """
 
 import json
-import math
 import subprocess
 import sys
 import textwrap
@@ -17,7 +16,8 @@ import pytest
 
 from risk_sac.geometry import relative_view
 from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
-from risk_sac.types import Frame, Kind, Role, Signal
+from risk_sac.types import Frame
+from tests import builders
 
 LENGTH_M, WIDTH_M = 4.6, 1.85
 SCENE = textwrap.dedent(
@@ -63,25 +63,15 @@ def frame_of(time_s: float, bumpers: list[list[float]]) -> Frame:
     """SUMO's front bumpers and compass angles as a frame."""
     x, y, angle, speed = np.array(bumpers).T
     heading = np.radians(90.0 - angle)
-    return Frame(
+    return builders.frame_of(
         time_s=time_s,
         ids=("ego", "lead"),
-        kind=np.full(2, Kind.VEHICLE, dtype=np.int8),
-        role=np.array([Role.EGO, Role.ADVERSARY], dtype=np.int8),
         x_m=x - LENGTH_M / 2 * np.cos(heading),
         y_m=y - LENGTH_M / 2 * np.sin(heading),
         heading_rad=heading,
-        vx_mps=speed * np.cos(heading),
-        vy_mps=speed * np.sin(heading),
         speed_mps=speed,
-        lateral_mps=np.zeros(2),
-        accel_mps2=np.zeros(2),
-        length_m=np.full(2, LENGTH_M),
-        width_m=np.full(2, WIDTH_M),
-        signal=Signal.NONE,
-        stop_line_m=math.inf,
-        lane_offset_m=np.zeros(2),
-        link=np.zeros(2, dtype=np.uint8),
+        length_m=LENGTH_M,
+        width_m=WIDTH_M,
     )
 
 

@@ -9,35 +9,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.geometry import RelativeView, line_of_sight, overlapping_pairs, relative_view, time_to_contact
-from risk_sac.types import Bools, Floats, Frame, Kind, Role, Signal
+from risk_sac.types import Bools, Floats, Frame
+from tests import builders
 
 TOUCHING_M = 1e-9
 Rows = list[tuple[float, ...]]  # x, y, heading, length, width, and optionally vx, vy
 
 
 def frame_of(rows: Rows) -> Frame:
-    n = len(rows)
-    columns = np.array([(*row, 0.0, 0.0)[:7] for row in rows]).T
-    return Frame(
-        time_s=0.0,
-        ids=tuple(f"actor_{i}" for i in range(n)),
-        kind=np.full(n, Kind.VEHICLE, dtype=np.int8),
-        role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
-        x_m=columns[0],
-        y_m=columns[1],
-        heading_rad=columns[2],
-        vx_mps=columns[5],
-        vy_mps=columns[6],
-        speed_mps=np.hypot(columns[5], columns[6]),
-        lateral_mps=np.zeros(n),
-        accel_mps2=np.zeros(n),
-        length_m=columns[3],
-        width_m=columns[4],
-        signal=Signal.NONE,
-        stop_line_m=math.inf,
-        lane_offset_m=np.zeros(n),
-        link=np.zeros(n, dtype=np.uint8),
-    )
+    x, y, heading, length, width, vx, vy = np.array([(*row, 0.0, 0.0)[:7] for row in rows]).T
+    return builders.frame_of(x_m=x, y_m=y, heading_rad=heading, vx_mps=vx, vy_mps=vy, length_m=length, width_m=width)
 
 
 def view_of(rows: Rows) -> RelativeView:
@@ -98,7 +79,7 @@ def test_overlapping_pairs_are_the_pairs_that_shapely_sees_intersect() -> None:
     for _ in range(300):
         frame = random_frame(generator, 8, 12.0)  # eight others and the ego
         bodies = boxes(frame)
-        pairs = overlapping_pairs(frame.x_m, frame.y_m, frame.heading_rad, frame.length_m, frame.width_m)
+        pairs = overlapping_pairs(frame.state)
         expected = [(i, j) for i in range(9) for j in range(i + 1, 9) if shapely.intersects(bodies[i], bodies[j])]
         assert pairs == expected
         found += len(pairs)

@@ -1,59 +1,56 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from risk_sac.geometry import relative_view
+from risk_sac.geometry import Sight, relative_view
 from risk_sac.risk.publish import (
     CROSSED_ON_RED_M,
     GAP_CAP_M,
     PEDESTRIAN_GAP_CAP_M,
     RED_LIGHT_BRAKING_CAP_MPS2,
+    RSS_SCALED,
+    TTC,
+    LeastMargins,
+    assess,
     in_charge,
     least_margins,
     publish,
     red_light_braking,
     red_light_margin,
 )
-from risk_sac.risk.rss import SCALED_HIGH, SCALED_LOW
+from risk_sac.risk.rss import SCALED_HIGH, SCALED_LOW, RssParameters
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.risk.ttc import TTC_CAP_S
-from risk_sac.types import Frame, Kind, Role, Signal
+from risk_sac.types import Frame, Kind, Signal
+from tests import builders
 
 VEHICLE, PEDESTRIAN = Kind.VEHICLE, Kind.PEDESTRIAN
+SEES_ALL = Sight(math.inf, math.pi, occlusion=False)
 
 
 def frame_of(
     *others: tuple[float, float, Kind], speed_mps: float = 10.0, accel_mps2: float = 0.0, stop_line_m: float = math.inf
 ) -> Frame:
-    """The ego at the origin, driving along x, its body 4 m long; each other is x, y, kind."""
-    n = len(others) + 1
-    speed = np.array([speed_mps] + [0.0] * (n - 1))
-    return Frame(
-        time_s=0.0,
-        ids=tuple(f"actor_{i}" for i in range(n)),
-        kind=np.array([VEHICLE, *(kind for _, _, kind in others)], dtype=np.int8),
-        role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
-        x_m=np.array([0.0, *(x for x, _, _ in others)]),
-        y_m=np.array([0.0, *(y for _, y, _ in others)]),
-        heading_rad=np.zeros(n),
-        vx_mps=speed,
-        vy_mps=np.zeros(n),
-        speed_mps=speed,
-        lateral_mps=np.zeros(n),
-        accel_mps2=np.array([accel_mps2] + [0.0] * (n - 1)),
-        length_m=np.full(n, 4.0),
-        width_m=np.full(n, 2.0),
-        lane_offset_m=np.zeros(n),
-        link=np.zeros(n, dtype=np.uint8),
+    """The ego at the origin, driving along x, its body 4 m long; each other is x, y, kind, and stands."""
+    rest = [0.0] * len(others)
+    return builders.frame_of(
+        [VEHICLE, *(kind for _, _, kind in others)],
+        x_m=[0.0, *(x for x, _, _ in others)],
+        y_m=[0.0, *(y for _, y, _ in others)],
+        speed_mps=[speed_mps, *rest],
+        accel_mps2=[accel_mps2, *rest],
+        length_m=4.0,
+        width_m=2.0,
         signal=Signal.NONE if math.isinf(stop_line_m) else Signal.RED,
         stop_line_m=stop_line_m,
     )
 
 
 def signals_of(frame: Frame, ttc: list[float], rss: list[float]) -> dict[str, float]:
-    return publish(frame, None, least_margins(relative_view(frame), frame.kind, np.array(ttc), np.array(rss)))
+    others = assess(frame, RssParameters(), SEES_ALL).others.copy()
+    others[TTC], others[RSS_SCALED] = ttc, rss
+    return publish(frame, None, LeastMargins(*least_margins(others, frame.kind)))
 
 
 @pytest.mark.parametrize(

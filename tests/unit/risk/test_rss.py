@@ -21,7 +21,7 @@ from risk_sac.risk.rss import (
     opposite_direction,
     same_direction,
 )
-from risk_sac.types import Frame, Kind, Role, Signal
+from tests.builders import frame_of
 
 # ρ = 1 s, a = 2, b_min = 4, b_max = 8, lateral a = 0.5 and b = 1, μ = 0.1: round enough for mental arithmetic.
 P = RssParameters(
@@ -150,27 +150,8 @@ def test_a_slower_response_never_shrinks_the_distance(rear: float, front: float,
 def view_of(ego_mps: float, *others: tuple[float, float, float, float, float]) -> RelativeView:
     """The ego at the origin, driving along x; each other is x, y, heading, vx, vy."""
     columns = np.array([(0.0, 0.0, 0.0, ego_mps, 0.0), *others]).T
-    n = len(others) + 1
-    frame = Frame(
-        time_s=0.0,
-        ids=tuple(f"actor_{i}" for i in range(n)),
-        kind=np.full(n, Kind.VEHICLE, dtype=np.int8),
-        role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
-        x_m=columns[0],
-        y_m=columns[1],
-        heading_rad=columns[2],
-        vx_mps=columns[3],
-        vy_mps=columns[4],
-        speed_mps=np.hypot(columns[3], columns[4]),
-        lateral_mps=np.zeros(n),
-        accel_mps2=np.zeros(n),
-        length_m=np.full(n, 4.0),
-        width_m=np.full(n, 2.0),
-        lane_offset_m=np.zeros(n),
-        link=np.zeros(n, dtype=np.uint8),
-        signal=Signal.NONE,
-        stop_line_m=math.inf,
-    )
+    x, y, heading, vx, vy = columns
+    frame = frame_of(x_m=x, y_m=y, heading_rad=heading, vx_mps=vx, vy_mps=vy, length_m=4.0, width_m=2.0)
     return relative_view(frame)
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from risk_sac.geometry import RelativeView, relative_view
 from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
-from risk_sac.types import Frame, Kind, Role, Signal
+from tests.builders import frame_of
 
 LENGTH_M, WIDTH_M = 4.6, 1.85
 
@@ -15,27 +15,8 @@ LENGTH_M, WIDTH_M = 4.6, 1.85
 def view_of(*others: tuple[float, float, float, float, float], ego_mps: float = 20.0) -> RelativeView:
     """The ego at the origin, driving along x; each other is x, y, heading, vx, vy."""
     columns = np.array([(0.0, 0.0, 0.0, ego_mps, 0.0), *others]).T
-    n = len(others) + 1
-    frame = Frame(
-        time_s=0.0,
-        ids=tuple(f"actor_{i}" for i in range(n)),
-        kind=np.full(n, Kind.VEHICLE, dtype=np.int8),
-        role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
-        x_m=columns[0],
-        y_m=columns[1],
-        heading_rad=columns[2],
-        vx_mps=columns[3],
-        vy_mps=columns[4],
-        speed_mps=np.hypot(columns[3], columns[4]),
-        lateral_mps=np.zeros(n),
-        accel_mps2=np.zeros(n),
-        length_m=np.full(n, LENGTH_M),
-        width_m=np.full(n, WIDTH_M),
-        signal=Signal.NONE,
-        stop_line_m=math.inf,
-        lane_offset_m=np.zeros(n),
-        link=np.zeros(n, dtype=np.uint8),
-    )
+    x, y, heading, vx, vy = columns
+    frame = frame_of(x_m=x, y_m=y, heading_rad=heading, vx_mps=vx, vy_mps=vy, length_m=LENGTH_M, width_m=WIDTH_M)
     return relative_view(frame)
 
 

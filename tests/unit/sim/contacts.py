@@ -6,7 +6,8 @@ import numpy as np
 
 from risk_sac.geometry import relative_view
 from risk_sac.sim.collision import Contact, find_contact
-from risk_sac.types import STEP_S, Frame, Kind, Role, Signal
+from risk_sac.types import STEP_S, Frame, Kind
+from tests.builders import frame_of
 
 LENGTH_M, WIDTH_M = 4.6, 1.85
 CAR, WALKER = Kind.VEHICLE, Kind.PEDESTRIAN
@@ -22,28 +23,17 @@ def frames(
     """
     columns = np.array([actor[:5] for actor in actors], dtype=np.float64).T
     kinds = [actor[5] for actor in actors]
-    n = len(actors)
 
     def at(offset_s: float) -> Frame:
-        return Frame(
+        return frame_of(
+            kinds,
             time_s=time_s + offset_s,
-            ids=ids or tuple(f"actor_{i}" for i in range(n)),
-            kind=np.array(kinds, dtype=np.int8),
-            role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
+            ids=ids,
             x_m=columns[0] + columns[3] * offset_s,
             y_m=columns[1] + columns[4] * offset_s,
             heading_rad=columns[2],
             vx_mps=columns[3],
             vy_mps=columns[4],
-            speed_mps=np.hypot(columns[3], columns[4]),
-            lateral_mps=np.zeros(n),
-            accel_mps2=np.zeros(n),
-            length_m=np.array([LENGTH_M if k is CAR else 0.5 for k in kinds]),
-            width_m=np.array([WIDTH_M if k is CAR else 0.5 for k in kinds]),
-            signal=Signal.NONE,
-            stop_line_m=math.inf,
-            lane_offset_m=np.zeros(n),
-            link=np.zeros(n, dtype=np.uint8),
         )
 
     return at(-share * step_s), at((1 - share) * step_s)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import Limits, limits_from_odd
-from risk_sac.sim.bends import BODY_M, GRID_M, bends
+from risk_sac.sim.bends import BODY_M, CAP, GRID_M, HERE, SOON, bends, index
 from risk_sac.sim.paths import Path
 from tests.roads import STRAIGHT_M, arc_m, road
 
@@ -22,19 +22,19 @@ def corner(turn_rad: float) -> Path:
 
 def with_headings(*heading_rad: float) -> Path:
     """Two pieces of 10 m; points and speeds do not matter."""
-    return Path(np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), np.array(heading_rad), np.full(3, 13.89))
+    return Path.of(np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), np.array(heading_rad), np.full(3, 13.89))
 
 
 def test_a_straight_road_asks_nothing() -> None:
     straight = bends(road(), LIMITS)
-    assert set(straight.curvature_per_m) == {0.0}
-    assert min(straight.cap_mps) > 1000
+    assert set(straight[HERE]) == {0.0}
+    assert min(straight[CAP]) > 1000
 
 
 def test_a_corner_turns_the_body_over_its_own_length_by_hand() -> None:
     got = bends(corner(0.46), LIMITS)
-    assert got.curvature_per_m == pytest.approx([0.0] * 20 + [0.1] * 10 + [0.0] * 11)  # 10 to 14.5 m: 0.46 rad / 4.6 m
-    assert got.ahead_per_m == pytest.approx([0.0] * 10 + [0.1] * 20 + [0.0] * 11)  # from 5 m before
+    assert got[HERE] == pytest.approx([0.0] * 20 + [0.1] * 10 + [0.0] * 11)  # 10 to 14.5 m: 0.46 rad / 4.6 m
+    assert got[SOON] == pytest.approx([0.0] * 10 + [0.1] * 20 + [0.0] * 11)  # from 5 m before
 
 
 def test_a_bend_is_approached_by_hand() -> None:
@@ -44,7 +44,7 @@ def test_a_bend_is_approached_by_hand() -> None:
     )  # fmt: skip
     assert limits.cornering_mps2 == pytest.approx(3.0)
     assert limits.approach_mps2 == pytest.approx(3.0)  # 3² + (3 + 1)² = 5²
-    cap = bends(corner(0.46), limits).cap_mps
+    cap = bends(corner(0.46), limits)[CAP]
     assert cap[10] == cap[29] == pytest.approx(math.sqrt(3.0 / 0.1))
     assert cap[0] == pytest.approx(math.sqrt(30.0 + 2 * 3.0 * 5.0))  # 5 m before
     assert cap[30] > 1000
@@ -57,16 +57,16 @@ def test_an_arc_has_its_own_curvature_and_the_speed_for_it(radius: float, turn: 
     start, end = (round(s / GRID_M) for s in arc_m(radius, turn))
     body = math.ceil((BODY_M + piece) / GRID_M)
     inside = slice(start + body, end - math.ceil(piece / GRID_M))
-    mean = np.array(got.curvature_per_m[inside])
+    mean = np.array(got[HERE][inside])
     if len(mean) > 4 * body:  # on average, for the corners of a coarse arc come one by one
         assert mean.mean() == pytest.approx(1 / radius, rel=0.25)
-    assert np.all(np.array(got.cap_mps) ** 2 * np.array(got.curvature_per_m) <= LIMITS.cornering_mps2 + 1e-9)
+    assert np.all(np.array(got[CAP]) ** 2 * np.array(got[HERE]) <= LIMITS.cornering_mps2 + 1e-9)
 
 
 @settings(max_examples=30)
 @given(radii, st.floats(0.3, math.pi))
 def test_every_cap_can_be_braked_to(radius: float, turn: float) -> None:
-    square = np.array(bends(road(radius, turn_rad=turn), LIMITS).cap_mps) ** 2
+    square = bends(road(radius, turn_rad=turn), LIMITS)[CAP] ** 2
     assert np.all(square[:-1] - square[1:] <= 2 * LIMITS.approach_mps2 * GRID_M + 1e-6)
 
 
@@ -74,18 +74,18 @@ def test_every_cap_can_be_braked_to(radius: float, turn: float) -> None:
 @given(radii, st.floats(0.3, math.pi), st.floats(0.2, 4))
 def test_left_and_right_bends_ask_the_same(radius: float, turn: float, piece: float) -> None:
     left, right = (bends(road(radius, turn_rad=turn, piece_m=piece, left=left), LIMITS) for left in (True, False))
-    assert left.cap_mps == pytest.approx(right.cap_mps)
-    assert left.curvature_per_m == pytest.approx(right.curvature_per_m)
+    assert left[CAP] == pytest.approx(right[CAP])
+    assert left[HERE] == pytest.approx(right[HERE])
 
 
 def test_a_heading_that_passes_pi_is_no_bend() -> None:
     got = bends(with_headings(math.pi - 0.01, -math.pi + 0.01, -math.pi + 0.01), LIMITS)
-    assert max(got.curvature_per_m) == pytest.approx(0.02 / BODY_M)
+    assert max(got[HERE]) == pytest.approx(0.02 / BODY_M)
 
 
 @settings(max_examples=30)
 @given(st.floats(-50, 500))
 def test_stations_off_the_path_mean_its_ends(station: float) -> None:
     got = bends(road(10.0), LIMITS)
-    assert 0 <= got.index(station) < len(got.cap_mps)
-    assert got.index(STRAIGHT_M) == STRAIGHT_M / GRID_M
+    assert 0 <= index(got, station) < len(got[CAP])
+    assert index(got, STRAIGHT_M) == STRAIGHT_M / GRID_M

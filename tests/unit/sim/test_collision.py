@@ -3,10 +3,10 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from risk_sac.sim.collision import agrees
+from tests.builders import moved
 from tests.unit.sim.contacts import (
     CAR,
     CROSSING,
@@ -105,7 +105,7 @@ def test_a_contact_is_found_when_another_actor_has_just_left() -> None:
 
 def test_headings_that_pass_south_are_interpolated_the_short_way() -> None:
     before, frame = frames(ego(10.0), (LENGTH_M, 0.0, math.pi, -10.0, 0.0, CAR))
-    before = replace(before, heading_rad=np.array([0.0, -math.pi + 0.01]))
+    before = moved(before, heading_rad=[0.0, -math.pi + 0.01])
     contact = contact_of(before, frame)
     assert contact is not None
     assert contact.time_s == pytest.approx(5.0, abs=0.005)

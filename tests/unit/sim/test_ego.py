@@ -4,60 +4,80 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.sim.ego import Belief, Glimpse, Perception
+from risk_sac.sim.ego import Belief, Perception
 from risk_sac.types import Frame
+from tests.builders import moved
 from tests.unit.sim.contacts import CAR, WALKER, ego, frames
 
 WALKING = (20.0, -3.0, math.pi / 2, 0.0, 1.4, WALKER)
 PARKED = (30.0, 3.0, 0.0, 0.0, 0.0, CAR)
+IDS = ("ego", "walker", "parked")
 
 
 def frame_at(time_s: float) -> Frame:
     """The walker has walked since 0 s."""
     _, frame = frames(ego(), WALKING, PARKED, share=1.0)
     y = frame.y_m + 1.4 * time_s * np.array([0, 1, 0])
-    return replace(frame, time_s=time_s, ids=("ego", "walker", "parked"), y_m=y)
+    return moved(replace(frame, time_s=time_s, ids=IDS), y_m=y)
 
 
 def look(perception: Perception, time_s: float, *seen: str) -> Belief:
     return perception.update(frame_at(time_s), np.array(["walker" in seen, "parked" in seen]))
 
 
-def test_a_glimpse_moves_on_by_hand() -> None:
-    seen = Glimpse(time_s=2.0, x_m=20.0, y_m=-3.0, heading_rad=1.5, vx_mps=-0.5, vy_mps=1.4)
-    assert seen.moved_on(2.0) == seen
-    later = Glimpse(time_s=4.5, x_m=18.75, y_m=0.5, heading_rad=1.5, vx_mps=-0.5, vy_mps=1.4)
-    assert seen.moved_on(4.5) == pytest.approx(later)
+def hidden(belief: Belief) -> set[str]:
+    return {id_ for id_, known in zip(IDS, belief.known, strict=True) if not known}
+
+
+def expected(belief: Belief) -> dict[str, list[float]]:
+    """Position, heading and velocity of whom it remembers."""
+    return {id_: column.tolist() for id_, column in zip(IDS, belief.expected.T, strict=True) if np.isfinite(column[0])}
 
 
 def test_who_was_never_seen_is_hidden() -> None:
-    assert look(Perception(3.0), 1.0, "parked") == Belief(frozenset({"walker"}), {})
+    belief = look(Perception(3.0), 1.0, "parked")
+    assert hidden(belief) == {"walker"}
+    assert expected(belief) == {}
 
 
 def test_who_goes_out_of_sight_is_expected_to_go_on_until_memory_ends() -> None:
     perception = Perception(memory_s=2.0)
-    assert look(perception, 1.0, "walker", "parked") == Belief(frozenset(), {})
-    hidden, expected = look(perception, 2.0, "parked")
-    assert hidden == frozenset()
-    assert expected == {"walker": pytest.approx((2.0, 20.0, -3.0 + 1.4 * 2.0, math.pi / 2, 0.0, 1.4))}
-    hidden, expected = look(perception, 3.0, "parked")
-    assert expected["walker"].y_m == pytest.approx(-3.0 + 1.4 * 3.0)
-    assert look(perception, 3.1, "parked") == Belief(frozenset({"walker"}), {})
+    belief = look(perception, 1.0, "walker", "parked")
+    assert hidden(belief) == set()
+    assert expected(belief) == {}
+    belief = look(perception, 2.0, "parked")
+    assert hidden(belief) == set()
+    assert expected(belief) == {"walker": pytest.approx([20.0, -3.0 + 1.4 * 2.0, math.pi / 2, 0.0, 1.4])}
+    belief = look(perception, 3.0, "parked")
+    assert expected(belief)["walker"][1] == pytest.approx(-3.0 + 1.4 * 3.0)
+    belief = look(perception, 3.1, "parked")
+    assert hidden(belief) == {"walker"}
+    assert expected(belief) == {}
 
 
 def test_what_is_expected_is_what_was_seen_last_and_not_what_is() -> None:
     perception = Perception(memory_s=2.0)
     look(perception, 1.0, "walker", "parked")
-    frame = frame_at(1.5)
-    stopped = replace(frame, y_m=frame_at(1.0).y_m, vy_mps=np.zeros(3))
-    expected = perception.update(stopped, np.array([False, True])).expected
-    assert expected["walker"].y_m == pytest.approx(-3.0 + 1.4 * 1.5)
+    stopped = moved(frame_at(1.5), y_m=frame_at(1.0).y_m, vy_mps=0.0)
+    belief = perception.update(stopped, np.array([False, True]))
+    assert expected(belief)["walker"][1] == pytest.approx(-3.0 + 1.4 * 1.5)
 
 
 def test_without_memory_who_is_out_of_sight_is_hidden_at_once() -> None:
     perception = Perception(memory_s=0.0)
     look(perception, 1.0, "walker", "parked")
-    assert look(perception, 1.1, "parked") == Belief(frozenset({"walker"}), {})
+    assert hidden(look(perception, 1.1, "parked")) == {"walker"}
+
+
+def test_what_is_remembered_of_an_actor_stays_its_own_when_another_leaves() -> None:
+    perception = Perception(memory_s=3.0)
+    look(perception, 1.0, "walker", "parked")
+    frame = frame_at(2.0)
+    without = replace(frame, ids=("ego", "parked"), state=frame.state[:, [0, 2]])
+    belief = perception.update(without, np.array([False]))
+    assert belief.expected[:2, 1].tolist() == pytest.approx([30.0, 3.0])
+    assert not perception.ever_seen("walker")
+    assert perception.ever_seen("parked")
 
 
 def test_a_flicker_is_no_break_and_more_is() -> None:
@@ -82,4 +102,4 @@ def test_a_new_episode_begins_with_nobody_known() -> None:
     look(perception, 1.0, "walker", "parked")
     perception.reset()
     assert not perception.ever_seen("walker")
-    assert look(perception, 1.0) == Belief(frozenset({"walker", "parked"}), {})
+    assert hidden(look(perception, 1.0)) == {"walker", "parked"}

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point
 
-from risk_sac.sim.lookout import MARGIN_M, Bodies, Lookout, project, targets
+from risk_sac.sim.lookout import MARGIN_M, Lookout, project, targets
 from risk_sac.sim.paths import Path
 from risk_sac.types import Kind
 from tests.roads import road
@@ -21,11 +21,6 @@ EGO: Actor = (FRONT_M - 2.3, 0.0, 0.0, SPEED_MPS, 0.0, CAR)
 sides = pytest.mark.parametrize("side", [1, -1], ids=["left", "right"])
 
 
-def bodies(*actors: Actor) -> Bodies:
-    _, frame = frames(*actors, share=1.0)
-    return Bodies.of(frame)
-
-
 class Target(NamedTuple):
     gap_m: float
     lead_mps: float
@@ -34,10 +29,11 @@ class Target(NamedTuple):
 def target(other: Actor, path: Path | None = None, speed_mps: float = SPEED_MPS, offset_m: float = 0.0) -> Target:
     """What the other is to a driver 20 m down the path."""
     known = np.ones(2, dtype=np.bool_)
-    both = bodies(EGO, other)
-    gap, lead = targets(path or road(), FRONT_M, offset_m, 0, speed_mps, ACCEL_MPS2, both, known)
-    assert gap[0] == math.inf
-    return Target(float(gap[1]), float(lead[1]))
+    _, frame = frames((*EGO[:3], speed_mps, *EGO[4:]), other, share=1.0)
+    points, vehicle = (path or road()).points, Lookout(frame).vehicle
+    found = targets(points, FRONT_M, offset_m, 0, ACCEL_MPS2, frame.state, vehicle, known).tolist()
+    assert [actor for actor, _, _ in found] in ([], [1])
+    return Target(*found[0][1:]) if found else NOBODY
 
 
 def walker(x: float, y: float, vy: float = 0.0) -> Actor:
@@ -142,9 +138,12 @@ def test_a_car_that_stands_across_or_tilted_is_stopped_for(side: int) -> None:
 
 
 def test_nobody_but_the_candidates_counts() -> None:
-    both = bodies(EGO, walker(50.0, 0.0))
-    gap, _ = targets(road(), FRONT_M, 0.0, 0, SPEED_MPS, ACCEL_MPS2, both, np.array([True, False], dtype=np.bool_))
-    assert gap.tolist() == [math.inf, math.inf]
+    _, frame = frames(EGO, walker(50.0, 0.0), share=1.0)
+    vehicle = Lookout(frame).vehicle
+    for known in (True, False):
+        candidate = np.array([True, known])
+        found = targets(road().points, FRONT_M, 0.0, 0, ACCEL_MPS2, frame.state, vehicle, candidate)
+        assert len(found) == known
 
 
 @settings(max_examples=100)
@@ -166,7 +165,7 @@ def test_the_mirrored_scene_has_the_mirrored_targets(
     assert left == pytest.approx(right)
 
 
-CORNER = Path(
+CORNER = Path.of(
     np.array([0.0, 10.0, 10.0]),
     np.array([0.0, 0.0, 10.0]),
     np.array([0.0, 10.0, 20.0]),
@@ -187,16 +186,16 @@ CORNER = Path(
     ],
 )
 def test_places_beside_a_corner_by_hand(x: float, y: float, expected: tuple[float, float, float]) -> None:
-    assert project(CORNER, x, y) == pytest.approx(expected)
+    assert project(CORNER.points, x, y) == pytest.approx(expected)
 
 
 @settings(max_examples=100)
 @given(st.floats(5, 150), st.floats(-60, 60), st.sampled_from((8.0, 20.0, 40.0)), st.booleans())
 def test_the_nearest_place_is_the_one_that_shapely_finds(x: float, y: float, radius: float, left: bool) -> None:
     path = road(radius, left=left)
-    line = LineString(np.column_stack((path.x_m, path.y_m)))
+    line = LineString(path.points[:2].T)
     assume(0.0 < line.project(Point(x, y)) < line.length)  # its ends do not go on
-    station, offset, _ = project(path, x, y)
+    station, offset, _ = project(path.points, x, y)
     if 0.0 <= station <= line.length:
         nearest_m = line.distance(Point(x, y))
         assert Point(x, y).distance(line.interpolate(station)) == pytest.approx(nearest_m, abs=1e-6)
@@ -215,8 +214,10 @@ def test_who_has_a_pedestrian_within_forty_metres() -> None:
 
 def test_whom_it_passes_at_its_speed_it_may_meet_at_that_of_a_bend() -> None:
     x = np.arange(0.0, 200.0, 10.0)
-    straight = Path(x, np.zeros_like(x), x, np.zeros_like(x), np.full_like(x, 13.89))
-    slow = straight._replace(limit_mps=np.where(x < 30.0, 13.89, 4.0))
+    straight, slow = (
+        Path.of(x, np.zeros_like(x), x, np.zeros_like(x), limit)
+        for limit in (np.full_like(x, 13.89), np.where(x < 30.0, 13.89, 4.0))
+    )
     late = walker(40.0, -6.0, 1.4)  # in the corridor after 3.2 s: at 13 m/s the ego is past, at 4 m/s it is there
     assert target(late, straight, speed_mps=13.0) == NOBODY
     assert target(late, slow, speed_mps=13.0).gap_m == pytest.approx(19.75)

@@ -13,7 +13,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.sim.lookout import project
-from risk_sac.sim.paths import AHEAD_M, Paths
+from risk_sac.sim.paths import AHEAD_M, HEADING, STATION, Paths
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Role
 
@@ -54,9 +54,9 @@ def test_a_vehicle_drives_along_its_path(
 ) -> None:
     frame = sim.reset(alone(family, route, lane, position_m), 0)
     path, station_m, offset_m = sim.along("ego")
-    np.testing.assert_allclose(np.hypot(np.diff(path.x_m), np.diff(path.y_m)), np.diff(path.station_m))
-    assert path.station_m[0] == 0.0
-    assert path.station_m[-1] >= min(AHEAD_M, 1.0)
+    np.testing.assert_allclose(np.hypot(*np.diff(path.points[:2])), np.diff(path.points[STATION]))
+    assert path.points[STATION, 0] == 0.0
+    assert path.points[STATION, -1] >= min(AHEAD_M, 1.0)
     assert abs(offset_m) < 0.5
     libsumo.vehicle.setLaneChangeMode("ego", 0)
     before_m = 0.0
@@ -65,7 +65,7 @@ def test_a_vehicle_drives_along_its_path(
             float(c[0]) + 2.3 * f(float(frame.heading_rad[0]))
             for c, f in ((frame.x_m, math.cos), (frame.y_m, math.sin))
         ]
-        at_m, aside_m, _ = project(path, *front)
+        at_m, aside_m, _ = project(path.points, *front)
         assert abs(aside_m) < 0.73, at_m  # within its lane of 3.3 m; it is 1.85 m wide
         assert at_m >= before_m - 0.1
         before_m = at_m
@@ -80,7 +80,7 @@ def test_the_intersection_looks_the_same_from_every_leg(sim: SumoSimulation, tur
         route = f"from_{leg}", f"to_{LEGS[(LEGS.index(leg) + turn) % 4]}"
         sim.reset(alone("dense", route, 1 if turn == 1 else 2, 190.0), 0)
         path = sim.along("ego").path
-        turned.append(math.remainder(float(path.heading_rad[-1] - path.heading_rad[0]), math.tau))
+        turned.append(math.remainder(float(path.points[HEADING, -1] - path.points[HEADING, 0]), math.tau))
     assert turned == pytest.approx([{1: -math.pi / 2, 2: 0.0, 3: math.pi / 2}[turn]] * 4, abs=0.02)
 
 

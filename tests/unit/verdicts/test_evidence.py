@@ -1,37 +1,17 @@
-import math
-
 import numpy as np
 import pytest
 
-from risk_sac.types import Frame, Kind, Role, Signal
+from risk_sac.types import Frame
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import judge
+from tests.builders import frame_of
 from tests.unit.verdicts.staged import STREET, cut_in, leader_brakes, stage, straight
 
 
 def frame(time_s: float, ids: tuple[str, ...]) -> Frame:
-    n = len(ids)
     rows = np.array([float(id_[-1]) for id_ in ids])
-    return Frame(
-        time_s=time_s,
-        ids=ids,
-        kind=np.array([Kind.VEHICLE] * n, dtype=np.int8),
-        role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
-        x_m=rows + time_s,
-        y_m=rows,
-        heading_rad=np.zeros(n),
-        vx_mps=rows,
-        vy_mps=rows,
-        speed_mps=rows,
-        lateral_mps=rows,
-        accel_mps2=rows,
-        length_m=np.full(n, 4.6),
-        width_m=np.full(n, 1.85),
-        signal=Signal.NONE,
-        stop_line_m=math.inf,
-        lane_offset_m=rows,
-        link=np.full(n, ord("r"), dtype=np.uint8),
-    )
+    moving = dict.fromkeys(("y_m", "vx_mps", "vy_mps", "speed_mps", "lateral_mps", "accel_mps2", "lane_offset_m"), rows)
+    return frame_of(time_s=time_s, ids=ids, x_m=rows + time_s, link=[ord("r")] * len(ids), **moving)
 
 
 def test_frames_become_columns_of_the_first_frames_actors() -> None:

@@ -2,15 +2,17 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from risk_sac.types import Frame, Kind, Signal
+from risk_sac.types import Frame, Kind
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
 from risk_sac.verdicts.online import conflicts_now
 from risk_sac.verdicts.path import polyline
+from tests.builders import frame_of, moved
 from tests.unit.verdicts.staged import LANE_M, STREET, cut_in, leader_brakes, pedestrian_crosses
 
 Actor = tuple[float, float, float, float, Kind]  # x, y, heading, speed, kind
@@ -18,33 +20,10 @@ CAR, WALKER = Kind.VEHICLE, Kind.PEDESTRIAN
 AHEAD = polyline(np.array([0.0, 200.0]), np.zeros(2))
 
 
-def frame(*others: Actor, ego: float = 12.0, mirror: int = 1, **changes: object) -> Frame:
+def frame(*others: Actor, ego: float = 12.0, mirror: int = 1, **changes: Any) -> Frame:
     x, y, heading, speed, kinds = zip((0.0, 0.0, 0.0, ego, CAR), *others, strict=True)
-    n = len(kinds)
-    heading_rad = mirror * np.array(heading)
-    vehicles = np.array(kinds) == CAR
-    return replace(
-        Frame(
-            time_s=0.0,
-            ids=tuple(f"a{i}" for i in range(n)),
-            kind=np.array(kinds, dtype=np.int8),
-            role=np.minimum(np.arange(n), 1).astype(np.int8),
-            x_m=np.array(x),
-            y_m=mirror * np.array(y),
-            heading_rad=heading_rad,
-            vx_mps=np.array(speed) * np.cos(heading_rad),
-            vy_mps=np.array(speed) * np.sin(heading_rad),
-            speed_mps=np.array(speed),
-            lateral_mps=np.zeros(n),
-            accel_mps2=np.zeros(n),
-            length_m=np.where(vehicles, 4.6, 0.5),
-            width_m=np.where(vehicles, 1.85, 0.5),
-            signal=Signal.NONE,
-            stop_line_m=math.inf,
-            lane_offset_m=np.zeros(n),
-            link=np.zeros(n, dtype=np.uint8),
-        ),
-        **changes,
+    return frame_of(
+        kinds, x_m=x, y_m=mirror * np.array(y), heading_rad=mirror * np.array(heading), speed_mps=speed, **changes
     )
 
 
@@ -89,8 +68,8 @@ def test_a_leader_that_brakes_hard() -> None:
 @pytest.mark.parametrize("mirror", [1, -1])
 def test_a_neighbour_that_comes_over(mirror: int) -> None:
     now = frame((12.0, 2.8, 0.0, 7.0, CAR), mirror=mirror)
-    assert in_conflict(replace(now, lane_offset_m=np.array([0.0, mirror * -0.5])))
-    assert not in_conflict(replace(now, y_m=now.y_m * 3.0 / 2.8, lane_offset_m=np.array([0.0, mirror * -0.3])))
+    assert in_conflict(moved(now, lane_offset_m=[0.0, mirror * -0.5]))
+    assert not in_conflict(moved(now, y_m=now.y_m * 3.0 / 2.8, lane_offset_m=[0.0, mirror * -0.3]))
 
 
 @pytest.mark.parametrize(("letter", "expected"), [("r", False), ("g", False), ("G", True), ("", True)])
@@ -117,20 +96,12 @@ def test_the_path_ahead_decides() -> None:
 def test_a_record_begins_where_it_would_have_been_seen(evidence: Evidence) -> None:
     began = find_conflict(evidence, 1).frame
     e = evidence
-    rows = {name: getattr(e, name) for name in (*PER_ACTOR, "link")}
 
     def at(t: int) -> bool:
-        now = Frame(
-            time_s=float(e.time_s[t]),
-            ids=e.ids,
-            kind=e.kind,
-            role=e.role,
-            length_m=e.length_m,
-            width_m=e.width_m,
-            signal=Signal.NONE,
-            stop_line_m=math.inf,
-            **{name: values[t] for name, values in rows.items()},
-        )
+        link = e.link[t].astype(np.uint8)
+        state = {name: getattr(e, name)[t] for name in PER_ACTOR}
+        sizes = {"length_m": e.length_m, "width_m": e.width_m}
+        now = frame_of(list(e.kind), time_s=float(e.time_s[t]), ids=e.ids, link=link, **state, **sizes)
         path = polyline(e.x_m[t, 0] + np.array([0.0, 200.0]), e.y_m[t, 0] + np.zeros(2))
         return bool(conflicts_now(now, path, e.known[t], e.ground)[1])
 
