@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 import sumo_nets
 from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
-from risk_sac.results import Contact
+from risk_sac.failures.roads import read_surfaces
 from risk_sac.risk.ttc import TTC_CAP_S
-from risk_sac.roads import read_surfaces
+from risk_sac.run_folder.results import Contact
+from risk_sac.run_folder.series import read_series
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.trace import read_series
 from risk_sac.types import Collision, Floats, Kind, Role
 
 EGO_COLOUR, OTHER_COLOUR, BYSTANDER_COLOUR = "tab:blue", "tab:red", "tab:gray"

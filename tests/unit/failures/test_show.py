@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
-from risk_sac.results import Contact
+from risk_sac.failures.show import Recording, draw, draw_recording
+from risk_sac.run_folder.results import Contact
+from risk_sac.run_folder.series import write_series
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.space import SceneSpace
-from risk_sac.show import Recording, draw, draw_recording
-from risk_sac.trace import write_series
 from risk_sac.train import train
 from risk_sac.types import Collision, ConflictType, EpisodeRecord, Judgement, Outcome, RunMetrics, SeriesFile
 from tests.judged import judgement
