@@ -24,7 +24,7 @@ from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run_folder.series import Measures, Trace
-from risk_sac.scenario.families import LEAD_IN_S
+from risk_sac.scenario.family import LEAD_IN_S
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact

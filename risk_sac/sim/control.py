@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.scenario.families import Family
+from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.bends import BODY_M, Bends, bends
 from risk_sac.sim.paths import Along, Path
