@@ -23,14 +23,14 @@ from risk_sac.risk.realism import adversaries_cost, broken_hard_rule
 from risk_sac.risk.reward import risk_reward
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
 from risk_sac.risk.ttc import TTC_CAP_S
-from risk_sac.scenario.families import LEAD_IN_S
+from risk_sac.run_folder.series import Measures, Trace
+from risk_sac.scenario.family import LEAD_IN_S
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.trace import Measures, Trace
 from risk_sac.types import STEP_S, Bools, Collision, Frame, Kind, Role, Scene
 from risk_sac.verdicts.artefact import Handling, artefact_verdicts
 from risk_sac.verdicts.conflict import find_conflict

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from risk_sac.jit import compiled
 from risk_sac.risk.publish import AHEAD, ASIDE, CLOSING_X, CLOSING_Y, COS, GAP, SEEN, SIN, Assessment
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
-from risk_sac.scenario.families import Family
+from risk_sac.scenario.family import Family
 from risk_sac.types import ACCEL, LATERAL, SPEED, Floats, Frame
 
 PER_ADVERSARY = 10

@@ -9,7 +9,8 @@ from risk_sac.config import CampaignSpec, EgoConfig, Odd, Requirement, RunSpec
 from risk_sac.errors import ConfigError, OddError
 from risk_sac.risk.rss import RssParameters
 from risk_sac.risk.stl import check_requirements
-from risk_sac.scenario.families import FAMILIES, Family
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import GRAVITY_MPS2, limits_from_odd
 from risk_sac.scenario.odd import intersect, narrow, requirements_from_odd
 from risk_sac.scenario.space import SceneSpace

@@ -15,25 +15,25 @@ from typing import Protocol
 import numpy as np
 import torch
 
-from risk_sac import checkpoint
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.random import RandomAgent
 from risk_sac.agents.replay import Transition
 from risk_sac.agents.scripted import ScriptedAgent
 from risk_sac.config import METHODS, RunSpec
-from risk_sac.crashes import CrashGuard
-from risk_sac.durable import sha256
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
 from risk_sac.metrics import MetricsAccumulator, results_digest
 from risk_sac.problem import Problem
-from risk_sac.records import records_from_json, records_to_json
-from risk_sac.results import FAILURES, series_name
 from risk_sac.risk.reward import training_reward
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
+from risk_sac.run_folder import checkpoint
+from risk_sac.run_folder.crashes import CrashGuard
+from risk_sac.run_folder.durable import sha256
+from risk_sac.run_folder.episode_json import records_from_json, records_to_json
+from risk_sac.run_folder.results import FAILURES, series_name
+from risk_sac.run_folder.series import write_series
 from risk_sac.scene_optimizer import BotorchOptimizer, SceneOptimizer, SobolOptimizer
-from risk_sac.trace import write_series
 from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
 
 logger = logging.getLogger(__name__)

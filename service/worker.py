@@ -133,7 +133,7 @@ def _run(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished | Failed:
 
 
 def _execute(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished:
-    from risk_sac.recorder import Recorder  # here, so that the slow import happens with a heartbeat
+    from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
     from risk_sac.train import train
 
     with Recorder(spec, folder, reporter) as recorder:

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 from risk_sac.audit.controls import CONTROLS, IDLE, Control
 from risk_sac.audit.play import Played, play
 from risk_sac.config import FamilyName
-from risk_sac.durable import replace_file
+from risk_sac.run_folder.durable import replace_file
 
 PART = 50  # episodes a process plays at a time
 _PLAYED = TypeAdapter(list[Played])

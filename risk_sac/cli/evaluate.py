@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, get_args
 from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, complain, console, progress_bar
 from risk_sac.config import METHODS, FamilyName
-from risk_sac.spec_file import read_campaign
+from risk_sac.config.spec_file import read_campaign
 
 if TYPE_CHECKING:
-    from risk_sac.processes import Job
+    from risk_sac.execution.processes import Job
 
 SEEDS = 5  # of a comparison that names none
 
@@ -33,7 +33,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     defaults = {"families": get_args(FamilyName), "methods": tuple(METHODS), "seeds": range(SEEDS)}
     defaults = {name: list(values) for name, values in defaults.items()}
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS), defaults)
-    from risk_sac.evaluate import evaluate  # here, because loading what checks the settings takes seconds
+    from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
 
     with progress_bar() as bar:
         jobs = options.jobs if options.jobs is not None else os.cpu_count() or 1

@@ -8,8 +8,8 @@ from rich.table import Table
 
 from risk_sac.cli.console import INTERRUPTED, OK, Commands, console, or_dash, progress_bar
 from risk_sac.config import METHODS, RunSpec
-from risk_sac.results import Results
-from risk_sac.spec_file import read_spec
+from risk_sac.config.spec_file import read_spec
+from risk_sac.run_folder.results import Results
 from risk_sac.types import RunMetrics
 
 
@@ -29,7 +29,7 @@ def add_run(commands: Commands) -> None:
 def _run(options: argparse.Namespace) -> int:
     names = ("family", "method", "seed", "episodes", "evaluation_episodes")
     spec = read_spec(options.spec, {name: getattr(options, name) for name in names})
-    from risk_sac.local_run import run  # here, because loading torch takes seconds
+    from risk_sac.execution.runs import run  # here, because loading torch takes seconds
 
     total = spec.budget.episodes + spec.budget.evaluation_episodes
     with progress_bar() as bar:

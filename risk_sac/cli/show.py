@@ -7,7 +7,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.console import OK, Commands, console
-from risk_sac.results import Results, read_results
+from risk_sac.run_folder.results import Results, read_results
 from risk_sac.types import Judgement
 
 
@@ -27,7 +27,7 @@ def _show(options: argparse.Namespace) -> int:
         return OK
     contact = results.contact(options.failure)
     folder = options.results if options.results.is_dir() else options.results.parent
-    from risk_sac.show import draw  # here, because loading matplotlib takes a second
+    from risk_sac.failures.show import draw  # here, because loading matplotlib takes a second
 
     picture = options.out or (folder / contact.series).with_suffix(".png")
     draw(results.spec.family, contact, folder, picture)

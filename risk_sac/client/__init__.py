@@ -9,17 +9,7 @@ with Client("http://127.0.0.1:8000") as client:
         ...
 """
 
-from risk_sac.client.client import Client
-from risk_sac.client.errors import (
-    ClientError,
-    FieldProblem,
-    Overdue,
-    Refused,
-    StreamLost,
-    UnexpectedAnswer,
-    Unreachable,
-)
-from risk_sac.client.records import (
+from risk_sac.client.answers import (
     Campaign,
     CampaignSummary,
     Episode,
@@ -31,6 +21,16 @@ from risk_sac.client.records import (
     Run,
     RunResult,
     Total,
+)
+from risk_sac.client.client import Client
+from risk_sac.client.errors import (
+    ClientError,
+    FieldProblem,
+    Overdue,
+    Refused,
+    StreamLost,
+    UnexpectedAnswer,
+    Unreachable,
 )
 
 __all__ = [

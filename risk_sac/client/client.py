@@ -10,9 +10,7 @@ from urllib.parse import quote
 from uuid import uuid4
 
 from risk_sac.client.address import DEFAULT_URL, api_key, checked_key, checked_url
-from risk_sac.client.errors import StreamLost
-from risk_sac.client.follow import AWAY_S, SILENCE_S, Follower
-from risk_sac.client.records import (
+from risk_sac.client.answers import (
     Campaign,
     CampaignSummary,
     Episode,
@@ -22,6 +20,8 @@ from risk_sac.client.records import (
     Record,
     Results,
 )
+from risk_sac.client.errors import StreamLost
+from risk_sac.client.follow import AWAY_S, SILENCE_S, Follower
 from risk_sac.client.transport import Transport
 from risk_sac.config import CampaignSpec
 from risk_sac.types import Grade

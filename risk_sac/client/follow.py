@@ -9,8 +9,8 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 
+from risk_sac.client.answers import Campaign
 from risk_sac.client.errors import Overdue, Refused, StreamLost, UnexpectedAnswer, Unreachable, retry_after_s
-from risk_sac.client.records import Campaign
 from risk_sac.client.transport import Transport
 
 AWAY_S = 120.0  # how long a service that was there may be away, as when it is restarted

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from risk_sac.config import FamilyName, MethodName, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import MetricsAccumulator, results_digest
-from risk_sac.results import EPISODES, Results, read_results
+from risk_sac.run_folder.results import EPISODES, Results, read_results
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.types import EpisodeRecord, RunMetrics
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.jit import compiled
-from risk_sac.scenario.families import Family
+from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.bends import BODY_M, CAP, HERE, SOON, bends, index
 from risk_sac.sim.paths import Along, Path

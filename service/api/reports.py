@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Query, Request, Response
 
 from risk_sac.config import CampaignSpec
+from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.report import Comparison, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS, Format
-from risk_sac.spec_file import campaign_yaml
 from service.api.access import CurrentCaller
 from service.api.context import Service
 from service.api.representations import accepted, caching, entity_tag, has, not_modified

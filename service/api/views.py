@@ -1,6 +1,6 @@
 """Records as response bodies."""
 
-from risk_sac.results import FAILURES
+from risk_sac.run_folder.results import FAILURES
 from risk_sac.types import Outcome
 from service import records
 from service.errors import StorageError

@@ -18,9 +18,9 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from risk_sac.durable import sync_folder
 from risk_sac.errors import DamagedError
-from risk_sac.seal import seal, unseal
+from risk_sac.run_folder.durable import sync_folder
+from risk_sac.run_folder.seal import seal, unseal
 from service.errors import ConflictError, NotFoundError, StorageError
 from service.networks.errors import BusyError
 from service.networks.incoming import Incoming

@@ -5,13 +5,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-from risk_sac.crashes import FATAL
+from risk_sac.run_folder.crashes import FATAL
 
 # The second episode reads address 0 in its eighth step, in libsumo's process, as a crash in libsumo does.
 RISK_SAC = """
 import ctypes, sys
 from risk_sac import cli
-from risk_sac.crashes import CrashGuard
+from risk_sac.run_folder.crashes import CrashGuard
 
 note = CrashGuard.step
 

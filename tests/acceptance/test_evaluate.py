@@ -14,7 +14,8 @@ from typing import Any
 
 import pytest
 
-from risk_sac import cli, processes
+from risk_sac import cli
+from risk_sac.execution import processes
 
 RISK_SAC = [sys.executable, "-m", "risk_sac"]
 # Small networks and a short warm-up, so that the few episodes learn; two contacts in twelve episodes or so.

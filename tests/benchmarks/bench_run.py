@@ -10,8 +10,8 @@ import pytest
 from risk_sac.agents.learner import Learner
 from risk_sac.config import Budget, RunSpec
 from risk_sac.env import RiskSacEnv
-from risk_sac.local_run import run
-from risk_sac.recorder import Recorder
+from risk_sac.execution.recorder import Recorder
+from risk_sac.execution.runs import run
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scene_optimizer import BotorchOptimizer
 from risk_sac.train import Run

@@ -3,7 +3,7 @@
 import ctypes
 import sys
 
-from risk_sac.crashes import CrashGuard
+from risk_sac.run_folder.crashes import CrashGuard
 from service import worker
 
 note = CrashGuard.step

@@ -4,7 +4,7 @@ import json
 import signal
 
 from risk_sac import cli
-from risk_sac.results import read_results
+from risk_sac.run_folder.results import read_results
 
 SPEC = {
     "families": ["low"],

@@ -12,9 +12,9 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.config import CampaignSpec
+from risk_sac.config.spec_file import read_campaign
 from risk_sac.report import compare, figure_bytes, figure_names, read_run, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS
-from risk_sac.spec_file import read_campaign
 from service.report_schemas import Table
 
 SPEC = {

@@ -14,7 +14,7 @@ from risk_sac.config import FamilyName, RunSpec
 from risk_sac.env import Observation, RiskSacEnv
 from risk_sac.problem import Problem
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
-from risk_sac.trace import Trace
+from risk_sac.run_folder.series import Trace
 from risk_sac.types import STEP_S, Collision
 
 each_family = pytest.mark.parametrize("family", ["low", "mixed", "dense"])

@@ -15,7 +15,7 @@ import pytest
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
-from risk_sac.results import FAILURES, RESULTS
+from risk_sac.run_folder.results import FAILURES, RESULTS
 from service.api.views import failure_body
 from service.campaigns import State
 from service.errors import StorageError
@@ -179,7 +179,7 @@ def test_a_run_with_a_damaged_file_goes_on_from_the_last_good_one(data, tmp_path
 def go_on(spec: RunSpec, folder: Path, stop_after: int | None = None) -> str:
     """Digest of a run that is started or goes on in a process of its own, or why it cannot."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["risk_sac.local_run"])
+    context.set_forkserver_preload(["risk_sac.execution.runs"])
     receiver, sender = context.Pipe(duplex=False)
     with receiver, sender:
         process = context.Process(target=_run, args=(spec, folder, stop_after, sender))
@@ -194,7 +194,7 @@ def go_on(spec: RunSpec, folder: Path, stop_after: int | None = None) -> str:
 def _run(spec: RunSpec, folder: Path, stop_after: int | None, sender: Any) -> None:
     import os
 
-    from risk_sac.local_run import run
+    from risk_sac.execution.runs import run
 
     def progress(done: int, metrics: object) -> None:
         if done == stop_after:

@@ -24,6 +24,14 @@ def inner(x):
 """
 
 
+def test_the_cache_is_named_by_every_file_that_compiles() -> None:
+    package = Path(risk_sac.jit.__file__).parent
+    named = {file for pattern in risk_sac.jit.COMPILED for file in package.glob(pattern)}
+    compiling = {file for file in package.rglob("*.py") if "@compiled" in file.read_text()}
+    assert compiling
+    assert compiling <= named
+
+
 def test_a_change_in_a_called_function_is_not_hidden_by_the_cache(tmp_path: Path) -> None:
     package = tmp_path / "risk_sac"
     (package / "risk").mkdir(parents=True)

@@ -7,8 +7,8 @@ from risk_sac.cli.campaigns.output import line, print_answer
 from risk_sac.cli.campaigns.watch import add_watch_flags, prepare, watch
 from risk_sac.cli.console import OK, Commands, notes
 from risk_sac.client import Client
+from risk_sac.config.spec_file import read_campaign
 from risk_sac.errors import ConfigError
-from risk_sac.spec_file import read_campaign
 
 SEEDS = 1  # where none are named
 

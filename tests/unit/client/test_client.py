@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
-from risk_sac.client import Client, records
+from risk_sac.client import Client, answers
 from risk_sac.config import Budget, CampaignSpec
 from tests.unit.client.scripted_server import Server, campaign
 
@@ -18,19 +18,19 @@ DESCRIPTION = yaml.safe_load((Path(__file__).parents[3] / "openapi.yaml").read_t
 @pytest.mark.parametrize(
     "record",
     [
-        records.Campaign,
-        records.CampaignSummary,
-        records.Episode,
-        records.Failure,
-        records.Metrics,
-        records.Progress,
-        records.Results,
-        records.Run,
-        records.RunResult,
-        records.Total,
+        answers.Campaign,
+        answers.CampaignSummary,
+        answers.Episode,
+        answers.Failure,
+        answers.Metrics,
+        answers.Progress,
+        answers.Results,
+        answers.Run,
+        answers.RunResult,
+        answers.Total,
     ],
 )
-def test_records_read_only_what_the_api_promises(record: type[records.Record]) -> None:
+def test_records_read_only_what_the_api_promises(record: type[answers.Record]) -> None:
     assert set(record.model_fields) <= set(DESCRIPTION[record.__name__]["required"])
 
 

@@ -8,7 +8,6 @@ import pytest
 
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import results_digest
-from risk_sac.records import records_to_json
 from risk_sac.report import (
     compare,
     figure_bytes,
@@ -20,8 +19,9 @@ from risk_sac.report import (
     write_report,
 )
 from risk_sac.report.figures import window_ecr, window_pcr
-from risk_sac.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
-from risk_sac.seal import seal, unseal
+from risk_sac.run_folder.episode_json import records_to_json
+from risk_sac.run_folder.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
+from risk_sac.run_folder.seal import seal, unseal
 
 
 @pytest.fixture

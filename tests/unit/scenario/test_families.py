@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.scenario.families import APPROACH_M, FAMILIES, Family
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.family import Family
+from risk_sac.scenario.junction import APPROACH_M
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Kind, Role, Scene

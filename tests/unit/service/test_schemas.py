@@ -7,7 +7,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from risk_sac.metrics import Funnel
-from risk_sac.trace import PER_ACTOR, PER_OTHER, write_series
+from risk_sac.run_folder.series import PER_ACTOR, PER_OTHER, write_series
 from risk_sac.types import Collision, EpisodeRecord, Judgement, Outcome, ReferenceOutcome, RunMetrics
 from service import schemas
 from service.api.views import episode_body

@@ -11,7 +11,8 @@ import pytest
 
 from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
-from risk_sac.scenario.families import FAMILIES, Family
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
 from risk_sac.sim.sumo import SumoSimulation, VehicleCommand, Walker
 from risk_sac.types import Frame, Role

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from risk_sac.config import RunSpec
+from risk_sac.execution.recorder import Recorder
+from risk_sac.execution.stopping import stop_signal
 from risk_sac.problem import Problem
-from risk_sac.recorder import Recorder
-from risk_sac.results import Results
-from risk_sac.stopping import stop_signal
+from risk_sac.run_folder.results import Results
 from risk_sac.train import train
 from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 

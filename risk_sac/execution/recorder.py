@@ -1,4 +1,4 @@
-"""Writes a run down as it goes; what its folder then holds is told in `risk_sac.results`."""
+"""Writes a run down as it goes; what its folder then holds is told in `risk_sac.run_folder.results`."""
 
 import logging
 import os
@@ -9,11 +9,11 @@ from typing import Self
 
 from pydantic import TypeAdapter
 
-from risk_sac import checkpoint
 from risk_sac.config import RunSpec
-from risk_sac.durable import set_aside
 from risk_sac.errors import ConfigError
-from risk_sac.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
+from risk_sac.run_folder import checkpoint
+from risk_sac.run_folder.durable import set_aside
+from risk_sac.run_folder.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
 from risk_sac.train import CHECKPOINT, Observer, RunSummary
 from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 

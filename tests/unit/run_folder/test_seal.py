@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.errors import DamagedError
-from risk_sac.seal import seal, unseal
+from risk_sac.run_folder.seal import seal, unseal
 
 TEXT = json.dumps({"name": "ε", "values": [1.5, None], "inner": {"sha256": "of something else"}}, indent=2).encode()
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac import checkpoint
 from risk_sac.errors import CheckpointError, DamagedCheckpoint
+from risk_sac.run_folder import checkpoint
 
 RUN = "a" * 64
 CASES = 60

@@ -1,7 +1,7 @@
 """A campaign without a server: each run in a process of its own, then the comparison of methods.
 
 DIR/spec.yaml                            the campaign
-DIR/runs/<family>-<method>-<seed>/       a run's folder, see `risk_sac.results`, and what its process printed
+DIR/runs/<family>-<method>-<seed>/       a run's folder, see `risk_sac.run_folder.results`, and what its process printed
 DIR/table.{json,md,csv}, DIR/figures/    see `risk_sac.report`
 """
 
@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.config.spec_file import campaign_yaml, read_campaign
 from risk_sac.errors import ConfigError
+from risk_sac.execution.processes import Executor, Job, Progress
+from risk_sac.execution.stopping import STOPPING, stop_signal
 from risk_sac.problem import Problem
-from risk_sac.processes import Executor, Job, Progress
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
-from risk_sac.spec_file import campaign_yaml, read_campaign
-from risk_sac.stopping import STOPPING, stop_signal
 
 SPEC, RUNS, LOCK = "spec.yaml", "runs", ".lock"
 

@@ -25,9 +25,9 @@ from typing import Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from risk_sac.durable import replace_file
 from risk_sac.errors import DamagedError
-from risk_sac.seal import seal, unseal
+from risk_sac.run_folder.durable import replace_file
+from risk_sac.run_folder.seal import seal, unseal
 
 logger = logging.getLogger(__name__)
 

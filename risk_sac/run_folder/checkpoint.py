@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from risk_sac.durable import replace_file, set_aside
 from risk_sac.errors import CheckpointError, DamagedCheckpoint
+from risk_sac.run_folder.durable import replace_file, set_aside
 
 logger = logging.getLogger(__name__)
 

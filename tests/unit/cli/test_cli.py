@@ -12,11 +12,11 @@ from risk_sac import cli
 from risk_sac.cli.show import _contacts
 from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
-from risk_sac.local_run import run
-from risk_sac.results import Contact, Results, read_results, write_results
+from risk_sac.execution.runs import run
+from risk_sac.run_folder.results import Contact, Results, read_results, write_results
 from risk_sac.types import ConflictType, Grade, RunMetrics
 from tests.judged import judgement
-from tests.unit.test_show import synthetic_contact
+from tests.unit.failures.staged import synthetic_contact
 
 SPEC = RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=3))
 

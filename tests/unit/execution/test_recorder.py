@@ -4,8 +4,8 @@ import pytest
 
 from risk_sac.config import Budget, LearnerConfig, RunSpec
 from risk_sac.errors import CheckpointError, ConfigError
-from risk_sac.local_run import run
-from risk_sac.results import EPISODES, RESULTS, read_results
+from risk_sac.execution.runs import run
+from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
 from risk_sac.train import CHECKPOINT
 
 SPEC = RunSpec(

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Literal
 
 from risk_sac.config import RunSpec
-from risk_sac.crashes import PATIENCE
 from risk_sac.errors import ConfigError
-from risk_sac.results import EPISODES, RESULTS, read_results
+from risk_sac.run_folder.crashes import PATIENCE
+from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
 
 LOG = "run.log"  # in a run's folder: what its process printed
 ATTEMPTS = PATIENCE + 1  # the last one without the episode that crashed the others

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sumo_nets
-from risk_sac.roads import read_surfaces
+from risk_sac.failures.roads import read_surfaces
 
 NETS = Path(sumo_nets.__path__[0])
 

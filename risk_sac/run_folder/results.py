@@ -2,7 +2,7 @@
 
 results.json    the spec, the metrics and every contact, sealed; rewritten at each checkpoint and at the end
 episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
-failures/       the time series of every contact, see `risk_sac.trace`
+failures/       the time series of every contact, see `risk_sac.run_folder.series`
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
 
@@ -14,9 +14,9 @@ from typing import ClassVar
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from risk_sac.config import RunSpec
-from risk_sac.durable import replace_file
 from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.seal import seal, unseal
+from risk_sac.run_folder.durable import replace_file
+from risk_sac.run_folder.seal import seal, unseal
 from risk_sac.types import EpisodeRecord, RunMetrics
 
 RESULTS = "results.json"

@@ -5,7 +5,7 @@ import pytest
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
-from risk_sac.results import RESULTS, Results, read_results, write_results
+from risk_sac.run_folder.results import RESULTS, Results, read_results, write_results
 
 SPEC = RunSpec(family="low", method="random", seed=0)
 

@@ -4,8 +4,8 @@ from typing import Any
 import pytest
 
 from risk_sac.config import RunSpec
+from risk_sac.config.spec_file import campaign_yaml, read_campaign, read_spec
 from risk_sac.errors import ConfigError
-from risk_sac.spec_file import campaign_yaml, read_campaign, read_spec
 
 FLAGS: dict[str, Any] = dict.fromkeys(("family", "method", "seed", "episodes", "evaluation_episodes"))
 

@@ -1,0 +1,115 @@
+"""The view from above: the roads, both paths, and the bodies at the contact and before it."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Polygon
+
+import sumo_nets
+from risk_sac.config import FamilyName
+from risk_sac.failures.recording import Recording
+from risk_sac.failures.roads import read_surfaces
+from risk_sac.failures.style import BYSTANDER_COLOUR, CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, legend
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.types import Kind, Role
+
+SURFACE_COLOURS = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
+GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the contact, where the two bodies are drawn as well
+
+
+def draw_from_above(axis: Axes, family: FamilyName, recording: Recording) -> None:
+    """Draws everything on the ground; who calls it chooses what part of the ground is seen."""
+    layout = FAMILIES[family].layout(recording.contact.episode.scene)
+    for surface in read_surfaces(Path(sumo_nets.__path__[0]) / layout.net):
+        colour = SURFACE_COLOURS[surface.use]
+        axis.add_patch(Polygon(surface.outline, facecolor=colour, edgecolor="0.7", linewidth=0.5))
+    for actor in range(1, len(recording.series["ids"])):
+        if actor != recording.other:
+            _draw_actor(axis, recording, actor, BYSTANDER_COLOUR, ghosts=())
+    _draw_actor(axis, recording, recording.other, OTHER_COLOUR, GHOSTS_S)
+    _draw_actor(axis, recording, 0, EGO_COLOUR, GHOSTS_S)
+    _draw_contact_point(axis, recording)
+    _draw_conflict(axis, recording)
+    axis.set(xlabel="x, m", ylabel="y, m")
+    legend(axis)
+
+
+def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, ghosts: tuple[float, ...]) -> None:
+    """Path, body at the contact, and bodies at the earlier times with their labels."""
+    involved = bool(ghosts)
+    name = str(recording.series["ids"][actor])
+    driver = Role(int(recording.series["role"][actor])).name.lower()
+    x, y = recording["x_m"][:, actor], recording["y_m"][:, actor]
+    axis.plot(x, y, color=colour, linewidth=1.2 if involved else 0.6, alpha=1.0 if involved else 0.5)
+    label = "ego" if actor == 0 else f"{name} ({driver})"
+    for before_s in ghosts:
+        if -before_s >= recording.time_s[0]:
+            _draw_body(axis, recording, actor, -before_s, facecolor="none", edgecolor=colour, linewidth=0.8)
+            _label_body(axis, recording, actor, -before_s, colour)
+    if np.isfinite(x[-1]):
+        _draw_body(
+            axis,
+            recording,
+            actor,
+            0.0,
+            facecolor=colour,
+            edgecolor=colour,
+            alpha=0.6 if involved else 0.2,
+            label=label if involved else None,
+        )
+        if not involved:
+            axis.annotate(name, (x[-1], y[-1]), fontsize=6, color=colour, ha="center", va="center", clip_on=True)
+
+
+def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **style: object) -> None:
+    x, y, heading = recording.pose(actor, time_s)
+    half_length, half_width = recording["length_m"][actor] / 2, recording["width_m"][actor] / 2
+    cos, sin = np.cos(heading), np.sin(heading)
+    corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * (half_length, half_width)
+    outline = corners @ np.array([(cos, sin), (-sin, cos)]) + (x, y)
+    axis.add_patch(Polygon(outline, **style))  # type: ignore[arg-type]
+    front = np.array([(0.45, 1), (1, 0), (0.45, -1)]) * (half_length, half_width)  # an arrow head tells where it heads
+    if recording.series["kind"][actor] == Kind.VEHICLE:
+        arrow = front @ np.array([(cos, sin), (-sin, cos)]) + (x, y)
+        axis.plot(arrow[:, 0], arrow[:, 1], color=str(style["edgecolor"]), linewidth=0.6)
+
+
+def _label_body(axis: Axes, recording: Recording, actor: int, time_s: float, colour: str) -> None:
+    """The time beside a body, on the side that faces away from the other one."""
+    x, y, heading = recording.pose(actor, time_s)
+    partner_x, partner_y, _ = recording.pose(recording.other if actor == 0 else 0, time_s)
+    left = np.array((-np.sin(heading), np.cos(heading)))
+    away = -left if left @ (partner_x - x, partner_y - y) > 0 else left
+    axis.annotate(
+        f"−{-time_s:g} s",
+        tuple(np.array((x, y)) + away * recording["width_m"][actor] / 2),
+        tuple(away * (16, 8)),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        fontsize=7,
+        color=colour,
+        annotation_clip=True,
+    )
+
+
+def _draw_contact_point(axis: Axes, recording: Recording) -> None:
+    x, y, heading = recording.pose(0, 0.0)
+    along, across = recording.collision.contact_x_m, recording.collision.contact_y_m
+    cos, sin = np.cos(heading), np.sin(heading)
+    place = x + along * cos - across * sin, y + along * sin + across * cos
+    axis.plot(*place, marker="x", color="black", markersize=7, linestyle="none", zorder=5, label="contact")
+
+
+def _draw_conflict(axis: Axes, recording: Recording) -> None:
+    """Where the striker was when the conflict began, and both bodies at that moment."""
+    judgement, begin_s = recording.collision.judgement, recording.conflict_s
+    if judgement is None or begin_s is None:
+        return
+    for actor in (0, recording.other):
+        if np.isfinite(recording.pose(actor, begin_s)).all():
+            style = {"facecolor": "none", "edgecolor": CONFLICT_COLOUR, "linewidth": 1.4, "linestyle": "--"}
+            _draw_body(axis, recording, actor, begin_s, **style)
+    place = judgement.conflict_x_m, judgement.conflict_y_m
+    axis.plot(*place, marker="D", color=CONFLICT_COLOUR, markersize=5, linestyle="none", zorder=5, label="conflict")

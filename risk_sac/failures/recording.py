@@ -1,0 +1,70 @@
+"""A contact and its time series, with time counted from the contact."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.run_folder.results import Contact
+from risk_sac.types import Collision, Floats
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A contact's time series with time counted from the contact."""
+
+    contact: Contact
+    series: dict[str, NDArray[np.generic]]
+
+    @property
+    def collision(self) -> Collision:
+        """What was recorded at the contact."""
+        assert self.contact.episode.collision is not None  # that is what makes an episode a contact
+        return self.contact.episode.collision
+
+    @cached_property
+    def time_s(self) -> Floats:
+        """`T`, negative before the contact."""
+        time: Floats = self["time_s"] - self._simulator_release_s - self.collision.time_s
+        return time
+
+    @property
+    def _simulator_release_s(self) -> float:
+        """The release by the simulator's clock; the first frame, in what was recorded before there was a release."""
+        return float(self["released_s"] if "released_s" in self.series else self["time_s"][0])
+
+    @property
+    def released_s(self) -> float:
+        """When the adversaries were released."""
+        return -self.collision.time_s
+
+    @property
+    def conflict_s(self) -> float | None:
+        """When the conflict began; None if nobody judged the contact, or if it was before the recording."""
+        if self.collision.judgement is None:
+            return None
+        began_s = self.collision.judgement.conflict_s - self.collision.time_s
+        return began_s if began_s >= self.time_s[0] else None
+
+    @cached_property
+    def other(self) -> int:
+        """Column of the actor that the ego touched; the ego's is 0."""
+        return [str(id_) for id_ in self.series["ids"]].index(self.collision.other_id)
+
+    def __getitem__(self, name: str) -> Floats:
+        return np.asarray(self.series[name], dtype=np.float64)
+
+    def pose(self, actor: int, time_s: float) -> tuple[float, float, float]:
+        """Centre and heading at any time within the recording, between two frames as the contact's search does."""
+        x, y, heading = (self[name][:, actor] for name in ("x_m", "y_m", "heading_rad"))
+        at = (float(np.interp(time_s, self.time_s, values)) for values in (x, y, np.unwrap(heading)))
+        return next(at), next(at), next(at)
+
+    def hidden(self) -> Iterator[tuple[float, float]]:
+        """The spans in which the ego could not see the other."""
+        unseen = np.concatenate(([False], self["visible"][:, self.other] == 0, [False]))
+        edges = np.flatnonzero(unseen[1:] != unseen[:-1])
+        for start, end in edges.reshape(-1, 2):
+            yield self.time_s[start], self.time_s[min(end, len(self.time_s) - 1)]

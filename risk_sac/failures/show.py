@@ -1,0 +1,81 @@
+"""Draws one contact as the paper's Fig. 2 does: both paths from above, and what was measured along the way.
+
+Where the contact was judged, the moment at which the conflict began is marked as well.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from risk_sac.config import FamilyName
+from risk_sac.errors import ConfigError
+from risk_sac.failures.caption import caption
+from risk_sac.failures.from_above import draw_from_above
+from risk_sac.failures.panels import PANELS, mark_instants
+from risk_sac.failures.recording import Recording
+from risk_sac.run_folder.results import Contact
+from risk_sac.run_folder.series import read_series
+from risk_sac.types import Floats
+
+VIEW_S, PANELS_S = 3.0, 8.0  # before the contact: what the view from above holds, and the panels
+MARGIN_M = 5.0
+WIDTH_IN, PANEL_IN, DPI = 11.0, 1.5, 110
+PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
+VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
+
+
+def draw(family: FamilyName, contact: Contact, folder: Path, picture: Path) -> None:
+    """Draws a contact into a file.
+
+    Args:
+      family: of the run.
+      contact: of the run's results.
+      folder: where results.json lies.
+      picture: its suffix names the format: png, pdf or svg.
+
+    Raises:
+      ConfigError: the format is none of these.
+      OSError: the time series is gone or the picture cannot be written.
+    """
+    if picture.suffix not in (".png", ".pdf", ".svg"):
+        raise ConfigError(f"got {str(picture)!r}; wanted a name that ends in .png, .pdf or .svg", field="out")
+    recording = Recording(contact, read_series(folder / contact.series))
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    draw_recording(family, recording).savefig(picture, dpi=DPI)
+
+
+def draw_recording(family: FamilyName, recording: Recording) -> Figure:
+    """The whole figure: the view from above, and one panel per kind of measurement over a common time axis."""
+    low, high = _extent(recording)
+    view_in = PANEL_WIDTH_IN * (high - low)[1] / (high - low)[0]
+    heights = (view_in, *(PANEL_IN for _ in PANELS))
+    figure = Figure(figsize=(WIDTH_IN, sum(heights) + 1.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    view, *axes = figure.subplots(len(heights), 1, height_ratios=heights)
+    figure.suptitle(caption(family, recording), fontsize=11)
+    draw_from_above(view, family, recording)
+    view.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    for axis, panel in zip(axes, PANELS, strict=True):
+        panel(axis, recording)
+        mark_instants(axis, recording)
+        axis.sharex(axes[0])
+        axis.label_outer()
+    axes[0].set_xlim(max(recording.time_s[0], -PANELS_S), 0.15)
+    axes[-1].set_xlabel("time before the contact, s")
+    return figure
+
+
+def _extent(recording: Recording) -> tuple[Floats, Floats]:
+    """Corners of the ground that both took in the last seconds, grown to a shape that fits the page."""
+    begin_s = recording.conflict_s
+    shown = recording.time_s >= min(-VIEW_S, max(begin_s, -PANELS_S) if begin_s is not None else 0.0)
+    pair = [0, recording.other]
+    points = np.concatenate([recording[name][shown][:, pair].reshape(1, -1) for name in ("x_m", "y_m")])
+    low, high = points.min(axis=1) - MARGIN_M, points.max(axis=1) + MARGIN_M
+    width, height = high - low
+    height = max(height, width * VIEW_IN[0] / PANEL_WIDTH_IN)
+    width = max(width, height * PANEL_WIDTH_IN / VIEW_IN[1])
+    middle, half = (low + high) / 2, np.array((width, height)) / 2
+    return middle - half, middle + half

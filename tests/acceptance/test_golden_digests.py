@@ -1,0 +1,27 @@
+"""A change that is not meant to change results changes none: small runs come to the digests that were recorded."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.acceptance.golden_digests import METHODS, SEEDS, digest, fingerprint, recorded
+
+
+@pytest.fixture(scope="module")
+def digests() -> dict[str, str]:
+    here = fingerprint()
+    found = recorded(here)
+    if found is None:
+        pytest.skip(
+            f"no digests were recorded for {' '.join(f'{name}={value}' for name, value in here.items())}; on a commit "
+            "you trust, record them with `python -m tests.acceptance.golden_digests`"
+        )
+    return found
+
+
+@pytest.mark.parametrize("family", SEEDS)
+@pytest.mark.parametrize("method", METHODS)
+def test_a_small_run_comes_to_the_recorded_digest(
+    digests: dict[str, str], family: str, method: str, tmp_path: Path
+) -> None:
+    assert digest(family, method, tmp_path) == digests[f"{family} {method}"]

@@ -1,0 +1,109 @@
+"""A contact made by hand, with its time series."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.run_folder.results import Contact
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.space import SceneSpace
+from risk_sac.types import Collision, ConflictType, EpisodeRecord, Judgement, Outcome
+from tests.judged import judgement
+
+JUDGED = judgement(
+    conflict_type=ConflictType.PEDESTRIAN,
+    conflict_s=0.75,
+    conflict_x_m=302.0,
+    conflict_y_m=-3.25,
+    broke=("pedestrian_on_red",),
+)
+
+
+def synthetic_contact(judged: Judgement | None = JUDGED) -> Contact:
+    """The ego drives east at 10 m/s into a pedestrian who walks north; the contact is 1.95 s after the release."""
+    space: SceneSpace = FAMILIES["mixed"].space
+    collision = Collision(
+        time_s=1.95,
+        other_id="pedestrian",
+        other_kind="pedestrian",
+        other_role="adversary",
+        contact_x_m=2.3,
+        contact_y_m=-0.5,
+        ego_zone="front",
+        other_zone="left",
+        ego_speed_mps=10.0,
+        other_speed_mps=1.0,
+        relative_speed_mps=10.05,
+        lateral_offset_m=-0.5,
+        min_ttc_s=0.1,
+        min_rss_margin_m=-3.0,
+        visible_for_s=1.0,
+        ego_peak_braking_mps2=0.0,
+        min_robustness=-1.0,
+        simulator_agrees=True,
+        verdicts={"ego_moving": True},
+        judgement=judged,
+    )
+    episode = EpisodeRecord(
+        index=7,
+        phase="train",
+        seed=1,
+        scene=space.from_unit(np.full(space.dimension, 0.4)).values,
+        outcome=Outcome.FAILURE,
+        reason="",
+        steps=20,
+        risk_return=1.0,
+        shaped_return=1.0,
+        mean_cost=0.1,
+        min_ttc_s=0.1,
+        min_robustness=-1.0,
+        objective=0.0,
+        dual_variable=0.0,
+        temperature=0.2,
+        environment_steps=20,
+        collision=collision,
+    )
+    return Contact.of(episode)
+
+
+def synthetic_series() -> dict[str, NDArray[np.generic]]:
+    """Ego, the pedestrian, and a bystander that leaves the net after one second."""
+    t = np.arange(21) * 0.1
+    zero, gone = np.zeros_like(t), np.where(t < 1.0, 0.0, np.nan)
+    return {
+        "time_s": t + 0.1,
+        "ids": np.array(["ego", "pedestrian", "bystander"]),
+        "kind": np.array([0, 1, 0], dtype=np.int8),
+        "role": np.array([0, 1, 2], dtype=np.int8),
+        "length_m": np.array([4.6, 0.5, 4.6]),
+        "width_m": np.array([1.85, 0.5, 1.85]),
+        "requirements": np.array(["safe_ttc", "pedestrian_gap"]),
+        "robustness": np.column_stack((1 - t, 2 - t)),
+        "soft_min": 1 - t,
+        "signal": np.zeros(21, dtype=np.int8),
+        "x_m": np.column_stack((280 + 10 * t, zero + 302, gone + 260)),
+        "y_m": np.column_stack((zero - 1.65, -4 + t, gone + 1.65)),
+        "heading_rad": np.column_stack((zero, zero + np.pi / 2, gone + np.pi)),
+        "speed_mps": np.column_stack((zero + 10, zero + 1, gone + 5)),
+        "lateral_mps": np.column_stack((zero, zero, gone)),
+        "accel_mps2": np.column_stack((zero, zero, gone)),
+        "distance_m": np.column_stack((zero + np.nan, 20 - 10 * t, gone + 20)),
+        "ttc_s": np.column_stack((zero + np.nan, 2 - t, gone + 10)),
+        "rss_longitudinal_m": np.column_stack((zero + np.nan, zero, gone)),
+        "rss_lateral_m": np.column_stack((zero + np.nan, zero, gone)),
+        "visible": np.column_stack((zero + np.nan, t > 1.0, gone + 1)),
+        "actions": np.zeros((21, 2)),
+    }
+
+
+def with_release() -> dict[str, NDArray[np.generic]]:
+    """The same with 1.5 s before the release, in which the ego drives as it does after and all others stand."""
+    series, early = synthetic_series(), 15
+    rows = len(series["time_s"])
+    longer = {
+        name: np.concatenate((np.repeat(values[:1], early, axis=0), values)) if len(values) == rows else values
+        for name, values in series.items()
+    }
+    t = np.arange(early + rows) * 0.1 - 1.5
+    x_m = longer["x_m"].copy()
+    x_m[:, 0] = 280 + 10 * t
+    return longer | {"time_s": t + 1.6, "x_m": x_m, "released_s": np.array(1.6)}

@@ -1,0 +1,104 @@
+import struct
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from risk_sac.config import Budget, RunSpec
+from risk_sac.errors import ConfigError
+from risk_sac.failures.recording import Recording
+from risk_sac.failures.show import draw, draw_recording
+from risk_sac.run_folder.results import Contact
+from risk_sac.run_folder.series import write_series
+from risk_sac.train import train
+from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
+from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
+
+
+def png_size(file: Path) -> tuple[int, int]:
+    content = file.read_bytes()
+    assert content.startswith(b"\x89PNG")
+    width, height = struct.unpack(">II", content[16:24])
+    return width, height
+
+
+@pytest.mark.parametrize("conflict_s", [0.75, -1.0])
+def test_release_and_conflict_are_marked_in_every_panel_and_the_conflict_from_above(conflict_s: float) -> None:
+    contact = synthetic_contact(replace(JUDGED, conflict_s=conflict_s))
+    view, *panels = draw_recording("mixed", Recording(contact, with_release())).axes
+    for panel in panels:
+        upright = [float(np.ravel(line.get_xdata())[0]) for line in panel.lines if line.get_linestyle() == ":"]
+        assert upright == pytest.approx([-0.95, -1.95, conflict_s - 1.95])
+        assert [text.get_text() for text in panel.texts] == ["in view", "release", "conflict"]
+    (mark,) = (line for line in view.lines if line.get_label() == "conflict")
+    assert (np.ravel(mark.get_xdata())[0], np.ravel(mark.get_ydata())[0]) == (302.0, -3.25)
+    ghosts = [patch for patch in view.patches if patch.get_linestyle() == "--"]
+    centres = [patch.get_path().vertices[:-1].mean(axis=0) for patch in ghosts]
+    pedestrian_y = -4 + max(conflict_s, 0)
+    np.testing.assert_allclose(centres, [(280 + 10 * conflict_s, -1.65), (302, pedestrian_y)])
+    low, high = view.get_xlim()
+    assert low < 280 + 10 * conflict_s < high
+
+
+def test_a_contact_that_nobody_judged_is_drawn_without_a_conflict() -> None:
+    figure = draw_recording("mixed", Recording(synthetic_contact(None), synthetic_series()))
+    view, *panels = figure.axes
+    assert len(figure.get_suptitle().splitlines()) == 2
+    assert "conflict" not in [line.get_label() for line in view.lines]
+    assert [text.get_text() for text in panels[0].texts] == ["in view", "release"]
+
+
+def test_contact_and_first_sight_are_marked_in_every_panel() -> None:
+    figure = draw_recording("mixed", Recording(synthetic_contact(), synthetic_series()))
+    assert isinstance(figure, Figure)
+    panels = figure.axes[1:]
+    assert len(panels) == 5
+    for panel in panels:
+        upright = [float(np.ravel(line.get_xdata())[0]) for line in panel.lines if line.get_linestyle() in ("--", ":")]
+        assert any(x == 0 for x in upright)
+        assert any(x == pytest.approx(-0.95) for x in upright)
+
+
+def test_both_bodies_and_both_paths_are_drawn() -> None:
+    view, *_ = draw_recording("mixed", Recording(synthetic_contact(), synthetic_series())).axes
+    labels = [text.get_text() for text in view.get_legend().get_texts()]
+    assert labels == ["pedestrian (adversary)", "ego", "contact", "conflict"]
+    paths = [line for line in view.lines if len(np.ravel(line.get_xdata())) == 21]
+    assert len(paths) == 3
+
+
+def test_drawing_writes_a_picture_of_sensible_size(tmp_path: Path) -> None:
+    contact = synthetic_contact()
+    write_series(tmp_path / contact.series, synthetic_series())
+    draw("mixed", contact, tmp_path, tmp_path / "new" / "contact.png")
+    width, height = png_size(tmp_path / "new" / "contact.png")
+    assert 800 <= width <= 2000
+    assert 800 <= height <= 2500
+
+
+def test_picture_of_an_unknown_format_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"contact.doc'; wanted a name that ends in .png"):
+        draw("mixed", synthetic_contact(), tmp_path, tmp_path / "contact.doc")
+
+
+class UntilContact:
+    contact: Contact | None = None
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        if record.collision is not None:
+            self.contact = Contact.of(record)
+            assert series is not None
+            assert self.contact.series == f"failures/{series.name}"
+
+    def should_stop(self) -> bool:
+        return self.contact is not None
+
+
+def test_contact_of_a_real_run_can_be_drawn(tmp_path: Path) -> None:
+    observer = UntilContact()
+    train(RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=200)), tmp_path, observer)
+    assert observer.contact is not None
+    draw("low", observer.contact, tmp_path, tmp_path / "contact.png")
+    assert min(png_size(tmp_path / "contact.png")) >= 800
