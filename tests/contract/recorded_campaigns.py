@@ -16,12 +16,12 @@ from risk_sac.report import FinishedRun
 from risk_sac.results import EPISODES, FAILURES, Contact, Results, series_name, write_results
 from risk_sac.trace import PER_ACTOR, PER_OTHER, write_series
 from risk_sac.types import Collision, EpisodeRecord, Grade, Judgement, Outcome, SeriesFile
-from service.campaigns import State
-from service.events import EpisodeDone, Finished
-from service.ledger import Ledger
-from service.records import Campaign, Run
 from service.settings import ServiceSettings
-from service.store import Store
+from service.store.reading import Store
+from service.store.records import StoredCampaign, StoredRun
+from service.store.states import State
+from service.store.writing import Ledger
+from service.workers.messages import EpisodeDone, Finished
 from tests.judged import judgement
 
 BEGAN = 1_750_000_000.0
@@ -182,7 +182,7 @@ class Recorded:
         self._ledger.start_run(first.number)
         self._report(campaign, first, records(NOTHING)[:5])
 
-    def _create(self, label: str, episodes: int, evaluation: int) -> Campaign:
+    def _create(self, label: str, episodes: int, evaluation: int) -> StoredCampaign:
         self._clock.now += 60
         budget = {"episodes": episodes, "evaluation_episodes": evaluation}
         spec = CampaignSpec.model_validate(
@@ -192,7 +192,7 @@ class Recorded:
         self._clock.now += 1
         return campaign
 
-    def _report(self, campaign: Campaign, run: Run, done: Sequence[EpisodeRecord]) -> None:
+    def _report(self, campaign: StoredCampaign, run: StoredRun, done: Sequence[EpisodeRecord]) -> None:
         folder, spec = self._settings.run_folder(campaign.id, run.id), campaign.run_spec(run)
         for count, episode in enumerate(done, 1):
             self._clock.now += 1
@@ -207,7 +207,7 @@ class Recorded:
             )
             self._ledger.add_episode(run.number, word)
 
-    def _finish(self, campaign: Campaign, run: Run, done: Sequence[EpisodeRecord]) -> None:
+    def _finish(self, campaign: StoredCampaign, run: StoredRun, done: Sequence[EpisodeRecord]) -> None:
         folder, spec = self._settings.run_folder(campaign.id, run.id), campaign.run_spec(run)
         result = finished(spec, done)
         write_results(

@@ -11,9 +11,9 @@ import uvicorn
 
 from risk_sac.config import RunSpec
 from service.app import create_app
-from service.events import Event
-from service.executor import Exited
 from service.settings import ServiceSettings
+from service.workers.executor import Exited
+from service.workers.messages import Event
 
 
 class IdleExecutor:
