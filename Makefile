@@ -52,7 +52,7 @@ openapi: $(STAMP) ## write openapi.yaml
 	$(PYTHON) -m service.openapi
 
 settings: $(STAMP) ## write the table of settings into README.md
-	$(PYTHON) -m service.settings_table
+	$(PYTHON) -m service.host.settings_table
 
 nets: $(STAMP) ## rebuild sumo_nets/*/*.net.xml
 	PATH="$(CURDIR)/$(BIN):$$PATH" sumo_nets/build.sh

@@ -7,8 +7,8 @@ import uvicorn
 
 from risk_sac.errors import RiskSacError
 from service.app import create_app
+from service.host.logs import set_up_logs
 from service.keys.exposure import check_exposure
-from service.logs import set_up_logs
 from service.settings import ServiceSettings
 
 ANSWERS_END_S = 2  # for answers and streams at work when the server is told to stop; workers are stopped after that
@@ -36,7 +36,7 @@ def main() -> None:
         access_log=False,
         server_header=False,
         ws="none",
-        loop="service.loop:new_event_loop",
+        loop="service.host.loop:new_event_loop",
         timeout_graceful_shutdown=ANSWERS_END_S,
     )
 

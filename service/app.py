@@ -9,28 +9,29 @@ from fastapi import FastAPI
 from prometheus_client import Histogram
 
 from risk_sac import __version__
-from service.api import campaigns, catalogue, episodes, events, networks, operations, polls, reports
+from service.api import polls
+from service.api.answers.problems import add_problem_handlers
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
 from service.api.guards import add_guards
 from service.api.live import Live
-from service.api.observe import Observe
-from service.api.problems import add_problem_handlers
 from service.api.recall import Recall
+from service.api.routes import campaigns, catalogue, episodes, events, networks, operations, reports
 from service.api.stream import Streams
-from service.database import READERS, held
+from service.api.telemetry.metrics import registry, request_latencies
+from service.api.telemetry.requests import Observe
 from service.errors import StorageError
-from service.executor import Executor
+from service.host.locks import try_lock
+from service.host.priority import give_way
 from service.keys.exposure import check_exposure
-from service.local_executor import LocalExecutor
-from service.locks import try_lock
-from service.manager import Manager
 from service.networks.shelf import Shelf
-from service.priority import give_way
-from service.reports import Reports
+from service.runs.manager import Manager
 from service.settings import ServiceSettings
-from service.store import Store
-from service.telemetry import registry, request_latencies
+from service.store.database import READERS, held
+from service.store.reading import Store
+from service.views.reports import Reports
+from service.workers.executor import Executor
+from service.workers.local import LocalExecutor
 
 
 def create_app(settings: ServiceSettings, executor: Executor | None = None) -> FastAPI:

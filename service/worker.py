@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
 from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
-from service.events import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
-from service.takeover import take_over
+from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
+from service.workers.takeover import take_over
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -94,7 +94,7 @@ class Reporter:
             thread.join()
 
 
-class Log(io.FileIO):
+class LossyLog(io.FileIO):
     """A log that a full disk leaves incomplete, but never ends the run."""
 
     def write(self, data: "ReadableBuffer", /) -> int:
@@ -155,7 +155,9 @@ def _take_stdout() -> io.FileIO:
     events = io.FileIO(os.dup(1), "wb")
     os.dup2(2, 1)
     sys.stdout, sys.stderr = (
-        io.TextIOWrapper(io.BufferedWriter(Log(number, "wb", closefd=False)), errors="replace", line_buffering=True)
+        io.TextIOWrapper(
+            io.BufferedWriter(LossyLog(number, "wb", closefd=False)), errors="replace", line_buffering=True
+        )
         for number in (1, 2)
     )
     return events

@@ -7,7 +7,7 @@ from typing import Annotated, cast
 
 from fastapi import Depends, Request
 
-from service.api.problems import ProblemError
+from service.api.answers.problems import ProblemError
 from service.keys.key import Scope
 from service.schemas import Reason
 

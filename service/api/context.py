@@ -8,11 +8,11 @@ from prometheus_client import CollectorRegistry
 
 from service.api.live import Live
 from service.api.stream import Streams
-from service.manager import Manager
 from service.networks.shelf import Shelf
-from service.reports import Reports
+from service.runs.manager import Manager
 from service.settings import ServiceSettings
-from service.store import Store
+from service.store.reading import Store
+from service.views.reports import Reports
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
-from service.api.body import body_schemas
 from service.api.guards.description import describe_guards
+from service.api.posted_campaign import body_schemas
 from service.schemas import StateChange
 
 DESCRIPTION = """Finds scenarios in which an automated driving system fails.

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 from starlette.concurrency import run_in_threadpool
 
 from risk_sac import __version__
-from service import records
+from service.api.answers.representations import Representation, caching, entity_tag
 from service.api.renderings import Renderings
-from service.api.representations import Representation, caching, entity_tag
-from service.api.views import campaign_body
-from service.progress import retry_after_s
-from service.results import results
 from service.schemas import Body
 from service.settings import ServiceSettings
-from service.store import Store
+from service.store.reading import Store
+from service.store.records import StoredCampaign
+from service.views.bodies import campaign_body
+from service.views.progress import retry_after_s
+from service.views.totals import results
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +78,14 @@ class Live:
         campaign = self._store.campaign(campaign_id)
         return self._rendered(campaign, results(campaign))
 
-    def _rendered(self, campaign: records.Campaign, body: Body) -> Rendered:
+    def _rendered(self, campaign: StoredCampaign, body: Body) -> Rendered:
         # The revision that was read, which may be newer than the one that was asked for.
         tag = entity_tag(campaign.revision, self._edition)
         headers = caching(tag) | waiting(campaign, self._settings)
         return Rendered(body.model_dump_json().encode(), tag, headers, campaign.revision)
 
 
-def waiting(campaign: records.Campaign, settings: ServiceSettings) -> dict[str, str]:
+def waiting(campaign: StoredCampaign, settings: ServiceSettings) -> dict[str, str]:
     """The header that says when to look again; none once the campaign has ended."""
     wait_s = retry_after_s(campaign, settings.max_workers)
     return {} if wait_s is None else {"Retry-After": str(wait_s)}

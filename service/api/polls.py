@@ -7,10 +7,10 @@ from fastapi import APIRouter, Request, Response
 from fastapi.routing import APIRoute
 
 from service.api.access import CALLER, Caller
+from service.api.answers.responses import INVALID, LIVE, STORAGE, UNKNOWN
 from service.api.context import Context
 from service.api.live import Rendered
 from service.api.recall import remember
-from service.api.responses import INVALID, LIVE, STORAGE, UNKNOWN
 from service.schemas import Campaign, Results
 
 

@@ -13,9 +13,9 @@ from fastapi import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.api.access import CALLER, Caller
-from service.api.representations import Representation
-from service.revisions import Mark
-from service.store import Store
+from service.api.answers.representations import Representation
+from service.store.reading import Store
+from service.store.revisions import Mark
 
 EPISODES_S = 1.0  # for which an answer holds although episodes have come; nobody is told to ask again sooner
 MOST_BYTES = 16 << 20  # of all that is kept

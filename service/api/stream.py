@@ -15,11 +15,11 @@ from starlette.concurrency import run_in_threadpool
 
 from risk_sac.types import Outcome
 from service.api.live import Live
-from service.api.views import change_body, episode_body
 from service.errors import NotFoundError, StorageError
-from service.feed import Happening, Position, read_batch
-from service.records import Episode
-from service.store import Store
+from service.store.reading import Store
+from service.store.records import StoredEpisode
+from service.views.bodies import change_body, episode_body
+from service.views.happenings import Happening, Position, read_batch
 
 logger = logging.getLogger(__name__)
 
@@ -112,7 +112,7 @@ def decode_position(event_id: str) -> Position | None:
 
 def _event(happening: Happening) -> bytes:
     what = happening.what
-    if isinstance(what, Episode):
+    if isinstance(what, StoredEpisode):
         name = "failure" if what.record.outcome is Outcome.FAILURE else "episode"
         data = episode_body(what).model_dump_json()
     else:

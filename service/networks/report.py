@@ -35,7 +35,7 @@ class Summary:
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class CheckReport:
     """The last word of the checker; exactly one of `refused` and `summary` is there."""
 
     refused: str | None = None

@@ -14,7 +14,7 @@ from service.errors import StorageError
 from service.networks.errors import UploadError
 from service.networks.limits import LOG_BYTES, WALL_S
 from service.networks.packaging import Packaging
-from service.networks.report import Report
+from service.networks.report import CheckReport
 
 logger = logging.getLogger(__name__)
 
@@ -23,10 +23,12 @@ CHECKER = (sys.executable, "-I", "-m", "service.networks.checker")
 UPLOAD, LOG, REPORT = "upload", "log", "report"
 _GRACE_S = 0.5  # for starting; the checker ends itself after WALL_S
 _TOO_SLOW = (signal.SIGALRM, signal.SIGXCPU, signal.SIGKILL)
-_REPORTS = TypeAdapter(Report)
+_REPORTS = TypeAdapter(CheckReport)
 
 
-def inspect(folder: Path, packaging: Packaging, checker: Sequence[str] = CHECKER, wall_s: float = WALL_S) -> Report:
+def inspect(
+    folder: Path, packaging: Packaging, checker: Sequence[str] = CHECKER, wall_s: float = WALL_S
+) -> CheckReport:
     """Check the file `upload` in a folder, in a process of its own, and wait for the report.
 
     Args:

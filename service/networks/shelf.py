@@ -25,10 +25,10 @@ from service.errors import ConflictError, NotFoundError, StorageError
 from service.networks.errors import BusyError
 from service.networks.incoming import Incoming
 from service.networks.packaging import Packaging
-from service.networks.report import Report
+from service.networks.report import CheckReport
 from service.networks.sandbox import CHECKER, inspect
 from service.networks.schemas import BoundingBox, Network, NetworkFile, Record
-from service.records import Page
+from service.store.records import Page
 
 logger = logging.getLogger(__name__)
 
@@ -181,7 +181,7 @@ class Shelf:
             )
 
 
-def _network(report: Report, label: str, sha256: str, size: int) -> Network:
+def _network(report: CheckReport, label: str, sha256: str, size: int) -> Network:
     now = time.time()
     number = int(now * 1000) << _RANDOM_BITS | secrets.randbits(_RANDOM_BITS)
     summary = report.summary

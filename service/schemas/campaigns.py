@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from datetime import datetime
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
-from service.campaigns import State
 from service.schemas.base import Body, Real
+from service.store.states import State
 
 
 class Metrics(Body):

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from risk_sac.config import FamilyName, MethodName
-from service.campaigns import State
 from service.schemas.base import Body, Real
 from service.schemas.campaigns import Metrics
+from service.store.states import State
 
 
 class RunResult(Body):

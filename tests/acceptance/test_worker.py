@@ -11,10 +11,10 @@ import psutil
 import pytest
 
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunSpec
-from service.events import EpisodeDone, Event, Failed, Finished, Started
-from service.executor import Cause, Exited
-from service.local_executor import LocalExecutor
 from service.settings import ServiceSettings
+from service.workers.executor import Cause, Exited
+from service.workers.local import LocalExecutor
+from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
 
 EPISODES = 20
 SPEC = RunSpec(

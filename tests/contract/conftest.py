@@ -1,56 +1,12 @@
-"""The real app on a real socket, with an executor that starts nothing."""
-
-import socket
-import threading
-import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
-import uvicorn
 
-from risk_sac.config import RunSpec
-from service.app import create_app
-from service.events import Event
-from service.executor import Exited
 from service.settings import ServiceSettings
-
-
-class IdleExecutor:
-    """Accepts runs and leaves them waiting until they are cancelled."""
-
-    def __init__(self) -> None:
-        self._cancelled: list[int] = []
-        self._wake = threading.Event()
-
-    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
-        pass
-
-    def cancel(self, number: int, grace_s: float) -> None:
-        self._cancelled.append(number)
-        self.wake()
-
-    def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
-        self._wake.wait(timeout_s)
-        self._wake.clear()
-        ended, self._cancelled = self._cancelled, []
-        return [(number, Exited(None)) for number in dict.fromkeys(ended)]
-
-    def wake(self) -> None:
-        self._wake.set()
+from tests.contract.serving import serving
 
 
 @pytest.fixture(scope="session")
 def base_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    settings = ServiceSettings(data_dir=tmp_path_factory.mktemp("data"))
-    server = uvicorn.Server(uvicorn.Config(create_app(settings, IdleExecutor()), log_level="warning"))
-    listener = socket.create_server(("127.0.0.1", 0))
-    thread = threading.Thread(target=server.run, args=([listener],))
-    thread.start()
-    while not server.started:
-        assert thread.is_alive(), "the server did not start"
-        time.sleep(0.01)
-    yield f"http://127.0.0.1:{listener.getsockname()[1]}"
-    server.should_exit = True
-    thread.join()
-    listener.close()
+    with serving(ServiceSettings(data_dir=tmp_path_factory.mktemp("data"))) as url:
+        yield url

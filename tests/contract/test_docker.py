@@ -9,8 +9,8 @@ from smoke_test import chroot_engine
 from smoke_test.workflow import Workflow
 
 from risk_sac.config import CampaignSpec
+from service.host.settings_table import BEGIN, END, with_table
 from service.settings import ServiceSettings
-from service.settings_table import BEGIN, END, with_table
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

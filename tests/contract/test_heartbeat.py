@@ -1,7 +1,7 @@
 import httpx
 import pytest
 
-from service.api import events
+from service.api.routes import events
 
 
 def test_a_stream_without_news_beats(base_url, monkeypatch):

@@ -9,6 +9,6 @@ def test_the_server_process_loads_neither_torch_nor_libsumo():
         "create_app(ServiceSettings()).openapi(); print(json.dumps(sorted(sys.modules)))"
     )
     loaded = json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout)
-    assert "service.manager" in loaded
+    assert "service.runs.manager" in loaded
     assert "risk_sac.report" in loaded
     assert not {"torch", "libsumo", "botorch", "gpytorch", "matplotlib.pyplot", "service.worker"} & set(loaded)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from risk_sac.config import RunSpec
 from risk_sac.types import EpisodeRecord, Outcome, RunMetrics
-from service.events import EpisodeDone, Event, Failed, Finished, Heartbeat, encode
+from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, encode
 
 WELL_BEHAVED, DIES, HANGS, BABBLES, DISK_FULL, EXITS, SEGFAULTS, FREEZES = 0, 9, 15, 7, 28, 3, 11, 19
 ONCE = 100  # added to one of them: the run's second worker behaves well

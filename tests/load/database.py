@@ -16,8 +16,8 @@ from typing import Any
 
 from risk_sac.config import METHODS
 from risk_sac.scenario.families import FAMILIES
-from service.api.pages import encode_cursor
-from service.campaigns import FINAL
+from service.api.answers.pages import encode_cursor
+from service.store.states import FINAL
 from tests.load.population import LABELS, RARE_LABEL, Plan, populate
 from tests.load.resources import processor_s
 from tests.load.verdicts import Verdict, at_most, percentile

@@ -16,9 +16,9 @@ from sqlalchemy.orm import Session
 from risk_sac.config import METHODS, CampaignSpec
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.types import Outcome
-from service.campaigns import State
-from service.database import open_database
-from service.tables import CampaignRow, ChangeRow, Checked, EpisodeRow, RunRow, checksum
+from service.store.database import open_database
+from service.store.states import State
+from service.store.tables import CampaignRow, ChangeRow, Checked, EpisodeRow, RunRow, checksum
 
 BATCH = 10_000  # rows of one statement
 LABELS = ("", "nightly", "release", "cut-ins")

@@ -16,12 +16,12 @@ import pytest
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
 from risk_sac.run_folder.results import FAILURES, RESULTS
-from service.api.views import failure_body
-from service.campaigns import State
 from service.errors import StorageError
-from service.reports import Reports
 from service.settings import ServiceSettings
-from service.store import Store
+from service.store.reading import Store
+from service.store.states import State
+from service.views.bodies import failure_body
+from service.views.reports import Reports
 from tests.server import servers
 
 SPEC = {

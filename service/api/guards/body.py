@@ -4,8 +4,8 @@ from http import HTTPStatus
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.api.answers.problems import ProblemError
 from service.api.guards.refusal import refuse
-from service.api.problems import ProblemError
 from service.schemas import Reason
 from service.settings import ServiceSettings
 

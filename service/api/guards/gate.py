@@ -9,11 +9,11 @@ from http import HTTPStatus
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.access import CALLER, LOCAL, Caller, check_scope
+from service.api.answers.problems import ProblemError
 from service.api.guards.hosts import Hosts
 from service.api.guards.origins import SAFE, Origins
 from service.api.guards.rate import RateLimit
 from service.api.guards.refusal import refuse
-from service.api.problems import ProblemError
 from service.errors import KeysError
 from service.keys.exposure import is_loopback
 from service.keys.key import Scope as KeyScope

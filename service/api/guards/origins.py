@@ -5,7 +5,7 @@ from http import HTTPStatus
 
 from starlette.types import Scope
 
-from service.api.problems import ProblemError
+from service.api.answers.problems import ProblemError
 from service.schemas import Reason
 
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # methods that change nothing

@@ -4,7 +4,7 @@ import time
 from collections import Counter
 from http import HTTPStatus
 
-from service.api.problems import ProblemError
+from service.api.answers.problems import ProblemError
 from service.schemas import Reason
 
 

@@ -2,7 +2,7 @@
 
 from starlette.types import Receive, Scope, Send
 
-from service.api.problems import ProblemError, problem_response
+from service.api.answers.problems import ProblemError, problem_response
 
 
 async def refuse(error: ProblemError, scope: Scope, receive: Receive, send: Send) -> None:

@@ -17,7 +17,7 @@ from service.networks.checker.bounds import bind
 from service.networks.checker.check import check
 from service.networks.errors import UploadError
 from service.networks.packaging import Packaging
-from service.networks.report import Report
+from service.networks.report import CheckReport
 
 UPLOAD = Path("upload")
 
@@ -30,9 +30,9 @@ def main() -> None:
     try:
         report = check(UPLOAD, Packaging(sys.argv[1]))
     except UploadError as error:
-        report = Report(refused=str(error))
+        report = CheckReport(refused=str(error))
     except MemoryError:
-        report = Report(
+        report = CheckReport(
             refused=f"checking it needs more than {limits.MEMORY_BYTES >> 20} MiB; wanted a smaller network"
         )
     os.write(stdout, json.dumps(asdict(report)).encode() + b"\n")

@@ -12,10 +12,10 @@ from service.networks.checker.document import Count, Observer, read, root_of
 from service.networks.checker.roads import Demand, Net
 from service.networks.errors import UploadError
 from service.networks.packaging import Packaging
-from service.networks.report import CheckedFile, Kind, Report, Summary
+from service.networks.report import CheckedFile, CheckReport, Kind, Summary
 
 
-def check(upload: Path, packaging: Packaging) -> Report:
+def check(upload: Path, packaging: Packaging) -> CheckReport:
     """Read the upload, write anew what it says, and let the simulator load that.
 
     Raises:
@@ -25,7 +25,7 @@ def check(upload: Path, packaging: Packaging) -> Report:
     bind_simulator()
     names = {kind: [file.name for file in files if file.kind is kind] for kind in Kind}
     warnings = simulator.load(names[Kind.NET][0], names[Kind.ADDITIONAL], names[Kind.ROUTES])
-    return Report(summary=summary, files=tuple(files), warnings=tuple(warnings))
+    return CheckReport(summary=summary, files=tuple(files), warnings=tuple(warnings))
 
 
 def rewrite(found: Sequence[bytes]) -> tuple[list[CheckedFile], Summary]:

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
-from service.events import EpisodeDone
-from service.ledger import Ledger
-from service.store import Store
+from service.store.reading import Store
+from service.store.writing import Ledger
+from service.workers.messages import EpisodeDone
 from tests.judged import judgement
 
 

@@ -1,0 +1,80 @@
+"""/v1/campaigns/{id}/episodes and failures: what a campaign did, one by one."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query
+
+from risk_sac.types import Grade, Outcome
+from service.api.access import CurrentCaller
+from service.api.answers.pages import Cursor, Limit, decode_cursor, encode_cursor
+from service.api.answers.responses import INVALID, STORAGE, UNKNOWN
+from service.api.context import Service
+from service.schemas import EpisodePage, Failure
+from service.store.finding import Judged
+from service.store.records import Page, StoredEpisode
+from service.views.bodies import episode_body, failure_body, tier_outcomes
+
+router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
+
+
+@router.get("/episodes")
+def list_episodes(
+    campaign_id: str,
+    service: Service,
+    caller: CurrentCaller,
+    run: Annotated[str | None, Query(description="Only episodes of this run.")] = None,
+    outcome: Annotated[Outcome | None, Query(description="Only episodes that ended so.")] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> EpisodePage:
+    """Episodes of a campaign in the order of their arrival."""
+    page = service.store.episodes(
+        campaign_id,
+        limit=limit,
+        after=decode_cursor(cursor),
+        run_id=run,
+        outcomes=() if outcome is None else (outcome,),
+        project=caller.sees,
+    )
+    return _episode_page(page)
+
+
+@router.get("/failures")
+def list_failures(
+    campaign_id: str,
+    service: Service,
+    caller: CurrentCaller,
+    tier: Annotated[Literal["valid", "raw"], Query(description="`raw` adds contacts that a rule refused.")] = "valid",
+    run: Annotated[str | None, Query(description="Only failures of this run.")] = None,
+    grade: Annotated[Grade | None, Query(description="Only failures of this grade; `careful`: preventable.")] = None,
+    broke: Annotated[
+        str | None, Query(max_length=40, pattern="^[a-z_]+$", description="Only those whose striker broke this.")
+    ] = None,
+    signature: Annotated[
+        str | None, Query(max_length=300, pattern=r"^[^\x00]*$", description="Only those with exactly this signature.")
+    ] = None,
+    limit: Limit = 50,
+    cursor: Cursor = None,
+) -> EpisodePage:
+    """Collisions of the ego in the order of their arrival."""
+    page = service.store.episodes(
+        campaign_id,
+        limit=limit,
+        after=decode_cursor(cursor),
+        run_id=run,
+        outcomes=tier_outcomes(tier),
+        judged=Judged(grade=grade, broke=broke, signature=signature),
+        project=caller.sees,
+    )
+    return _episode_page(page)
+
+
+@router.get("/failures/{failure_id}")
+def get_failure(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> Failure:
+    """One collision, valid or not, with its full time series."""
+    episode = service.store.failure(campaign_id, failure_id, caller.sees)
+    return failure_body(campaign_id, episode, service.settings)
+
+
+def _episode_page(page: Page[StoredEpisode]) -> EpisodePage:
+    return EpisodePage(items=[episode_body(episode) for episode in page.items], next=encode_cursor(page.last))

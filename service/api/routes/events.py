@@ -1,0 +1,85 @@
+"""/v1/campaigns/{id}/events: what happens, as it happens, to be taken up again where a connection broke."""
+
+from typing import Annotated
+
+import anyio
+from fastapi import APIRouter, Header, Response
+from sse_starlette import EventSourceResponse, ServerSentEvent
+from starlette.concurrency import run_in_threadpool
+
+from service.api.access import CurrentCaller
+from service.api.answers.problems import invalid_field
+from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses
+from service.api.context import Service
+from service.api.stream import decode_position
+from service.store.reading import Store
+from service.views.happenings import Position, knows, read_batch
+
+HEARTBEAT_S = 15.0
+GRACE_S = 1.0  # for streams to end by themselves when the server stops
+
+EXAMPLE = {
+    "id": "MTIuMw==",
+    "event": "failure",
+    "data": '{"id":"low-risk-sac-0-train-11","run_id":"low-risk-sac-0","outcome":"failure", …}',
+}
+# What each event is made of: OpenAPI before 3.2 has no other place for it.
+EVENT = {
+    "type": "object",
+    "required": ["id", "event", "data"],
+    "properties": {
+        "id": {"type": "string", "description": "Come back with it as Last-Event-ID."},
+        "event": {"enum": ["episode", "failure", "state"]},
+        "data": {
+            "type": "string",
+            "contentMediaType": "application/json",
+            "contentSchema": {
+                "anyOf": [{"$ref": "#/components/schemas/Episode"}, {"$ref": "#/components/schemas/StateChange"}]
+            },
+        },
+    },
+}
+EVENTS: Responses = {
+    200: {
+        "description": "`episode`, or `failure` for a valid one: an Episode, with the funnel of its run so far."
+        " `state`: a StateChange. The end of a run"
+        " or of the campaign comes after all its episodes, and the stream ends with that of the campaign.",
+        "content": {"text/event-stream": {"schema": EVENT, "example": EXAMPLE}},
+    },
+    204: {"description": "The campaign has ended and all was told; do not come back."},
+}
+LastEventId = Annotated[
+    str | None,
+    Header(alias="Last-Event-ID", max_length=100, description="The `id` of the last event that was received."),
+]
+
+router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
+
+
+@router.get("/{campaign_id}/events", response_class=Response, responses=EVENTS)
+async def get_events(
+    campaign_id: str, service: Service, caller: CurrentCaller, last_event_id: LastEventId = None
+) -> Response:
+    """Server-sent events: episodes, failures and changes of state, all of them or those after the last one received."""
+    position, ended = await run_in_threadpool(_start, service.store, campaign_id, caller.sees, last_event_id)
+    if position is None:
+        return Response(status_code=204)
+    stopping = anyio.Event()
+    return EventSourceResponse(
+        service.streams.follow(campaign_id, position, stopping, ended=ended),
+        ping=HEARTBEAT_S,
+        ping_message_factory=lambda: ServerSentEvent(comment="alive", sep="\n"),
+        shutdown_event=stopping,
+        shutdown_grace_period=GRACE_S,
+    )
+
+
+def _start(store: Store, campaign_id: str, project: str | None, event_id: str | None) -> tuple[Position | None, bool]:
+    """Where to begin, None where nothing is left to tell; and whether the campaign has ended."""
+    campaign = store.campaign(campaign_id, project)
+    position = decode_position(event_id) if event_id else Position()
+    if position is None or not knows(store, campaign_id, position):
+        raise invalid_field("Last-Event-ID", event_id, "the id of an event of this campaign, unchanged")
+    ended = campaign.state.final
+    told = ended and not read_batch(store, campaign_id, position, limit=1).happenings
+    return None if told else position, ended

@@ -1,0 +1,45 @@
+"""What those who run the service ask it: is it alive, can it work, and how it does."""
+
+from http import HTTPStatus
+
+from fastapi import APIRouter, Depends, Response
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+
+from service.api.access import require
+from service.api.answers.problems import ProblemError
+from service.api.answers.responses import STOPPED, UNREADY, Responses
+from service.api.context import Service
+from service.keys.key import Scope
+from service.schemas import Health, Ready, Reason
+from service.store.statistics import check_readable
+
+EXAMPLE = 'risk_sac_episodes_total{family="low",method="risk-sac"} 4711.0\n…'
+METRICS: Responses = {200: {"content": {"text/plain": {"schema": {"type": "string"}, "example": EXAMPLE}}}}
+
+router = APIRouter(tags=["operations"])
+
+
+@router.get("/healthz", responses=STOPPED)
+async def get_health(service: Service) -> Health:
+    """Whether the service is alive; if it is not, start it anew."""
+    if not service.manager.alive:
+        detail = "the manager has stopped; the log has the reason"
+        raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.MANAGER_STOPPED, detail)
+    return Health()
+
+
+@router.get("/readyz", responses=UNREADY)
+def get_readiness(service: Service) -> Ready:
+    """Whether campaigns can be posted and make progress; if not, it goes on by itself once the cause is gone."""
+    problem = service.manager.storage_problem
+    if problem is not None:
+        raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.STORAGE_UNAVAILABLE, problem)
+    check_readable(service.store.engine)
+    return Ready()
+
+
+# A key that may see all campaigns: the runs at work are among the metrics.
+@router.get("/metrics", response_class=Response, responses=METRICS, dependencies=[Depends(require(Scope.ADMIN))])
+def get_metrics(service: Service) -> Response:
+    """Metrics in the text format of Prometheus."""
+    return Response(generate_latest(service.metrics), media_type=CONTENT_TYPE_LATEST)

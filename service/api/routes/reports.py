@@ -1,0 +1,162 @@
+"""/v1/campaigns/{id}/table and figures: the report that `risk-sac evaluate` writes; and the spec to have it again.
+
+Sync routes, so that statistics and drawing take place in FastAPI's thread pool.
+"""
+
+import shlex
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+
+from risk_sac.config import CampaignSpec
+from risk_sac.config.spec_file import campaign_yaml
+from risk_sac.report import Comparison, table_csv, table_json, table_markdown
+from risk_sac.report.figures import FORMATS, Format
+from service.api.access import CurrentCaller
+from service.api.answers.representations import accepted, caching, entity_tag, has, not_modified
+from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses
+from service.api.context import Service
+from service.schemas.reports import Figure, FigureFile, Figures, Table
+from service.views.reports import edition
+
+TableFormat = Literal["json", "md", "csv"]
+SpecFormat = Literal["json", "yaml"]
+MEDIA_TYPES = {"json": "application/json", "md": "text/markdown", "csv": "text/csv", "yaml": "application/yaml"}
+IMAGE_TYPES: dict[Format, str] = {"png": "image/png", "svg": "image/svg+xml"}
+TABLES: dict[str, Callable[[Comparison], str]] = {"json": table_json, "md": table_markdown, "csv": table_csv}
+SPECS: dict[str, Callable[[CampaignSpec], str]] = {"json": CampaignSpec.model_dump_json, "yaml": campaign_yaml}
+
+CACHED = {
+    "ETag": {
+        "description": "Changes when a run finishes and when the reason why one is missing changes; "
+        "absent where the folder of a finished run cannot be read.",
+        "schema": {"type": "string"},
+    },
+    "Cache-Control": {"description": "`no-cache`: keep it, and ask with If-None-Match.", "schema": {"type": "string"}},
+}
+UNCHANGED: Responses = {304: {"description": "What If-None-Match names still holds", "headers": CACHED}}
+
+
+def _content(**examples: str) -> dict[str, Any]:
+    """Media types of an answer that is text, with an example of each."""
+    return {MEDIA_TYPES[name]: {"schema": {"type": "string"}, "example": text} for name, text in examples.items()}
+
+
+TABLE: Responses = {
+    200: {
+        "headers": CACHED,
+        "content": _content(
+            md="# Comparison of methods\n\n…\n\n## low, search\n\n| method | seeds | ECR | …",
+            csv="family,method,phase,runs,episodes,failures,…\nlow,random,search,2,80,3,…",
+        ),
+    }
+}
+SPEC: Responses = {
+    200: {
+        "content": {
+            MEDIA_TYPES["yaml"]: {
+                "schema": {"$ref": "#/components/schemas/CampaignSpec"},
+                "example": {"label": "", "families": ["low"]},
+            }
+        }
+    }
+}
+FIGURES: Responses = {200: {"headers": CACHED}}
+FIGURE: Responses = {200: {"headers": CACHED, "content": {media_type: {} for media_type in IMAGE_TYPES.values()}}}
+
+router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
+
+
+@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED | UNACCEPTABLE)
+def get_table(
+    campaign_id: str,
+    request: Request,
+    service: Service,
+    caller: CurrentCaller,
+    format_: Annotated[
+        TableFormat | None, Query(alias="format", description="Instead of the Accept header, for a browser.")
+    ] = None,
+) -> Response:
+    """The methods compared over seeds by the runs that have finished, with the others named; empty before the first."""
+    campaign = service.store.campaign(campaign_id, caller.sees)
+    name = format_ or _accepted(request, TABLES)
+    tag = entity_tag(edition(campaign), name)
+    if has(request, tag):
+        return not_modified(tag, vary="Accept")
+    report = service.reports.report(campaign)
+    command, spec_command = _commands(request, campaign_id)
+    text = TABLES[name](replace(report.comparison, command=command, spec_command=spec_command))
+    headers = caching(tag if report.lasting else None, vary="Accept")
+    return Response(text, headers=headers, media_type=MEDIA_TYPES[name])
+
+
+@router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)
+def list_figures(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+    """The figures that the finished runs allow: how the methods search, what they reach, λ and α."""
+    campaign = service.store.campaign(campaign_id, caller.sees)
+    tag = entity_tag(edition(campaign), "figures")
+    if has(request, tag):
+        return not_modified(tag)
+    report = service.reports.report(campaign)
+    items = [Figure(name=name, files=_files(campaign_id, name)) for name in report.figures]
+    body = Figures(complete=not report.comparison.missing, items=items)
+    headers = caching(tag if report.lasting else None)
+    return Response(body.model_dump_json(), headers=headers, media_type="application/json")
+
+
+@router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED)
+def get_figure(
+    campaign_id: str,
+    name: str,
+    format: Format,
+    request: Request,
+    service: Service,
+    caller: CurrentCaller,
+) -> Response:
+    """One figure; drawn when it is first asked for, and again once more runs have finished."""
+    campaign = service.store.campaign(campaign_id, caller.sees)
+    tag = entity_tag(edition(campaign), name, format)
+    if has(request, tag):
+        return not_modified(tag)
+    report = service.reports.report(campaign)
+    content = report.figure(name, format)
+    return Response(content, headers=caching(tag if report.lasting else None), media_type=IMAGE_TYPES[format])
+
+
+@router.get("/spec", response_model=CampaignSpec, responses=SPEC | UNACCEPTABLE)
+def get_spec(
+    campaign_id: str,
+    request: Request,
+    service: Service,
+    caller: CurrentCaller,
+    format_: Annotated[
+        SpecFormat | None, Query(alias="format", description="Instead of the Accept header, for a browser.")
+    ] = None,
+) -> Response:
+    """The campaign alone: JSON to post again, or YAML for `risk-sac run --spec` and `risk-sac evaluate --spec`."""
+    spec = service.store.campaign(campaign_id, caller.sees).spec
+    name = format_ or _accepted(request, SPECS)
+    return Response(SPECS[name](spec), headers={"Vary": "Accept"}, media_type=MEDIA_TYPES[name])
+
+
+def _accepted(request: Request, formats: dict[str, Any]) -> str:
+    names = {MEDIA_TYPES[name]: name for name in formats}
+    return names[accepted(", ".join(request.headers.getlist("accept")), list(names))]
+
+
+def _files(campaign_id: str, name: str) -> list[FigureFile]:
+    path = f"/v1/campaigns/{campaign_id}/figures/{name}"
+    return [FigureFile(format=each, media_type=IMAGE_TYPES[each], href=f"{path}.{each}") for each in FORMATS]
+
+
+def _commands(request: Request, campaign_id: str) -> tuple[str, str]:
+    """What to type to queue the campaign again, and to have it as a file for the command line."""
+    campaigns = f"{request.base_url}v1/campaigns"
+    spec, post, as_yaml = map(
+        shlex.quote,
+        (f"{campaigns}/{campaign_id}/spec", campaigns, f"{campaigns}/{campaign_id}/spec?format=yaml"),
+    )
+    again = f"curl -s {spec} | curl {post} -H 'content-type: application/json' -d @-"
+    return again, f"curl -s {as_yaml} -o spec.yaml"

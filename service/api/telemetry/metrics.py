@@ -1,0 +1,123 @@
+"""Metrics for Prometheus. Each app has a registry of its own; nothing is global.
+
+What is stored is counted when it is asked for, so that it survives restarts and costs nothing in between.
+"""
+
+import threading
+from collections import Counter as Counts
+from collections.abc import Iterator
+
+from prometheus_client import CollectorRegistry, Histogram, ProcessCollector
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from service.errors import StorageError
+from service.runs.manager import Manager
+from service.store.reading import Store
+from service.store.states import State
+from service.store.statistics import Statistics, read_statistics
+
+BUCKETS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)
+SEARCH = ("family", "method")
+# The funnel, and what preventable failures are counted with repetitions; by the column that is summed up.
+COUNTERS = {
+    "episodes_done": ("risk_sac_episodes", "Finished episodes, rejected scenes included."),
+    "raw_collisions": ("risk_sac_contacts", "Episodes in which the ego touched something."),
+    "failures": ("risk_sac_failures", "Valid failures of the ego."),
+    "distinct_failures": ("risk_sac_distinct_failures", "Valid failures that resemble no earlier one of their run."),
+    "preventable": ("risk_sac_preventable_failures", "Valid failures that the careful driver would have prevented."),
+    "distinct_preventable": (
+        "risk_sac_distinct_preventable_failures",
+        "The distinct ones of the preventable failures.",
+    ),
+}
+
+
+def request_latencies() -> Histogram:
+    """How long requests took until their answer began, by route, method and status; of one app."""
+    return Histogram(
+        "risk_sac_request_seconds",
+        "Time until an answer began.",
+        ("route", "method", "status"),
+        buckets=BUCKETS_S,
+        registry=None,
+    )
+
+
+def registry(latencies: Histogram, store: Store, manager: Manager) -> CollectorRegistry:
+    """All there is to know about one running service."""
+    metrics = CollectorRegistry()
+    metrics.register(latencies)
+    metrics.register(CampaignMetrics(store, manager))
+    ProcessCollector(registry=metrics)
+    return metrics
+
+
+class CampaignMetrics(Collector):
+    """Reads the database and the manager when it is scraped."""
+
+    def __init__(self, store: Store, manager: Manager) -> None:
+        self._store = store
+        self._manager = manager
+        self._counters = {name: _Monotone() for name in COUNTERS}
+
+    def collect(self) -> Iterator[Metric]:
+        """All families; without those of the database while it cannot be read."""
+        refusal = self._manager.storage_problem
+        restarts = CounterMetricFamily("risk_sac_worker_restarts", "Workers lost and replaced.", labels=["cause"])
+        for cause, count in sorted(self._manager.restarts.items()):
+            restarts.add_metric([cause], count)
+        yield restarts
+        try:
+            yield from self._stored(read_statistics(self._store.engine))
+        except StorageError as error:
+            refusal = str(error)
+        works = 0 if refusal else 1
+        yield GaugeMetricFamily("risk_sac_storage_available", "Whether database and disk can be used.", value=works)
+
+    def _stored(self, statistics: Statistics) -> Iterator[Metric]:
+        yield from _states(statistics)
+        for counted, (name, meaning) in COUNTERS.items():
+            sums = Counts[tuple[str, str]]()
+            for tally in statistics.tallies:
+                sums[tally.family, tally.method] += tally.counts[counted]
+            yield self._counters[counted].family(name, meaning, sums)
+        labels = ["campaign", "run", *SEARCH]
+        ecr = GaugeMetricFamily("risk_sac_run_ecr", "Valid failures per episode of a run at work.", labels=labels)
+        pcr = GaugeMetricFamily("risk_sac_run_pcr", "Preventable failures per episode of a run at work.", labels=labels)
+        for run in statistics.at_work:
+            for gauge, rate in ((ecr, run.ecr), (pcr, run.pcr)):
+                if rate is not None:
+                    gauge.add_metric([run.campaign_id, run.id, run.family, run.method], rate)
+        yield ecr
+        yield pcr
+
+
+class _Monotone:
+    """Sums over rows as counters: deleted rows must not look like a counter that began anew."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._last = Counts[tuple[str, str]]()
+        self._deleted = Counts[tuple[str, str]]()
+
+    def family(self, name: str, meaning: str, sums: Counts[tuple[str, str]]) -> CounterMetricFamily:
+        family = CounterMetricFamily(name, meaning, labels=SEARCH)
+        with self._lock:
+            for labels in sorted(sums.keys() | self._last.keys()):
+                self._deleted[labels] += max(0, self._last[labels] - sums[labels])
+                family.add_metric(labels, sums[labels] + self._deleted[labels])
+            self._last = Counts(sums)
+        return family
+
+
+def _states(statistics: Statistics) -> Iterator[Metric]:
+    """How many campaigns and runs are in each state; the queue are the runs that are queued."""
+    runs = Counts[State]()
+    for tally in statistics.tallies:
+        runs[tally.state] += tally.runs
+    for name, counts in (("campaigns", statistics.campaigns), ("runs", runs)):
+        family = GaugeMetricFamily(f"risk_sac_{name}", f"Stored {name} by state.", labels=["state"])
+        for state in State:
+            family.add_metric([state], counts.get(state, 0))
+        yield family

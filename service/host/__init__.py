@@ -1,0 +1,1 @@
+"""The server process itself: its logs, locks, event loop and settings."""

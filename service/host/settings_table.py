@@ -1,0 +1,55 @@
+"""`python -m service.host.settings_table [FILE]`: write the table of environment variables into the README."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from service.settings import ServiceSettings
+
+BEGIN = "<!-- settings: written by `make settings` -->"
+END = "<!-- /settings -->"
+BOUNDS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤"}
+TYPES = {"array": "JSON list", "path": "folder", "string": "text"}
+
+
+def table() -> str:
+    """The settings as a markdown table: variable, what it takes, its default, its meaning."""
+    prefix = ServiceSettings.model_config["env_prefix"]
+    rows = [
+        f"| `{prefix}{name.upper()}` | {_takes(field)} | {_default(field)} | {' '.join(field['description'].split())} |"
+        for name, field in ServiceSettings.model_json_schema()["properties"].items()
+    ]
+    return "\n".join(["| variable | takes | default | meaning |", "|---|---|---|---|", *rows])
+
+
+def with_table(text: str) -> str:
+    """The text with the table between its two marks."""
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not end:
+        raise ValueError(f"the text lacks {BEGIN!r} or, behind it, {END!r}; put both where the table belongs")
+    return f"{before}{begin}\n{table()}\n{end}{after}"
+
+
+def _takes(field: dict[str, Any]) -> str:
+    if "anyOf" in field:  # one of them is null, which is what no variable means
+        return next(_takes(each) for each in field["anyOf"] if each["type"] != "null")
+    if "enum" in field:
+        return " or ".join(f"`{each}`" for each in field["enum"])
+    bounds = ", ".join(f"{sign} {field[name]:g}" for name, sign in BOUNDS.items() if name in field)
+    kind = field.get("format", field["type"])
+    return f"{TYPES.get(kind, kind)} {bounds}".strip()
+
+
+def _default(field: dict[str, Any]) -> str:
+    """As it would be written; a dash where it means none or depends on the machine."""
+    default = field.get("default")
+    if default is None:
+        return "–"
+    return f"`{json.dumps(default) if isinstance(default, list) else default}`"
+
+
+if __name__ == "__main__":
+    readme = Path(sys.argv[1] if len(sys.argv) > 1 else "README.md")
+    readme.write_text(with_table(readme.read_text(encoding="utf-8")), encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Campaigns at work: the queue, quotas, pauses and what is deleted."""

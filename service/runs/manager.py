@@ -1,0 +1,272 @@
+"""Queue, limits, launch, retry, pause, cancel, recover, delete: the only writer of the database."""
+
+import logging
+import threading
+from collections import Counter
+from dataclasses import dataclass
+
+from risk_sac.config import CampaignSpec
+from risk_sac.problem import check_campaign
+from service.errors import ConflictError, StorageError
+from service.runs.disposal import dispose, settle
+from service.runs.quota import check_quota, exhausted
+from service.runs.retention import Retention
+from service.runs.storage_pause import StoragePause, refused
+from service.settings import ServiceSettings
+from service.store.reading import Store
+from service.store.records import StoredCampaign, StoredRun
+from service.store.states import State
+from service.store.writing import Ledger
+from service.workers.executor import Executor, Exited
+from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
+
+logger = logging.getLogger(__name__)
+
+TICK_S = 1.0
+UNKILLABLE_S = 3.0  # how long after SIGKILL a worker may take to vanish
+
+
+@dataclass(slots=True)
+class _Active:
+    """A run whose worker lives."""
+
+    run: StoredRun
+    project: str
+    cancelled: bool = False
+    abandoned: bool = False  # the disk refused; what it still says is not wanted, since it will be said again
+    last: Finished | Failed | None = None
+
+    @property
+    def ids(self) -> dict[str, str]:
+        """What a line of the log says it is about."""
+        return {"campaign": self.run.campaign_id, "run": self.run.id}
+
+
+class Manager:
+    """Runs campaigns: one thread turns what workers say into rows and starts what waits.
+
+    Requests call `submit`, `cancel` and `delete` from their own threads; the lock makes every step whole.
+
+    Attributes:
+      restarts: workers that were lost and replaced, by cause.
+    """
+
+    def __init__(self, settings: ServiceSettings, store: Store, executor: Executor) -> None:
+        self._settings = settings
+        self._store = store
+        self._ledger = Ledger(store)
+        self._executor = executor
+        self._active: dict[int, _Active] = {}
+        self._deaths: Counter[int] = Counter()  # of a run's workers in a row, without a new episode
+        self.restarts: Counter[str] = Counter()
+        self._lock = threading.RLock()
+        self._stopping = False
+        self._storage = StoragePause(store, self._ledger, settings.data_dir)
+        self._retention = Retention(settings, store)
+        self._thread = threading.Thread(target=self._work, name="manager", daemon=True)
+
+    @property
+    def alive(self) -> bool:
+        """Whether campaigns make progress."""
+        return self._thread.is_alive()
+
+    @property
+    def storage_problem(self) -> str | None:
+        """Why campaigns are paused, while they are."""
+        return self._storage.reason
+
+    def start(self) -> None:
+        """Take up what an earlier server left, then work the queue.
+
+        Raises:
+          StorageError: the database or the data folder cannot be written.
+        """
+        try:
+            settle(self._settings.data_dir / "campaigns", self._store.exists)
+        except OSError as error:
+            raise StorageError(refused("tidying the data folder", self._settings.data_dir, error)) from error
+        resumed = self._ledger.resume()
+        if resumed:
+            logger.info("%d interrupted runs go back to the queue", resumed)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop all workers at their next episode boundary, leave their runs queued, and return.
+
+        Runs whose worker cannot even be killed stay `running`; the next start puts them back in the queue.
+        """
+        with self._lock:
+            self._stopping = True
+            for number in self._active:
+                self._executor.cancel(number, self._settings.stop_s)
+        self._executor.wake()
+        self._thread.join(self._settings.stop_s + UNKILLABLE_S)
+        if self._thread.is_alive():
+            logger.error("workers of runs %s did not end", sorted(self._active))
+
+    def submit(self, spec: CampaignSpec, *, project: str = "default", key: str | None = None) -> StoredCampaign:
+        """Queue a campaign, or find the one that this idempotency key has queued before.
+
+        Raises:
+          ConfigError: the campaign cannot be run; the error names the field.
+          ConflictError: the key has queued another campaign.
+          QuotaError: the project has used up its share.
+          StorageError: it cannot be written down.
+        """
+        check_campaign(spec)
+        with self._lock:
+            found = None if key is None else self._ledger.find(project, key, spec)
+            if found is not None:
+                return found
+            check_quota(self._store.usage(project), len(spec.runs()), self._settings)
+            campaign = self._ledger.create(spec, project, key)
+        logger.info("%d runs queued", len(campaign.runs), extra={"campaign": campaign.id})
+        self._executor.wake()
+        return campaign
+
+    def cancel(self, campaign_id: str, project: str | None = None) -> StoredCampaign:
+        """Cancel a campaign; does nothing to one that has ended.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+          StorageError: the cancellation cannot be written down.
+        """
+        with self._lock:
+            for number in self._ledger.cancel(campaign_id, project):
+                if number in self._active:
+                    self._active[number].cancelled = True
+                    self._executor.cancel(number, self._settings.grace_s)
+            return self._store.campaign(campaign_id)
+
+    def delete(self, campaign_id: str, project: str | None = None) -> None:
+        """Remove a campaign that has ended, with its files.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+          ConflictError: it has not ended.
+          StorageError: its files or rows cannot be removed.
+        """
+        with self._lock:
+            campaign = self._store.campaign(campaign_id, project)
+            leaving = any(active.run.campaign_id == campaign_id for active in self._active.values())
+            if not campaign.state.final or leaving:
+                message = f"campaign {campaign_id} is {campaign.state}; cancel it and wait until it has ended"
+                raise ConflictError(message, reason="not_ended")
+            self._dispose(campaign_id)
+
+    def _dispose(self, campaign_id: str) -> None:
+        folder = self._settings.campaign_folder(campaign_id)
+        try:
+            dispose(folder, lambda: self._ledger.delete(campaign_id))
+        except OSError as error:
+            raise StorageError(refused("deleting a campaign", folder, error)) from error
+        logger.info("deleted", extra={"campaign": campaign_id})
+
+    def _work(self) -> None:
+        while True:
+            for number, message in self._executor.events(TICK_S):
+                with self._lock:
+                    self._handle(self._active[number], message)
+            with self._lock:
+                if self._stopping:
+                    if not self._active:
+                        return
+                elif self._storage.reason is None:
+                    self._tend()
+                elif not self._active:
+                    self._storage.try_again()
+
+    def _tend(self) -> None:
+        try:
+            self._launch_waiting()
+            self._retention.retire(self._dispose)
+        except StorageError as error:
+            self._pause(str(error))
+
+    def _handle(self, active: _Active, message: Event | Exited) -> None:
+        number = active.run.number
+        try:
+            if isinstance(message, Exited):
+                del self._active[number]
+                self._end(active, message)
+            elif isinstance(message, EpisodeDone) and not active.abandoned:
+                if self._ledger.add_episode(number, message):
+                    self._deaths.pop(number, None)
+            elif isinstance(message, Finished | Failed):
+                active.last = message
+            elif isinstance(message, Started):
+                logger.info("process %d", message.pid, extra=active.ids)
+        except StorageError as error:
+            self._pause(str(error), active)
+
+    def _end(self, active: _Active, exited: Exited) -> None:
+        """Decide what became of a run; a worker's own account goes before its exit status."""
+        number, last = active.run.number, active.last
+        if active.abandoned:
+            return
+        if isinstance(last, Finished) and last.finished:
+            self._ledger.end_run(number, State.SUCCEEDED, result=last)
+        elif isinstance(last, Failed) and last.storage:
+            self._pause(last.reason, active)
+        elif isinstance(last, Failed):
+            self._ledger.end_run(number, State.FAILED, last.reason)
+        elif active.cancelled:
+            self._ledger.end_run(number, State.CANCELLED)
+        elif self._stopping:
+            self._ledger.requeue_run(number)
+        else:
+            self._replace(active, exited)
+        if active.last is not None or active.cancelled:
+            self._deaths.pop(number, None)
+
+    def _replace(self, active: _Active, exited: Exited) -> None:
+        """A worker was lost: another one goes on from its checkpoint, unless that has failed too often."""
+        number = active.run.number
+        reason = exited.reason or "worker stopped before its run was done"
+        self._deaths[number] += 1
+        self.restarts[exited.cause] += 1
+        logger.warning("%s; attempt %d", reason, self._deaths[number], extra=active.ids)
+        if self._deaths[number] < self._settings.attempts:
+            self._ledger.requeue_run(number, f"{reason}; goes on from its checkpoint")
+        else:
+            times = f"{self._deaths.pop(number)} workers in a row finished no episode"
+            self._ledger.end_run(number, State.FAILED, f"{reason}; {times}")
+
+    def _launch_waiting(self) -> None:
+        while len(self._active) < self._settings.max_workers:
+            number = self._next()
+            if number is None:
+                return
+            self._launch(self._store.run(number))
+
+    def _next(self) -> int | None:
+        """The run that has waited longest, of the project that has the fewest at work."""
+        at_work = Counter(active.project for active in self._active.values())
+        waiting = self._store.waiting()
+        able = [project for project in waiting if not exhausted(self._store.usage(project), self._settings)]
+        return min(((at_work[project], waiting[project]) for project in able), default=(0, None))[1]
+
+    def _launch(self, run: StoredRun) -> None:
+        folder = self._settings.run_folder(run.campaign_id, run.id)
+        campaign = self._store.campaign(run.campaign_id)
+        self._ledger.start_run(run.number)
+        self._active[run.number] = active = _Active(run, campaign.project)
+        try:
+            self._executor.submit(run.number, campaign.run_spec(run), folder)
+        except OSError as error:
+            del self._active[run.number]
+            self._pause(refused("starting a run", folder, error), active)
+
+    def _pause(self, reason: str, *without_worker: _Active) -> None:
+        """The disk refused: nothing is lost, since workers have their checkpoints; all wait until it has room.
+
+        Args:
+          reason: what it said.
+          without_worker: runs that are to wait although they have no worker any more.
+        """
+        self._storage.begin(reason)
+        for number, active in self._active.items():
+            active.abandoned = True
+            self._executor.cancel(number, self._settings.stop_s)
+        numbers = {active.run.number for active in (*self._active.values(), *without_worker)}
+        self._storage.write_down(numbers, reason)

@@ -1,0 +1,38 @@
+"""What one project may take of the service. Pure."""
+
+from service.errors import QuotaError
+from service.settings import ServiceSettings
+from service.store.records import Usage
+
+RETRY_S = 60.0
+HOUR_S = 3600.0
+
+
+def check_quota(usage: Usage, new_runs: int, settings: ServiceSettings) -> None:
+    """Refuse runs that a project may not queue now.
+
+    Args:
+      usage: what the project takes already.
+      new_runs: how many it asks for.
+      settings: hold the quotas.
+
+    Raises:
+      QuotaError: too many would wait, or its worker hours are used up.
+    """
+    if usage.queued_runs + new_runs > settings.quota_queued_runs:
+        raise QuotaError(
+            f"got {new_runs} runs with {usage.queued_runs} waiting already; wanted at most "
+            f"{settings.quota_queued_runs} of one project in the queue",
+            RETRY_S,
+        )
+    if exhausted(usage, settings):
+        raise QuotaError(
+            f"the project has used {usage.cpu_s / HOUR_S:.2f} worker hours within 24; wanted at most "
+            f"{settings.quota_cpu_hours:g}",
+            HOUR_S,
+        )
+
+
+def exhausted(usage: Usage, settings: ServiceSettings) -> bool:
+    """Whether a project's worker hours are used up, so that its runs wait."""
+    return settings.quota_cpu_hours is not None and usage.cpu_s >= settings.quota_cpu_hours * HOUR_S

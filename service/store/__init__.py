@@ -1,0 +1,1 @@
+"""What the service keeps: tables, records of them, reading and writing."""

@@ -1,0 +1,60 @@
+"""What an episode adds to its row, its run's counts and its project's hours."""
+
+import time
+
+from pydantic_core import from_json, to_json
+from sqlalchemy.orm import Session
+
+from risk_sac.metrics import Funnel
+from risk_sac.types import EpisodeRecord, Outcome
+from service.store.tables import EpisodeRow, RunRow, UsageRow
+from service.workers.messages import EpisodeDone
+
+HOUR_S = 3600
+
+
+def add_usage(session: Session, project: str, busy_s: float) -> None:
+    """A project has used a worker for some time, now."""
+    hour = int(time.time() // HOUR_S)
+    row = session.get(UsageRow, (project, hour))
+    if row is None:
+        session.add(UsageRow(project=project, hour=hour, busy_s=busy_s))
+    else:
+        row.busy_s += busy_s
+
+
+def count(run: RunRow, outcome: Outcome, sign: int) -> None:
+    """Add an episode that ended so to a run's counts, or take it away."""
+    run.episodes_done += sign
+    run.rejected += sign * (outcome is Outcome.REJECTED)
+    run.raw_collisions += sign * (outcome in (Outcome.FAILURE, Outcome.DEGENERATE))
+    run.failures += sign * (outcome is Outcome.FAILURE)
+
+
+def tally(run: RunRow) -> None:
+    """What only the run itself can count: which failures are distinct is decided by those before them."""
+    phases = [from_json(text) for text in (run.metrics, run.evaluation) if text is not None]
+    for name in ("distinct_failures", "preventable", "distinct_preventable"):
+        setattr(run, name, sum(phase.get(name, 0) for phase in phases))
+
+
+def fill(row: EpisodeRow, event: EpisodeDone) -> None:
+    """Write what a worker said of an episode into its row."""
+    record: EpisodeRecord = event.record
+    row.phase = record.phase
+    row.index = record.index
+    row.outcome = record.outcome
+    row.record = to_text(record)
+    row.series = event.series
+    row.series_sha256 = event.series_sha256
+    row.wall_s = event.wall_s
+    row.funnel = to_text(Funnel.of(event.metrics))
+    judgement = record.collision.judgement if record.collision is not None else None
+    row.grade = judgement.grade if judgement is not None and record.outcome is Outcome.FAILURE else None
+    row.signature = judgement.signature if judgement is not None else None
+    row.broke = f",{','.join(judgement.broke)}," if judgement is not None else None
+
+
+def to_text(value: object) -> str:
+    """JSON as columns hold it."""
+    return to_json(value, inf_nan_mode="strings").decode()

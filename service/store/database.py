@@ -1,0 +1,153 @@
+"""Opening the database: SQLite in the data folder, or PostgreSQL by URL; sound, up to date, and ours alone.
+
+SQLite reads its write-ahead log up to the last commit whose checksums hold and says nothing of what follows: a commit
+that a kill cut off, or one that the disk damaged. Nothing is lost for good by it, since runs tell again what their
+checkpoints know; but it is noticed.
+
+Source: the format of the write-ahead log, sqlite.org/fileformat2.html.
+"""
+
+import logging
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import takewhile
+from pathlib import Path
+from sqlite3 import Connection as SqliteConnection
+
+from alembic import command
+from alembic.config import Config
+from alembic.util import CommandError
+from sqlalchemy import Engine, create_engine, event, make_url, text
+from sqlalchemy.exc import ArgumentError, DatabaseError, IntegrityError, NoSuchModuleError, ProgrammingError
+
+from service.errors import StorageError
+
+logger = logging.getLogger(__name__)
+
+READERS = 8  # requests answered in threads at once; of more, each would only wait longer for the interpreter
+ADVISORY_LOCK = 0x5249534B  # any number that all servers of this project agree on
+
+LOG_HEADER = struct.Struct(">8I")  # magic, version, page size, sequence, two salts, two checksums
+LOG_FRAME = struct.Struct(">6I")  # page, size after a commit, two salts, two checksums
+
+PRAGMAS = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000")
+
+
+def open_database(url: str) -> Engine:
+    """Connect, check for damage, and bring the tables up to date.
+
+    Raises:
+      StorageError: it cannot be opened, is damaged, belongs to a newer version, or is another server's.
+    """
+    engine = _engine(url)
+    logged = _logged_frames(Path(engine.url.database or "")) if engine.dialect.name == "sqlite" else 0
+    try:
+        with storage_errors("opening the database"):
+            if logged and (dropped := logged - _taken_frames(engine)) > 0:
+                logger.warning("the last %d frames of the journal hold no whole commit; runs tell again", dropped)
+            _check(engine)
+            _upgrade(engine)
+    except BaseException:
+        engine.dispose()
+        raise
+    return engine
+
+
+@contextmanager
+def held(engine: Engine) -> Iterator[None]:
+    """Be the only server that writes this database; SQLite's is guarded by the lock of the data folder.
+
+    Raises:
+      StorageError: another server holds it.
+    """
+    if engine.dialect.name != "postgresql":
+        yield
+        return
+    with storage_errors("locking the database"):
+        connection = engine.connect().execution_options(isolation_level="AUTOCOMMIT")
+    with connection:  # the lock lives as long as its connection
+        with storage_errors("locking the database"):
+            taken = connection.scalar(text("SELECT pg_try_advisory_lock(:number)"), {"number": ADVISORY_LOCK})
+        if not taken:
+            raise StorageError(f"database {engine.url!r} is in use by another server; stop it or use another")
+        yield
+
+
+@contextmanager
+def storage_errors(doing: str) -> Iterator[None]:
+    """Turn what the database driver raises into a StorageError with its reason.
+
+    Broken constraints and statements are bugs, not storage, and pass through.
+    """
+    try:
+        yield
+    except (IntegrityError, ProgrammingError):
+        raise
+    except DatabaseError as error:
+        raise StorageError(f"storage failed while {doing}: {str(error.orig).strip()}") from error
+
+
+def _engine(url: str) -> Engine:
+    try:
+        if make_url(url).get_backend_name() == "sqlite":
+            engine = create_engine(url, pool_size=READERS)
+            event.listen(engine, "connect", _set_up)
+            event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN"))
+            return engine
+        if make_url(url).get_backend_name() == "postgresql":
+            return create_engine(url, pool_size=READERS, pool_pre_ping=True)
+    except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
+        raise StorageError(f"database_url cannot be used: {error}") from error
+    raise StorageError("database_url names another kind of database; wanted postgresql+psycopg://… or sqlite:///…")
+
+
+def _set_up(connection: SqliteConnection, _: object) -> None:
+    connection.isolation_level = None  # else the driver would commit before each change of a table
+    for pragma in PRAGMAS:
+        connection.execute(f"PRAGMA {pragma}").close()
+
+
+def _logged_frames(database: Path) -> int:
+    """Frames of the write-ahead log's present generation, as it lies there before the database is opened."""
+    log = database.with_name(f"{database.name}-wal")
+    content = log.read_bytes() if log.exists() else b""
+    if len(content) < LOG_HEADER.size:
+        return 0
+    _, _, page_size, _, *salts, _, _ = LOG_HEADER.unpack_from(content)
+    size = LOG_FRAME.size + page_size
+    starts = range(LOG_HEADER.size, len(content) - size + 1, size)
+    generations = (list(LOG_FRAME.unpack_from(content, start)[2:4]) for start in starts)
+    return sum(1 for _ in takewhile(lambda found: found == salts, generations))
+
+
+def _taken_frames(engine: Engine) -> int:
+    """How many of them the database, open now, has taken."""
+    with engine.connect() as connection:
+        taken: int = connection.execute(text("PRAGMA wal_checkpoint(PASSIVE)")).one()[1]
+    return max(0, taken)
+
+
+def _check(engine: Engine) -> None:
+    """Look at every page of a SQLite file; PostgreSQL looks after its own."""
+    if engine.dialect.name != "sqlite":
+        return
+    with engine.connect() as connection:
+        found = connection.scalars(text("PRAGMA integrity_check(1)")).all()
+        orphan = connection.execute(text("PRAGMA foreign_key_check")).first()
+    if list(found) != ["ok"]:
+        raise StorageError(f"database {engine.url.database!r} is damaged ({found[0]}); restore a copy or move it away")
+    if orphan is not None:
+        raise StorageError(f"database {engine.url.database!r} is damaged ({orphan[0]!r} lacks its {orphan[2]!r} row)")
+
+
+def _upgrade(engine: Engine) -> None:
+    """All missing steps in one transaction, so that a server that dies in between leaves the old tables."""
+    config = Config()
+    config.set_main_option("script_location", "service.store:migrations")
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        try:
+            command.upgrade(config, "head")
+        except CommandError as error:
+            raise StorageError(f"database cannot be brought up to date: {error}; a newer version wrote it") from error

@@ -1,0 +1,94 @@
+"""Rows by the ids that callers know, and pages of those that fit."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from heapq import merge
+from itertools import islice
+from operator import attrgetter
+
+from sqlalchemy import ColumnElement, Select, select
+from sqlalchemy.orm import Session
+
+from risk_sac.types import Grade, Outcome
+from service.errors import NotFoundError
+from service.store.records import Page, StoredEpisode
+from service.store.snapshots import episode_record
+from service.store.tables import CampaignRow, EpisodeRow, RunRow
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Judged:
+    """Which contacts are asked for, by their judgement; None: any."""
+
+    grade: Grade | None = None
+    broke: str | None = None
+    signature: str | None = None
+
+    def conditions(self) -> Iterator[ColumnElement[bool]]:
+        """As the database takes them."""
+        if self.grade is not None:
+            yield EpisodeRow.grade == self.grade
+        if self.broke is not None:
+            yield EpisodeRow.broke.contains(f",{self.broke},", autoescape=True)
+        if self.signature is not None:
+            yield EpisodeRow.signature == self.signature
+
+
+def find_campaign(session: Session, campaign_id: str, project: str | None = None) -> CampaignRow:
+    """The row with this public id, if it is the project's.
+
+    Raises:
+      NotFoundError: there is none.
+    """
+    # No id has a NUL, and PostgreSQL does not even look for one.
+    query = select(CampaignRow).where(CampaignRow.id == campaign_id)
+    row = None if "\0" in campaign_id else session.scalars(query).one_or_none()
+    if row is None or project not in (None, row.project):
+        message = f"no campaign has the id {campaign_id!r}; GET /v1/campaigns lists those there are"
+        raise NotFoundError(message, field="campaign_id", got=campaign_id)
+    return row
+
+
+def find_run(session: Session, campaign: CampaignRow, run_id: str) -> int:
+    """Number of a campaign's run with this public id.
+
+    Raises:
+      NotFoundError: there is none.
+    """
+    query = select(RunRow.number).filter_by(campaign_number=campaign.number, id=run_id)
+    number = None if "\0" in run_id else session.scalar(query)
+    if number is not None:
+        return number
+    known = ", ".join(run.id for run in campaign.runs[:10])
+    message = f"campaign {campaign.id} has no run {run_id!r}; its runs are {known}"
+    raise NotFoundError(message, field="run", got=run_id)
+
+
+def episode_page(
+    session: Session, query: Select[EpisodeRow], outcomes: Collection[Outcome], limit: int, after: int
+) -> Page[StoredEpisode]:
+    """The page of a query's episodes just after number `after`; no outcomes means all."""
+    # A query for each outcome: the index has the order of a page only within one.
+    query = query.where(EpisodeRow.number > after).order_by(EpisodeRow.number).limit(limit + 1)
+    queries = [query.where(EpisodeRow.outcome == outcome) for outcome in outcomes] or [query]
+    found = merge(*(session.scalars(each) for each in queries), key=attrgetter("number"))
+    rows = list(islice(found, limit + 1))
+    last = rows[limit - 1].number if len(rows) > limit else None
+    return Page(items=tuple(episode_record(row) for row in rows[:limit]), last=last)
+
+
+def split_failure_id(failure_id: str) -> tuple[str, str, int]:
+    """Run, phase and index; an id of another shape yields a run that cannot exist."""
+    run_id, _, rest = failure_id.partition("-train-")
+    phase = "train"
+    if not rest:
+        run_id, _, rest = failure_id.partition("-evaluate-")
+        phase = "evaluate"
+    well_formed = "\0" not in run_id and rest.isascii() and rest.isdigit() and len(rest) < 10
+    return (run_id, phase, int(rest)) if well_formed else ("", phase, -1)
+
+
+def unknown_failure(campaign_id: str, failure_id: str) -> NotFoundError:
+    """What to raise where no contact has this id."""
+    message = f"campaign {campaign_id} has no failure {failure_id!r}; GET its `failures?tier=raw` lists all contacts"
+    return NotFoundError(message, field="failure_id", got=failure_id)

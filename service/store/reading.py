@@ -1,0 +1,243 @@
+"""Reading the database. Nothing here writes: that is the manager's alone, in `service.store.writing`."""
+
+import time
+import zlib
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from sqlalchemy import func, select
+from sqlalchemy.orm import Session, selectinload
+
+from risk_sac.types import Outcome
+from service.errors import StorageError
+from service.store.counting import HOUR_S
+from service.store.database import open_database, storage_errors
+from service.store.finding import Judged, episode_page, find_campaign, find_run, split_failure_id, unknown_failure
+from service.store.records import Page, StoredCampaign, StoredChange, StoredEpisode, StoredRun, Usage
+from service.store.revisions import Mark, Revisions
+from service.store.snapshots import campaign_record, change_record, episode_record, run_record
+from service.store.states import FINAL, State
+from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow, UsageRow
+
+DAY_HOURS = 24
+
+
+class Store:
+    """Snapshots of campaigns, runs and episodes.
+
+    Attributes:
+      engine: the database.
+      revisions: of campaigns, kept by those who write and read them.
+      refusal: why the disk refuses, while it does. Campaigns at work are then shown as paused: the disk that stops
+        them may refuse the note about it, too.
+    """
+
+    def __init__(self, url: str) -> None:
+        """Open the database, creating it where there is none.
+
+        Raises:
+          StorageError: it cannot be opened, is no database, or is damaged.
+        """
+        self.engine = open_database(url)
+        self.refusal: str | None = None
+        self.revisions = Revisions()
+        try:
+            self._check()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close all connections."""
+        self.engine.dispose()
+
+    def campaign(self, campaign_id: str, project: str | None = None) -> StoredCampaign:
+        """The campaign with this id.
+
+        Args:
+          campaign_id: of the campaign.
+          project: who asks; None sees all. Another project's campaign is as unknown as one that never was.
+
+        Raises:
+          NotFoundError: there is none.
+        """
+        with self._reading() as session:
+            return self._campaign(find_campaign(session, campaign_id, project))
+
+    def campaigns(
+        self,
+        limit: int,
+        before: int | None = None,
+        *,
+        project: str | None = None,
+        state: State | None = None,
+        family: str | None = None,
+        method: str | None = None,
+        label: str | None = None,
+    ) -> Page[StoredCampaign]:
+        """Newest first, from the campaign just older than number `before`; family and method are those of one run."""
+        query = select(CampaignRow).options(selectinload(CampaignRow.runs)).order_by(CampaignRow.number.desc())
+        wanted = {"project": project, "state": state, "label": label}
+        query = query.filter_by(**{name: value for name, value in wanted.items() if value is not None})
+        run = {name: value for name, value in (("family", family), ("method", method)) if value is not None}
+        if run:
+            query = query.where(CampaignRow.number.in_(select(RunRow.campaign_number).filter_by(**run)))
+        if before is not None:
+            query = query.where(CampaignRow.number < before)
+        with self._reading() as session:
+            rows = list(session.scalars(query.limit(limit + 1)))
+            last = rows[limit - 1].number if len(rows) > limit else None
+            return Page(items=tuple(self._campaign(row) for row in rows[:limit]), last=last)
+
+    def revision(self, campaign_id: str, project: str | None = None) -> str:
+        """A name for what a campaign, its runs and its episodes look like now; another one once they do not.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+        """
+        known = self.known_revision(campaign_id, project)
+        if known is not None:
+            return known
+        with self._reading() as session:
+            row = find_campaign(session, campaign_id, project)
+            return self._shown_revision(self.revisions.learn(row.id, row.project, row.revision).mark.latest)
+
+    def known_revision(self, campaign_id: str, project: str | None = None) -> str | None:
+        """The same if the database need not be asked for it, else None."""
+        known = self.revisions.get(campaign_id)
+        if known is None or project not in (None, known.project):
+            return None
+        return self._shown_revision(known.mark.latest)
+
+    def mark(self, campaign_id: str) -> Mark | None:
+        """What a campaign looks like now; None if the database must be asked for it."""
+        known = self.revisions.get(campaign_id)
+        return None if known is None else replace(known.mark, refusal=self.refusal)
+
+    def mark_of_all(self) -> Mark:
+        """What all campaigns look like now."""
+        return replace(self.revisions.all, refusal=self.refusal)
+
+    def changes(self, campaign_id: str, *, after: int = 0, limit: int = 500) -> list[StoredChange]:
+        """Changes of state of a campaign and its runs in their order, from the one just after number `after`.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+        """
+        with self._reading() as session:
+            campaign = find_campaign(session, campaign_id)
+            query = select(ChangeRow).where(ChangeRow.campaign_number == campaign.number, ChangeRow.number > after)
+            return [change_record(row) for row in session.scalars(query.order_by(ChangeRow.number).limit(limit))]
+
+    def episodes(
+        self,
+        campaign_id: str,
+        *,
+        limit: int,
+        after: int | None = None,
+        run_id: str | None = None,
+        outcomes: Collection[Outcome] = (),
+        judged: Judged | None = None,
+        project: str | None = None,
+    ) -> Page[StoredEpisode]:
+        """In order of arrival, from the episode just after number `after`; no outcomes means all.
+
+        Raises:
+          NotFoundError: there is no such campaign, or it has no such run.
+        """
+        with self._reading() as session:
+            campaign = find_campaign(session, campaign_id, project)
+            if run_id is None:
+                query = select(EpisodeRow).where(EpisodeRow.campaign_number == campaign.number)
+            else:  # without the campaign's number, which would let the database choose a slower index
+                query = select(EpisodeRow).where(EpisodeRow.run_number == find_run(session, campaign, run_id))
+            query = query if judged is None else query.where(*judged.conditions())
+            return episode_page(session, query, outcomes, limit, after or 0)
+
+    def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredEpisode:
+        """The episode with this id in which the ego touched something.
+
+        Raises:
+          NotFoundError: there is none.
+        """
+        run_id, phase, index = split_failure_id(failure_id)
+        with self._reading() as session:
+            campaign = find_campaign(session, campaign_id, project)
+            query = (
+                select(EpisodeRow)
+                .join(EpisodeRow.run)
+                .where(RunRow.campaign_number == campaign.number, RunRow.id == run_id)
+                .where(EpisodeRow.phase == phase, EpisodeRow.index == index)
+                .where(EpisodeRow.outcome.in_([Outcome.FAILURE, Outcome.DEGENERATE]))
+            )
+            row = session.scalars(query).one_or_none()
+            if row is None:
+                raise unknown_failure(campaign_id, failure_id)
+            return episode_record(row)
+
+    def waiting(self) -> dict[str, int]:
+        """Number of the run that has waited longest, for each project that has runs in the queue."""
+        query = (
+            select(CampaignRow.project, func.min(RunRow.number).label("number"))
+            .join(RunRow.campaign)
+            .where(RunRow.state == State.QUEUED)
+            .group_by(CampaignRow.project)
+        )
+        with self._reading() as session:
+            return {row.project: row.number for row in session.execute(query)}
+
+    def run(self, number: int) -> StoredRun:
+        """The run with this number, which there is."""
+        with self._reading() as session:
+            row = session.get_one(RunRow, number)
+            return run_record(row, row.campaign.id)
+
+    def usage(self, project: str) -> Usage:
+        """What a project takes of the service now."""
+        queued = (
+            select(func.count())
+            .select_from(RunRow)
+            .join(RunRow.campaign)
+            .where(CampaignRow.project == project, RunRow.state == State.QUEUED)
+        )
+        oldest = int(time.time() // HOUR_S) - DAY_HOURS
+        hours = select(UsageRow).where(UsageRow.project == project, UsageRow.hour > oldest)
+        with self._reading() as session:
+            cpu_s = sum(row.busy_s for row in session.scalars(hours))
+            return Usage(queued_runs=session.scalar(queued) or 0, cpu_s=cpu_s)
+
+    def ended_before(self, moment: float, limit: int) -> list[str]:
+        """Ids of campaigns that ended before a moment (seconds since the epoch), the oldest first."""
+        query = select(CampaignRow.id).where(CampaignRow.state.in_(FINAL), CampaignRow.finished_at < moment)
+        with self._reading() as session:
+            return list(session.scalars(query.order_by(CampaignRow.number).limit(limit)))
+
+    def exists(self, campaign_id: str) -> bool:
+        """Whether there is a campaign with this id."""
+        with self._reading() as session:
+            return session.scalar(select(CampaignRow.number).where(CampaignRow.id == campaign_id)) is not None
+
+    @contextmanager
+    def _reading(self) -> Iterator[Session]:
+        with storage_errors("reading"), Session(self.engine) as session:
+            yield session
+
+    def _campaign(self, row: CampaignRow) -> StoredCampaign:
+        campaign = campaign_record(row, self._shown_revision(row.revision))
+        at_work = campaign.state in (State.RUNNING, State.PAUSED)
+        return campaign.paused(self.refusal) if self.refusal is not None and at_work else campaign
+
+    def _shown_revision(self, revision: int) -> str:
+        return f"{revision}" if self.refusal is None else f"{revision}-{zlib.crc32(self.refusal.encode()):x}"
+
+    def _check(self) -> None:
+        """Read every campaign and run once, which verifies them, and count the episodes they should have."""
+        counted = select(func.count()).where(EpisodeRow.run_number == RunRow.number).scalar_subquery()
+        with self._reading() as session:
+            for table in (CampaignRow, RunRow):
+                for _ in session.scalars(select(table).execution_options(yield_per=1000)):
+                    pass
+            lacking = session.scalars(select(RunRow.id).where(RunRow.episodes_done != counted)).first()
+        if lacking is not None:
+            raise StorageError(f"database is damaged: run {lacking!r} lacks episodes; restore a copy or move it away")

@@ -1,0 +1,220 @@
+"""Writing the database; the manager holds the only one of these."""
+
+import secrets
+import time
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+
+from sqlalchemy import delete, select
+from sqlalchemy.orm import Session
+
+from risk_sac.config import CampaignSpec
+from risk_sac.types import Outcome
+from service.errors import ConflictError
+from service.store.counting import add_usage, count, fill, tally, to_text
+from service.store.database import storage_errors
+from service.store.finding import find_campaign
+from service.store.reading import Store
+from service.store.records import StoredCampaign
+from service.store.snapshots import campaign_record
+from service.store.states import RESUMED, State, advance, campaign_state
+from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
+from service.workers.messages import EpisodeDone, Finished
+
+
+class Ledger:
+    """Each method is one transaction: it holds entirely or, with a StorageError, not at all."""
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._repeated_s: dict[int, float] = {}  # time of runs that only repeated what was known
+
+    def find(self, project: str, key: str, spec: CampaignSpec) -> StoredCampaign | None:
+        """The campaign that was created with this idempotency key.
+
+        Raises:
+          ConflictError: the key was used for another campaign.
+        """
+        with storage_errors("reading"), Session(self._store.engine) as session:
+            row = session.scalars(select(CampaignRow).filter_by(project=project, idempotency_key=key)).one_or_none()
+            if row is None:
+                return None
+            found = campaign_record(row, self._store.revision(row.id))
+        if found.spec != spec:
+            message = f"Idempotency-Key {key!r} belongs to campaign {found.id}, which differs; wanted another key"
+            raise ConflictError(message, reason="idempotency_key_reused")
+        return found
+
+    def create(self, spec: CampaignSpec, project: str = "default", key: str | None = None) -> StoredCampaign:
+        """Write a new campaign and its runs down, all queued."""
+        row = CampaignRow(id=f"c{secrets.token_hex(8)}", project=project, idempotency_key=key, label=spec.label)
+        row.spec, row.state, row.created_at = spec.model_dump_json(), State.QUEUED, time.time()
+        row.runs = [
+            RunRow(
+                id=f"{run.family}-{run.method}-{run.seed}",
+                family=run.family,
+                method=run.method,
+                seed=run.seed,
+                spec_digest=run.digest,
+                state=State.QUEUED,
+                episodes_total=run.budget.episodes + run.budget.evaluation_episodes,
+            )
+            for run in spec.runs()
+        ]
+        with self._writing("creating a campaign") as session:
+            session.add(row)
+            session.flush()
+            return campaign_record(row, str(row.revision))
+
+    def start_run(self, number: int) -> None:
+        """A worker is being launched for this run."""
+        with self._run(number, "starting a run") as (session, row):
+            _move(session, row, State.RUNNING)
+            row.started_at = row.started_at or time.time()
+            row.attempts += 1
+
+    def add_episode(self, number: int, event: EpisodeDone) -> bool:
+        """Store an episode, or replace it where a resumed run reports another outcome; False if it was known."""
+        with self._writing("storing an episode", episode=True) as session:
+            run = session.get_one(RunRow, number)
+            query = select(EpisodeRow).filter_by(run_number=number, phase=event.record.phase, index=event.record.index)
+            row = session.scalars(query).one_or_none()
+            self._repeated_s[number] = self._repeated_s.get(number, 0.0) + event.wall_s
+            if row is not None and row.record == to_text(event.record) and row.series_sha256 == event.series_sha256:
+                return False
+            new = row is None
+            if row is None:
+                row = EpisodeRow(campaign_number=run.campaign_number, run_number=number)
+                session.add(row)
+            else:
+                count(run, Outcome(row.outcome), -1)
+            fill(row, event)
+            count(run, event.record.outcome, +1)
+            if event.record.phase == "train":
+                run.metrics = to_text(event.metrics)
+            else:
+                run.evaluation = to_text(event.metrics)
+            tally(run)
+            busy_s = self._repeated_s.pop(number)
+            run.busy_s += busy_s
+            add_usage(session, run.campaign.project, busy_s)
+            run.campaign.revision += 1  # its state follows those of its runs, which an episode leaves alone
+            return new
+
+    def end_run(self, number: int, state: State, reason: str | None = None, result: Finished | None = None) -> None:
+        """A run reached its end; its campaign ends with the last one."""
+        with self._run(number, "ending a run") as (session, row):
+            _move(session, row, state, reason)
+            row.finished_at = time.time()
+            if result is not None:
+                row.metrics = to_text(result.metrics)
+                row.evaluation = None if result.evaluation is None else to_text(result.evaluation)
+                tally(row)
+                row.digest = result.digest
+                row.versions = to_text(dict(result.versions))
+
+    def requeue_run(self, number: int, reason: str | None = None) -> None:
+        """A run lost its worker; it will resume from its checkpoint."""
+        with self._run(number, "putting a run back in the queue") as (session, row):
+            _move(session, row, State.QUEUED, reason)
+
+    def pause(self, numbers: Collection[int], reason: str) -> None:
+        """The disk refused these runs, which had workers."""
+        with self._writing("pausing") as session:
+            for row in session.scalars(select(RunRow).where(RunRow.number.in_(numbers))):
+                if row.state == State.RUNNING:
+                    _move(session, row, State.PAUSED, reason)
+                    _settle(session, row.campaign)
+
+    def resume(self) -> int:
+        """Settle what has no worker any more, after a pause or an earlier server; returns how many runs wait again."""
+        with self._writing("resuming") as session:
+            rows = list(session.scalars(select(RunRow).where(RunRow.state.in_(RESUMED))))
+            for row in rows:
+                _move(session, row, RESUMED[State(row.state)])
+                _settle(session, row.campaign)
+            return sum(row.state == State.QUEUED for row in rows)
+
+    def cancel(self, campaign_id: str, project: str | None = None) -> list[int]:
+        """Cancel what waits and mark what runs; returns the numbers of the runs to stop.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+        """
+        with self._writing("cancelling a campaign") as session:
+            campaign = find_campaign(session, campaign_id, project)
+            if State(campaign.state).final:
+                return []
+            running = [run for run in campaign.runs if run.state == State.RUNNING]
+            if running and campaign.state != State.CANCELLING:
+                campaign.state = advance(State(campaign.state), State.CANCELLING)
+                _log(session, campaign.number, None, State.CANCELLING, None)
+            for run in campaign.runs:
+                if run in running:
+                    _move(session, run, State.CANCELLING)
+                elif run.state in (State.QUEUED, State.PAUSED):
+                    _move(session, run, State.CANCELLED)
+                    run.finished_at = time.time()
+            _settle(session, campaign)
+            return [run.number for run in campaign.runs if run.state == State.CANCELLING]
+
+    def delete(self, campaign_id: str) -> None:
+        """Remove a campaign with all that belongs to it.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+        """
+        with self._writing("deleting a campaign") as session:
+            number = find_campaign(session, campaign_id).number
+            session.expunge_all()
+            for table in (EpisodeRow, ChangeRow, RunRow):
+                session.execute(delete(table).where(table.campaign_number == number))
+            session.execute(delete(CampaignRow).where(CampaignRow.number == number))
+        self._store.revisions.forget(campaign_id)
+
+    @contextmanager
+    def _run(self, number: int, doing: str) -> Iterator[tuple[Session, RunRow]]:
+        with self._writing(doing) as session:
+            row = session.get_one(RunRow, number)
+            yield session, row
+            _settle(session, row.campaign)
+
+    @contextmanager
+    def _writing(self, doing: str, *, episode: bool = False) -> Iterator[Session]:
+        with storage_errors(doing), Session(self._store.engine, expire_on_commit=False) as session:
+            with session.begin():
+                yield session
+            for row in session.identity_map.values():
+                if isinstance(row, CampaignRow):
+                    self._store.revisions.note(row.id, row.project, row.revision, episode=episode)
+
+
+def _move(session: Session, run: RunRow, state: State, reason: str | None = None) -> None:
+    run.state = advance(State(run.state), state)
+    run.reason = reason
+    _log(session, run.campaign_number, run.id, state, reason)
+
+
+def _settle(session: Session, campaign: CampaignRow) -> None:
+    """Let a campaign follow its runs, and show that something of it has changed."""
+    campaign.revision += 1
+    current = State(campaign.state)
+    new = campaign_state(current, [State(run.state) for run in campaign.runs])
+    if new is current:
+        return
+    campaign.state = new
+    campaign.reason = next((f"run {run.id}: {run.reason}" for run in campaign.runs if _tells(run, new)), None)
+    if new is State.RUNNING:
+        campaign.started_at = campaign.started_at or time.time()
+    if new.final:
+        campaign.finished_at = time.time()
+    _log(session, campaign.number, None, new, campaign.reason)
+
+
+def _tells(run: RunRow, state: State) -> bool:
+    """Whether a run is why its campaign is in this state."""
+    return bool(run.reason) and run.state == state
+
+
+def _log(session: Session, campaign: int, run_id: str | None, state: State, reason: str | None) -> None:
+    session.add(ChangeRow(campaign_number=campaign, run_id=run_id, state=state, reason=reason, at=time.time()))

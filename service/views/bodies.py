@@ -1,0 +1,70 @@
+"""Records as response bodies."""
+
+from risk_sac.run_folder.results import FAILURES
+from risk_sac.types import Outcome
+from service.errors import StorageError
+from service.schemas import Campaign, CampaignSummary, Episode, Failure, Run, StateChange
+from service.settings import ServiceSettings
+from service.store.records import StoredCampaign, StoredChange, StoredEpisode
+from service.views.progress import progress
+from service.views.series import load_series
+
+
+def campaign_body(campaign: StoredCampaign, settings: ServiceSettings) -> Campaign:
+    """A campaign in full."""
+    return Campaign(
+        **dict(summary_body(campaign, settings)),
+        runs=[Run.model_validate(run) for run in campaign.runs],
+        spec=campaign.spec,
+    )
+
+
+def summary_body(campaign: StoredCampaign, settings: ServiceSettings) -> CampaignSummary:
+    """A campaign in a list."""
+    return CampaignSummary.model_validate(
+        {
+            "id": campaign.id,
+            "label": campaign.label,
+            "state": campaign.state,
+            "reason": campaign.reason,
+            "created_at": campaign.created_at,
+            "started_at": campaign.started_at,
+            "finished_at": campaign.finished_at,
+            "progress": progress(campaign, settings.max_workers),
+        }
+    )
+
+
+def episode_body(episode: StoredEpisode) -> Episode:
+    """An episode in a list."""
+    return Episode.model_validate(_fields(episode))
+
+
+def failure_body(campaign_id: str, episode: StoredEpisode, settings: ServiceSettings) -> Failure:
+    """A contact with its time series, or with the reason why there is none."""
+    body = _fields(episode)
+    try:
+        if episode.series is None:
+            raise StorageError("no time series was recorded")
+        folder = settings.run_folder(campaign_id, episode.run_id) / FAILURES
+        body |= {"series": load_series(folder / episode.series, episode.series_sha256), "series_problem": None}
+    except StorageError as error:
+        body |= {"series": None, "series_problem": str(error)}
+    return Failure.model_validate(body)
+
+
+def change_body(change: StoredChange) -> StateChange:
+    """A change of state in a stream of events."""
+    return StateChange.model_validate(change)
+
+
+def tier_outcomes(tier: str) -> tuple[Outcome, ...]:
+    """Outcomes that a tier of failures admits: `valid`, or `raw` for all contacts."""
+    return (Outcome.FAILURE,) if tier == "valid" else (Outcome.FAILURE, Outcome.DEGENERATE)
+
+
+def _fields(episode: StoredEpisode) -> dict[str, object]:
+    record = episode.record
+    own = ("id", "run_id", "wall_s", "funnel")
+    names = (name for name in Episode.model_fields if name not in own)
+    return {name: getattr(record, name) for name in names} | {name: getattr(episode, name) for name in own}

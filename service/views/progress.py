@@ -1,0 +1,80 @@
+"""How far a campaign is and when it will end. Pure."""
+
+import math
+from collections.abc import Sequence
+
+from risk_sac.types import RunMetrics
+from service.schemas import Progress
+from service.store.records import StoredCampaign, StoredRun
+from service.store.states import State
+
+LOOKS = 20  # that somebody who follows a campaign takes from now to its end
+SOONEST_S, LATEST_S = 1, 30
+
+
+def progress(campaign: StoredCampaign, workers: int) -> Progress:
+    """Counts over all runs, present values of the runs at work, and the time left.
+
+    Args:
+      campaign: the campaign.
+      workers: runs the server executes at once.
+    """
+    runs = campaign.runs
+    present = _present(runs)
+    return Progress(
+        episodes_done=sum(run.episodes_done for run in runs),
+        episodes_total=sum(run.episodes_total for run in runs),
+        failures=sum(run.failures for run in runs),
+        raw_collisions=sum(run.raw_collisions for run in runs),
+        rejected=sum(run.rejected for run in runs),
+        distinct_failures=sum(run.distinct_failures for run in runs),
+        preventable=sum(run.preventable for run in runs),
+        distinct_preventable=sum(run.distinct_preventable for run in runs),
+        window_ecr=_mean([metrics.window_ecr for metrics in present]),
+        window_pcr=_mean([metrics.window_pcr for metrics in present]),
+        dual_variable=_mean([metrics.dual_variable for metrics in present]),
+        temperature=_mean([metrics.temperature for metrics in present]),
+        eta_s=0.0 if campaign.state.final else eta_s(runs, workers),
+    )
+
+
+def retry_after_s(campaign: StoredCampaign, workers: int) -> int | None:
+    """Seconds after which a look pays again: a twentieth of the time left, or None once the campaign has ended."""
+    if campaign.state.final:
+        return None
+    left_s = eta_s(campaign.runs, workers) or 0.0
+    return math.ceil(min(max(left_s / LOOKS, SOONEST_S), LATEST_S))
+
+
+def eta_s(runs: Sequence[StoredRun], workers: int) -> float | None:
+    """Seconds until all runs have ended, or None before the first episode has.
+
+    eta = max(longest run at work, work left / workers)
+
+    Each run goes at its own pace, and one without a pace at the mean of those that have one.
+    Campaigns ahead in the queue are not counted.
+
+    Args:
+      runs: all runs of the campaign.
+      workers: runs executed at once, at least 1.
+    """
+    busy_s = sum(run.busy_s for run in runs)
+    done = sum(run.episodes_done for run in runs)
+    if done == 0:
+        return None
+    left = [_left(run, busy_s / done) for run in runs if not run.state.final]
+    return max(max(left, default=0.0), sum(left) / workers)
+
+
+def _left(run: StoredRun, mean_pace_s: float) -> float:
+    pace_s = run.busy_s / run.episodes_done if run.episodes_done else mean_pace_s
+    return pace_s * max(0, run.episodes_total - run.episodes_done)
+
+
+def _present(runs: Sequence[StoredRun]) -> list[RunMetrics]:
+    at_work = [run for run in runs if run.state in (State.RUNNING, State.CANCELLING)]
+    return [run.metrics for run in at_work or runs if run.metrics is not None]
+
+
+def _mean(values: Sequence[float]) -> float | None:
+    return sum(values) / len(values) if values else None

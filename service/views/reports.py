@@ -1,0 +1,94 @@
+"""The report of a campaign: made of the folders of its finished runs, as `risk-sac evaluate` makes it."""
+
+import hashlib
+import threading
+
+from risk_sac import __version__
+from risk_sac.errors import ConfigError
+from risk_sac.report import Comparison, FinishedRun, compare, figure_bytes, figure_names, read_run
+from risk_sac.report.figures import Format
+from service.errors import NotFoundError
+from service.settings import ServiceSettings
+from service.store.records import StoredCampaign, StoredRun
+from service.store.states import State
+
+
+def edition(campaign: StoredCampaign) -> str:
+    """A name that changes whenever the report would: a run has finished, or why one is missing has changed."""
+    lines = [__version__, campaign.id, *(f"{run.id} {run.digest or _missing(run)}" for run in campaign.runs)]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:32]
+
+
+class CampaignReport:
+    """One edition of a campaign's report.
+
+    Attributes:
+      comparison: what it says; its commands are the caller's to fill in.
+      lasting: whether the same edition would say it again: not if a finished run's folder could not be read.
+    """
+
+    def __init__(self, campaign: StoredCampaign, comparison: Comparison, *, lasting: bool) -> None:
+        self.comparison = comparison
+        self.lasting = lasting
+        self._campaign_id = campaign.id
+        self._lock = threading.Lock()
+        self._drawn: dict[tuple[str, Format], bytes] = {}
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """Names of the figures there are."""
+        return figure_names(self.comparison)
+
+    def figure(self, name: str, format_: Format) -> bytes:
+        """One figure as a file, drawn once.
+
+        Raises:
+          NotFoundError: there is no such figure.
+        """
+        if name not in self.figures:
+            message = f"campaign {self._campaign_id} has no figure {name!r}; GET its `figures` lists those there are"
+            raise NotFoundError(message, field="name", got=name)
+        with self._lock:  # who asks for the same figure meanwhile waits for it instead of drawing it again
+            if (name, format_) not in self._drawn:
+                self._drawn[name, format_] = figure_bytes(self.comparison, name, format_)
+            return self._drawn[name, format_]
+
+
+class Reports:
+    """Makes reports, and keeps the newest: a page with tables and figures asks for the same one many times."""
+
+    def __init__(self, settings: ServiceSettings) -> None:
+        self._settings = settings
+        self._lock = threading.Lock()
+        self._newest: tuple[str, CampaignReport] | None = None
+
+    def report(self, campaign: StoredCampaign) -> CampaignReport:
+        """The report of a campaign as it stands; blocks for the seconds that the statistics take."""
+        name = edition(campaign)
+        with self._lock:
+            if self._newest is None or self._newest[0] != name:
+                report = self._make(campaign)
+                self._newest = (name, report) if report.lasting else None
+                return report
+            return self._newest[1]
+
+    def _make(self, campaign: StoredCampaign) -> CampaignReport:
+        found: list[FinishedRun] = []
+        reasons: dict[str, str] = {}
+        lasting = True
+        for run in campaign.runs:
+            if run.state is not State.SUCCEEDED:
+                reasons[run.spec_digest] = _missing(run)
+                continue
+            try:
+                found.append(read_run(self._settings.run_folder(campaign.id, run.id)))
+            except (ConfigError, OSError) as error:
+                reasons[run.spec_digest] = f"it succeeded, but its results are lost: {error}"
+                lasting = False
+        comparison = compare(campaign.spec, found, command="", reasons=reasons)
+        return CampaignReport(campaign, comparison, lasting=lasting)
+
+
+def _missing(run: StoredRun) -> str:
+    """Why a run that has not succeeded is not in the tables."""
+    return f"{run.state}: {run.reason}" if run.reason else run.state

@@ -1,0 +1,1 @@
+"""Where runs execute: the seam, processes of this machine, and what they say."""

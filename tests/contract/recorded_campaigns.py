@@ -1,0 +1,238 @@
+"""Campaigns at a known time, of known ids, put into a database and a data folder as the manager and workers do it."""
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.metrics import results_digest
+from risk_sac.report import FinishedRun
+from risk_sac.run_folder.episode_json import records_to_json
+from risk_sac.run_folder.results import EPISODES, FAILURES, Contact, Results, series_name, write_results
+from risk_sac.run_folder.series import PER_ACTOR, PER_OTHER, write_series
+from risk_sac.types import Collision, EpisodeRecord, Grade, Judgement, Outcome, SeriesFile
+from service.settings import ServiceSettings
+from service.store.reading import Store
+from service.store.records import StoredCampaign, StoredRun
+from service.store.states import State
+from service.store.writing import Ledger
+from service.workers.messages import EpisodeDone, Finished
+from tests.judged import judgement
+
+BEGAN = 1_750_000_000.0
+ENDED_ID, LIVE_ID, CANCELLED_ID, POSTED_ID = (f"c{number:016x}" for number in range(1, 5))
+VERSIONS = {"numpy": "2.4", "sumo": "1.28"}
+FOUND, NOTHING = ".fF.dr", ".a.r.."  # a letter for each episode, see `OUTCOMES`
+
+
+def collision(judged: Judgement | None = None, broken: str = "", least_ttc_s: float = 0.3) -> Collision:
+    return Collision(
+        time_s=3.2,
+        other_id="lead",
+        other_kind="vehicle",
+        other_role="adversary",
+        contact_x_m=2.3,
+        contact_y_m=0.1,
+        ego_zone="front",
+        other_zone="rear",
+        ego_speed_mps=9.0,
+        other_speed_mps=2.0,
+        relative_speed_mps=7.0,
+        lateral_offset_m=0.1,
+        min_ttc_s=least_ttc_s,
+        min_rss_margin_m=-3.0,
+        visible_for_s=3.0,
+        ego_peak_braking_mps2=4.5,
+        min_robustness=-1.0,
+        simulator_agrees=True,
+        verdicts={rule: rule != broken for rule in ("inside_limits", "ego_moving")},
+        judgement=judged,
+    )
+
+
+OUTCOMES = {
+    ".": (Outcome.SAFE, "", None),
+    "r": (Outcome.REJECTED, "sim_crash", None),
+    "f": (Outcome.FAILURE, "", collision(judgement())),
+    "F": (Outcome.FAILURE, "", collision(judgement(Grade.IDEAL, -0.5, unresponsive=True, signature="leader"))),
+    "a": (Outcome.DEGENERATE, "inside_limits", collision(broken="inside_limits", least_ttc_s=math.inf)),
+    "d": (Outcome.DEGENERATE, "ego_moving", collision(broken="ego_moving")),
+}
+
+
+def record(index: int, letter: str, phase: str) -> EpisodeRecord:
+    outcome, reason, hit = OUTCOMES[letter]
+    return EpisodeRecord(
+        index=index,
+        phase=phase,
+        seed=index + 7,
+        scene={"lead_gap_m": 12.5 + index},
+        outcome=outcome,
+        reason=reason,
+        steps=0 if letter == "r" else 50,
+        risk_return=1.0,
+        shaped_return=0.5,
+        mean_cost=0.25,
+        min_ttc_s=9.5 if hit is None else hit.min_ttc_s,
+        min_robustness=0.2 if hit is None else -1.0,
+        objective=None if index == 0 else 0.75,
+        dual_variable=0.5 * index,
+        temperature=0.25,
+        environment_steps=50 * (index + 1),
+        collision=hit,
+    )
+
+
+def records(letters: str, evaluation: str = "") -> list[EpisodeRecord]:
+    search = [record(index, letter, "train") for index, letter in enumerate(letters)]
+    return search + [record(index, letter, "evaluate") for index, letter in enumerate(evaluation, len(letters))]
+
+
+def finished(spec: RunSpec, done: Sequence[EpisodeRecord]) -> FinishedRun:
+    return FinishedRun(
+        spec=spec, digest=results_digest(done), records=tuple(done), versions=VERSIONS, wall_s=30.0, cpu_s=20.0
+    )
+
+
+def series(folder: Path, index: int) -> SeriesFile:
+    """Three steps of two actors, one of which is absent in the second step."""
+    rows = np.arange(6, dtype=float).reshape(3, 2)
+    rows[1, 1] = np.nan
+    arrays = dict.fromkeys((*PER_ACTOR, *PER_OTHER), rows) | {
+        "time_s": np.arange(3) / 10,
+        "ids": np.array(["ego", "lead"]),
+        "kind": np.array([0, 1], dtype=np.int8),
+        "role": np.array([0, 1], dtype=np.int8),
+        "length_m": np.array([4.6, 0.5]),
+        "width_m": np.array([1.8, 0.5]),
+        "visible": np.array([[np.nan, 1.0], [np.nan, np.nan], [np.nan, 0.0]]),
+        "requirements": np.array(["safe_ttc"]),
+        "robustness": np.array([[1.0], [np.inf], [-1.0]]),
+        "soft_min": np.zeros(3),
+        "actions": np.zeros((3, 4), dtype=np.float32),
+        "signal": np.array([0, 3, 1], dtype=np.int8),
+    }
+    return write_series(folder / FAILURES / series_name(index), arrays)
+
+
+class Clock:
+    """The time of day, which stands still until it is told to pass."""
+
+    def __init__(self) -> None:
+        self.now = BEGAN
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@contextmanager
+def known_times_and_ids() -> Iterator[Clock]:
+    """Within it, what the service notes of time and makes up as ids is known beforehand."""
+    clock, ids = Clock(), iter((ENDED_ID, LIVE_ID, CANCELLED_ID, POSTED_ID))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(time, "time", clock)
+        patch.setattr("secrets.token_hex", lambda _: next(ids).removeprefix("c"))
+        yield clock
+
+
+class Recorded:
+    """Fills the database of a service that has not started."""
+
+    def __init__(self, settings: ServiceSettings, clock: Clock) -> None:
+        self._settings = settings
+        self._clock = clock
+        self._store = Store(settings.url)
+        self._ledger = Ledger(self._store)
+
+    def write(self) -> None:
+        """One campaign that has ended, one at work, and one that was cancelled while it waited."""
+        self._ended()
+        self._live()
+        cancelled = self._ledger.create(CampaignSpec(families=("dense",), methods=("random",), label="cancelled"))
+        self._clock.now += 5
+        self._ledger.cancel(cancelled.id)
+        self._clock.now += 5
+        self._store.close()
+
+    def _ended(self) -> None:
+        """One run has found failures, one of its workers died; the other run has failed."""
+        campaign = self._create("ended", episodes=len(FOUND), evaluation=2)
+        first, second = campaign.runs
+        done = records(FOUND, "f.")
+        self._ledger.start_run(first.number)
+        self._report(campaign, first, done[:3])
+        self._ledger.requeue_run(first.number, "worker was killed by SIGKILL; goes on from its checkpoint")
+        self._ledger.start_run(first.number)
+        self._report(campaign, first, done)
+        self._finish(campaign, first, done)
+        self._ledger.start_run(second.number)
+        self._report(campaign, second, records(NOTHING)[:4])
+        self._clock.now += 1
+        self._ledger.end_run(second.number, State.FAILED, "worker exited with status 1: Traceback: the policy is NaN")
+
+    def _live(self) -> None:
+        """One run is at work, the other one has its episodes to come."""
+        campaign = self._create("live", episodes=len(NOTHING), evaluation=0)
+        first, _ = campaign.runs
+        self._ledger.start_run(first.number)
+        self._report(campaign, first, records(NOTHING)[:5])
+
+    def _create(self, label: str, episodes: int, evaluation: int) -> StoredCampaign:
+        self._clock.now += 60
+        budget = {"episodes": episodes, "evaluation_episodes": evaluation}
+        spec = CampaignSpec.model_validate(
+            {"label": label, "families": ("low",), "methods": ("risk-sac", "random"), "seeds": (3,), "budget": budget}
+        )
+        campaign = self._ledger.create(spec, key=f"key of {label}")
+        self._clock.now += 1
+        return campaign
+
+    def _report(self, campaign: StoredCampaign, run: StoredRun, done: Sequence[EpisodeRecord]) -> None:
+        folder, spec = self._settings.run_folder(campaign.id, run.id), campaign.run_spec(run)
+        for count, episode in enumerate(done, 1):
+            self._clock.now += 1
+            kept = None if episode.collision is None else series(folder, episode.index)
+            metrics = finished(spec, done[:count]).metrics
+            word = EpisodeDone(
+                record=episode,
+                metrics=metrics["evaluation" if episode.phase == "evaluate" else "search"],
+                series=kept and kept.name,
+                series_sha256=kept and kept.sha256,
+                wall_s=0.5,
+            )
+            self._ledger.add_episode(run.number, word)
+
+    def _finish(self, campaign: StoredCampaign, run: StoredRun, done: Sequence[EpisodeRecord]) -> None:
+        folder, spec = self._settings.run_folder(campaign.id, run.id), campaign.run_spec(run)
+        result = finished(spec, done)
+        write_results(
+            folder,
+            Results(
+                spec=spec,
+                spec_digest=spec.digest,
+                finished=True,
+                metrics=result.metrics["search"],
+                evaluation=result.metrics["evaluation"],
+                digest=result.digest,
+                versions=VERSIONS,
+                device="cpu",
+                wall_s=result.wall_s,
+                cpu_s=result.cpu_s,
+                contacts=tuple(Contact.of(each) for each in done if each.collision is not None),
+            ),
+        )
+        (folder / EPISODES).write_text("".join(records_to_json([each])[1:-1].strip() + "\n" for each in done))
+        last = Finished(
+            finished=True,
+            metrics=result.metrics["search"],
+            evaluation=result.metrics["evaluation"],
+            digest=result.digest,
+            versions=VERSIONS,
+            wall_s=30.0,
+        )
+        self._ledger.end_run(run.number, State.SUCCEEDED, result=last)

@@ -1,0 +1,58 @@
+"""The real app on a real socket, with an executor that starts nothing."""
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import uvicorn
+
+from risk_sac.config import RunSpec
+from service.app import create_app
+from service.settings import ServiceSettings
+from service.workers.executor import Exited
+from service.workers.messages import Event
+
+
+class IdleExecutor:
+    """Accepts runs and leaves them waiting until they are cancelled."""
+
+    def __init__(self) -> None:
+        self._cancelled: list[int] = []
+        self._wake = threading.Event()
+
+    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
+        pass
+
+    def cancel(self, number: int, grace_s: float) -> None:
+        self._cancelled.append(number)
+        self.wake()
+
+    def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
+        self._wake.wait(timeout_s)
+        self._wake.clear()
+        ended, self._cancelled = self._cancelled, []
+        return [(number, Exited(None)) for number in dict.fromkeys(ended)]
+
+    def wake(self) -> None:
+        self._wake.set()
+
+
+@contextmanager
+def serving(settings: ServiceSettings) -> Iterator[str]:
+    """Where the app answers."""
+    server = uvicorn.Server(uvicorn.Config(create_app(settings, IdleExecutor()), log_level="warning"))
+    listener = socket.create_server(("127.0.0.1", 0))
+    thread = threading.Thread(target=server.run, args=([listener],))
+    thread.start()
+    try:
+        while not server.started:
+            assert thread.is_alive(), "the server did not start"
+            time.sleep(0.01)
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+    finally:
+        server.should_exit = True
+        thread.join()
+        listener.close()

@@ -1,0 +1,59 @@
+import pytest
+from fastapi import HTTPException, Request
+
+from service.api.answers.representations import accepted, caching, entity_tag, has
+
+OFFERED = ("application/json", "text/markdown", "text/csv")
+BROWSER = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,*/*;q=0.8"
+
+
+@pytest.mark.parametrize(
+    ("accept", "chosen"),
+    [
+        ("", "application/json"),
+        ("*/*", "application/json"),
+        (BROWSER, "application/json"),
+        ("text/*", "text/markdown"),
+        ("text/csv", "text/csv"),
+        ("TEXT/CSV; charset=utf-8", "text/csv"),
+        ("text/markdown;q=0.3, text/csv;q=0.7", "text/csv"),
+        ("*/*;q=0.1, text/markdown", "text/markdown"),
+        ("text/*, text/markdown;q=0", "text/csv"),
+        ("application/json;q=0, */*", "text/markdown"),
+        ("text/csv;q=nonsense", "text/csv"),
+        (",, text/csv ,", "text/csv"),
+    ],
+)
+def test_the_most_specific_range_decides_and_the_best_quality_wins(accept, chosen):
+    assert accepted(accept, OFFERED) == chosen
+
+
+@pytest.mark.parametrize("accept", ["image/png", "text/csv;q=0", "text", ";;;", "*/*;q=0.000"])
+def test_nothing_acceptable_is_a_406_that_lists_what_there_is(accept):
+    with pytest.raises(HTTPException, match="text/markdown") as caught:
+        accepted(accept, OFFERED)
+    assert caught.value.status_code == 406
+
+
+def test_what_has_no_tag_is_not_to_be_kept_by_one():
+    assert caching(None) == {"Cache-Control": "no-cache"}
+    tag = entity_tag("abc", "csv")
+    assert caching(tag, "Accept") == {"Cache-Control": "no-cache", "ETag": 'W/"abc-csv"', "Vary": "Accept"}
+
+
+@pytest.mark.parametrize(
+    ("sent", "there"),
+    [
+        ('W/"7"', True),
+        ('"7"', True),  # a weak comparison
+        ('W/"6", W/"7"', True),
+        ("*", True),
+        ('W/"77"', False),
+        ("7", False),
+        ("", False),
+        (None, False),
+    ],
+)
+def test_a_tag_is_among_those_that_the_client_has(sent, there):
+    headers = [] if sent is None else [(b"if-none-match", sent.encode())]
+    assert has(Request({"type": "http", "headers": headers}), entity_tag("7")) is there

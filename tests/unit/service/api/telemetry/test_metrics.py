@@ -1,0 +1,104 @@
+import pytest
+from prometheus_client import generate_latest
+from prometheus_client.parser import text_string_to_metric_families
+
+from risk_sac.config import CampaignSpec
+from risk_sac.types import Outcome
+from service.api.telemetry.metrics import registry, request_latencies
+from service.runs.manager import Manager
+from service.settings import ServiceSettings
+from service.store.states import State
+from service.workers.local import LocalExecutor
+
+SPEC = CampaignSpec(families=("low",), methods=("random", "sac"), seeds=(0, 1))
+
+
+@pytest.fixture
+def manager(store, tmp_path):
+    settings = ServiceSettings(data_dir=tmp_path)
+    return Manager(settings, store, LocalExecutor(settings))
+
+
+@pytest.fixture
+def scrape(store, manager):
+    """Scrapes the service: samples by name and labels."""
+    latencies = request_latencies()
+    metrics = registry(latencies, store, manager)
+
+    def read():
+        families = text_string_to_metric_families(generate_latest(metrics).decode())
+        samples = (sample for family in families for sample in family.samples)
+        return {(sample.name, *sorted(sample.labels.values())): sample.value for sample in samples}
+
+    read.latencies = latencies
+    return read
+
+
+def test_what_is_stored_is_counted(store, ledger, episode, scrape):
+    campaign = ledger.create(SPEC)
+    first, second, *_ = campaign.runs
+    for run in (first, second):
+        ledger.start_run(run.number)
+    for index in range(4):
+        ledger.add_episode(first.number, episode(index, Outcome.FAILURE if index % 2 else Outcome.REJECTED))
+    seen = scrape()
+    assert seen["risk_sac_episodes_total", "low", "random"] == 4
+    assert seen["risk_sac_episodes_total", "low", "sac"] == 0
+    assert seen["risk_sac_failures_total", "low", "random"] == 2
+    assert seen["risk_sac_contacts_total", "low", "random"] == 2
+    for name in ("distinct", "preventable", "distinct_preventable"):  # as its metrics say
+        assert seen[f"risk_sac_{name}_failures_total", "low", "random"] == 1
+        assert seen[f"risk_sac_{name}_failures_total", "low", "sac"] == 0
+    assert seen["risk_sac_run_ecr", *sorted([campaign.id, first.id, "low", "random"])] == 0.25  # as its metrics say
+    assert seen["risk_sac_run_pcr", *sorted([campaign.id, first.id, "low", "random"])] == 0.25
+    for gauge in ("risk_sac_run_ecr", "risk_sac_run_pcr"):
+        assert not [key for key in seen if key[0] == gauge and second.id in key]  # no episode yet
+    assert (seen["risk_sac_runs", "running"], seen["risk_sac_runs", "queued"]) == (2, 2)
+    assert (seen["risk_sac_campaigns", "running"], seen["risk_sac_campaigns", "failed"]) == (1, 0)
+    assert seen[("risk_sac_storage_available",)] == 1
+    assert seen[("process_resident_memory_bytes",)] > 0
+
+
+def test_a_run_from_before_contacts_were_judged_has_an_ecr_alone(store, ledger, episode, scrape):
+    run = ledger.create(SPEC).runs[0]
+    ledger.start_run(run.number)
+    ledger.add_episode(run.number, episode(0))
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE runs SET metrics = '{\"ecr\": 0.5}' WHERE metrics IS NOT NULL")
+    rates = {key[0]: value for key, value in scrape().items() if key[0].startswith("risk_sac_run_")}
+    assert rates == {"risk_sac_run_ecr": 0.5}
+
+
+def test_counters_do_not_fall_when_a_campaign_is_deleted(store, ledger, episode, scrape):
+    kept, deleted = ledger.create(SPEC), ledger.create(SPEC)
+    for campaign in (kept, deleted):
+        ledger.start_run(campaign.runs[0].number)
+        for index in range(3):
+            ledger.add_episode(campaign.runs[0].number, episode(index))
+    assert scrape()["risk_sac_episodes_total", "low", "random"] == 6
+    ledger.delete(deleted.id)
+    assert scrape()["risk_sac_episodes_total", "low", "random"] == 6
+    ledger.add_episode(kept.runs[0].number, episode(3))
+    assert scrape()["risk_sac_episodes_total", "low", "random"] == 7
+    ledger.delete(kept.id)
+    assert scrape()["risk_sac_episodes_total", "low", "random"] == 7
+
+
+def test_lost_workers_and_a_refusing_disk_are_told(store, manager, scrape):
+    manager.restarts["killed"] += 2
+    store.refusal = "no space left on device"
+    seen = scrape()
+    assert seen["risk_sac_worker_restarts_total", "killed"] == 2
+    assert seen[("risk_sac_storage_available",)] == 0
+
+
+def test_latencies_are_those_of_one_app(scrape):
+    scrape.latencies.labels("/v1/campaigns", "GET", "200").observe(0.02)
+    seen = scrape()
+    assert seen["risk_sac_request_seconds_count", "/v1/campaigns", "200", "GET"] == 1
+    assert request_latencies().collect()[0].samples == []
+
+
+def test_every_state_has_a_figure(scrape):
+    seen = scrape()
+    assert all(seen["risk_sac_runs", state] == 0 for state in State)

@@ -1,0 +1,196 @@
+import math
+from dataclasses import replace
+
+import pytest
+
+from risk_sac.config import CampaignSpec
+from risk_sac.metrics import Funnel
+from risk_sac.types import Grade, Outcome
+from service.errors import NotFoundError, StorageError
+from service.store.finding import Judged
+from service.store.reading import Store
+from service.store.states import State
+from tests.begun import start
+from tests.judged import judgement
+
+SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
+
+
+def judged(event, kind):
+    collision = replace(event.record.collision, judgement=kind)
+    return event.model_copy(update={"record": replace(event.record, collision=collision)})
+
+
+def test_a_record_comes_back_with_its_numbers_that_are_not_finite(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    ledger.add_episode(start(store, ledger), episode(5, Outcome.FAILURE))
+    found = store.failure(campaign.id, "low-risk-sac-3-train-5")
+    assert found.id == "low-risk-sac-3-train-5"
+    assert found.record.min_ttc_s == math.inf
+    assert math.isnan(found.record.collision.min_ttc_s)
+
+
+def test_pages_continue_where_they_ended_while_more_arrives(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    for index in range(5):
+        ledger.add_episode(number, episode(index, Outcome.FAILURE if index % 2 else Outcome.SAFE))
+    first = store.episodes(campaign.id, limit=3)
+    ledger.add_episode(number, episode(5))
+    second = store.episodes(campaign.id, limit=3, after=first.last)
+    assert [item.record.index for item in first.items + second.items] == [0, 1, 2, 3, 4, 5]
+    assert second.last is None
+    failures = store.episodes(campaign.id, limit=10, run_id="low-risk-sac-3", outcomes=[Outcome.FAILURE])
+    assert [item.record.index for item in failures.items] == [1, 3]
+
+
+def test_campaigns_are_listed_newest_first(store, ledger):
+    ids = [ledger.create(SPEC).id for _ in range(5)]
+    first = store.campaigns(limit=2)
+    ledger.create(SPEC)
+    second = store.campaigns(limit=10, before=first.last)
+    assert [item.id for item in first.items + second.items] == ids[::-1]
+
+
+@pytest.mark.parametrize(
+    "failure_id",
+    ["", "-", "x", "low-risk-sac-3-train-0", "low-risk-sac-3-train-9", "low-risk-sac-3-train-٣", "a-train-99999999999"],
+)
+def test_what_does_not_exist_is_not_found(store, ledger, episode, failure_id):
+    campaign = ledger.create(SPEC)
+    ledger.add_episode(start(store, ledger), episode(0))
+    with pytest.raises(NotFoundError):
+        store.failure(campaign.id, failure_id)
+    with pytest.raises(NotFoundError, match="no run 'x'; its runs are low-risk-sac-3"):
+        store.episodes(campaign.id, limit=1, run_id="x")
+    with pytest.raises(NotFoundError):
+        store.campaign("x")
+    with pytest.raises(NotFoundError):
+        ledger.cancel("x")
+
+
+def test_a_pause_that_the_disk_refuses_to_note_is_shown_all_the_same(store, ledger):
+    campaign, waiting = ledger.create(SPEC), ledger.create(SPEC)
+    start(store, ledger)
+    before = store.revision(campaign.id)
+    store.refusal = "no room"
+    shown = store.campaign(campaign.id)
+    assert (shown.state, shown.reason) == (State.PAUSED, "no room")
+    assert [run.state for run in shown.runs] == [State.PAUSED, State.QUEUED, State.QUEUED, State.QUEUED]
+    assert shown.revision == store.revision(campaign.id) != before
+    assert store.campaign(waiting.id).state is State.QUEUED
+    store.refusal = None
+    assert store.campaign(campaign.id).state is State.RUNNING
+    assert store.revision(campaign.id) == before
+
+
+def test_changes_of_state_come_in_their_order(store, ledger):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    ledger.requeue_run(number, "worker was killed by SIGKILL")
+    ledger.cancel(campaign.id)
+    changes = store.changes(campaign.id)
+    assert [(change.run_id, change.state) for change in changes[:4]] == [
+        ("low-risk-sac-3", State.RUNNING),
+        (None, State.RUNNING),
+        ("low-risk-sac-3", State.QUEUED),
+        (None, State.QUEUED),
+    ]
+    assert changes[2].reason == "worker was killed by SIGKILL"
+    assert (changes[-1].run_id, changes[-1].state) == (None, State.CANCELLED)
+    assert store.changes(campaign.id, after=changes[3].number) == changes[4:]
+
+
+def test_another_project_sees_nothing(store, ledger, episode):
+    ours, theirs = ledger.create(SPEC, "ours"), ledger.create(SPEC, "theirs")
+    assert [item.id for item in store.campaigns(limit=5, project="ours").items] == [ours.id]
+    assert store.revision(ours.id, "ours") == ours.revision
+    for read in (
+        store.campaign,
+        store.revision,
+        lambda id_, project: store.episodes(id_, limit=1, project=project),
+        lambda id_, project: store.failure(id_, "x", project),
+        ledger.cancel,
+    ):
+        with pytest.raises(NotFoundError) as foreign:
+            read(theirs.id, "ours")
+        with pytest.raises(NotFoundError) as unknown:
+            read("c123", "ours")
+        assert str(foreign.value).replace(theirs.id, "c123") == str(unknown.value)
+
+
+def test_lists_are_filtered_by_state_family_method_and_label(store, ledger):
+    low = ledger.create(SPEC)
+    mixed = ledger.create(CampaignSpec(label="night", families=("low", "mixed"), methods=("sac",)))
+    ledger.cancel(low.id)
+
+    def found(**wanted):
+        return [item.id for item in store.campaigns(limit=5, **wanted).items]
+
+    assert found() == found(family="low") == [mixed.id, low.id]
+    assert found(state=State.CANCELLED) == found(method="random") == [low.id]
+    assert found(label="night") == found(family="mixed", method="sac") == [mixed.id]
+    assert found(label="") == [low.id]
+    assert found(family="mixed", method="random") == found(state=State.FAILED) == []
+
+
+def test_a_database_that_lost_an_episode_is_not_opened(store, ledger, episode, database_url):
+    ledger.create(SPEC)
+    ledger.add_episode(start(store, ledger), episode(0))
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("DELETE FROM episodes")
+    with pytest.raises(StorageError, match="run 'low-risk-sac-3' lacks episodes"):
+        Store(database_url)
+
+
+def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    numbers = [start(store, ledger) for _ in range(2)]
+    kinds = [
+        judgement(),
+        judgement(Grade.IDEAL, broke=()),
+        judgement(Grade.UNAVOIDABLE, broke=("wrong_direction",), signature="crossing, 50 % hidden"),
+        judgement(Grade.CAREFUL, broke=("speeding",)),
+        None,
+    ]
+    for number in numbers:
+        for index, kind in enumerate(kinds):
+            ledger.add_episode(number, judged(episode(index, Outcome.FAILURE), kind))
+        ledger.add_episode(number, judged(episode(5, Outcome.DEGENERATE), judgement(None)))
+        ledger.add_episode(number, episode(6))
+
+    def found(run_id=None, **wanted):
+        outcomes = (Outcome.FAILURE, Outcome.DEGENERATE)
+        page = store.episodes(campaign.id, limit=50, run_id=run_id, outcomes=outcomes, judged=Judged(**wanted))
+        return [item.record.index for item in page.items]
+
+    assert found() == [0, 1, 2, 3, 4, 5] * 2
+    assert found(grade=Grade.CAREFUL) == [0, 3] * 2
+    assert found(grade=Grade.CAREFUL, run_id="low-random-3") == [0, 3]
+    assert found(grade=Grade.UNAVOIDABLE) == [2, 2]
+    assert found(broke="speeding") == [0, 3, 5] * 2
+    assert found(broke="red_light", grade=Grade.CAREFUL) == [0, 0]
+    assert found(broke="red-light") == found(broke="redXlight") == found(broke="red") == []
+    assert found(signature="crossing, 50 % hidden") == [2, 2]
+    assert found(signature="crossing") == []
+    first = store.episodes(campaign.id, limit=1, judged=Judged(grade=Grade.CAREFUL))
+    rest = store.episodes(campaign.id, limit=9, after=first.last, judged=Judged(grade=Grade.CAREFUL))
+    assert [item.record.index for item in (*first.items, *rest.items)] == [0, 3] * 2
+
+
+def test_an_episode_comes_with_the_funnel_at_its_time(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    ledger.add_episode(start(store, ledger), episode(0))
+    (stored,) = store.episodes(campaign.id, limit=10).items
+    assert stored.funnel == Funnel(contacts=2, valid=1, distinct=1, preventable=1)
+
+
+def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):
+    campaign = ledger.create(SPEC)
+    for wrong in ("\0", f"{campaign.id}\0"):
+        with pytest.raises(NotFoundError):
+            store.campaign(wrong)
+        with pytest.raises(NotFoundError):
+            store.episodes(campaign.id, limit=1, run_id=wrong)
+        with pytest.raises(NotFoundError):
+            store.failure(campaign.id, f"{wrong}-train-0")

@@ -1,0 +1,186 @@
+from dataclasses import replace
+
+import pytest
+
+from risk_sac.config import CampaignSpec
+from risk_sac.types import Outcome
+from service.errors import ConflictError, NotFoundError, TransitionError
+from service.store.states import State
+from service.workers.messages import Finished
+from tests.begun import start
+
+SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
+
+
+def tallies(store, campaign):
+    run = store.campaign(campaign.id).runs[0]
+    return run.distinct_failures, run.preventable, run.distinct_preventable
+
+
+def test_a_campaign_comes_back_as_it_was_posted(store, ledger):
+    campaign = ledger.create(SPEC)
+    assert store.campaign(campaign.id) == campaign
+    assert campaign.spec == SPEC
+    assert [run.id for run in campaign.runs] == ["low-risk-sac-3", "low-random-3", "low-risk-sac-4", "low-random-4"]
+    assert [campaign.run_spec(run) for run in campaign.runs] == list(SPEC.runs())
+    assert [run.spec_digest for run in campaign.runs] == [spec.digest for spec in SPEC.runs()]
+
+
+def test_runs_leave_the_queue_in_the_order_they_came(store, ledger):
+    first, second = ledger.create(SPEC), ledger.create(SPEC)
+    left = [start(store, ledger) for _ in range(8)]
+    assert left == [run.number for run in first.runs + second.runs]
+    assert store.waiting() == {}
+
+
+def test_an_episode_reported_twice_is_stored_and_counted_once(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    reports = (episode(0), episode(1, Outcome.FAILURE), episode(1, Outcome.FAILURE), episode(0), episode(2))
+    assert [ledger.add_episode(number, report) for report in reports] == [True, True, False, False, True]
+    run = store.campaign(campaign.id).runs[0]
+    assert (run.episodes_done, run.failures, run.raw_collisions, run.rejected) == (3, 1, 1, 0)
+    assert [item.record.index for item in store.episodes(campaign.id, limit=10).items] == [0, 1, 2]
+    assert run.busy_s == 2.5  # the time was spent twice
+    assert store.usage("default").cpu_s == 2.5
+
+
+def test_an_episode_that_comes_out_otherwise_replaces_the_first(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    assert ledger.add_episode(number, episode(0, Outcome.FAILURE))
+    assert not ledger.add_episode(number, episode(0))
+    (stored,) = store.episodes(campaign.id, limit=10).items
+    assert stored.record.outcome is Outcome.SAFE
+    assert (store.campaign(campaign.id).runs[0].failures, store.campaign(campaign.id).runs[0].episodes_done) == (0, 1)
+
+
+def test_search_and_evaluation_episodes_of_one_index_are_two(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    ledger.add_episode(number, episode(0))
+    ledger.add_episode(number, episode(0, phase="evaluate"))
+    (run, *_) = store.campaign(campaign.id).runs
+    assert run.episodes_done == 2
+    assert run.metrics == run.evaluation == episode(0).metrics
+
+
+def test_a_campaign_succeeds_with_its_last_run(store, ledger, metrics):
+    campaign = ledger.create(SPEC)
+    result = Finished(
+        finished=True, metrics=metrics, evaluation=metrics, digest="abc", versions={"sumo": "1"}, wall_s=1
+    )
+    for _ in campaign.runs:
+        assert store.campaign(campaign.id).state in (State.QUEUED, State.RUNNING)
+        ledger.end_run(start(store, ledger), State.SUCCEEDED, result=result)
+    campaign = store.campaign(campaign.id)
+    assert campaign.state is State.SUCCEEDED
+    assert campaign.created_at <= campaign.started_at <= campaign.finished_at
+    assert campaign.runs[0].evaluation == metrics
+    assert (campaign.runs[0].digest, campaign.runs[0].versions) == ("abc", {"sumo": "1"})
+
+
+def test_one_failed_run_fails_the_campaign_once_the_others_have_ended(store, ledger):
+    campaign = ledger.create(SPEC)
+    ledger.end_run(start(store, ledger), State.FAILED, "worker was killed by SIGKILL")
+    assert store.campaign(campaign.id).state is State.RUNNING
+    for _ in range(3):
+        ledger.end_run(start(store, ledger), State.SUCCEEDED)
+    campaign = store.campaign(campaign.id)
+    assert campaign.state is State.FAILED
+    assert campaign.reason == "run low-risk-sac-3: worker was killed by SIGKILL"
+
+
+def test_cancel_stops_what_runs_and_drops_what_waits(store, ledger):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    assert ledger.cancel(campaign.id) == [number]
+    assert ledger.cancel(campaign.id) == [number]
+    states = [run.state for run in store.campaign(campaign.id).runs]
+    assert states == [State.CANCELLING] + [State.CANCELLED] * 3
+    ledger.end_run(number, State.CANCELLED)
+    assert store.campaign(campaign.id).state is State.CANCELLED
+    assert ledger.cancel(campaign.id) == []
+
+
+def test_a_state_outside_the_table_is_refused_and_changes_nothing(store, ledger):
+    campaign = ledger.create(SPEC)
+    with pytest.raises(TransitionError, match="state is queued; got succeeded"):
+        ledger.end_run(campaign.runs[0].number, State.SUCCEEDED)
+    assert store.campaign(campaign.id) == campaign
+
+
+def test_what_has_no_worker_any_more_waits_again_or_ends_cancelled(store, ledger):
+    kept, dropped = ledger.create(SPEC), ledger.create(SPEC)
+    for _ in range(5):
+        start(store, ledger)
+    ledger.cancel(dropped.id)
+    ledger.pause([kept.runs[0].number], "no room")
+    assert ledger.resume() == 4
+    assert store.campaign(kept.id).state is State.QUEUED
+    assert store.campaign(dropped.id).state is State.CANCELLED
+    assert ledger.resume() == 0
+
+
+def test_a_pause_is_written_with_its_reason_and_can_be_cancelled(store, ledger):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    ledger.pause([number], "no room")
+    paused = store.campaign(campaign.id)
+    assert (paused.state, paused.reason) == (State.PAUSED, "run low-risk-sac-3: no room")
+    assert (paused.runs[0].state, paused.runs[0].reason) == (State.PAUSED, "no room")
+    assert ledger.cancel(campaign.id) == []
+    assert store.campaign(campaign.id).state is State.CANCELLED
+
+
+def test_every_stored_change_has_another_revision(store, ledger, episode, metrics):
+    campaign = ledger.create(SPEC)
+    seen = [store.revision(campaign.id)]
+    number = start(store, ledger)
+    seen.append(store.revision(campaign.id))
+    ledger.add_episode(number, episode(0))
+    seen.append(store.revision(campaign.id))
+    ledger.requeue_run(number, "worker was killed by SIGKILL")
+    seen.append(store.revision(campaign.id))
+    ledger.cancel(campaign.id)
+    seen.append(store.revision(campaign.id))
+    assert len(set(seen)) == len(seen)
+    assert store.campaign(campaign.id).revision == seen[-1]
+
+
+def test_the_same_idempotency_key_finds_the_campaign_or_conflicts(store, ledger):
+    campaign = ledger.create(SPEC, "ours", "k1")
+    assert ledger.find("ours", "k1", SPEC).id == campaign.id
+    assert ledger.find("ours", "k2", SPEC) is None
+    assert ledger.find("theirs", "k1", SPEC) is None
+    with pytest.raises(ConflictError, match="belongs to campaign"):
+        ledger.find("ours", "k1", SPEC.model_copy(update={"label": "other"}))
+
+
+def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):
+    campaign, kept = ledger.create(SPEC), ledger.create(SPEC)
+    for _ in range(5):
+        ledger.add_episode(start(store, ledger), episode(0))
+    ledger.delete(campaign.id)
+    with pytest.raises(NotFoundError):
+        store.revision(campaign.id)
+    assert store.episodes(kept.id, limit=5).items
+    with store.engine.connect() as connection:
+        for table in ("campaigns", "runs", "episodes", "changes"):
+            column = "number" if table == "campaigns" else "campaign_number"
+            numbers = connection.exec_driver_sql(f"SELECT DISTINCT {column} FROM {table}").scalars().all()
+            assert numbers == [kept.number]
+
+
+def test_a_run_has_the_sums_of_what_its_phases_counted(store, ledger, episode, metrics):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    ledger.add_episode(number, episode(0, Outcome.FAILURE))
+    assert tallies(store, campaign) == (1, 1, 1)
+    counted = replace(metrics, distinct_failures=4, preventable=3, distinct_preventable=2)
+    evaluated = episode(0, Outcome.FAILURE, phase="evaluate").model_copy(update={"metrics": counted})
+    ledger.add_episode(number, evaluated)
+    assert tallies(store, campaign) == (5, 4, 3)
+    done = Finished(finished=True, metrics=counted, evaluation=counted, digest="d", versions={}, wall_s=1.0)
+    ledger.end_run(number, State.SUCCEEDED, result=done)
+    assert tallies(store, campaign) == (8, 6, 4)

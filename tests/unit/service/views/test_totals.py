@@ -1,0 +1,55 @@
+from dataclasses import replace
+
+import pytest
+
+from risk_sac.config import CampaignSpec
+from service.store.states import State
+from service.views.totals import results
+
+
+def test_totals_are_per_family_and_method_over_the_seeds(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random"), seeds=(0, 1)))
+    sac = [replace(metrics, ecr=0.25), replace(metrics, ecr=0.75, failures=3, dispersion=0.5)]
+    runs = tuple(
+        replace(run, metrics=sac[run.seed] if run.method == "sac" else None, state=State.RUNNING)
+        for run in campaign.runs
+    )
+    found = results(replace(campaign, runs=runs))
+    assert not found.complete
+    assert [run.metrics is not None for run in found.runs] == [True, False, True, False]
+    (total,) = found.totals
+    assert (total.method, total.runs, total.episodes, total.failures) == ("sac", 2, 8, 4)
+    assert (total.ecr, total.dispersion, total.steps_per_distinct_failure) == (0.5, 0.5, 400.0)
+    assert total.ecr_low <= 0.5 <= total.ecr_high
+
+
+def test_totals_have_the_funnel_and_its_histograms(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0, 1)))
+    second = replace(
+        metrics,
+        raw_collisions=5,
+        failures=3,
+        distinct_failures=2,
+        preventable=2,
+        distinct_preventable=1,
+        pcr=0.5,
+        unresponsive=1,
+        signatures={"pedestrian": 2, "cut-in, straight": 1},
+        conflicts_by_second=(1, 1, 1, 0),
+        contacts_by_second=(0, 0, 1, 2),
+    )
+    runs = tuple(replace(run, metrics=(metrics, second)[run.seed]) for run in campaign.runs)
+    (total,) = results(replace(campaign, runs=runs)).totals
+    assert (total.raw_collisions, total.failures, total.distinct_failures) == (7, 4, 3)
+    assert (total.preventable, total.distinct_preventable, total.artefacts) == (3, 2, 2)
+    assert (total.pcr, total.pcr_low, total.pcr_high) == (0.375, 0.25, 0.5)
+    assert (total.unresponsive, total.unresponsive_share) == (1, 0.25)
+    assert total.signatures == {"cut-in, straight": 2, "pedestrian": 2}
+    assert (total.conflicts_by_second, total.contacts_by_second) == ([1, 1, 2, 0], [0, 0, 1, 3])
+
+
+def test_one_run_keeps_its_wilson_interval(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0,)))
+    (total,) = results(replace(campaign, runs=(replace(campaign.runs[0], metrics=metrics),))).totals
+    assert (total.ecr_low, total.ecr_high) == pytest.approx((0.0456, 0.6994), abs=1e-4)  # of 1 in 4
+    assert (total.pcr_low, total.pcr_high) == (total.ecr_low, total.ecr_high)  # the same one
