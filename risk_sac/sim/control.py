@@ -23,6 +23,7 @@ from risk_sac.sim.sumo import Room, SumoSimulation, VehicleCommand, Walker
 from risk_sac.types import STEP_S, Floats, Frame
 
 CORRECTION_PER_M = 0.05  # curvature that is left for steering in the tightest bend, and so before a road's edge
+TURNING_BACK = 0.85  # share of the heading that leaves just enough room; a step of 0.1 s resolves no more
 EDGE_M = 0.03  # of the road that is kept free: what a car overshoots by that brakes while it straightens
 SKID = 0.98  # who is too fast for a curve keeps a fifth of its grip for braking, or it would never slow down
 
@@ -188,9 +189,13 @@ def _steer(
     Keeping its heading, a car that brakes loses lateral speed with the longitudinal; `limits.slip` is such that
     this alone is within the limit on lateral acceleration, and both bounds below always leave something.
     """
-    rate = min(limits.lateral_accel_mps2, CORRECTION_PER_M * speed**2)
-    room_m = (left_m if steer >= 0 else right_m) - EDGE_M
-    reach = min(limits.lateral_mps, limits.slip * speed, _taper(room_m, rate))
+    room_m = max((left_m if steer >= 0 else right_m) - EDGE_M, 0.0)
+    # The heading θ that leaves room to turn back at curvature κ after the d metres of a full braking, in which a tight
+    # bend may leave nothing for turning: θ d + θ² / 2κ = room.
+    stopping_m = speed**2 / (2 * limits.brake_mps2)
+    heading = CORRECTION_PER_M * (math.sqrt(stopping_m**2 + 2 * room_m / CORRECTION_PER_M) - stopping_m)
+    slip = min(limits.slip, TURNING_BACK * heading)
+    reach = min(limits.lateral_mps, slip * speed, _taper(room_m, limits.lateral_accel_mps2))
     wanted = _clip(steer * limits.lateral_mps, -reach, reach)
     same_heading = lateral * speed / before if before > 0.0 else 0.0
     turn, change = curvature * speed**2 * STEP_S, limits.lateral_accel_mps2 * STEP_S
