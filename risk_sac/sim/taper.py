@@ -22,5 +22,5 @@ def taper(distance: float, rate: float) -> float:
 
 @compiled
 def clip(value: float, low: float, high: float) -> float:
-    """The value, or the bound that it is beyond; the upper one where they cross."""
+    """The value, or the bound that it is beyond."""
     return low if value < low else high if value > high else value
