@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from risk_sac.geometry import RelativeView, Sight, frame_view, in_sight
 from risk_sac.jit import compiled
+from risk_sac.risk.encounter import ENCOUNTER_CAP_S, time_to_encounter
 from risk_sac.risk.rss import LONGITUDINAL_CAP_M, SCALED_HIGH, RssParameters, margins
 from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
 from risk_sac.types import Bools, Floats, Frame, Kind, Signal
@@ -33,6 +34,7 @@ class LeastMargins(NamedTuple):
     """The smallest of each measure over the actors it concerns; its cap where there is none."""
 
     ttc_s: float
+    encounter_s: float
     rss_margin: float
     pedestrian_gap_m: float
     vehicle_gap_m: float
@@ -81,7 +83,8 @@ def _assess(
 ) -> Assessment:
     view = frame_view(x, y, heading, vx, vy, length, width)
     ttc_s = time_to_collision(view)
-    rss_margins = margins(view, kind[1:] == PEDESTRIAN, rss)
+    walks = kind[1:] == PEDESTRIAN
+    rss_margins = margins(view, walks, rss)
     return Assessment(
         view,
         in_sight(view, kind[1:] == VEHICLE, sight),
@@ -89,25 +92,28 @@ def _assess(
         rss_margins.longitudinal_m,
         rss_margins.lateral_m,
         rss_margins.scaled,
-        least_margins(view, kind, ttc_s, rss_margins.scaled),
+        least_margins(view, kind, ttc_s, time_to_encounter(view, walks), rss_margins.scaled),
     )
 
 
 @compiled
-def least_margins(view: RelativeView, kind: NDArray[np.int8], ttc_s: Floats, rss_margin: Floats) -> LeastMargins:
-    """See `LeastMargins`; TTC and RSS over those the ego answers for, gaps over all."""
-    ttc, rss = TTC_CAP_S, SCALED_HIGH
+def least_margins(
+    view: RelativeView, kind: NDArray[np.int8], ttc_s: Floats, encounter_s: Floats, rss_margin: Floats
+) -> LeastMargins:
+    """See `LeastMargins`; TTC and RSS over those the ego answers for, gaps and encounters over all."""
+    ttc, encounter, rss = TTC_CAP_S, ENCOUNTER_CAP_S, SCALED_HIGH
     pedestrian, vehicle = PEDESTRIAN_GAP_CAP_M, GAP_CAP_M
     charge = in_charge(view)
     for i in range(len(charge)):
         if charge[i]:
             ttc = min(ttc, ttc_s[i])
             rss = min(rss, rss_margin[i])
+        encounter = min(encounter, encounter_s[i])
         if kind[i + 1] == PEDESTRIAN:
             pedestrian = min(pedestrian, view.gap[i])
         else:
             vehicle = min(vehicle, view.gap[i])
-    return LeastMargins(ttc, rss, pedestrian, vehicle)
+    return LeastMargins(ttc, encounter, rss, pedestrian, vehicle)
 
 
 def worst_rss_margin(assessment: Assessment) -> float:
@@ -126,6 +132,7 @@ def publish(frame: Frame, before: Frame | None, least: LeastMargins) -> dict[str
     """
     return {
         "ttc_s": least.ttc_s,
+        "encounter_s": least.encounter_s,
         "rss_margin": least.rss_margin,
         "pedestrian_gap_m": least.pedestrian_gap_m,
         "vehicle_gap_m": least.vehicle_gap_m,
