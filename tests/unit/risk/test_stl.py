@@ -151,7 +151,7 @@ FORMULAS: dict[str, Any] = {
     ),
 }
 SHIPPED_FORMULAS: dict[str, Any] = {
-    "safe_ttc": (">=", "ttc_s", 1.5),
+    "safe_ttc": (">=", "encounter_s", 1.5),
     "rss_margin": (">=", "rss_margin", 0),
     "pedestrian_gap": (
         "or",
@@ -328,7 +328,7 @@ BAD: list[tuple[str, int | None, str]] = [  # formula, position, reason
     ("rise(ttc_s >= 1)", 0, "'rise' is not supported; use p and not prev p"),
     ("sqrt(ttc_s) >= 1", 0, "'sqrt' is not supported"),
     ("true and ttc_s >= 1", 0, "'true' is not supported; use a comparison"),
-    ("tcc_s >= 1", 0, "unknown signal 'tcc_s'; the published ones are ttc_s, rss_margin"),
+    ("tcc_s >= 1", 0, "unknown signal 'tcc_s'; the published ones are ttc_s, encounter_s"),
     ("ego.speed >= 1", 3, "unknown character '.'"),
     ("ttc_s ≥ 1", 6, "unknown character '≥'"),
     ("ttc_s >= 1; import os", 10, "unknown character ';'"),
