@@ -94,6 +94,7 @@ class StoredEpisode:
     series_sha256: str | None  # of that file, as it was written
     wall_s: float
     funnel: Funnel | None  # of the run's phase, this episode included; None if it is older than that
+    sequence: int  # among all events of the campaign, from 1
 
     @property
     def id(self) -> str:
@@ -105,7 +106,7 @@ class StoredEpisode:
 class StoredChange:
     """A campaign, or one of its runs, came into another state."""
 
-    number: int  # in the order of arrival, over all campaigns
+    sequence: int  # among all events of the campaign, from 1
     run_id: str | None  # None: the campaign itself
     state: State
     reason: str | None

@@ -83,9 +83,10 @@ def episode_record(row: EpisodeRow) -> StoredEpisode:
         series_sha256=row.series_sha256,
         wall_s=row.wall_s,
         funnel=None if row.funnel is None else _FUNNEL.validate_json(row.funnel),
+        sequence=row.sequence,
     )
 
 
 def change_record(row: ChangeRow) -> StoredChange:
     """The snapshot of a change."""
-    return StoredChange(number=row.number, run_id=row.run_id, state=State(row.state), reason=row.reason, at=row.at)
+    return StoredChange(sequence=row.sequence, run_id=row.run_id, state=State(row.state), reason=row.reason, at=row.at)

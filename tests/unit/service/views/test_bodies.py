@@ -38,7 +38,9 @@ def test_a_body_has_every_field_of_its_record(record, body, added):
 
 def shown(record, funnel=None):
     return episode_body(
-        StoredEpisode(number=1, run_id="r", record=record, series=None, series_sha256=None, wall_s=0.5, funnel=funnel)
+        StoredEpisode(
+            number=1, sequence=1, run_id="r", record=record, series=None, series_sha256=None, wall_s=0.5, funnel=funnel
+        )
     )
 
 
