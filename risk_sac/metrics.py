@@ -8,14 +8,13 @@ import json
 import math
 from collections import Counter, deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
 from itertools import zip_longest
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from risk_sac.errors import NotFinite
-from risk_sac.types import STEP_S, Collision, EpisodeRecord, Floats, Outcome, RunMetrics
+from risk_sac.types import STEP_S, Collision, EpisodeRecord, Floats, Outcome, Record, RunMetrics
 from risk_sac.verdicts.distinct import DistinctFailures
 from risk_sac.verdicts.distinct import distinct_failures as distinct_failures
 
@@ -189,14 +188,14 @@ def results_digest(records: Sequence[EpisodeRecord]) -> str:
     return digest.hexdigest()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Funnel:
+class Funnel(Record):
     """From what the ego touched to what is worth a person's time; each count is part of the one before."""
 
     contacts: int
     valid: int
     distinct: int
-    preventable: int  # distinct failures that the careful driver would have prevented
+    preventable: int
+    """Distinct failures that the careful driver would have prevented."""
 
     @classmethod
     def of(cls, metrics: RunMetrics) -> "Funnel":
@@ -373,10 +372,9 @@ def _distances(rows: Floats, point: Floats) -> float:
 
 def _plain(value: object) -> dict[str, Any]:
     """Records and mappings as dicts, shallowly; `json` comes back for what they contain."""
-    if is_dataclass(value) and not isinstance(value, type):
-        plain = {each.name: getattr(value, each.name) for each in fields(value)}
+    if isinstance(value, Record):
         # Records from before contacts were judged keep the digest they had.
-        return {name: each for name, each in plain.items() if (name, each) != ("judgement", None)}
+        return {name: each for name, each in value if (name, each) != ("judgement", None)}
     if isinstance(value, Mapping):
         return dict(value)
     raise TypeError(f"{value!r} of {type(value).__name__} has no canonical JSON; wanted a record of plain values")

@@ -1,7 +1,6 @@
 """`risk-sac run`: one run without a server."""
 
 import argparse
-from dataclasses import asdict
 from pathlib import Path
 
 from rich.table import Table
@@ -72,15 +71,14 @@ def _summary(spec: RunSpec, results: Results) -> Table:
 
 
 def _figures(metrics: RunMetrics) -> dict[str, str]:
-    values = asdict(metrics)
     return {
         "episodes": f"{metrics.episodes} ({metrics.rejected} rejected)",
         "contacts": f"{metrics.raw_collisions} ({metrics.artefacts} artefacts)",
         "valid failures": f"{metrics.failures} ({metrics.unresponsive} unresponsive)",
         "distinct failures": f"{metrics.distinct_failures}",
         "distinct and preventable": f"{metrics.distinct_preventable}",
-        "ECR (95 %)": "{ecr:.3f} ({ecr_low:.3f} to {ecr_high:.3f})".format(**values),
-        "PCR (95 %)": "{pcr:.3f} ({pcr_low:.3f} to {pcr_high:.3f})".format(**values),
+        "ECR (95 %)": f"{metrics.ecr:.3f} ({metrics.ecr_low:.3f} to {metrics.ecr_high:.3f})",
+        "PCR (95 %)": f"{metrics.pcr:.3f} ({metrics.pcr_low:.3f} to {metrics.pcr_high:.3f})",
         "efficiency ES": f"{metrics.efficiency:.3f}",
         "realism cost per step": f"{metrics.cost_rate:.3f}",
         "dispersion OFD": or_dash(metrics.dispersion, ".3f"),

@@ -7,8 +7,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from pydantic import TypeAdapter
-
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.run_folder import checkpoint
@@ -18,8 +16,6 @@ from risk_sac.train import CHECKPOINT, Observer, RunSummary
 from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 
 logger = logging.getLogger(__name__)
-
-_LINE = TypeAdapter(EpisodeRecord)
 
 
 class Recorder:
@@ -56,7 +52,7 @@ class Recorder:
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         """Writes an episode down."""
-        self._episodes.write(_LINE.dump_json(record) + b"\n")
+        self._episodes.write(record.model_dump_json().encode() + b"\n")
         self._episodes.flush()
         if record.collision is not None:
             self._contacts.append(Contact.of(record))

@@ -12,7 +12,6 @@ from sqlalchemy.orm import Session
 from risk_sac.types import Grade, Outcome
 from service.errors import NotFoundError
 from service.store.records import Page, StoredEpisode
-from service.store.snapshots import episode_record
 from service.store.tables import CampaignRow, EpisodeRow, RunRow
 
 
@@ -74,7 +73,7 @@ def episode_page(
     found = merge(*(session.scalars(each) for each in queries), key=attrgetter("number"))
     rows = list(islice(found, limit + 1))
     last = rows[limit - 1].number if len(rows) > limit else None
-    return Page(items=tuple(episode_record(row) for row in rows[:limit]), last=last)
+    return Page(items=tuple(StoredEpisode.from_row(row) for row in rows[:limit]), last=last)
 
 
 def split_failure_id(failure_id: str) -> tuple[str, str, int]:

@@ -16,7 +16,6 @@ from service.store.database import storage_errors
 from service.store.finding import find_campaign
 from service.store.reading import Store
 from service.store.records import StoredCampaign
-from service.store.snapshots import campaign_record
 from service.store.states import RESUMED, State, advance, campaign_state
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 from service.workers.messages import EpisodeDone, Finished
@@ -39,7 +38,7 @@ class Ledger:
             row = session.scalars(select(CampaignRow).filter_by(project=project, idempotency_key=key)).one_or_none()
             if row is None:
                 return None
-            found = campaign_record(row, self._store.revision(row.id))
+            found = StoredCampaign.from_row(row, self._store.revision(row.id))
         if found.spec != spec:
             message = f"Idempotency-Key {key!r} belongs to campaign {found.id}, which differs; wanted another key"
             raise ConflictError(message, reason="idempotency_key_reused")
@@ -64,7 +63,7 @@ class Ledger:
         with self._writing("creating a campaign") as session:
             session.add(row)
             session.flush()
-            return campaign_record(row, str(row.revision))
+            return StoredCampaign.from_row(row, str(row.revision))
 
     def start_run(self, number: int) -> None:
         """A worker is being launched for this run."""

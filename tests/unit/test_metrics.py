@@ -1,4 +1,3 @@
-import dataclasses
 import hashlib
 import json
 import math
@@ -9,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pydantic import TypeAdapter
 
 from risk_sac.errors import NotFinite
 from risk_sac.metrics import (
@@ -311,7 +309,7 @@ def test_bad_records_are_refused_and_leave_the_figures_alone():
     with pytest.raises(NotFinite, match="mean_cost"):
         accumulator.add(episode(cost=math.nan))
     with pytest.raises(ValueError, match="without a collision"):
-        accumulator.add(dataclasses.replace(episode(Outcome.FAILURE, 10), collision=None))
+        accumulator.add(episode(Outcome.FAILURE, 10).model_copy(update={"collision": None}))
     assert accumulator.metrics() == before
     with pytest.raises(ValueError, match="horizon_steps"):
         MetricsAccumulator(0)
@@ -395,20 +393,20 @@ def test_digest_is_the_hash_of_canonical_json():
 
 def test_records_from_before_contacts_were_judged_keep_their_digest():
     # As the version before wrote it: of this very record, by hand.
-    old = json.loads(json.dumps(dataclasses.asdict(RUN[0])))
+    old = json.loads(json.dumps(RUN[0].model_dump()))
     del old["collision"]["judgement"]
     line = json.dumps(old, sort_keys=True, separators=(",", ":")).encode() + b"\n"
     assert results_digest([RUN[0]]) == hashlib.sha256(line).hexdigest()
-    judged = dataclasses.replace(RUN[0], collision=dataclasses.replace(RUN[0].collision, judgement=judgement()))
+    judged = RUN[0].model_copy(update={"collision": RUN[0].collision.model_copy(update={"judgement": judgement()})})
     assert results_digest([judged]) != results_digest([RUN[0]])
 
 
 def test_metrics_from_before_contacts_were_judged_can_still_be_read():
-    stored = dataclasses.asdict(feed(RUN))
+    stored = feed(RUN).model_dump()
     new = ("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts")
     for name in (*new, "unresponsive", "signatures", "conflicts_by_second", "contacts_by_second"):
         del stored[name]
-    metrics = TypeAdapter(RunMetrics).validate_json(json.dumps(stored))
+    metrics = RunMetrics.model_validate(stored)
     assert (metrics.failures, metrics.preventable, metrics.pcr_low, metrics.pcr_high) == (2, 0, 0, 1)
     assert Funnel.of(metrics) == Funnel(contacts=3, valid=2, distinct=1, preventable=0)
 
@@ -423,11 +421,11 @@ def test_digest_does_not_depend_on_the_order_or_kind_of_mappings():
     "change", [{"risk_return": math.nextafter(1.0, 2)}, {"steps": 149}, {"scene": {"gap_m": 10.0}}, {"objective": None}]
 )
 def test_digest_notices_the_smallest_change(change):
-    assert results_digest([dataclasses.replace(RUN[1], **change)]) != results_digest([RUN[1]])
+    assert results_digest([RUN[1].model_copy(update=change)]) != results_digest([RUN[1]])
     assert results_digest(RUN[::-1]) != results_digest(RUN)
 
 
 def test_digest_accepts_infinities_and_refuses_foreign_values():
     assert len(results_digest([episode(min_ttc_s=math.inf)])) == 64
     with pytest.raises(TypeError, match="canonical JSON"):
-        results_digest([episode(scene={"gap_m": np.float32(1)})])
+        results_digest([episode().model_copy(update={"scene": {"gap_m": np.float32(1)}})])
