@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum, StrEnum
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -258,6 +258,10 @@ class Collision(Record):
         return self.valid and self.judgement is not None and self.judgement.grade is Grade.CAREFUL
 
 
+Phase = Literal["search", "evaluation"]
+RECORDED: Mapping[Phase, str] = {"search": "train", "evaluation": "evaluate"}  # as records and ids name a phase
+
+
 class EpisodeRecord(Record):
     """One episode as stored, streamed and counted. Plain values only, so it is JSON as it stands."""
 
@@ -289,6 +293,11 @@ class EpisodeRecord(Record):
     environment_steps: int
     """Of the run, up to and including this episode."""
     collision: Collision | None = None
+
+    @property
+    def searching(self) -> bool:
+        """Whether it belongs to the search, and not to the evaluation of the frozen policy."""
+        return self.phase == RECORDED["search"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,7 @@ class Recorder:
             self._contacts.append(Contact.of(record))
         told = self.results.metrics.episodes if self.results.metrics else 0
         due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes > told
-        if due and record.phase == "train":
+        if due and record.searching:
             self._write(replace(self.results, metrics=metrics, contacts=tuple(self._contacts)))
         self._observer.episode(record, metrics, series)
 

@@ -12,8 +12,8 @@ from risk_sac.metrics import (
     pooled_signatures,
     wilson_interval,
 )
-from risk_sac.report.runs import FinishedRun, Phase
-from risk_sac.types import RunMetrics
+from risk_sac.report.runs import FinishedRun
+from risk_sac.types import Phase, RunMetrics
 
 RESAMPLING_SEED = 0
 PER_STEPS = 1000  # environment steps over which the rate of distinct failures is taken

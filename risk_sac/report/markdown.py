@@ -8,9 +8,8 @@ from risk_sac.config import FamilyName, RunSpec
 from risk_sac.report.cells import METRICS, Cell, Estimate
 from risk_sac.report.comparison import LEVEL, Comparison, PairedTest
 from risk_sac.report.provenance import this_platform
-from risk_sac.report.runs import Phase
 from risk_sac.report.statistics import pairs_needed, smallest_p
-from risk_sac.types import ARTEFACT_RULES
+from risk_sac.types import ARTEFACT_RULES, Phase
 
 DASH = "–"
 CONTROL = "no-adversary"

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
 
 from pydantic import ValidationError
 
@@ -14,10 +13,7 @@ from risk_sac.metrics import MetricsAccumulator, results_digest
 from risk_sac.run_folder.episode_json import records_from_lines
 from risk_sac.run_folder.results import EPISODES, Results, read_results
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.types import EpisodeRecord, RunMetrics
-
-Phase = Literal["search", "evaluation"]
-RECORDED: dict[Phase, str] = {"search": "train", "evaluation": "evaluate"}  # as `EpisodeRecord.phase` has it
+from risk_sac.types import RECORDED, EpisodeRecord, Phase, RunMetrics
 
 
 @dataclass(frozen=True, kw_only=True)

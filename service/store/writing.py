@@ -50,13 +50,13 @@ class Ledger:
         row.spec, row.state, row.created_at = spec.model_dump_json(), State.QUEUED, time.time()
         row.runs = [
             RunRow(
-                id=f"{run.family}-{run.method}-{run.seed}",
+                id=run.id,
                 family=run.family,
                 method=run.method,
                 seed=run.seed,
                 spec_digest=run.digest,
                 state=State.QUEUED,
-                episodes_total=run.budget.episodes + run.budget.evaluation_episodes,
+                episodes_total=run.budget.total_episodes,
             )
             for run in spec.runs()
         ]
@@ -89,7 +89,7 @@ class Ledger:
                 count(run, Outcome(row.outcome), -1)
             fill(row, event)
             count(run, event.record.outcome, +1)
-            if event.record.phase == "train":
+            if event.record.searching:
                 run.metrics = to_text(event.metrics)
             else:
                 run.evaluation = to_text(event.metrics)

@@ -156,7 +156,7 @@ def _runs(plan: Plan, patterns: Patterns) -> Iterator[Values]:
     for run in plan.spec.runs():
         yield patterns.run | {
             "campaign_number": plan.number,
-            "id": f"{run.family}-{run.method}-{run.seed}",
+            "id": run.id,
             "family": run.family,
             "method": run.method,
             "seed": run.seed,
@@ -194,7 +194,7 @@ def _episodes(run: Values, patterns: Patterns) -> Iterator[Values]:
 
 
 def _changes(plan: Plan) -> Iterator[Values]:
-    ids = [None, *(f"{run.family}-{run.method}-{run.seed}" for run in plan.spec.runs())]
+    ids = [None, *(run.id for run in plan.spec.runs())]
     for state, at in ((State.RUNNING, plan.at + 1), (plan.state, plan.at + APART_S)):
         for run_id in ids:
             yield {"campaign_number": plan.number, "run_id": run_id, "state": state, "reason": None, "at": at}
