@@ -31,7 +31,7 @@ def _run(options: argparse.Namespace) -> int:
     spec = read_spec(options.spec, {name: getattr(options, name) for name in names})
     from risk_sac.execution.runs import run  # here, because loading torch takes seconds
 
-    total = spec.budget.episodes + spec.budget.evaluation_episodes
+    total = spec.budget.total_episodes
     with progress_bar() as bar:
         task = bar.add_task(f"{spec.family} {spec.method}", total=total, found="")
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
-from risk_sac.types import RunMetrics
+from risk_sac.types import Record, RunMetrics
 
 
 @dataclass(kw_only=True)
@@ -30,14 +30,14 @@ def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
     return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in COUNTS})
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Funnel:
+class Funnel(Record):
     """From what the ego touched to what is worth a person's time; each count is part of the one before."""
 
     contacts: int
     valid: int
     distinct: int
-    preventable: int  # distinct failures that the careful driver would have prevented
+    preventable: int
+    """Distinct failures that the careful driver would have prevented."""
 
     @classmethod
     def of(cls, metrics: RunMetrics) -> "Funnel":

@@ -3,10 +3,9 @@
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
 from typing import Any
 
-from risk_sac.types import EpisodeRecord
+from risk_sac.types import EpisodeRecord, Record
 
 
 def results_digest(records: Sequence[EpisodeRecord]) -> str:
@@ -23,10 +22,9 @@ def results_digest(records: Sequence[EpisodeRecord]) -> str:
 
 def _plain(value: object) -> dict[str, Any]:
     """Records and mappings as dicts, shallowly; `json` comes back for what they contain."""
-    if is_dataclass(value) and not isinstance(value, type):
-        plain = {each.name: getattr(value, each.name) for each in fields(value)}
+    if isinstance(value, Record):
         # Records from before contacts were judged keep the digest they had.
-        return {name: each for name, each in plain.items() if (name, each) != ("judgement", None)}
+        return {name: each for name, each in value if (name, each) != ("judgement", None)}
     if isinstance(value, Mapping):
         return dict(value)
     raise TypeError(f"{value!r} of {type(value).__name__} has no canonical JSON; wanted a record of plain values")

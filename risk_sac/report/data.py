@@ -74,7 +74,7 @@ def _row(run: FinishedRun) -> dict[str, Any]:
         "seed": run.spec.seed,
         "digest": run.digest,
         "spec_digest": run.spec.digest,
-        "metrics": {phase: asdict(metrics) for phase, metrics in run.metrics.items()},
+        "metrics": {phase: metrics.model_dump() for phase, metrics in run.metrics.items()},
         "wall_s": run.wall_s,
         "cpu_s": run.cpu_s,
         "versions": dict(run.versions),

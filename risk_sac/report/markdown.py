@@ -9,8 +9,8 @@ from risk_sac.metrics import METRICS, RATIOS, Estimate, Metric, Ratio
 from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import LEVEL, Comparison, PairedTest
 from risk_sac.report.provenance import this_platform
-from risk_sac.report.runs import Phase
 from risk_sac.report.statistics import pairs_needed, smallest_p
+from risk_sac.types import Phase
 
 DASH = "–"
 CONTROL = "no-adversary"

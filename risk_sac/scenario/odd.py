@@ -8,9 +8,9 @@ from typing import Any, TypeVar
 
 from risk_sac.config import Interval, Odd, Requirement, Scenery, Settings
 from risk_sac.errors import OddError
+from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.scenario.space import Parameter, SceneSpace
 
-GRAVITY_MPS2 = 9.81
 MIN_TTC_S = 1.5  # below it a conflict counts as serious in traffic conflict studies
 UNDISTURBED_ENCOUNTER_S = 4.25  # what the signal encounter_s says in undisturbed traffic
 PEDESTRIAN_GAP_M = 0.5  # what a driver leaves beside a pedestrian at walking pace, at the very least,

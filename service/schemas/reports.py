@@ -7,9 +7,9 @@ from pydantic import Field
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.metrics import METRICS
+from risk_sac.types import Phase
 from service.schemas import Body, Metrics, Real
 
-Phase = Literal["search", "evaluation"]
 MetricName = Annotated[
     str,
     Field(

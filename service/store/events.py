@@ -11,7 +11,6 @@ from sqlalchemy.orm import Session
 
 from service.errors import StorageError
 from service.store.records import Page, StoredChange, StoredEpisode
-from service.store.snapshots import change_record, episode_record
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 
 
@@ -45,8 +44,8 @@ def event_page(session: Session, campaign: CampaignRow, limit: int, after: int) 
     episodes = select(EpisodeRow).where(EpisodeRow.sequence.between(after + 1, last))
     changes = select(ChangeRow).where(ChangeRow.sequence.between(after + 1, last))
     found: list[StoredEpisode | StoredChange] = [
-        *map(episode_record, session.scalars(episodes.filter_by(campaign_number=campaign.number))),
-        *map(change_record, session.scalars(changes.filter_by(campaign_number=campaign.number))),
+        *map(StoredEpisode.from_row, session.scalars(episodes.filter_by(campaign_number=campaign.number))),
+        *map(StoredChange.from_row, session.scalars(changes.filter_by(campaign_number=campaign.number))),
     ]
     if len(found) != last - after:
         raise StorageError(f"events {after + 1} to {last} of campaign {campaign.id} are {len(found)}; restore a copy")

@@ -17,7 +17,6 @@ from service.store.events import event_page, former_position
 from service.store.finding import Judged, episode_page, find_campaign, find_run, split_failure_id, unknown_failure
 from service.store.records import Page, StoredCampaign, StoredChange, StoredEpisode, StoredRun, Usage
 from service.store.revisions import Mark, Revisions
-from service.store.snapshots import campaign_record, episode_record, run_record
 from service.store.states import FINAL, State
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, UsageRow
 
@@ -182,7 +181,7 @@ class Store:
             row = session.scalars(query).one_or_none()
             if row is None:
                 raise unknown_failure(campaign_id, failure_id)
-            return episode_record(row)
+            return StoredEpisode.from_row(row)
 
     def waiting(self) -> dict[str, int]:
         """Number of the run that has waited longest, for each project that has runs in the queue."""
@@ -199,7 +198,7 @@ class Store:
         """The run with this number, which there is."""
         with self._reading() as session:
             row = session.get_one(RunRow, number)
-            return run_record(row, row.campaign.id)
+            return StoredRun.from_row(row, row.campaign.id)
 
     def usage(self, project: str) -> Usage:
         """What a project takes of the service now."""
@@ -232,7 +231,7 @@ class Store:
             yield session
 
     def _campaign(self, row: CampaignRow) -> StoredCampaign:
-        campaign = campaign_record(row, self._shown_revision(row.revision))
+        campaign = StoredCampaign.from_row(row, self._shown_revision(row.revision))
         at_work = campaign.state in (State.RUNNING, State.PAUSED)
         return campaign.paused(self.refusal) if self.refusal is not None and at_work else campaign
 

@@ -17,7 +17,6 @@ from service.store.events import hold_campaigns, next_sequence
 from service.store.finding import find_campaign
 from service.store.reading import Store
 from service.store.records import StoredCampaign
-from service.store.snapshots import campaign_record
 from service.store.states import RESUMED, State, advance, campaign_state
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 from service.workers.messages import EpisodeDone, Finished
@@ -41,7 +40,7 @@ class Ledger:
             row = session.scalars(select(CampaignRow).filter_by(project=project, idempotency_key=key)).one_or_none()
             if row is None:
                 return None
-            found = campaign_record(row, self._store.revision(row.id))
+            found = StoredCampaign.from_row(row, self._store.revision(row.id))
         if found.spec != spec:
             message = f"Idempotency-Key {key!r} belongs to campaign {found.id}, which differs; wanted another key"
             raise ConflictError(message, reason="idempotency_key_reused")
@@ -53,20 +52,20 @@ class Ledger:
         row.spec, row.state, row.created_at = spec.model_dump_json(), State.QUEUED, time.time()
         row.runs = [
             RunRow(
-                id=f"{run.family}-{run.method}-{run.seed}",
+                id=run.id,
                 family=run.family,
                 method=run.method,
                 seed=run.seed,
                 spec_digest=run.digest,
                 state=State.QUEUED,
-                episodes_total=run.budget.episodes + run.budget.evaluation_episodes,
+                episodes_total=run.budget.total_episodes,
             )
             for run in spec.runs()
         ]
         with self._writing("creating a campaign") as session:
             session.add(row)
             session.flush()
-            return campaign_record(row, str(row.revision))
+            return StoredCampaign.from_row(row, str(row.revision))
 
     def start_run(self, number: int) -> None:
         """A worker is being launched for this run."""
@@ -93,7 +92,7 @@ class Ledger:
                 count(run, Outcome(row.outcome), -1)
             fill(row, event)
             count(run, event.record.outcome, +1)
-            if event.record.phase == "train":
+            if event.record.searching:
                 run.metrics = to_text(event.metrics)
             else:
                 run.evaluation = to_text(event.metrics)

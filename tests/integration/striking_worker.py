@@ -3,8 +3,6 @@
 Those in episodes 1, 7, 13, … are preventable.
 """
 
-from dataclasses import replace
-
 import scripted_worker
 
 from risk_sac.metrics import wilson_interval
@@ -40,26 +38,27 @@ def record(index: int) -> EpisodeRecord:
         return _record(index)
     preventable = index % 6 == 1
     judged = judgement(Grade.CAREFUL if preventable else Grade.IDEAL, broke=("red_light",) if preventable else ())
-    return replace(_record(index), outcome=Outcome.FAILURE, collision=replace(COLLISION, judgement=judged))
+    collision = COLLISION.model_copy(update={"judgement": judged})
+    return _record(index).model_copy(update={"outcome": Outcome.FAILURE, "collision": collision})
 
 
 def metrics(episodes: int) -> RunMetrics:
     failures = episodes // 2
     preventable = (failures + 2) // 3
     low, high = wilson_interval(preventable, episodes)
-    return replace(
-        _metrics(episodes),
-        failures=failures,
-        raw_collisions=failures,
-        ecr=failures / episodes,
-        distinct_failures=failures - failures // 3,
-        preventable=preventable,
-        distinct_preventable=preventable,
-        pcr=preventable / episodes,
-        pcr_low=low,
-        pcr_high=high,
-        signatures={"cut-in, straight": failures},
-    )
+    found = {
+        "failures": failures,
+        "raw_collisions": failures,
+        "ecr": failures / episodes,
+        "distinct_failures": failures - failures // 3,
+        "preventable": preventable,
+        "distinct_preventable": preventable,
+        "pcr": preventable / episodes,
+        "pcr_low": low,
+        "pcr_high": high,
+        "signatures": {"cut-in, straight": failures},
+    }
+    return _metrics(episodes).model_copy(update=found)
 
 
 if __name__ == "__main__":

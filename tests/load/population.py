@@ -165,7 +165,7 @@ def _runs(plan: Plan, patterns: Patterns) -> Iterator[Values]:
     for run in plan.spec.runs():
         yield patterns.run | {
             "campaign_number": plan.number,
-            "id": f"{run.family}-{run.method}-{run.seed}",
+            "id": run.id,
             "family": run.family,
             "method": run.method,
             "seed": run.seed,
@@ -209,7 +209,7 @@ def _episodes(run: Values, patterns: Patterns) -> Iterator[Values]:
 
 
 def _changes(plan: Plan) -> Iterator[Values]:
-    ids = [None, *(f"{run.family}-{run.method}-{run.seed}" for run in plan.spec.runs())]
+    ids = [None, *(run.id for run in plan.spec.runs())]
     ends = plan.events - len(ids)
     for state, at, before in ((State.RUNNING, plan.at + 1, 0), (plan.state, plan.at + APART_S, ends)):
         of_all = {"campaign_number": plan.number, "state": state, "reason": None, "at": at}

@@ -1,12 +1,9 @@
-import dataclasses
-import json
 import math
 import time
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from pydantic import TypeAdapter
 
 from risk_sac.errors import NotFinite
 from risk_sac.metrics import WINDOW, Funnel, MetricsAccumulator, wilson_interval
@@ -106,11 +103,11 @@ def test_bad_records_are_refused_and_leave_the_figures_alone():
         with pytest.raises(NotFinite, match="finite times"):
             accumulator.add(episode(Outcome.FAILURE, 10, hit=collision(**times)))
     with pytest.raises(NotFinite, match="no NaN"):  # of what tells distinct failures apart
-        accumulator.add(episode(Outcome.FAILURE, 10, hit=dataclasses.replace(collision(), ego_speed_mps=math.nan)))
+        accumulator.add(episode(Outcome.FAILURE, 10, hit=collision().model_copy(update={"ego_speed_mps": math.nan})))
     with pytest.raises(NotFinite, match="mean_cost"):
         accumulator.add(episode(cost=math.nan))
     with pytest.raises(ValueError, match="without a collision"):
-        accumulator.add(dataclasses.replace(episode(Outcome.FAILURE, 10), collision=None))
+        accumulator.add(episode(Outcome.FAILURE, 10).model_copy(update={"collision": None}))
     assert accumulator.metrics() == before
     with pytest.raises(ValueError, match="horizon_steps"):
         MetricsAccumulator(0)
@@ -173,10 +170,10 @@ def test_many_failures_stay_cheap_to_add():
 
 
 def test_metrics_from_before_contacts_were_judged_can_still_be_read():
-    stored = dataclasses.asdict(feed(RUN))
+    stored = feed(RUN).model_dump()
     new = ("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts")
     for name in (*new, "unresponsive", "signatures", "conflicts_by_second", "contacts_by_second"):
         del stored[name]
-    metrics = TypeAdapter(RunMetrics).validate_json(json.dumps(stored))
+    metrics = RunMetrics.model_validate(stored)
     assert (metrics.failures, metrics.preventable, metrics.pcr_low, metrics.pcr_high) == (2, 0, 0, 1)
     assert Funnel.of(metrics) == Funnel(contacts=3, valid=2, distinct=1, preventable=0)

@@ -1,4 +1,3 @@
-import dataclasses
 import hashlib
 import json
 import math
@@ -19,11 +18,11 @@ def test_digest_is_the_hash_of_canonical_json():
 
 def test_records_from_before_contacts_were_judged_keep_their_digest():
     # As the version before wrote it: of this very record, by hand.
-    old = json.loads(json.dumps(dataclasses.asdict(RUN[0])))
+    old = json.loads(json.dumps(RUN[0].model_dump()))
     del old["collision"]["judgement"]
     line = json.dumps(old, sort_keys=True, separators=(",", ":")).encode() + b"\n"
     assert results_digest([RUN[0]]) == hashlib.sha256(line).hexdigest()
-    judged = dataclasses.replace(RUN[0], collision=dataclasses.replace(RUN[0].collision, judgement=judgement()))
+    judged = RUN[0].model_copy(update={"collision": RUN[0].collision.model_copy(update={"judgement": judgement()})})
     assert results_digest([judged]) != results_digest([RUN[0]])
 
 
@@ -37,11 +36,11 @@ def test_digest_does_not_depend_on_the_order_or_kind_of_mappings():
     "change", [{"risk_return": math.nextafter(1.0, 2)}, {"steps": 149}, {"scene": {"gap_m": 10.0}}, {"objective": None}]
 )
 def test_digest_notices_the_smallest_change(change):
-    assert results_digest([dataclasses.replace(RUN[1], **change)]) != results_digest([RUN[1]])
+    assert results_digest([RUN[1].model_copy(update=change)]) != results_digest([RUN[1]])
     assert results_digest(RUN[::-1]) != results_digest(RUN)
 
 
 def test_digest_accepts_infinities_and_refuses_foreign_values():
     assert len(results_digest([episode(min_ttc_s=math.inf)])) == 64
     with pytest.raises(TypeError, match="canonical JSON"):
-        results_digest([episode(scene={"gap_m": np.float32(1)})])
+        results_digest([episode().model_copy(update={"scene": {"gap_m": np.float32(1)}})])

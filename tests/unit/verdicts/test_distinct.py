@@ -1,5 +1,4 @@
 import random
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -48,7 +47,7 @@ def failure(signature: str | None = "leader", ego: float = 6.0, other: float = 2
         ego_peak_braking_mps2=1.0,
         min_robustness=-3.0,
         simulator_agrees=True,
-        judgement=None if signature is None else replace(JUDGED, signature=signature),
+        judgement=None if signature is None else JUDGED.model_copy(update={"signature": signature}),
     )
 
 
@@ -69,7 +68,7 @@ any_failure = st.builds(
         (failure(after=2.1), True),
         (failure("cut-in"), True),
         (failure(None), True),
-        (replace(failure(), ego_zone="left", other_id="adv_1", min_robustness=0.0), False),
+        (failure().model_copy(update={"ego_zone": "left", "other_id": "adv_1", "min_robustness": 0.0}), False),
     ],
 )
 def test_signature_first_and_then_the_cell(second: Collision, distinct: bool) -> None:

@@ -1,5 +1,4 @@
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -17,8 +16,8 @@ SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3,
 
 
 def judged(event, kind):
-    collision = replace(event.record.collision, judgement=kind)
-    return event.model_copy(update={"record": replace(event.record, collision=collision)})
+    collision = event.record.collision.model_copy(update={"judgement": kind})
+    return event.model_copy(update={"record": event.record.model_copy(update={"collision": collision})})
 
 
 def test_a_record_comes_back_with_its_numbers_that_are_not_finite(store, ledger, episode):
