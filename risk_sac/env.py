@@ -154,16 +154,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """Everything recorded since the last reset."""
         return self._trace
 
-    @property
-    def min_ttc_s(self) -> float:
-        """Smallest TTC since the release, over the actors the ego answers for."""
-        return min(m.signals["ttc_s"] for m in self._trace.measures[self._trace.released :])
-
-    @property
-    def min_robustness(self) -> float:
-        """Smallest soft-min robustness since the release."""
-        return min(m.soft_min for m in self._trace.measures[self._trace.released :])
-
     def close(self) -> None:
         """Ends the simulation."""
         self._sim.close()

@@ -50,6 +50,21 @@ class Trace:
         """Index of the frame at which the adversaries were released."""
         return len(self.frames) - 1 - len(self.actions)
 
+    @property
+    def since_release(self) -> list[Measures]:
+        """Of that frame and those that followed."""
+        return self.measures[self.released :]
+
+    @property
+    def min_ttc_s(self) -> float:
+        """Smallest TTC since the release, over the actors the ego answers for."""
+        return min(m.signals["ttc_s"] for m in self.since_release)
+
+    @property
+    def min_robustness(self) -> float:
+        """Smallest soft-min robustness since the release."""
+        return min(m.soft_min for m in self.since_release)
+
     def append(self, frame: Frame, measures: Measures, action: NDArray[np.float32] | None) -> None:
         """Records a frame and the action that led to it, None up to the release."""
         self.frames.append(frame)
