@@ -9,22 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.risk.measures import Measures
 from risk_sac.risk.publish import Assessment
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.types import Bools, Floats, Frame, SeriesFile
 from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
 
 PER_ACTOR = (*MOTION, "link")
-
-
-@dataclass(frozen=True, slots=True)
-class Measures:
-    """What one frame says about risk, and what the requirements say to it."""
-
-    assessment: Assessment
-    signals: dict[str, float]
-    robustness: Floats  # M, scaled
-    soft_min: float
 
 
 PER_OTHER: dict[str, Callable[[Assessment], Floats | Bools]] = {

@@ -18,8 +18,10 @@ from risk_sac.jit import compiled
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.bends import BODY_M, CAP, HERE, SOON, bends, index
+from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.paths import Along, Path
-from risk_sac.sim.sumo import Room, SumoSimulation, VehicleCommand, Walker
+from risk_sac.sim.roads import Room
+from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Floats, Frame
 
 CORRECTION_PER_M = 0.05  # curvature that is left for steering in the tightest bend, and so before a road's edge

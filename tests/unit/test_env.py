@@ -81,6 +81,15 @@ def test_the_same_seed_gives_the_same_episode_to_the_last_bit(family: FamilyName
 
 
 @each_family
+def test_measuring_does_not_act(family: FamilyName, monkeypatch: pytest.MonkeyPatch) -> None:
+    with closing(make_default(family)) as env:
+        measured = episode(env, 3)
+        measures = iter(env.trace.measures)
+        monkeypatch.setattr(env._gauge, "measure", lambda frame, before: next(measures))
+        assert same(episode(env, 3), measured)
+
+
+@each_family
 def test_another_seed_gives_another_episode(family: FamilyName) -> None:
     with closing(make_default(family)) as env:
         assert not same(episode(env, 3), episode(env, 5))

@@ -13,9 +13,10 @@ from risk_sac.config import DynamicElements, Interval, Odd
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import GRAVITY_MPS2, Limits, limits_from_odd
 from risk_sac.scenario.odd import intersect
+from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.control import CORRECTION_PER_M, PedestrianControl, VehicleControl
 from risk_sac.sim.paths import Along, Path
-from risk_sac.sim.sumo import Room, VehicleCommand, Walker
+from risk_sac.sim.roads import Room
 from risk_sac.types import STEP_S
 from tests.roads import STRAIGHT_M, arc_m, road
 
