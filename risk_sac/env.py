@@ -6,7 +6,6 @@ realism cost and the robustness come in `info`, because λ and the shaping belon
 Source: RISK-SAC, Alg. 1, l. 5 and 8.
 """
 
-import logging
 from typing import Any
 
 import gymnasium as gym
@@ -18,12 +17,11 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.geometry import overlapping_pairs, relative_view
 from risk_sac.observation import LIMIT, Encoder
 from risk_sac.problem import Problem
-from risk_sac.risk.publish import assess, publish, worst_rss_margin
+from risk_sac.risk.measures import Gauge, Measures
+from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import adversaries_cost, broken_hard_rule
 from risk_sac.risk.reward import risk_reward
-from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, soft_min
-from risk_sac.risk.ttc import TTC_CAP_S
-from risk_sac.run_folder.series import Measures, Trace
+from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.family import LEAD_IN_S
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import limits_from_odd
@@ -31,20 +29,15 @@ from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import STEP_S, Bools, Collision, Frame, Kind, Role, Scene
-from risk_sac.verdicts.artefact import Handling, artefact_verdicts
-from risk_sac.verdicts.conflict import find_conflict
+from risk_sac.types import STEP_S, Bools, Collision, Frame, Kind, Scene
+from risk_sac.verdicts.artefact import Handling
+from risk_sac.verdicts.collision import Acquaintance, collision_of
 from risk_sac.verdicts.evidence import Evidence, Ground
-from risk_sac.verdicts.judge import judge
 from risk_sac.verdicts.online import conflicts_now
 from risk_sac.verdicts.path import Path, polyline
-from risk_sac.verdicts.validity import validity_verdicts
 from risk_sac.verdicts.wheel import CarefulReflex
 
-logger = logging.getLogger(__name__)
-
 FEASIBLE_TRIES = 100
-WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
 Observation = NDArray[np.float32]
 
 
@@ -64,11 +57,11 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self.problem = problem
         self._reward = reward
         self._controlled = controlled
-        self._sim = SumoSimulation(problem.ego)
-        sensor = problem.ego.sensor
-        self._sight = sight(sensor, problem.visibility_m)
-        self._perception = Perception(sensor.memory_s if sensor else 0.0)
-        self._monitor = Monitor(problem.requirements, STEP_S, problem.family.horizon_steps)
+        sensor, horizon_steps = problem.ego.sensor, problem.family.horizon_steps
+        in_view = sight(sensor, problem.visibility_m)
+        self._perception = Perception(sensor.memory_s if sensor else 0.0, in_view)
+        self._sim = SumoSimulation(problem.ego, self._perception)
+        self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, in_view, reward.softmin_sharpness)
         self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
         self.observation_size = self._encoder.size
         self.action_size = 2 * len(problem.family.adversaries)
@@ -124,7 +117,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         if self._reflex is not None:
             self._sim.brake(self._reflex.braking(self._frame, self._ego_path(), self._in_sight()))
         before, self._frame = self._frame, self._sim.step()
-        previous, self._measures = self._measures, self._measure(self._frame, before)
+        previous, self._measures = self._measures, self._gauge.measure(self._frame, before)
         self._steps += 1
         self._inside_limits &= not self._controlled or self._adversaries.keep_limits(self._frame)
         self._teleported |= bool(self._frame.teleported)
@@ -154,16 +147,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """Everything recorded since the last reset."""
         return self._trace
 
-    @property
-    def min_ttc_s(self) -> float:
-        """Smallest TTC since the release, over the actors the ego answers for."""
-        return min(m.signals["ttc_s"] for m in self._trace.measures[self._trace.released :])
-
-    @property
-    def min_robustness(self) -> float:
-        """Smallest soft-min robustness since the release."""
-        return min(m.soft_min for m in self._trace.measures[self._trace.released :])
-
     def close(self) -> None:
         """Ends the simulation."""
         self._sim.close()
@@ -182,9 +165,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         )
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = CarefulReflex(self._ground) if self.problem.ego.profile == "careful" else None
-        self._monitor.reset()
-        self._perception.reset()
-        self._trace = Trace(self._monitor.names)
+        self._gauge.reset()
+        self._trace = Trace(self._gauge.names)
         self._steps = 0
         self._inside_limits, self._teleported = True, False
         self._touched: set[str] = set()
@@ -200,12 +182,12 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _lead_in(self, start: Frame) -> None:
         """Traffic, before anybody attacks: SUMO drives all vehicles, and pedestrians go on as the scene says."""
-        self._frame, self._measures = start, self._measure(start, None)
+        self._frame, self._measures = start, self._gauge.measure(start, None)
         self._trace.append(start, self._measures, None)
         for _ in range(round(LEAD_IN_S / STEP_S)):
             self._sim.walk_on()
             before, self._frame = self._frame, self._sim.step()
-            self._measures = self._measure(self._frame, before)
+            self._measures = self._gauge.measure(self._frame, before)
             self._trace.append(self._frame, self._measures, None)
 
     def _check_feasible(self, scene: Scene) -> None:
@@ -236,14 +218,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         pairs = overlapping_pairs(self._frame.state)
         return {self._frame.ids[i] for pair in pairs if pair[0] > 0 for i in pair}
 
-    def _measure(self, frame: Frame, before: Frame | None) -> Measures:
-        assessment = assess(frame, self.problem.rss, self._sight)
-        self._sim.believe(self._perception.update(frame, assessment.seen))
-        signals = publish(frame, before, assessment.least)
-        robustness = self._monitor.update(signals)
-        least = soft_min(robustness[self._monitor.shapes], self._reward.softmin_sharpness)
-        return Measures(assessment, signals, robustness, least)
-
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""
         if before.ids != frame.ids:  # somebody left the net, far from the ego: compare those who stayed
@@ -260,53 +234,23 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         )
 
     def _judge(self, contact: Contact) -> Collision:
-        frame, measures = self._frame, self._trace.measures[self._trace.released :]
-        warning = measures[:-WARNING_STEPS]
-        other = frame.ids[contact.other]
-        evidence = self.evidence()
-        striker = evidence.column(other)
-        conflict = find_conflict(evidence, striker)
-        visible_for_s = self._perception.in_view_for(other, frame.time_s)
-        simulator_agrees = None if frame.kind[contact.other] == Kind.PEDESTRIAN else self._sim.lists_collision(other)
+        frame = self._frame
+        other, pedestrian = frame.ids[contact.other], frame.kind[contact.other] == Kind.PEDESTRIAN
+        visible_for_s, ever_visible = (
+            self._perception.in_view_for(other, frame.time_s),
+            self._perception.ever_seen(other),
+        )
+        agrees = None if pedestrian else self._sim.lists_collision(other)
         handling = Handling(
             teleported=self._teleported,
             spawn_overlap=self._spawn_overlap,
             inside_limits=self._inside_limits,
             touched_before=other in self._touched,
-            ego_model_saw=simulator_agrees is not False,  # of a pedestrian, it was told the oracle's own box
+            ego_model_saw=agrees is not False,  # of a pedestrian, it was told the oracle's own box
         )
-        verdicts = {
-            **artefact_verdicts(evidence, striker, conflict, handling),
-            **validity_verdicts(
-                evidence,
-                striker,
-                contact,
-                visible_for_s=visible_for_s,
-                ever_visible=self._perception.ever_seen(other),
-            ),
-        }
-        return Collision(
-            time_s=contact.time_s - self._released_s,
-            other_id=other,
-            other_kind=Kind(int(frame.kind[contact.other])).name.lower(),
-            other_role=Role(int(frame.role[contact.other])).name.lower(),
-            contact_x_m=contact.x_m,
-            contact_y_m=contact.y_m,
-            ego_zone=contact.ego_zone,
-            other_zone=contact.other_zone,
-            ego_speed_mps=frame.ego_speed_mps,
-            other_speed_mps=float(frame.speed_mps[contact.other]),
-            relative_speed_mps=contact.relative_speed_mps,
-            lateral_offset_m=contact.lateral_offset_m,
-            min_ttc_s=min((m.signals["ttc_s"] for m in warning), default=TTC_CAP_S),
-            min_rss_margin_m=min(worst_rss_margin(m.assessment) for m in measures),
-            visible_for_s=visible_for_s,
-            ego_peak_braking_mps2=max(m.signals["ego_braking_mps2"] for m in measures),
-            min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
-            simulator_agrees=simulator_agrees,
-            verdicts=verdicts,
-            judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict),
-        )
+        striker = Acquaintance(visible_for_s=visible_for_s, ever_visible=ever_visible, simulator_agrees=agrees)
+        measures = self._trace.since_release
+        return collision_of(contact, frame, self._released_s, self.evidence(), measures, handling, striker)
 
     def evidence(self) -> Evidence:
         """What a judge may look at, of the episode so far."""

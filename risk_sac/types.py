@@ -2,7 +2,7 @@
 
 Geometry is metric and mathematical: x east, y north, heading 0 = east, counter-clockwise, radians,
 and every position is the centre of the actor's body. SUMO's own conventions (front bumper, compass
-degrees) end in `risk_sac.sim.sumo`.
+degrees) end in `risk_sac.sim.reading`.
 """
 
 import math

@@ -35,6 +35,25 @@ def deterministic_target(reward: Tensor, terminated: Tensor, next_value: Tensor,
     return reward + discount * (1.0 - terminated) * next_value
 
 
+def actor_loss(action: Tensor, values: Tensor, slope: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
+    """Negative value of the policy's own actions.
+
+    J_μ = -E[w Q_ψ(s, a)],  a = tanh(x),  ∂J_μ/∂x = -w ∂Q/∂a (1 - a²) / batch
+
+    Args:
+      action: a, `batch x action_size`, from the policy network's output x.
+      values: `batch`, Q_ψ(s, a).
+      slope: `batch x action_size`, ∂Q/∂a.
+      weight: `batch`, importance weights of (10), 1 on average.
+
+    Returns:
+      J_μ, and its gradient in x, `batch x action_size`.
+
+    Source: Lillicrap et al. 2016, Eq. 6, times w of RISK-SAC, Eq. 10.
+    """
+    return -(weight * values).mean(), weight.unsqueeze(1) * slope * (1.0 - action.square()) / -len(values)
+
+
 class DdpgAgent:
     """Policy and critic with targets; Gaussian noise explores.
 
@@ -89,15 +108,13 @@ class DdpgAgent:
         activations = self._policy.forward(batch.observation)
         action = torch.tanh(activations[-1])
         values, slope = self._critics.smallest(batch.observation, action)
-        # J_μ = -E[w Q_ψ(s, μ_θ(s))]
-        weight = batch.weight / batch.weight.mean()
-        gradient = weight.unsqueeze(1) * slope * (1.0 - action.square()) / -len(reward)
+        loss_mu, gradient = actor_loss(action, values, slope, batch.weight / batch.weight.mean())
         self._policy.backward(activations, gradient)
         self._actor_optimizer.step()
         self._critics.follow()
         self._target_policy.parameters.lerp_(self._policy.parameters, self._config.target_rate)
 
-        critic_figure, actor_figure = all_finite(torch.stack((loss_q, -(weight * values).mean())).tolist())
+        critic_figure, actor_figure = all_finite(torch.stack((loss_q, loss_mu)).tolist())
         return UpdateResult(
             td_errors=td_errors.abs().mean(dim=0).double().cpu().numpy(),
             critic_loss=critic_figure,

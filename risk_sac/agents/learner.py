@@ -19,7 +19,7 @@ from risk_sac.agents.replay import Replay, RiskPrioritizedReplay, Transition, Un
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
-from risk_sac.risk.reward import Value, training_reward
+from risk_sac.risk.reward import TrainingReward
 
 
 class Learner:
@@ -39,6 +39,7 @@ class Learner:
         """
         self._method = method
         self._config = config
+        self._reward = TrainingReward(method, config)
         self._action_size = action_size
         make = {"sac": self._sac, "ddpg": self._ddpg}[method.agent]
         self._make = partial(make, observation_size, action_size, seed)
@@ -118,29 +119,21 @@ class Learner:
 
     def _update_once(self) -> UpdateResult:
         batch = self._replay.sample(self._config.agent.batch_size, self._generator).on(self.device)  # Alg. 1, l. 13
-        reward = self._reward(batch.risk_reward, batch.cost, batch.robustness, batch.next_robustness, batch.terminated)
+        # Deviation: formed when sampled, so λ is today's and not the one in force when the step was taken.
+        reward = self._reward(  # Alg. 1, l. 9-10
+            batch.risk_reward,
+            batch.cost,
+            batch.robustness,
+            batch.next_robustness,
+            batch.terminated,
+            self._dual.value,
+        )
         result = self._agent.update(batch, reward)  # Alg. 1, l. 14
         self._replay.update(batch.indices, result.td_errors)
         # Weighted, since RPER draws costly transitions more often: their plain mean overstates the policy's cost.
         weight = batch.weight / batch.weight.mean()
         self._dual.update((weight * batch.cost).mean().item())  # Alg. 1, l. 15-16
         return result
-
-    def _reward(
-        self, risk_reward: Value, cost: Value, robustness: Value, next_robustness: Value, terminated: Value
-    ) -> Value:
-        # Deviation: formed when sampled, so λ is today's and not the one in force when the step was taken.
-        return training_reward(  # Alg. 1, l. 9-10
-            risk_reward,
-            cost,
-            robustness,
-            next_robustness,
-            terminated,
-            dual_variable=self._dual.value,
-            shaped=self._method.shaping,
-            zero_terminal_potential=self._config.reward.zero_terminal_potential,
-            discount=self._config.agent.discount,
-        )
 
     def _td_error(self, transition: Transition) -> float:
         """|δ| at insertion (Alg. 1, l. 11); uniform replay does without."""
@@ -152,6 +145,7 @@ class Learner:
             transition.robustness,
             transition.next_robustness,
             float(transition.terminated),
+            self._dual.value,
         )
         return self._agent.td_error(
             transition.observation, transition.action, reward, transition.next_observation, transition.terminated

@@ -5,7 +5,7 @@ Source: RISK-SAC, Eq. 4; Haarnoja et al., "Soft actor-critic algorithms and appl
 
 import copy
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -46,29 +46,52 @@ def soft_target(
     return reward + discount * (1.0 - terminated) * soft_value
 
 
-def actor_loss(log_prob: Tensor, values: Tensor, weight: Tensor, temperature: Tensor) -> Tensor:
+class Sample(NamedTuple):
+    """Actions drawn from the policy, and what they were drawn with."""
+
+    raw: Tensor  # output of the policy network, `batch x 2 action_size`
+    noise: Tensor  # ε, `batch x action_size`
+    action: Tensor  # `batch x action_size`
+    log_prob: Tensor  # `batch`
+
+    def since(self, row: int) -> "Sample":
+        """Those from a row on."""
+        return Sample(*(each[row:] for each in self))
+
+
+def actor_loss(
+    sample: Sample, values: Tensor, slope: Tensor, weight: Tensor, temperature: Tensor
+) -> tuple[Tensor, Tensor]:
     """Negative soft value of the policy's own actions, the term in the sum of (4).
 
-    J_π = E[w (α log π(a|s) - min_i Q_ψi(s, a))],  a ~ π(·|s) reparameterised
+    J_π = E[w (α log π(a|s) - Q(s, a))],  a ~ π(·|s) reparameterised,  Q = min_i Q_ψi
+    ∂J_π/∂x = w (α ∂log π/∂x - ∂Q/∂a ∂a/∂x) / batch
 
     Choice: weighted like the critics' loss. Most PER agents weight that alone, but then the policy learns for the
     states that are replayed most and forgets the quiet ones, from which an attack has to begin.
 
     Args:
-      log_prob: `batch`.
-      values: `batch`, the smaller of both critics'.
+      sample: a and log π(a|s), from the policy network's output x.
+      values: `batch`, Q(s, a).
+      slope: `batch x action_size`, ∂Q/∂a.
       weight: `batch`, importance weights of (10), 1 on average.
       temperature: α, held constant.
 
-    Source: Haarnoja et al. 2018, Eq. 7-9.
+    Returns:
+      J_π, and its gradient in x, `batch x 2 action_size`.
+
+    Source: Haarnoja et al. 2018, Eq. 7-10.
     """
-    return (weight * (temperature * log_prob - values)).mean()
+    count = len(values)
+    loss = (weight * (temperature * sample.log_prob - values)).mean()
+    gradient = tanh_gaussian_gradient(sample.raw, sample.noise, sample.action, slope / -count, temperature / count)
+    return loss, weight.unsqueeze(1) * gradient
 
 
-def temperature_gradient(temperature: Tensor, entropy: Tensor, target_entropy: float) -> Tensor:
+def temperature_loss(temperature: Tensor, entropy: Tensor, target_entropy: float) -> tuple[Tensor, Tensor]:
     """Pulls the policy's entropy towards its target.
 
-    J(α) = E[-α (log π(a|s) + H̄)],  ∂J/∂log α = α (H - H̄) with the policy's entropy H = E[-log π(a|s)]
+    J(α) = E[-α (log π(a|s) + H̄)] = α (H - H̄) with the policy's entropy H = E[-log π(a|s)],  ∂J/∂log α = J(α)
 
     Choice: minimised over log α, so that α stays positive.
 
@@ -78,11 +101,12 @@ def temperature_gradient(temperature: Tensor, entropy: Tensor, target_entropy: f
       target_entropy: H̄, nats.
 
     Returns:
-      ∂J/∂log α.
+      J(α), and its gradient in log α.
 
     Source: Haarnoja et al. 2018, Eq. 18.
     """
-    return temperature * (entropy - target_entropy)
+    loss = temperature * (entropy - target_entropy)
+    return loss, loss
 
 
 class SacAgent:
@@ -120,7 +144,7 @@ class SacAgent:
     def act(self, observation: Vector, explore: bool) -> Vector:
         """See `Agent.act`: a draw from the policy, or tanh of its mean."""
         raw = self._policy.forward(row(observation, self._device))[-1]
-        action = self._sample(raw)[0] if explore else torch.tanh(raw.chunk(2, dim=1)[0])
+        action = self._sample(raw).action if explore else torch.tanh(raw.chunk(2, dim=1)[0])
         return action[0].cpu().numpy()
 
     def td_error(
@@ -128,13 +152,13 @@ class SacAgent:
     ) -> float:
         """See `Agent.td_error`."""
         following = row(next_observation, self._device)
-        next_action, next_log_prob, _ = self._sample(self._policy.forward(following)[-1])
+        drawn = self._sample(self._policy.forward(following)[-1])
         target = self._target(
             torch.tensor([reward], dtype=torch.float32, device=self._device),
             torch.tensor([float(terminated)], device=self._device),
             following,
-            next_action,
-            next_log_prob,
+            drawn.action,
+            drawn.log_prob,
         )
         values = self._critics.values(row(observation, self._device), row(action, self._device))
         return (target - values).abs().mean().item()
@@ -144,23 +168,21 @@ class SacAgent:
         count = len(reward)
         # The policy changes last, so one pass serves the critics' targets and its own step.
         activations = self._policy.forward(torch.cat((batch.next_observation, batch.observation)))
-        raw = activations[-1]
-        action, log_prob, noise = self._sample(raw)
-        target = self._target(reward, batch.terminated, batch.next_observation, action[:count], log_prob[:count])
+        drawn = self._sample(activations[-1])
+        next_action, next_log_prob = drawn.action[:count], drawn.log_prob[:count]
+        target = self._target(reward, batch.terminated, batch.next_observation, next_action, next_log_prob)
         td_errors, loss_q = self._critics.fit(batch.observation, batch.action, target, batch.weight)
 
-        raw, action, log_prob, noise = raw[count:], action[count:], log_prob[count:], noise[count:]
-        values, slope = self._critics.smallest(batch.observation, action)
+        own = drawn.since(count)
+        values, slope = self._critics.smallest(batch.observation, own.action)
         temperature = self._log_temperature.exp()
-        weight = batch.weight / batch.weight.mean()
-        gradient = tanh_gaussian_gradient(raw, noise, action, slope / -count, temperature / count)
-        self._policy.backward([each[count:] for each in activations], weight.unsqueeze(1) * gradient)
-        entropy = -log_prob.mean()
-        self._log_temperature.grad = temperature_gradient(temperature, entropy, self._target_entropy)
+        loss_pi, gradient = actor_loss(own, values, slope, batch.weight / batch.weight.mean(), temperature)
+        self._policy.backward([each[count:] for each in activations], gradient)
+        entropy = -own.log_prob.mean()
+        _, self._log_temperature.grad = temperature_loss(temperature, entropy, self._target_entropy)
         self._actor_optimizer.step()
         self._critics.follow()
 
-        loss_pi = actor_loss(log_prob, values, weight, temperature)
         figures = torch.stack((loss_q, loss_pi, self._log_temperature.exp()[0], entropy)).tolist()
         critic_figure, actor_figure, temperature_figure, entropy_figure = all_finite(figures)
         return UpdateResult(
@@ -200,8 +222,7 @@ class SacAgent:
         temperature = self._log_temperature.exp()
         return soft_target(reward, terminated, next_values, next_log_prob, temperature, self._config.discount)
 
-    def _sample(self, raw: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Action, its log-probability and the noise it was drawn with."""
+    def _sample(self, raw: Tensor) -> Sample:
         mean, raw_log_std = raw.chunk(2, dim=1)
         noise = torch.randn(mean.shape, generator=self._generator, device=self._device)
-        return *tanh_gaussian(mean, bounded_log_std(raw_log_std), noise), noise
+        return Sample(raw, noise, *tanh_gaussian(mean, bounded_log_std(raw_log_std), noise))

@@ -8,9 +8,10 @@ reward transformations", ICML 1999.
 """
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-from risk_sac.config import RewardConfig
+from risk_sac.config import LearnerConfig, Method, RewardConfig
 from risk_sac.types import Floats
 
 if TYPE_CHECKING:
@@ -149,34 +150,36 @@ def shaped_reward(
     return reward + shaping(potential(robustness), next_potential, discount)
 
 
-def training_reward(
-    risk_reward: Value,
-    cost: Value,
-    robustness: Value,
-    next_robustness: Value,
-    terminated: Value,
-    *,
-    dual_variable: float,
-    shaped: bool,
-    zero_terminal_potential: bool,
-    discount: float,
-) -> Value:
-    """What the policy is trained on: R of (3), and R' of (8) for methods with shaping; Alg. 1, l. 9-10.
+@dataclass(frozen=True, slots=True)
+class TrainingReward:
+    """What the policy is trained on: R of (3), and R' of (8) for methods with shaping; Alg. 1, l. 9-10."""
 
-    Args:
-      risk_reward: R_risk.
-      cost: C_soft.
-      robustness: ρ(Φ, s).
-      next_robustness: ρ(Φ, s').
-      terminated: 1 where s' is terminal.
-      dual_variable: λ, today's.
-      shaped: whether the method shapes its reward.
-      zero_terminal_potential: whether φ(s') = 0 at terminal states, see `shaped_reward`.
-      discount: γ in (0, 1).
-    """
-    reward = penalised_reward(risk_reward, cost, dual_variable)  # Alg. 1, l. 9
-    if not shaped:
-        return reward
-    return shaped_reward(  # Alg. 1, l. 10
-        reward, robustness, next_robustness, discount, terminated * float(zero_terminal_potential)
-    )
+    method: Method
+    config: LearnerConfig
+
+    def __call__(
+        self,
+        risk_reward: Value,
+        cost: Value,
+        robustness: Value,
+        next_robustness: Value,
+        terminated: Value,
+        dual_variable: float,
+    ) -> Value:
+        """The reward of one step, or of each of a batch.
+
+        Args:
+          risk_reward: R_risk.
+          cost: C_soft.
+          robustness: ρ(Φ, s).
+          next_robustness: ρ(Φ, s').
+          terminated: 1 where s' is terminal.
+          dual_variable: λ, today's.
+        """
+        reward = penalised_reward(risk_reward, cost, dual_variable)  # Alg. 1, l. 9
+        if not self.method.shaping:
+            return reward
+        without_potential = terminated * float(self.config.reward.zero_terminal_potential)
+        return shaped_reward(  # Alg. 1, l. 10
+            reward, robustness, next_robustness, self.config.agent.discount, without_potential
+        )

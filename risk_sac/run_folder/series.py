@@ -9,22 +9,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.risk.measures import Measures
 from risk_sac.risk.publish import Assessment
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.types import Bools, Floats, Frame, SeriesFile
 from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
 
 PER_ACTOR = (*MOTION, "link")
-
-
-@dataclass(frozen=True, slots=True)
-class Measures:
-    """What one frame says about risk, and what the requirements say to it."""
-
-    assessment: Assessment
-    signals: dict[str, float]
-    robustness: Floats  # M, scaled
-    soft_min: float
 
 
 PER_OTHER: dict[str, Callable[[Assessment], Floats | Bools]] = {
@@ -49,6 +40,21 @@ class Trace:
     def released(self) -> int:
         """Index of the frame at which the adversaries were released."""
         return len(self.frames) - 1 - len(self.actions)
+
+    @property
+    def since_release(self) -> list[Measures]:
+        """Of that frame and those that followed."""
+        return self.measures[self.released :]
+
+    @property
+    def min_ttc_s(self) -> float:
+        """Smallest TTC since the release, over the actors the ego answers for."""
+        return min(m.signals["ttc_s"] for m in self.since_release)
+
+    @property
+    def min_robustness(self) -> float:
+        """Smallest soft-min robustness since the release."""
+        return min(m.soft_min for m in self.since_release)
 
     def append(self, frame: Frame, measures: Measures, action: NDArray[np.float32] | None) -> None:
         """Records a frame and the action that led to it, None up to the release."""

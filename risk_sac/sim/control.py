@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import Limits
+from risk_sac.sim.commands import Walker
 from risk_sac.sim.pedestrian_control import PedestrianControl
-from risk_sac.sim.sumo import SumoSimulation, Walker
+from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.sim.vehicle_control import VehicleControl
 from risk_sac.types import Floats, Frame
 

@@ -1,14 +1,18 @@
 """What the ego perceives: a line-of-sight sensor and the memory of who was seen since when."""
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from risk_sac.config import SensorConfig
-from risk_sac.geometry import Sight
+from risk_sac.geometry import Sight, frame_view, in_sight
 from risk_sac.jit import compiled
-from risk_sac.types import HEADING, VX, VY, Bools, Floats, Frame, X, Y
+from risk_sac.types import HEADING, VX, VY, Bools, Floats, Frame, Kind, X, Y
+
+EVERYTHING = Sight(reach_m=math.inf, half_view_rad=math.pi, occlusion=False)
+VEHICLE = int(Kind.VEHICLE)  # compiled code knows no enums of int8
 
 
 def sight(sensor: SensorConfig | None, visibility_m: float) -> Sight:
@@ -19,7 +23,7 @@ def sight(sensor: SensorConfig | None, visibility_m: float) -> Sight:
       visibility_m: the weather's bound on the range.
     """
     if sensor is None:
-        return Sight(reach_m=math.inf, half_view_rad=math.pi, occlusion=False)
+        return EVERYTHING
     return Sight(min(sensor.range_m, visibility_m), sensor.field_of_view_rad / 2, sensor.occlusion)
 
 
@@ -40,14 +44,31 @@ class Belief(NamedTuple):
     expected: Floats  # position, heading and velocity, `5 x n`, of those it remembers; NaN of the rest
 
 
+class Senses(Protocol):
+    """How the ego gets to know of others; the simulation asks for each frame of an episode once."""
+
+    def reset(self) -> None:
+        """Begins an episode."""
+
+    def look(self, frame: Frame) -> Belief:
+        """What the ego makes of a frame."""
+
+
 class Perception:
     """Whom the ego sees, and whom it remembers.
 
     An actor is remembered for the sensor's memory after it went out of sight, and expected to go on as it did then.
     """
 
-    def __init__(self, memory_s: float) -> None:
+    def __init__(self, memory_s: float, sight: Sight) -> None:
+        """Knows nobody yet.
+
+        Args:
+          memory_s: for how long an actor is remembered.
+          sight: what is in it is seen.
+        """
         self._memory_s = memory_s
+        self._sight = sight
         self.reset()
 
     def reset(self) -> None:
@@ -55,8 +76,12 @@ class Perception:
         self._ids: tuple[str, ...] = ()
         self._memory = np.empty((THEN + len(MOTION), 0))
 
+    def look(self, frame: Frame) -> Belief:
+        """See `Senses.look`."""
+        return self.update(frame, _seen(frame.state, frame.kind, *self._sight))
+
     def update(self, frame: Frame, seen: Bools) -> Belief:
-        """Looks at a frame.
+        """Takes note of who is in sight.
 
         Args:
           frame: all actors, the ego first.
@@ -82,6 +107,12 @@ class Perception:
     def ever_seen(self, id_: str) -> bool:
         """Whether `id_` has been in sight at any time in this episode, and has not left the net since."""
         return not math.isnan(self._of(id_)[SEEN_S])
+
+
+@compiled
+def _seen(state: Floats, kind: NDArray[np.int8], reach_m: float, half_view_rad: float, occlusion: bool) -> Bools:
+    """Which of the others are in sight."""
+    return in_sight(frame_view(state), kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion))
 
 
 @compiled

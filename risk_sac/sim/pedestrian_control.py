@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from risk_sac.scenario.limits import Limits
-from risk_sac.sim.sumo import Walker
+from risk_sac.sim.commands import Walker
 from risk_sac.sim.taper import clip, taper
 from risk_sac.types import STEP_S
 

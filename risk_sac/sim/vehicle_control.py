@@ -13,8 +13,9 @@ import numpy as np
 from risk_sac.jit import compiled
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.bends import BODY_M, CAP, HERE, SOON, bends, index
+from risk_sac.sim.commands import VehicleCommand
 from risk_sac.sim.paths import Along, Path
-from risk_sac.sim.sumo import Room, VehicleCommand
+from risk_sac.sim.roads import Room
 from risk_sac.sim.taper import clip, taper
 from risk_sac.types import STEP_S, Floats
 

@@ -12,9 +12,9 @@ from risk_sac.config import Budget, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.execution.recorder import Recorder
 from risk_sac.execution.runs import run
+from risk_sac.run import RunState
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scene_optimizer import BotorchOptimizer
-from risk_sac.train import Run
 from risk_sac.types import RunMetrics
 
 WARM_UP, EPISODES = 30, 60  # the first 1000 steps and 16 scenes are drawn without a model; then what is measured
@@ -23,7 +23,7 @@ PARTS = {
     "simulator": ((RiskSacEnv, "reset"), (RiskSacEnv, "step")),
     "learner": ((Learner, "act"), (Learner, "observe"), (Learner, "update")),
     "scene optimiser": ((BotorchOptimizer, "ask"), (BotorchOptimizer, "tell")),
-    "everything else": ((Run, "save"), (Recorder, "episode")),  # and what is in none of these
+    "everything else": ((RunState, "save"), (Recorder, "episode")),  # and what is in none of these
 }
 
 

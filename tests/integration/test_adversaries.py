@@ -81,7 +81,7 @@ def by_a_learner(name: FamilyName, folder: Path, monkeypatch: pytest.MonkeyPatch
                 episodes.append(driven(self))
             return outcome
 
-    monkeypatch.setattr("risk_sac.train.RiskSacEnv", Watched)
+    monkeypatch.setattr("risk_sac.run.RiskSacEnv", Watched)
     agent = AgentConfig(hidden_sizes=(16, 16), batch_size=16, warmup_steps=150)
     spec = RunSpec(
         family=name,

@@ -6,8 +6,8 @@ view. Swerving is a reaction too, so "no reaction" means the same trajectory to 
 
 import math
 from collections.abc import Iterator
-from contextlib import closing
-from dataclasses import replace
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -18,9 +18,10 @@ from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, PedestrianStart, VehicleStart
-from risk_sac.sim.sumo import SumoSimulation, VehicleCommand
+from risk_sac.sim.commands import VehicleCommand
+from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Floats, Frame, Role
-from tests.builders import belief_of
+from tests.builders import Told, belief_of
 
 LANE_Y_M = -1.65  # the ego's lane on the mixed road
 GREEN_S, NEVER = 0.0, 10_000
@@ -28,9 +29,24 @@ MIXED = FAMILIES["mixed"].layout(FAMILIES["mixed"].space.from_unit(np.full(10, 0
 DENSE_SPACE = FAMILIES["dense"].space
 
 
+@dataclass
+class Driven:
+    """A simulation, and what its ego is told of the others."""
+
+    sim: SumoSimulation
+    told: Told
+
+
+@contextmanager
+def driven(config: EgoConfig) -> Iterator[Driven]:
+    told = Told(lambda frame, _: belief_of(frame))
+    with closing(SumoSimulation(config, told)) as sim:
+        yield Driven(sim, told)
+
+
 @pytest.fixture
-def sim() -> Iterator[SumoSimulation]:
-    with closing(SumoSimulation(EgoConfig())) as simulation:
+def sim() -> Iterator[Driven]:
+    with driven(EgoConfig()) as simulation:
         yield simulation
 
 
@@ -55,13 +71,14 @@ def on_the_mixed_road(ego: VehicleStart, *vehicles: VehicleStart, walker: tuple[
     )
 
 
-def drive(sim: SumoSimulation, layout: Layout, *, seen_from: int = 0, steps: int = 110) -> list[Frame]:
+def drive(run: Driven, layout: Layout, *, seen_from: int = 0, steps: int = 110) -> list[Frame]:
     """Frames of a run in which `actor` is hidden before step `seen_from`; adversary vehicles keep their speed."""
+    run.told.tell = lambda frame, step: belief_of(frame, hidden=() if step >= seen_from else ("actor",))
+    sim = run.sim
     frames = [sim.reset(layout, 1)]
     sim.release()
     kept = {v.id: VehicleCommand(v.speed_mps, 0.0) for v in layout.vehicles if v.role is Role.ADVERSARY}
-    for step in range(steps):
-        sim.believe(belief_of(frames[-1], hidden=() if step >= seen_from else ("actor",)))
+    for _ in range(steps):
         sim.apply(kept, {})
         frames.append(sim.step())
     return frames
@@ -108,7 +125,7 @@ each_pedestrian = pytest.mark.parametrize(("present", "absent"), PEDESTRIANS.val
 
 
 @each_pedestrian
-def test_a_visible_pedestrian_is_not_hit(sim: SumoSimulation, present: Layout, absent: Layout) -> None:
+def test_a_visible_pedestrian_is_not_hit(sim: Driven, present: Layout, absent: Layout) -> None:
     frames = drive(sim, present)
     assert least_gap(frames) > 0.2
     assert not np.array_equal(path(frames), path(drive(sim, absent)))
@@ -116,7 +133,7 @@ def test_a_visible_pedestrian_is_not_hit(sim: SumoSimulation, present: Layout, a
 
 @each_pedestrian
 def test_a_hidden_pedestrian_changes_nothing_and_is_driven_through(
-    sim: SumoSimulation, present: Layout, absent: Layout
+    sim: Driven, present: Layout, absent: Layout
 ) -> None:
     frames = drive(sim, present, seen_from=NEVER)
     assert np.array_equal(path(frames), path(drive(sim, absent)))
@@ -126,7 +143,7 @@ def test_a_hidden_pedestrian_changes_nothing_and_is_driven_through(
 @each_pedestrian
 @pytest.mark.parametrize("seen_from", [15, 30])
 def test_the_ego_reacts_from_the_moment_a_pedestrian_comes_into_view(
-    sim: SumoSimulation, present: Layout, absent: Layout, seen_from: int
+    sim: Driven, present: Layout, absent: Layout, seen_from: int
 ) -> None:
     late, never = path(drive(sim, present, seen_from=seen_from)), path(drive(sim, absent))
     first = int(np.flatnonzero(np.any(late != never, axis=1))[0])
@@ -134,7 +151,7 @@ def test_the_ego_reacts_from_the_moment_a_pedestrian_comes_into_view(
     assert least_gap(drive(sim, present, seen_from=seen_from)) > 0.0  # still far enough to stop or to pass
 
 
-def test_a_hidden_pedestrian_does_not_hide_the_vehicle_beside_it(sim: SumoSimulation) -> None:
+def test_a_hidden_pedestrian_does_not_hide_the_vehicle_beside_it(sim: Driven) -> None:
     other = replace(PARKED, id="parked", position_m=PARKED.position_m + 5)
     layout = on_the_mixed_road(MIDBLOCK_EGO, other, walker=(150.0, LANE_Y_M))
     frames = drive(sim, layout, seen_from=NEVER)
@@ -143,21 +160,18 @@ def test_a_hidden_pedestrian_does_not_hide_the_vehicle_beside_it(sim: SumoSimula
     assert gap > 0.0
 
 
-def test_a_pedestrian_off_the_road_does_not_stop_the_ego(sim: SumoSimulation) -> None:
+def test_a_pedestrian_off_the_road_does_not_stop_the_ego(sim: Driven) -> None:
     frames = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, walker=(190.0, -8.0)))
     assert np.array_equal(path(frames), path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO))))
 
 
-def with_a_memory(sim: SumoSimulation, layout: Layout, x_m: float, y_m: float) -> list[Frame]:
+def with_a_memory(run: Driven, layout: Layout, x_m: float, y_m: float) -> list[Frame]:
     """Frames of a run in which the ego believes a standing `actor` to be there, wherever it is."""
-    frames = [sim.reset(layout, 1)]
-    for _ in range(110):
-        sim.believe(belief_of(frames[-1], expected={"actor": (x_m, y_m, 0.0, 0.0, 0.0)}))
-        frames.append(sim.step())
-    return frames
+    run.told.tell = lambda frame, _: belief_of(frame, expected={"actor": (x_m, y_m, 0.0, 0.0, 0.0)})
+    return [run.sim.reset(layout, 1), *(run.sim.step() for _ in range(110))]
 
 
-def test_a_remembered_pedestrian_is_braked_for_where_it_is_expected(sim: SumoSimulation) -> None:
+def test_a_remembered_pedestrian_is_braked_for_where_it_is_expected(sim: Driven) -> None:
     frames = with_a_memory(sim, on_the_mixed_road(MIDBLOCK_EGO, walker=(190.0, -8.0)), 190.0, LANE_Y_M)
     there = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, walker=(190.0, LANE_Y_M)))
     assert np.array_equal(path(frames), path(there))
@@ -165,7 +179,7 @@ def test_a_remembered_pedestrian_is_braked_for_where_it_is_expected(sim: SumoSim
 
 
 @pytest.mark.parametrize("aside_m", [-6.0, 6.0])
-def test_a_remembered_pedestrian_is_not_braked_for_where_it_is(sim: SumoSimulation, aside_m: float) -> None:
+def test_a_remembered_pedestrian_is_not_braked_for_where_it_is(sim: Driven, aside_m: float) -> None:
     layout = on_the_mixed_road(MIDBLOCK_EGO, walker=(190.0, LANE_Y_M))
     frames = with_a_memory(sim, layout, 190.0, LANE_Y_M + aside_m)
     assert np.array_equal(path(frames), path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO))))
@@ -175,7 +189,7 @@ def test_a_remembered_pedestrian_is_not_braked_for_where_it_is(sim: SumoSimulati
 @pytest.mark.parametrize("friction", [0.6, 1.0])
 def test_braking_builds_up_to_the_grip_by_its_jerk(friction: float) -> None:
     layout = replace(on_the_mixed_road(MIDBLOCK_EGO, walker=(155.0, LANE_Y_M)), friction=friction)
-    with closing(SumoSimulation(EgoConfig(reaction_time_s=0.1))) as sim:
+    with driven(EgoConfig(reaction_time_s=0.1)) as sim:
         frames = drive(sim, layout, seen_from=25, steps=60)
     accel = np.array([float(f.accel_mps2[0]) for f in frames])
     assert accel[26:30] - accel[25] == pytest.approx([-1.265, -2.53, -3.795, -5.06], abs=1e-6)
@@ -188,7 +202,7 @@ MODELS = pytest.mark.parametrize("model", ["IDM", "ACC"])  # without dawdling, w
 
 @MODELS
 def test_a_visible_vehicle_ahead_is_not_hit(model: str) -> None:
-    with closing(SumoSimulation(EgoConfig(car_following=model))) as sim:
+    with driven(EgoConfig(car_following=model)) as sim:
         frames = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, PARKED))
         assert least_gap(frames) > 0.2
         assert not np.array_equal(path(frames), path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO))))
@@ -197,7 +211,7 @@ def test_a_visible_vehicle_ahead_is_not_hit(model: str) -> None:
 @MODELS
 def test_a_hidden_vehicle_ahead_does_not_slow_the_ego(model: str) -> None:
     # SUMO can hide a vehicle from car following and at junctions, not from lane changing: only the speed is untouched.
-    with closing(SumoSimulation(EgoConfig(car_following=model))) as sim:
+    with driven(EgoConfig(car_following=model)) as sim:
         frames = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, PARKED), seen_from=NEVER)
         alone = drive(sim, on_the_mixed_road(MIDBLOCK_EGO))
         assert np.array_equal(path(frames)[:, 3], path(alone)[:, 3])
@@ -206,7 +220,7 @@ def test_a_hidden_vehicle_ahead_does_not_slow_the_ego(model: str) -> None:
 
 @MODELS
 def test_the_ego_brakes_from_the_moment_a_vehicle_ahead_comes_into_view(model: str) -> None:
-    with closing(SumoSimulation(EgoConfig(car_following=model))) as sim:
+    with driven(EgoConfig(car_following=model)) as sim:
         late = path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO, PARKED), seen_from=25))
         alone = path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO)))
     differs = np.flatnonzero(np.any(late != alone, axis=1))
@@ -223,14 +237,14 @@ each_side = pytest.mark.parametrize("route", [("from_west", "to_east"), ("from_e
 
 
 @each_side
-def test_a_visible_vehicle_at_the_junction_is_braked_for(sim: SumoSimulation, route: tuple[str, ...]) -> None:
+def test_a_visible_vehicle_at_the_junction_is_braked_for(sim: Driven, route: tuple[str, ...]) -> None:
     seen, alone = drive(sim, dense(red_light_runner(route)), steps=90), drive(sim, dense(), steps=90)
     assert peak_braking(seen) > peak_braking(alone) + 3.0
     assert least_gap(seen) > 0.5
 
 
 @each_side
-def test_a_hidden_vehicle_at_the_junction_changes_nothing(sim: SumoSimulation, route: tuple[str, ...]) -> None:
+def test_a_hidden_vehicle_at_the_junction_changes_nothing(sim: Driven, route: tuple[str, ...]) -> None:
     hidden = drive(sim, dense(red_light_runner(route)), seen_from=NEVER, steps=90)
     assert np.array_equal(path(hidden), path(drive(sim, dense(), steps=90)))
     assert least_gap(hidden) == 0.0

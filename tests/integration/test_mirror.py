@@ -17,8 +17,9 @@ from risk_sac.config import EgoConfig
 from risk_sac.geometry import relative_view
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, PedestrianStart, VehicleStart
+from risk_sac.sim.commands import Walker
 from risk_sac.sim.paths import STATION
-from risk_sac.sim.sumo import SumoSimulation, Walker
+from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Frame, Role
 
 LEFT, RIGHT = 1, -1

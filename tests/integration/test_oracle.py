@@ -18,7 +18,7 @@ from risk_sac.sim.collision import agrees
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Frame
-from tests.builders import belief_of
+from tests.builders import Told, belief_of
 
 LOW = FAMILIES["low"]
 
@@ -29,8 +29,15 @@ def sim() -> Iterator[SumoSimulation]:
         yield simulation
 
 
-def episode(sim: SumoSimulation, seed: int, *, steering: bool, blind: bool) -> Iterator[Frame]:
-    """Frames of a random episode; a blind ego sees no other vehicle and so drives into them."""
+@pytest.fixture
+def blind() -> Iterator[SumoSimulation]:
+    """The ego sees no other vehicle and so drives into them."""
+    with closing(SumoSimulation(EgoConfig(), Told(lambda frame, _: belief_of(frame, frame.ids[1:])))) as simulation:
+        yield simulation
+
+
+def episode(sim: SumoSimulation, seed: int, *, steering: bool, obstacle: bool) -> Iterator[Frame]:
+    """Frames of a random episode; as an obstacle, the leader stands in the ego's way."""
     generator = np.random.default_rng(seed)
     layout = LOW.layout(LOW.space.from_unit(generator.random(LOW.space.dimension)).values)
     frame = sim.reset(layout, seed)
@@ -42,18 +49,17 @@ def episode(sim: SumoSimulation, seed: int, *, steering: bool, blind: bool) -> I
         action = np.clip(0.95 * action + 0.3 * generator.standard_normal(len(action)), -1, 1)
         if not steering:
             action[1::2] = 0.0
-        if blind:
-            action[0] = -1.0  # the leader stands in its way
-            sim.believe(belief_of(frame, hidden=frame.ids[1:]))
+        if obstacle:
+            action[0] = -1.0
         adversaries.command(action.tolist(), sim)
         frame = sim.step()
         yield frame
 
 
-def test_aligned_vehicles_meet_in_the_step_in_which_sumo_says_so(sim: SumoSimulation) -> None:
+def test_aligned_vehicles_meet_in_the_step_in_which_sumo_says_so(blind: SumoSimulation) -> None:
     contacts = 0
     for seed in range(60):
-        for frame in episode(sim, seed, steering=False, blind=True):
+        for frame in episode(blind, seed, steering=False, obstacle=True):
             if abs(np.sin(frame.heading_rad[0])) > 1e-3:
                 break  # the ego changes lanes
             ours = {frame.ids[i + 1] for i in np.flatnonzero(relative_view(frame).overlap)}
@@ -68,7 +74,7 @@ def test_aligned_vehicles_meet_in_the_step_in_which_sumo_says_so(sim: SumoSimula
 def test_steering_vehicles_that_sumo_reports_are_within_their_turned_corners_of_the_ego(sim: SumoSimulation) -> None:
     reported = 0
     for seed in range(150):
-        for frame in episode(sim, seed, steering=True, blind=False):
+        for frame in episode(sim, seed, steering=True, obstacle=False):
             view = relative_view(frame)
             theirs = [i for i, other in enumerate(frame.ids[1:]) if agrees(frame, "ego", other)]
             if theirs:

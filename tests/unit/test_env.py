@@ -81,6 +81,15 @@ def test_the_same_seed_gives_the_same_episode_to_the_last_bit(family: FamilyName
 
 
 @each_family
+def test_measuring_does_not_act(family: FamilyName, monkeypatch: pytest.MonkeyPatch) -> None:
+    with closing(make_default(family)) as env:
+        measured = episode(env, 3)
+        measures = iter(env.trace.measures)
+        monkeypatch.setattr(env._gauge, "measure", lambda frame, before: next(measures))
+        assert same(episode(env, 3), measured)
+
+
+@each_family
 def test_another_seed_gives_another_episode(family: FamilyName) -> None:
     with closing(make_default(family)) as env:
         assert not same(episode(env, 3), episode(env, 5))
@@ -370,8 +379,8 @@ def test_the_trace_holds_every_frame_of_the_episode(family: FamilyName) -> None:
     after = series["soft_min"][LEAD_IN_STEPS:]
     np.testing.assert_allclose(after, [o[4]["robustness"] for o in outcomes])
     assert np.nanmax(np.abs(series["rss_lateral_m"])) <= LATERAL_CAP_M
-    assert env.min_robustness == after.min()
-    assert env.min_ttc_s == series["least_ttc_s"][LEAD_IN_STEPS:].min()
+    assert env.trace.min_robustness == after.min()
+    assert env.trace.min_ttc_s == series["least_ttc_s"][LEAD_IN_STEPS:].min()
 
 
 @each_family
@@ -381,8 +390,8 @@ def test_what_happened_before_the_release_does_not_count(family: FamilyName) -> 
         before = env.trace.measures[0]
         worse = replace(before, soft_min=-9.0, signals=before.signals | {"ttc_s": 0.0})
         env.trace.measures[0] = worse
-        assert env.min_robustness > -9.0
-        assert env.min_ttc_s > 0.0
+        assert env.trace.min_robustness > -9.0
+        assert env.trace.min_ttc_s > 0.0
 
 
 @each_family

@@ -4,9 +4,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
+from torch import Tensor
 
+from risk_sac.agents.agent import UpdateResult
 from risk_sac.agents.learner import Learner
-from risk_sac.agents.replay import Transition
+from risk_sac.agents.replay import Batch, Transition
 from risk_sac.config import (
     METHODS,
     AgentConfig,
@@ -14,7 +16,6 @@ from risk_sac.config import (
     LearnerConfig,
     MethodName,
     ReplayConfig,
-    RewardConfig,
 )
 from risk_sac.errors import CheckpointError
 
@@ -92,18 +93,22 @@ def test_dual_variable_rises_with_cost_only_where_the_method_constrains_it(
     assert subject.dual_variable == pytest.approx(0.005 if METHODS[method].lagrangian else 0.0)
 
 
-def test_reward_is_formed_with_the_current_dual_variable_and_shaping() -> None:
-    subject = learner()
+def test_a_batch_is_learnt_from_with_the_dual_variable_of_the_moment(
+    transition: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    subject, rewards = learner("sac-lag"), []
+    update = subject._agent.update
+
+    def watched(batch: Batch, reward: Tensor) -> UpdateResult:
+        rewards.append((reward - batch.risk_reward).tolist())
+        return update(batch, reward)
+
+    monkeypatch.setattr(subject._agent, "update", watched)
+    for _ in range(CONFIG.agent.warmup_steps):
+        subject.observe(transition(cost=0.3))  # when λ was 0
     subject._dual.value = 2.0
-    columns = [np.array(column) for column in ([1.0, 1.0], [0.3, 0.3], [0.5, 0.5], [-0.2, -0.2], [0.0, 1.0])]
-    # R = 1 - 2 · 0.3 = 0.4; F = 0.98 · 0.2 + 0.5, and 0 + 0.5 where s' is terminal.
-    assert subject._reward(*columns) == pytest.approx([1.096, 0.9])
-    assert learner("sac-lag")._reward(*columns) == pytest.approx([1.0, 1.0])
-
-
-def test_equation_8_to_the_letter_pays_the_terminal_potential() -> None:
-    config = CONFIG.model_copy(update={"reward": RewardConfig(zero_terminal_potential=False)})
-    assert learner(config=config)._reward(0.0, 0.0, 0.5, -0.2, 1.0) == pytest.approx(0.98 * 0.2 + 0.5)
+    subject.update()
+    assert rewards == [pytest.approx([-2.0 * 0.3] * CONFIG.agent.batch_size)]
 
 
 def test_state_of_other_networks_is_refused() -> None:

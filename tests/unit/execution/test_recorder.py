@@ -5,8 +5,8 @@ import pytest
 from risk_sac.config import Budget, LearnerConfig, RunSpec
 from risk_sac.errors import CheckpointError, ConfigError
 from risk_sac.execution.runs import run
+from risk_sac.run import CHECKPOINT
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
-from risk_sac.train import CHECKPOINT
 
 SPEC = RunSpec(
     family="low",

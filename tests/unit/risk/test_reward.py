@@ -6,7 +6,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.config import RewardConfig
+from risk_sac.config import METHODS, LearnerConfig, RewardConfig
 from risk_sac.risk import reward
 
 CONFIG = RewardConfig(valid_collision=10, degenerate_collision=2, ttc_weight=0.1, ttc_scale_s=2.0, rss_weight=0.05)
@@ -86,3 +86,18 @@ def test_shaping_of_an_episode_telescopes_to_the_first_states_potential(robustne
         g**t * reward.shaped_reward(0.0, robustness[t], robustness[t + 1], g, float(t == last)) for t in range(last + 1)
     )
     assert total == pytest.approx(-reward.potential(robustness[0]), abs=1e-9)
+
+
+def test_the_training_reward_is_shaped_only_for_methods_that_shape() -> None:
+    parts = (1.0, 0.4, 2.0, -3.0)  # R_risk, C_soft, ρ(s), ρ(s')
+    config = LearnerConfig.model_validate({"agent": {"discount": 0.5}})
+    plain, shaped = (reward.TrainingReward(METHODS[name], config) for name in ("sac-lag", "risk-sac"))
+    assert plain(*parts, 0.0, 2.5) == 0.0
+    assert shaped(*parts, 0.0, 2.5) == 3.5
+    assert shaped(*parts, 1.0, 2.5) == 2.0
+
+
+def test_the_training_reward_takes_equation_8_to_the_letter_if_told() -> None:
+    told = {"agent": {"discount": 0.5}, "reward": {"zero_terminal_potential": False}}
+    to_the_letter = reward.TrainingReward(METHODS["risk-sac"], LearnerConfig.model_validate(told))
+    assert to_the_letter(1.0, 0.4, 2.0, -3.0, 1.0, 2.5) == 3.5

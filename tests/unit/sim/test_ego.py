@@ -4,7 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.sim.ego import Belief, Perception
+from risk_sac.config import SensorConfig
+from risk_sac.sim.ego import EVERYTHING, Belief, Perception, sight
 from risk_sac.types import Frame
 from tests.builders import moved
 from tests.unit.sim.contacts import CAR, WALKER, ego, frames
@@ -35,13 +36,13 @@ def expected(belief: Belief) -> dict[str, list[float]]:
 
 
 def test_who_was_never_seen_is_hidden() -> None:
-    belief = look(Perception(3.0), 1.0, "parked")
+    belief = look(Perception(3.0, EVERYTHING), 1.0, "parked")
     assert hidden(belief) == {"walker"}
     assert expected(belief) == {}
 
 
 def test_who_goes_out_of_sight_is_expected_to_go_on_until_memory_ends() -> None:
-    perception = Perception(memory_s=2.0)
+    perception = Perception(2.0, EVERYTHING)
     belief = look(perception, 1.0, "walker", "parked")
     assert hidden(belief) == set()
     assert expected(belief) == {}
@@ -56,7 +57,7 @@ def test_who_goes_out_of_sight_is_expected_to_go_on_until_memory_ends() -> None:
 
 
 def test_what_is_expected_is_what_was_seen_last_and_not_what_is() -> None:
-    perception = Perception(memory_s=2.0)
+    perception = Perception(2.0, EVERYTHING)
     look(perception, 1.0, "walker", "parked")
     stopped = moved(frame_at(1.5), y_m=frame_at(1.0).y_m, vy_mps=0.0)
     belief = perception.update(stopped, np.array([False, True]))
@@ -64,13 +65,13 @@ def test_what_is_expected_is_what_was_seen_last_and_not_what_is() -> None:
 
 
 def test_without_memory_who_is_out_of_sight_is_hidden_at_once() -> None:
-    perception = Perception(memory_s=0.0)
+    perception = Perception(0.0, EVERYTHING)
     look(perception, 1.0, "walker", "parked")
     assert hidden(look(perception, 1.1, "parked")) == {"walker"}
 
 
 def test_what_is_remembered_of_an_actor_stays_its_own_when_another_leaves() -> None:
-    perception = Perception(memory_s=3.0)
+    perception = Perception(3.0, EVERYTHING)
     look(perception, 1.0, "walker", "parked")
     frame = frame_at(2.0)
     without = replace(frame, ids=("ego", "parked"), state=frame.state[:, [0, 2]])
@@ -81,7 +82,7 @@ def test_what_is_remembered_of_an_actor_stays_its_own_when_another_leaves() -> N
 
 
 def test_a_flicker_is_no_break_and_more_is() -> None:
-    perception = Perception(memory_s=3.0)
+    perception = Perception(3.0, EVERYTHING)
     for tenth in range(10, 16):
         look(perception, tenth / 10, "walker")
     for tenth in range(16, 20):
@@ -98,8 +99,16 @@ def test_a_flicker_is_no_break_and_more_is() -> None:
 
 
 def test_a_new_episode_begins_with_nobody_known() -> None:
-    perception = Perception(memory_s=3.0)
+    perception = Perception(3.0, EVERYTHING)
     look(perception, 1.0, "walker", "parked")
     perception.reset()
     assert not perception.ever_seen("walker")
     assert hidden(look(perception, 1.0)) == {"walker", "parked"}
+
+
+def test_a_look_takes_note_of_whom_the_sensor_sees() -> None:
+    near = Perception(0.0, sight(SensorConfig(range_m=25.0), visibility_m=math.inf))
+    assert hidden(near.look(frame_at(0.0))) == {"parked"}
+    assert near.ever_seen("walker")
+    assert hidden(Perception(0.0, sight(SensorConfig(), visibility_m=15.0)).look(frame_at(0.0))) == {"walker", "parked"}
+    assert hidden(Perception(0.0, sight(None, visibility_m=15.0)).look(frame_at(0.0))) == set()

@@ -14,8 +14,11 @@ from risk_sac.errors import SimulationError
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
-from risk_sac.sim.sumo import SumoSimulation, VehicleCommand, Walker
+from risk_sac.sim.commands import VehicleCommand, Walker
+from risk_sac.sim.ego import Belief
+from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Frame, Role
+from tests.builders import Told, belief_of
 
 LEAD_IN_STEPS = 15
 each_family = pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
@@ -174,3 +177,29 @@ def test_what_sumo_refuses_is_reported(sim: SumoSimulation) -> None:
     with pytest.raises(SimulationError, match=r"low/low\.net\.xml"):
         sim.reset(replace(layout, ego=replace(layout.ego, route=("nowhere",))), 0)
     assert sim.reset(layout, 0).ids[0] == "ego"
+
+
+def test_each_frame_is_perceived_once_and_before_the_next_step(
+    sim: SumoSimulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whom the ego does not know of is ignored by SUMO's models as soon as the frame is there."""
+    perceived: list[Frame] = []
+    ignored: list[list[set[str]]] = []
+    tell_sumo = libsumo.vehicle.setParameter
+
+    def tell_ego(frame: Frame, _: int) -> Belief:
+        perceived.append(frame)
+        ignored.append([])
+        return belief_of(frame, hidden=() if len(perceived) == 2 else ("lead", "left"))
+
+    def noted(vehicle: str, name: str, value: str) -> None:
+        assert vehicle == "ego"
+        ignored[-1].append(set(value.split()))
+        tell_sumo(vehicle, name, value)
+
+    monkeypatch.setattr(sim, "_senses", Told(tell_ego))
+    monkeypatch.setattr(libsumo.vehicle, "setParameter", noted)
+    frames = [sim.reset(middle(FAMILIES["low"]), 0), *(sim.step() for _ in range(3))]
+    assert all(one is other for one, other in zip(perceived, frames, strict=True))
+    hidden: set[str] = {"lead", "left"}
+    assert ignored == [[hidden] * 2, [set()] * 2, [hidden] * 2, []]  # both models, where anything has changed

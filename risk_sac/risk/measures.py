@@ -1,0 +1,68 @@
+"""All that is measured of a frame. Measuring acts on nothing: nobody in the simulation can tell that it was done."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from risk_sac.config import Requirement
+from risk_sac.geometry import Sight
+from risk_sac.risk.publish import Assessment, assess, publish
+from risk_sac.risk.rss import RssParameters
+from risk_sac.risk.stl import Monitor, soft_min
+from risk_sac.types import STEP_S, Floats, Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Measures:
+    """What one frame says about risk, and what the requirements say to it."""
+
+    assessment: Assessment
+    signals: dict[str, float]
+    robustness: Floats  # M, scaled
+    soft_min: float
+
+
+class Gauge:
+    """Measures the frames of an episode one after the other, since requirements have a memory.
+
+    Attributes:
+      names: of the requirements, in the order of their robustness.
+    """
+
+    def __init__(
+        self,
+        requirements: Sequence[Requirement],
+        horizon_steps: int,
+        rss: RssParameters,
+        sight: Sight,
+        softmin_sharpness: float,
+    ) -> None:
+        """Compiles the requirements.
+
+        Args:
+          requirements: to be monitored.
+          horizon_steps: the longest episode.
+          rss: parameters of the safe distances.
+          sight: what the ego can see at best.
+          softmin_sharpness: β of Eq. 7.
+        """
+        self._monitor = Monitor(requirements, STEP_S, horizon_steps)
+        self._rss = rss
+        self._sight = sight
+        self._sharpness = softmin_sharpness
+        self.names = self._monitor.names
+
+    def reset(self) -> None:
+        """Forgets the previous episode."""
+        self._monitor.reset()
+
+    def measure(self, frame: Frame, before: Frame | None) -> Measures:
+        """Measures the next frame.
+
+        Args:
+          frame: all actors now.
+          before: the previous frame, None at the start.
+        """
+        assessment = assess(frame, self._rss, self._sight)
+        signals = publish(frame, before, assessment.least)
+        robustness = self._monitor.update(signals)
+        return Measures(assessment, signals, robustness, soft_min(robustness[self._monitor.shapes], self._sharpness))

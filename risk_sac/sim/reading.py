@@ -1,0 +1,173 @@
+"""What SUMO says after a step, as a frame. SUMO's conventions, front bumpers and compass degrees, end here."""
+
+import math
+import re
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+import libsumo
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.jit import compiled
+from risk_sac.scenario.layout import Area, Layout
+from risk_sac.sim.commands import Walker
+from risk_sac.sim.lookout import Lookout
+from risk_sac.types import (
+    ACCEL,
+    HEADING,
+    LATERAL,
+    LENGTH,
+    OFFSET,
+    SPEED,
+    STEP_S,
+    VX,
+    VY,
+    WIDTH,
+    Floats,
+    Frame,
+    Kind,
+    Role,
+    Signal,
+    X,
+    Y,
+)
+
+PEDESTRIAN_SIZE_M = 0.5
+SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
+CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
+COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
+
+
+class Reading(NamedTuple):
+    """A frame, and what its vehicles' drivers look at; rows are those of the frame, vehicles first, the ego 0."""
+
+    frame: Frame
+    vehicles: tuple[str, ...]
+    row: Mapping[str, int]  # of each vehicle
+    speed_and_accel: Sequence[tuple[float, float]]  # of each vehicle, m/s and m/s²: also in the frame, but quicker here
+    offset_m: Sequence[float]  # of each vehicle from its lane's centre; the same
+    lookout: Lookout
+
+
+class Reader:
+    """Reads the frames of an episode."""
+
+    def __init__(self, layout: Layout, walkers: Collection[str]) -> None:
+        """Looks at who is there; all vehicles of the layout have been inserted."""
+        starts = (layout.ego, *layout.vehicles)
+        self._roles = {start.id: start.role for start in starts}
+        self._roles |= {start.id: start.role for start in layout.pedestrians}
+        self._walkers = tuple(walkers)
+        self._signal = layout.signal
+        self._walk_signals = [] if layout.signal is None else _walk_signals(layout.signal, layout.crossings)
+        self._vehicles = tuple(start.id for start in starts)
+        self._describe()
+        self._told = np.full((len(self._ids), 7), np.nan)
+
+    def _describe(self) -> None:
+        """Takes down what stays the same until a vehicle leaves the net."""
+        driving, walking = len(self._vehicles), len(self._walkers)
+        self._ids = (*self._vehicles, *self._walkers)
+        self._kind = np.array([Kind.VEHICLE] * driving + [Kind.PEDESTRIAN] * walking, dtype=np.int8)
+        self._role = np.array([self._roles[id_] for id_ in self._ids], dtype=np.int8)
+        self._row = {id_: row for row, id_ in enumerate(self._vehicles)}
+        self._attackers = [(row, v) for row, v in enumerate(self._vehicles) if self._roles[v] is Role.ADVERSARY]
+        get = libsumo.vehicle
+        bodies = [(get.getLength(v), get.getWidth(v)) for v in self._vehicles]
+        self._bodies = np.array(bodies + [(PEDESTRIAN_SIZE_M, PEDESTRIAN_SIZE_M)] * walking).T
+
+    def forget(self, gone: Collection[str]) -> None:
+        """Leaves out vehicles that have left the net."""
+        self._told = self._told[[id_ not in gone for id_ in self._ids]]
+        self._vehicles = tuple(id_ for id_ in self._vehicles if id_ not in gone)
+        self._describe()
+
+    def read(self, walkers: Mapping[str, Walker]) -> Reading:
+        """What there is now; SUMO knows nothing of the walkers, so they are told."""
+        get_position, get_angle = libsumo.vehicle.getPosition, libsumo.vehicle.getAngle
+        get_speed, get_lateral = libsumo.vehicle.getSpeed, libsumo.vehicle.getLateralSpeed
+        get_accel = libsumo.vehicle.getAcceleration
+        get_offset = libsumo.vehicle.getLateralLanePosition
+        told: list[float] = []  # flat: numpy converts nested sequences at half the speed
+        speed_and_accel, offsets = [], []
+        for id_ in self._vehicles:
+            x, y = get_position(id_)
+            speed, accel, offset = get_speed(id_), get_accel(id_), get_offset(id_)
+            told += (x, y, get_angle(id_), speed, get_lateral(id_), accel, offset)
+            speed_and_accel.append((speed, accel))
+            offsets.append(offset)
+        for w in walkers.values():
+            told += (w.x_m, w.y_m, w.heading_rad, w.speed_mps, 0.0, w.accel_mps2, 0.0)
+        before, self._told = self._told, np.array(told).reshape(-1, 7)
+        ahead = () if self._signal is None else libsumo.vehicle.getNextTLS(self._vehicles[0])
+        frame = Frame(
+            time_s=libsumo.simulation.getTime(),
+            ids=self._ids,
+            kind=self._kind,
+            role=self._role,
+            state=_state(self._told, before, self._bodies, len(self._vehicles)),
+            signal=COLOURS.get(ahead[0][3].lower(), Signal.NONE) if ahead else Signal.NONE,
+            stop_line_m=ahead[0][2] if ahead else math.inf,
+            link=self._links(ahead[0][3] if ahead else "", walkers),
+            simulator_collisions=tuple((c.collider, c.victim) for c in libsumo.simulation.getCollisions()),
+            teleported=libsumo.simulation.getStartingTeleportIDList(),
+        )
+        return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, Lookout(frame))
+
+    def _links(self, ego: str, walkers: Mapping[str, Walker]) -> NDArray[np.uint8]:
+        """The letter of the signal ahead of the ego and of each adversary; a pedestrian's is that of its crossing."""
+        links = np.zeros(len(self._ids), dtype=np.uint8)
+        if self._signal is None:
+            return links
+        letters = [(0, ego)] if ego else []
+        for row, id_ in self._attackers:
+            ahead = libsumo.vehicle.getNextTLS(id_)
+            if ahead:
+                letters.append((row, ahead[0][3]))
+        for row, walker in enumerate(walkers.values(), start=len(self._vehicles)):
+            for area, index in self._walk_signals:
+                if area.contains(walker.x_m, walker.y_m):
+                    letters.append((row, libsumo.trafficlight.getRedYellowGreenState(self._signal)[index]))
+        for row, letter in letters:
+            links[row] = ord(letter)
+        return links
+
+
+@compiled
+def _state(told: Floats, before: Floats, bodies: Floats, vehicles: int) -> Floats:
+    """The state of a frame.
+
+    Args:
+      told: `n x 7`, of each actor x, y, angle, speed, lateral speed, acceleration, and offset from its lane. SUMO's own
+        of vehicles: front bumpers and compass degrees.
+      before: the same in the step before, NaN where there was none.
+      bodies: `2 x n`, length and width.
+      vehicles: how many actors, the first of them, are vehicles.
+    """
+    n = len(told)
+    state = np.empty((WIDTH + 1, n))
+    for i in range(n):
+        x, y, heading, speed, half = told[i, 0], told[i, 1], told[i, 2], told[i, 3], 0.0
+        if i < vehicles:
+            heading, half = math.radians(90.0 - heading), bodies[0, i] / 2
+        cos, sin = math.cos(heading), math.sin(heading)
+        state[VX, i], state[VY, i] = speed * cos, speed * sin
+        if i < vehicles and not math.isnan(before[i, 0]):
+            # The velocity that was driven: SUMO's angle lags behind a lateral move.
+            state[VX, i], state[VY, i] = (x - before[i, 0]) / STEP_S, (y - before[i, 1]) / STEP_S
+        state[X, i], state[Y, i], state[HEADING, i] = x - half * cos, y - half * sin, heading
+        for k, row in enumerate((SPEED, LATERAL, ACCEL, OFFSET)):
+            state[row, i] = told[i, 3 + k]
+        state[LENGTH, i], state[WIDTH, i] = bodies[0, i], bodies[1, i]
+    return state
+
+
+def _walk_signals(signal: str, crossings: Sequence[Area]) -> list[tuple[Area, int]]:
+    """The crossings that a signal controls, each grown onto the sidewalks, and the index of its letter."""
+    found = []
+    for index, links in enumerate(libsumo.trafficlight.getControlledLinks(signal)):
+        for lane in {lane for link in links for lane in link if CROSSING_LANE.fullmatch(lane)}:
+            x, y = np.mean(libsumo.lane.getShape(lane), axis=0)
+            found += [(area.grown(SIDEWALK_M), index) for area in crossings if area.contains(x, y)]
+    return found

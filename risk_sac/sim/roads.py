@@ -1,0 +1,91 @@
+"""Where vehicles are on their roads: along the path they take, and how far they may move aside."""
+
+from typing import NamedTuple
+
+import libsumo
+import numpy as np
+
+from risk_sac.scenario.layout import Layout
+from risk_sac.sim.paths import HEADING, STATION, Along, Paths, X, Y
+from risk_sac.types import Floats
+
+EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
+
+
+class Room(NamedTuple):
+    """Lateral room of a vehicle on its road, from its sides to the edges of the drivable lanes."""
+
+    left_m: float
+    right_m: float
+
+
+class Roads:
+    """The roads that the vehicles of an episode take; what was asked of a net is kept for the next episode on it."""
+
+    def __init__(self) -> None:
+        self._net = ""
+        self._paths = Paths()
+        self._lanes: dict[tuple[tuple[str, ...], str], tuple[float, float, float]] = {}
+        self._routes: dict[str, tuple[str, ...]] = {}
+
+    def enter(self, layout: Layout) -> None:
+        """Begins an episode."""
+        self._routes = {start.id: start.route for start in (layout.ego, *layout.vehicles)}
+        if layout.net != self._net:  # another one may use the same names
+            self._net = layout.net
+            self._lanes.clear()
+            self._paths.clear()
+
+    def along(self, vehicle: str) -> Along:
+        """Where a vehicle is on its path."""
+        get = libsumo.vehicle
+        path = self._paths.of(self._routes[vehicle], get.getLaneID(vehicle))
+        return Along(path, get.getLanePosition(vehicle), get.getLateralLanePosition(vehicle))
+
+    def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
+        """The way ahead of a vehicle whose centre is there: x and y of points, its centre first."""
+        path, station_m, offset_m = self.along(vehicle)
+        ahead = path.points[:, path.points[STATION] > station_m]
+        sin, cos = np.sin(ahead[HEADING]), np.cos(ahead[HEADING])
+        x = np.concatenate(([x_m], ahead[X] - offset_m * sin))
+        y = np.concatenate(([y_m], ahead[Y] + offset_m * cos))
+        return x, y
+
+    def place(self, vehicle: str, offset_m: float, width_m: float) -> tuple[Room, Along]:
+        """How far a vehicle may move sideways, and where it is on its path.
+
+        The lanes that its route goes on from end at a wall: SUMO halts a vehicle dead at the end of any other.
+
+        Args:
+          vehicle: one that is there.
+          offset_m: of its centre from that of its lane, positive to the left.
+          width_m: of its body.
+        """
+        get, route = libsumo.vehicle, self._routes[vehicle]
+        lane = get.getLaneID(vehicle)
+        right_lanes, left_lanes, lane_width = self._lane(route, lane)
+        spare = (lane_width - width_m) / 2 - EDGE_M
+        room = Room(left_lanes + spare - offset_m, right_lanes + spare + offset_m)
+        return room, Along(self._paths.of(route, lane), get.getLanePosition(vehicle), offset_m)
+
+    def _lane(self, route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
+        """Width of the lanes right and left of `lane` that lead on along `route`, and its own."""
+        if (route, lane) not in self._lanes:
+            edge, _, index = lane.rpartition("_")
+            widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
+            own = int(index)
+            self._lanes[route, lane] = (sum(widths[:own]), sum(widths[own + 1 :]), libsumo.lane.getWidth(lane))
+        return self._lanes[route, lane]
+
+
+def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
+    """Width of a lane, m; 0 if vehicles may not use it or it does not lead to the route's next edge."""
+    if libsumo.lane.getAllowed(lane) == ("pedestrian",):
+        return 0.0
+    edge = lane.rpartition("_")[0]
+    if edge in route[:-1]:
+        following = route[route.index(edge) + 1]
+        if not any(link[0].rpartition("_")[0] == following for link in libsumo.lane.getLinks(lane)):
+            return 0.0
+    width: float = libsumo.lane.getWidth(lane)
+    return width

@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+
+from risk_sac.config import Requirement
+from risk_sac.geometry import Sight
+from risk_sac.risk.measures import Gauge, Measures
+from risk_sac.risk.publish import assess, publish
+from risk_sac.risk.rss import RssParameters
+from risk_sac.risk.stl import soft_min
+from risk_sac.types import Frame
+from tests.builders import frame_of
+
+RSS = RssParameters(response_s=0.5, brake_min_mps2=6.0, brake_max_mps2=6.0)
+SIGHT = Sight(reach_m=80.0, half_view_rad=np.pi, occlusion=True)
+REQUIREMENTS = (
+    Requirement(name="far", formula="vehicle_gap_m >= 10", scale=10.0),
+    Requirement(name="apart", formula="historically(vehicle_gap_m >= 5)", scale=10.0),
+)
+
+
+def gauge() -> Gauge:
+    return Gauge(REQUIREMENTS, 100, RSS, SIGHT, softmin_sharpness=20.0)
+
+
+def behind(gap_m: float) -> Frame:
+    """The ego at 10 m/s, and somebody who stands ahead of it."""
+    return frame_of(x_m=[0.0, gap_m + 4.6], speed_mps=[10.0, 0.0])
+
+
+def measured(subject: Gauge, *gaps_m: float) -> list[Measures]:
+    return [subject.measure(behind(gap_m), None) for gap_m in gaps_m]
+
+
+def test_a_frame_is_measured_by_the_functions_of_the_paper() -> None:
+    (measures,) = measured(gauge(), 20.0)
+    assessment = assess(behind(20.0), RSS, SIGHT)
+    assert np.array_equal(measures.assessment.others, assessment.others)
+    assert measures.signals == publish(behind(20.0), None, assessment.least)
+    assert measures.robustness.tolist() == pytest.approx([1.0, 1.5])
+    assert measures.soft_min == soft_min(measures.robustness, 20.0)
+
+
+def test_requirements_remember_the_frames_of_an_episode_and_nothing_before_it() -> None:
+    subject = gauge()
+    assert [m.robustness[1] for m in measured(subject, 20.0, 8.0, 20.0)] == pytest.approx([1.5, 0.3, 0.3])
+    subject.reset()
+    assert measured(subject, 20.0)[0].robustness[1] == pytest.approx(1.5)
