@@ -62,8 +62,9 @@ class AnswerCache:
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
-        self._answers: OrderedDict[Asked, KeptAnswer] = OrderedDict()  # the one made longest ago first
+        self._answers: OrderedDict[Asked, tuple[int, KeptAnswer]] = OrderedDict()  # by when they were made
         self._renewals: dict[Asked, asyncio.Event] = {}  # set once a new answer is there, or is known to fail
+        self._passed_on = 0  # requests; each answer goes with the number of the request that it was made for
         self._bytes = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -82,27 +83,28 @@ class AnswerCache:
 
     async def _find(self, asked: Asked, store: Store) -> KeptAnswer | None:
         """An answer that shows what is stored now or later; None where a route has to make one."""
-        for _ in range(2):  # a renewal at work may have begun before the last change; the one after it has not
-            answer = self._answers.get(asked)
-            if answer is None or answer.valid(store):
+        before = self._passed_on
+        while asked in self._answers:
+            number, answer = self._answers[asked]
+            if number > before or answer.valid(store):
                 return answer
-            renewal = self._renewals.get(asked)
-            if renewal is None:
+            if asked not in self._renewals:
                 return None
-            await renewal.wait()
-        return self._answers.get(asked)
+            await self._renewals[asked].wait()  # it may have begun before the last change; the one after it has not
+        return None
 
     async def _renew(self, asked: Asked, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on, and keep its answer once it begins: a client that reads slowly holds up nobody else."""
-        renewal = asyncio.Event()
+        self._passed_on += 1
+        number, renewal = self._passed_on, asyncio.Event()
         if asked in self._answers:
             self._renewals[asked] = renewal
 
         def finish() -> None:
             if not renewal.is_set():
-                self._replace(asked, scope.get(ANSWER))
-                self._renewals.pop(asked, None)
                 renewal.set()
+                self._renewals.pop(asked, None)
+                self._replace(asked, number, scope.get(ANSWER))
 
         async def finish_and_send(message: Message) -> None:
             finish()
@@ -113,11 +115,13 @@ class AnswerCache:
         finally:
             finish()
 
-    def _replace(self, asked: Asked, answer: KeptAnswer | None) -> None:
-        old = self._answers.pop(asked, None)
-        self._bytes -= old.size if old else 0
+    def _replace(self, asked: Asked, number: int, answer: KeptAnswer | None) -> None:
+        """Keep an answer in place of an older one, or nothing if there is none; the oldest answers make room for it."""
+        if asked in self._answers:
+            self._bytes -= self._answers.pop(asked)[1].size
         if answer is not None:
-            self._answers[asked] = answer
+            self._answers[asked] = number, answer
             self._bytes += answer.size
         while self._bytes > MOST_BYTES:
-            self._bytes -= self._answers.popitem(last=False)[1].size
+            _, (_, oldest) = self._answers.popitem(last=False)
+            self._bytes -= oldest.size
