@@ -17,7 +17,7 @@ from service.api.answers.representations import Representation
 from service.store.reading import Store
 
 MOST_BYTES = 16 << 20  # of all kept answers
-OVERHEAD_BYTES = 2000  # of each answer, about, beside its body and the request
+OVERHEAD_BYTES = 2000  # of each answer, about, beside its body, path and query
 ANSWER = "risk_sac.answer"  # in the ASGI scope: what a route wants to have kept
 FROM_CACHE = "risk_sac.from_cache"  # in the ASGI scope: set where a kept answer was given
 
@@ -32,11 +32,6 @@ class KeptAnswer:
     revision: str  # read before the representation was made, so that it is never newer
     campaign_id: str | None  # whose revision it is; None: the one of all campaigns together
     routed: Mapping[str, Any]  # what the router leaves in the scope for the log and the metrics
-
-    @property
-    def size(self) -> int:
-        """Memory that it takes, bytes, about."""
-        return len(self.representation.body) + OVERHEAD_BYTES
 
     def valid(self, store: Store) -> bool:
         """Whether nothing has changed since."""
@@ -118,10 +113,16 @@ class AnswerCache:
     def _replace(self, asked: Asked, number: int, answer: KeptAnswer | None) -> None:
         """Keep an answer in place of an older one, or nothing if there is none; the oldest answers make room for it."""
         if asked in self._answers:
-            self._bytes -= self._answers.pop(asked)[1].size
+            self._bytes -= _size(asked, self._answers.pop(asked)[1])
         if answer is not None:
             self._answers[asked] = number, answer
-            self._bytes += answer.size
+            self._bytes += _size(asked, answer)
         while self._bytes > MOST_BYTES:
-            _, (_, oldest) = self._answers.popitem(last=False)
-            self._bytes -= oldest.size
+            oldest, (_, kept) = self._answers.popitem(last=False)
+            self._bytes -= _size(oldest, kept)
+
+
+def _size(asked: Asked, answer: KeptAnswer) -> int:
+    """Memory that an answer takes, bytes, about."""
+    _, path, query = asked
+    return len(answer.representation.body) + len(path) + len(query) + OVERHEAD_BYTES

@@ -256,3 +256,11 @@ async def test_only_so_much_is_kept_and_the_newest_of_it(service):
     assert service.shown == []
     await service.ask("/campaigns/c1?0")
     assert service.shown == ["1"]
+
+
+@asynchronous
+async def test_long_questions_take_room_too(service):
+    long = "x" * (MOST_BYTES // 3)
+    for number in (1, 2, 3, 1):
+        await service.ask(f"/campaigns/c1?{number}{long}")
+    assert len(service.shown) == 4
