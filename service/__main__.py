@@ -36,7 +36,6 @@ def main() -> None:
         access_log=False,
         server_header=False,
         ws="none",
-        loop="service.host.loop:new_event_loop",
         timeout_graceful_shutdown=ANSWERS_END_S,
     )
 

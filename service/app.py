@@ -9,20 +9,17 @@ from fastapi import FastAPI
 from prometheus_client import Histogram
 
 from risk_sac import __version__
-from service.api import polls
+from service.api.answer_cache import AnswerCache
 from service.api.answers.problems import add_problem_handlers
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
 from service.api.guards import add_guards
-from service.api.live import Live
-from service.api.recall import Recall
 from service.api.routes import campaigns, catalogue, episodes, events, networks, operations, reports
 from service.api.stream import Streams
 from service.api.telemetry.metrics import registry, request_latencies
 from service.api.telemetry.requests import Observe
 from service.errors import StorageError
 from service.host.locks import try_lock
-from service.host.priority import give_way
 from service.keys.exposure import check_exposure
 from service.networks.shelf import Shelf
 from service.runs.manager import Manager
@@ -49,16 +46,15 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         local = executor or LocalExecutor(settings)
         with opened(settings, local, latencies) as context:
             app.state.context = context
-            give_way(settings.worker_niceness)
             yield
 
     app = FastAPI(
         title="RISK-SAC", description=DESCRIPTION, version=__version__, lifespan=lifespan, redirect_slashes=False
     )
-    for routes in (campaigns, polls, episodes, events, reports, networks, catalogue, operations):
+    for routes in (campaigns, episodes, events, reports, networks, catalogue, operations):
         app.include_router(routes.router)
     add_problem_handlers(app)
-    app.add_middleware(Recall)
+    app.add_middleware(AnswerCache)
     add_guards(app, settings)
     app.add_middleware(Observe, latencies=latencies)
     app.openapi = lambda: openapi(app)  # type: ignore[method-assign]  # FastAPI's documented way
@@ -90,10 +86,9 @@ def opened(settings: ServiceSettings, executor: Executor, latencies: Histogram) 
 
 
 def _context(settings: ServiceSettings, store: Store, manager: Manager, latencies: Histogram) -> Context:
-    live = Live(store, settings)
     metrics = registry(latencies, store, manager)
     networks = Shelf(settings.networks_dir)
-    return Context(settings, store, manager, Reports(settings), networks, live, Streams(store, live), metrics)
+    return Context(settings, store, manager, Reports(settings), networks, Streams(store), metrics)
 
 
 def _data_folder(settings: ServiceSettings) -> IO[bytes]:

@@ -38,7 +38,7 @@ class ServiceSettings(BaseSettings):
     worker_module: str = "service.worker"
     """Module that executes one run, started as `python -m`."""
     worker_niceness: Annotated[int, Field(ge=0, le=19)] = 5
-    """Added to the niceness of workers, and of the threads that answer requests."""
+    """Added to the niceness of workers."""
     grace_s: Annotated[float, Field(gt=0, le=600)] = 30.0
     """How long a worker whose run is cancelled may finish its episode before it is killed, s."""
     stop_s: Annotated[float, Field(gt=0, le=600)] = 15.0

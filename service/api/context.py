@@ -6,7 +6,6 @@ from typing import Annotated, cast
 from fastapi import Depends, Request
 from prometheus_client import CollectorRegistry
 
-from service.api.live import Live
 from service.api.stream import Streams
 from service.networks.shelf import Shelf
 from service.runs.manager import Manager
@@ -24,7 +23,6 @@ class Context:
     manager: Manager
     reports: Reports
     networks: Shelf
-    live: Live
     streams: Streams
     metrics: CollectorRegistry
 

@@ -14,7 +14,6 @@ from sse_starlette import ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from risk_sac.types import Outcome
-from service.api.live import Live
 from service.errors import NotFoundError, StorageError
 from service.store.reading import Store
 from service.store.records import StoredEpisode
@@ -43,9 +42,8 @@ class Chunk:
 class Streams:
     """All who follow campaigns. They look at the same moments, so that they ask for the same batches."""
 
-    def __init__(self, store: Store, live: Live) -> None:
+    def __init__(self, store: Store) -> None:
         self._store = store
-        self._live = live
         self._chunks = alru_cache(maxsize=KEPT)(self._chunk)
 
     async def follow(
@@ -64,10 +62,8 @@ class Streams:
         yield ServerSentEvent(retry=RETRY_MS, sep="\n").encode()
         try:
             while not stopping.is_set():
-                revision = await self._live.revision(campaign_id, None)
+                revision = await self._revision(campaign_id)
                 chunk = await self._chunks(campaign_id, position, revision)
-                if chunk.ended:
-                    self._live.expire(campaign_id)  # who is told that it has ended will ask for its results
                 if chunk.data:
                     yield chunk.data
                 if chunk.ended or (ended and not chunk.more):
@@ -79,6 +75,11 @@ class Streams:
             return
         except StorageError as error:
             logger.warning("a stream of events ends: %s", error, extra={"campaign": campaign_id})
+
+    async def _revision(self, campaign_id: str) -> str:
+        """The campaign's revision; a thread is needed only where the database must be asked."""
+        known = self._store.known_revision(campaign_id)
+        return known if known is not None else await run_in_threadpool(self._store.revision, campaign_id)
 
     async def _change(self, campaign_id: str, revision: str, stopping: anyio.Event) -> None:
         loop = asyncio.get_running_loop()

@@ -4,7 +4,6 @@ import time
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import replace
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, selectinload
@@ -16,7 +15,7 @@ from service.store.database import open_database, storage_errors
 from service.store.events import event_page, former_position
 from service.store.finding import Judged, episode_page, find_campaign, find_run, split_failure_id, unknown_failure
 from service.store.records import Page, StoredCampaign, StoredChange, StoredEpisode, StoredRun, Usage
-from service.store.revisions import Mark, Revisions
+from service.store.revisions import Revisions
 from service.store.states import FINAL, State
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, UsageRow
 
@@ -101,23 +100,18 @@ class Store:
             return known
         with self._reading() as session:
             row = find_campaign(session, campaign_id, project)
-            return self._shown_revision(self.revisions.learn(row.id, row.project, row.revision).mark.latest)
+            return self._shown_revision(self.revisions.learn(row.id, row.project, row.revision).revision)
 
     def known_revision(self, campaign_id: str, project: str | None = None) -> str | None:
         """The same if the database need not be asked for it, else None."""
         known = self.revisions.get(campaign_id)
         if known is None or project not in (None, known.project):
             return None
-        return self._shown_revision(known.mark.latest)
+        return self._shown_revision(known.revision)
 
-    def mark(self, campaign_id: str) -> Mark | None:
-        """What a campaign looks like now; None if the database must be asked for it."""
-        known = self.revisions.get(campaign_id)
-        return None if known is None else replace(known.mark, refusal=self.refusal)
-
-    def mark_of_all(self) -> Mark:
-        """What all campaigns look like now."""
-        return replace(self.revisions.all, refusal=self.refusal)
+    def revision_of_all(self) -> str:
+        """A name for what all campaigns look like now; another one once any of them does not. Holds until a restart."""
+        return self._shown_revision(self.revisions.all)
 
     def events(self, campaign_id: str, *, limit: int, after: int = 0) -> Page[StoredEpisode | StoredChange]:
         """Episodes of a campaign and changes of its state and its runs', in their one order, just after `after`.

@@ -76,7 +76,7 @@ class Ledger:
 
     def add_episode(self, number: int, event: EpisodeDone) -> bool:
         """Store an episode, or replace it where a resumed run reports another outcome; False if it was known."""
-        with self._writing("storing an episode", episode=True) as session:
+        with self._writing("storing an episode") as session:
             (campaign,) = hold_campaigns(session, RunRow.number == number)
             run = session.get_one(RunRow, number)
             query = select(EpisodeRow).filter_by(run_number=number, phase=event.record.phase, index=event.record.index)
@@ -187,13 +187,13 @@ class Ledger:
             _settle(session, campaign)
 
     @contextmanager
-    def _writing(self, doing: str, *, episode: bool = False) -> Iterator[Session]:
+    def _writing(self, doing: str) -> Iterator[Session]:
         with storage_errors(doing), Session(self._engine, expire_on_commit=False) as session:
             with session.begin():
                 yield session
             for row in session.identity_map.values():
                 if isinstance(row, CampaignRow):
-                    self._store.revisions.note(row.id, row.project, row.revision, episode=episode)
+                    self._store.revisions.note(row.id, row.project, row.revision)
 
 
 def _move(session: Session, run: RunRow, state: State, reason: str | None = None) -> None:

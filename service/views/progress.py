@@ -39,7 +39,7 @@ def progress(campaign: StoredCampaign, workers: int) -> Progress:
 
 
 def retry_after_s(campaign: StoredCampaign, workers: int) -> int | None:
-    """Seconds after which a look pays again: a twentieth of the time left, or None once the campaign has ended."""
+    """Seconds after which to ask again: a twentieth of the time left, or None once the campaign has ended."""
     if campaign.state.final:
         return None
     left_s = eta_s(campaign.runs, workers) or 0.0

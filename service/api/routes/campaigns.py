@@ -1,17 +1,21 @@
-"""/v1/campaigns: post, list, cancel, delete."""
+"""/v1/campaigns: post, list, look, cancel, delete."""
 
+from collections.abc import Callable
 from hashlib import blake2b
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Request, Response
 
+from risk_sac import __version__
 from risk_sac.config import FamilyName, MethodName
-from service.api.access import CurrentCaller
+from service.api.access import Caller, CurrentCaller
+from service.api.answer_cache import keep
 from service.api.answers.pages import Cursor, Limit, decode_cursor, encode_cursor
 from service.api.answers.representations import Representation, caching, entity_tag
 from service.api.answers.responses import (
     ACCEPTED,
     INVALID,
+    LIVE,
     MALFORMED,
     NOT_ENDED,
     NOT_JSON,
@@ -20,14 +24,14 @@ from service.api.answers.responses import (
     TAGGED,
     UNKNOWN,
 )
-from service.api.context import Service
-from service.api.live import waiting
+from service.api.context import Context, Service
 from service.api.posted_campaign import DOCUMENTED_BODY, PostedCampaign
-from service.api.recall import remember
-from service.schemas import Campaign, CampaignPage
+from service.schemas import Body, Campaign, CampaignPage, Results
 from service.store.records import StoredCampaign
 from service.store.states import State
 from service.views.bodies import campaign_body, summary_body
+from service.views.progress import retry_after_s
+from service.views.totals import results
 
 POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON
 IdempotencyKey = Annotated[
@@ -69,7 +73,7 @@ def list_campaigns(
     cursor: Cursor = None,
 ) -> Response:
     """Campaigns, newest first; what is posted meanwhile comes before the first page."""
-    mark = service.store.mark_of_all()
+    revision = service.store.revision_of_all()
     page = service.store.campaigns(
         limit,
         decode_cursor(cursor),
@@ -83,7 +87,7 @@ def list_campaigns(
     body = CampaignPage(items=items, next=encode_cursor(page.last)).model_dump_json().encode()
     tag = entity_tag(blake2b(body, digest_size=8).hexdigest())
     representation = Representation(body, tag, caching(tag))
-    remember(request, representation, mark)
+    keep(request, representation, revision)
     return representation.response(request)
 
 
@@ -91,7 +95,6 @@ def list_campaigns(
 def cancel_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> Response:
     """Stop a campaign and keep what it found; changes nothing once it has ended."""
     campaign = service.manager.cancel(campaign_id, caller.sees)
-    service.live.expire(campaign_id)
     return _accepted(campaign, service)
 
 
@@ -101,7 +104,39 @@ def delete_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -
     service.manager.delete(campaign_id, caller.sees)
 
 
-def _accepted(campaign: StoredCampaign, service: Service) -> Response:
-    headers = {"Location": f"/v1/campaigns/{campaign.id}"} | waiting(campaign, service.settings)
+@router.get("/{campaign_id}", response_model=Campaign, responses=UNKNOWN | LIVE)
+def get_campaign(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+    """State, progress and runs of a campaign."""
+    return _kept(campaign_id, request, service, caller, lambda found: campaign_body(found, service.settings))
+
+
+@router.get("/{campaign_id}/results", response_model=Results, responses=UNKNOWN | LIVE)
+def get_results(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+    """What a campaign has found; partial until it has ended."""
+    return _kept(campaign_id, request, service, caller, results)
+
+
+def _kept(
+    campaign_id: str, request: Request, service: Context, caller: Caller, body: Callable[[StoredCampaign], Body]
+) -> Response:
+    """An answer about one campaign, which the cache keeps."""
+    revision = service.store.revision(campaign_id, caller.sees)
+    campaign = service.store.campaign(campaign_id, caller.sees)
+    # The revision that was read, which may be newer. A body depends on it, on the version and on one setting.
+    tag = entity_tag(campaign.revision, __version__, str(service.settings.max_workers))
+    headers = caching(tag) | _retry_after(campaign, service)
+    representation = Representation(body(campaign).model_dump_json().encode(), tag, headers)
+    keep(request, representation, revision, campaign_id)
+    return representation.response(request)
+
+
+def _accepted(campaign: StoredCampaign, service: Context) -> Response:
+    headers = {"Location": f"/v1/campaigns/{campaign.id}"} | _retry_after(campaign, service)
     body = campaign_body(campaign, service.settings).model_dump_json()
     return Response(body, status_code=202, headers=headers, media_type="application/json")
+
+
+def _retry_after(campaign: StoredCampaign, service: Context) -> dict[str, str]:
+    """The header that says when to ask again; none once the campaign has ended."""
+    wait_s = retry_after_s(campaign, service.settings.max_workers)
+    return {} if wait_s is None else {"Retry-After": str(wait_s)}

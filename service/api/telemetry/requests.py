@@ -9,7 +9,7 @@ from prometheus_client import Histogram
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.access import CALLER, Caller
-from service.api.recall import RECALLED
+from service.api.answer_cache import FROM_CACHE
 
 logger = logging.getLogger("service.access")
 
@@ -67,8 +67,8 @@ def _request_id(scope: Scope) -> bytes:
 
 
 def _log(scope: Scope, status: int, seconds: float, request_id: str) -> None:
-    # The first of several equal answers to one caller is enough, or those who poll would fill the disk.
-    level = logging.DEBUG if RECALLED in scope else logging.INFO
+    # Clients that poll would fill the disk, so answers from the cache are not logged by default.
+    level = logging.DEBUG if FROM_CACHE in scope else logging.INFO
     if not logger.isEnabledFor(level):
         return
     ms = round(1e3 * seconds, 2)

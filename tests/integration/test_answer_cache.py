@@ -1,4 +1,4 @@
-"""Answers that are given again, on real servers: never to the wrong one, and never when something has happened."""
+"""The cache of answers on real servers: no answer is given to the wrong one, nor after something has happened."""
 
 import time
 
@@ -19,7 +19,7 @@ def listed(client, **query):
     return [item["id"] for item in client.get("/v1/campaigns", params=query).json()["items"]]
 
 
-def test_whatever_is_not_an_episode_shows_at_once(serve):
+def test_what_a_client_does_shows_at_once(serve):
     service = serve()
     seen = []
     for label in ("one", "two", "three"):
@@ -40,7 +40,7 @@ def test_whatever_is_not_an_episode_shows_at_once(serve):
     assert listed(service.client) == seen[1:]
 
 
-def test_episodes_show_within_a_moment(serve):
+def test_episodes_show_as_they_come(serve):
     service = serve()
     campaign = service.post(budget={"episodes": 80})
     counts, before = set(), 0
