@@ -144,7 +144,7 @@ def crash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], No
         count = f"echo crash >> {tmp_path}/crashes; [ $(wc -l < {tmp_path}/crashes) -gt {times} ] || kill -SEGV $$"
         python.write_text(f'#!/bin/sh\n{count}\nexec {sys.executable} "$@"\n')
         python.chmod(0o755)
-        monkeypatch.setattr(processes.sys, "executable", str(python))
+        monkeypatch.setattr(sys, "executable", str(python))
 
     return arrange
 
