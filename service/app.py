@@ -9,6 +9,8 @@ from fastapi import FastAPI
 from prometheus_client import Histogram
 
 from risk_sac import __version__
+from risk_sac.execution.executor import Executor
+from risk_sac.execution.executors import executor_named
 from service.api.answer_cache import AnswerCache
 from service.api.answers.problems import add_problem_handlers
 from service.api.context import Context
@@ -27,24 +29,24 @@ from service.settings import ServiceSettings
 from service.store.database import READERS, held
 from service.store.reading import Store
 from service.views.reports import Reports
-from service.workers.executor import Executor
-from service.workers.local import LocalExecutor
+from service.workers.messages import Event
+from service.workers.program import program
 
 
-def create_app(settings: ServiceSettings, executor: Executor | None = None) -> FastAPI:
+def create_app(settings: ServiceSettings, executor: Executor[Event] | None = None) -> FastAPI:
     """The service as an ASGI application; it touches neither disk nor processes until it is started.
 
     Args:
       settings: the environment's settings.
-      executor: where runs execute; by default processes of this machine.
+      executor: where runs execute; by default as the settings say.
     """
     latencies = request_latencies()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         to_thread.current_default_thread_limiter().total_tokens = READERS
-        local = executor or LocalExecutor(settings)
-        with opened(settings, local, latencies) as context:
+        chosen = executor or executor_named(settings.executor)(program(settings))
+        with opened(settings, chosen, latencies) as context:
             app.state.context = context
             yield
 
@@ -62,7 +64,7 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
 
 
 @contextmanager
-def opened(settings: ServiceSettings, executor: Executor, latencies: Histogram) -> Iterator[Context]:
+def opened(settings: ServiceSettings, executor: Executor[Event], latencies: Histogram) -> Iterator[Context]:
     """The data folder, held exclusively, with its database open and its queue at work.
 
     Raises:

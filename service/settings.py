@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from risk_sac.execution.executors import ExecutorName
+
 SECRETS = os.environ.get("RISK_SAC_SECRETS_DIR")
 
 
@@ -33,6 +35,8 @@ class ServiceSettings(BaseSettings):
     log_format: Literal["text", "json"] = "text"
     """How the log is written; `json` has one object per line with campaign and run ids as fields."""
 
+    executor: ExecutorName = "local"
+    """Where runs are executed; `local`: in processes of this machine."""
     max_workers: Annotated[int, Field(ge=1, le=1024)] = Field(default_factory=_cores)
     """Runs executed at the same time, each in a process of its own; by default one per core."""
     worker_module: str = "service.worker"

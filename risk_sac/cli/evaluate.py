@@ -37,7 +37,8 @@ def _evaluate(options: argparse.Namespace) -> int:
 
     with progress_bar() as bar:
         jobs = options.jobs if options.jobs is not None else os.cpu_count() or 1
-        evaluation = evaluate(spec, options.out, options.typed, jobs, partial(_drawn, Board(bar)))
+        executor = os.environ.get("RISK_SAC_EXECUTOR", "local")
+        evaluation = evaluate(spec, options.out, options.typed, jobs, partial(_drawn, Board(bar)), executor)
     for job in evaluation.failed:
         complain(f"{job.name}: {job.reason}")
     comparison = evaluation.comparison

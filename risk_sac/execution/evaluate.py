@@ -15,7 +15,8 @@ from pathlib import Path
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import campaign_yaml, read_campaign
 from risk_sac.errors import ConfigError
-from risk_sac.execution.processes import Executor, Job, Progress
+from risk_sac.execution.executors import executor_named
+from risk_sac.execution.processes import Job, Progress, Queue, program
 from risk_sac.execution.stopping import STOPPING, stop_signal
 from risk_sac.problem import Problem
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
@@ -32,7 +33,9 @@ class Evaluation:
     stopped: bool  # by a signal
 
 
-def evaluate(spec: CampaignSpec, folder: Path, command: str, jobs: int, progress: Progress) -> Evaluation:
+def evaluate(
+    spec: CampaignSpec, folder: Path, command: str, jobs: int, progress: Progress, executor: str = "local"
+) -> Evaluation:
     """Executes what is not finished yet and writes the report of what is.
 
     SIGINT, SIGTERM or SIGHUP stop it: the runs save a checkpoint, and the same call goes on with them.
@@ -43,20 +46,22 @@ def evaluate(spec: CampaignSpec, folder: Path, command: str, jobs: int, progress
       command: what the user typed, for the report.
       jobs: processes at a time.
       progress: told how the runs go.
+      executor: where they execute, by its name in `risk_sac.execution.executors`.
 
     Raises:
-      ConfigError: a family's settings pose no problem that can be run, or the folder holds another campaign or
-        is in use.
+      ConfigError: a family's settings pose no problem that can be run, there is no such executor, or the folder
+        holds another campaign or is in use.
       OSError: the folder cannot be written.
     """
     if jobs < 1:
         raise ConfigError(f"got {jobs}; wanted at least one process", field="jobs")
     for run in {run.family: run for run in spec.runs()}.values():
         Problem.from_spec(run)  # before the folder is claimed
+    make_executor = executor_named(executor)
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
     with _claimed(spec, folder) as lock, stop_signal((*STOPPING, *hung_up)) as stopping:
         queue = [Job(spec=run, folder=folder / RUNS / run.id) for run in spec.runs()]
-        Executor(folder / SPEC, queue, lock, progress).execute(jobs, stopping)
+        Queue(queue, make_executor(program(folder / SPEC, lock)), progress).execute(jobs, stopping)
         comparison = _report(spec, folder, command, queue)
         return Evaluation(
             comparison=comparison,

@@ -1,18 +1,17 @@
-"""Runs in processes of their own, so many at a time: one that crashes takes no other down."""
+"""The runs of a campaign, so many at a time: one that crashes is tried again and takes no other down."""
 
-import os
-import signal
-import subprocess
-import sys
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Never
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
+from risk_sac.execution.executor import Executor, Exited, Program
+from risk_sac.execution.postmortem import signal_name
 from risk_sac.run_folder.crashes import PATIENCE
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
 
@@ -20,6 +19,7 @@ LOG = "run.log"  # in a run's folder: what its process printed
 ATTEMPTS = PATIENCE + 1  # the last one without the episode that crashed the others
 MISUSED = 2  # the exit status of a run that can never succeed
 POLL_S = 0.1
+GONE_S = 5.0  # until a killed process is gone, or the signal that killed us has cost us the news of it
 
 State = Literal["waiting", "running", "finished", "failed", "stopped"]
 
@@ -76,19 +76,33 @@ Progress = Callable[[Sequence[Job]], None]
 """Told about all jobs a few times a second."""
 
 
-class Executor:
-    """Keeps some processes at work until every run has finished or failed."""
+def program(spec_file: Path, lock: int) -> Program[Never]:
+    """A run as its user would start it: it speaks through its folder and its exit status alone.
 
-    def __init__(self, spec_file: Path, jobs: Sequence[Job], lock: int, progress: Progress) -> None:
-        self._spec_file = spec_file
+    Args:
+      spec_file: the campaign.
+      lock: on the campaign's folder; held as long as one of its runs is there.
+    """
+
+    def arguments(spec: RunSpec, folder: Path) -> Sequence[str]:
+        picked = ["--family", spec.family, "--method", spec.method, "--seed", str(spec.seed)]
+        return ["-m", "risk_sac", "run", "--spec", str(spec_file), *picked, "--out", str(folder)]
+
+    return Program(arguments=arguments, log=LOG, hear=None, inherited=(lock,))
+
+
+class Queue:
+    """Keeps so many runs at work until every one of them has finished or failed."""
+
+    def __init__(self, jobs: Sequence[Job], executor: Executor[Never], progress: Progress) -> None:
         self._jobs = jobs
-        self._lock = lock
+        self._executor = executor
         self._progress = progress
-        self._running: list[tuple[Job, subprocess.Popen[bytes]]] = []
+        self._running: dict[int, Job] = {}  # by its place among the jobs
 
     def execute(self, processes: int, stopping: Callable[[], bool]) -> None:
         """Returns once nothing runs any more; no process outlives it."""
-        waiting = deque(job for job in self._jobs if not self._settled(job))
+        waiting = deque(number for number, job in enumerate(self._jobs) if not self._settled(job))
         told_to_stop = False
         try:
             while self._running or (waiting and not stopping()):
@@ -96,15 +110,18 @@ class Executor:
                     self._begin(waiting.popleft())
                 if stopping() and not told_to_stop:
                     told_to_stop = True
-                    for _, process in self._running:
-                        process.terminate()
+                    self._cancel(math.inf)
                 waiting.extendleft(self._ended(stopping()))
                 self._progress(self._jobs)
-                time.sleep(POLL_S)
         finally:
-            for _, process in self._running:
-                process.kill()
-                process.wait()
+            self._cancel(0)
+            deadline = time.monotonic() + GONE_S
+            while self._running and time.monotonic() < deadline:
+                self._ended(True)
+
+    def _cancel(self, grace_s: float) -> None:
+        for number in self._running:
+            self._executor.cancel(number, grace_s)
 
     def _settled(self, job: Job) -> bool:
         """Whether there is nothing to do for a job, or nothing that could be done."""
@@ -115,56 +132,47 @@ class Executor:
             job.state, job.reason = "failed", str(error)
         return job.state != "waiting"
 
-    def _begin(self, job: Job) -> None:
+    def _begin(self, number: int) -> None:
+        job = self._jobs[number]
         try:
-            self._start(job)
+            self._executor.submit(number, job.attempts + 1, job.spec, job.folder)
         except OSError as error:  # of this run's folder; the others may have better luck
             job.state, job.reason = "failed", str(error)
-
-    def _start(self, job: Job) -> None:
-        job.folder.mkdir(parents=True, exist_ok=True)
-        picked = ["--family", job.spec.family, "--method", job.spec.method, "--seed", str(job.spec.seed)]
-        command = [sys.executable, "-m", "risk_sac", "run", "--spec", str(self._spec_file), *picked]
-        with (job.folder / LOG).open("ab") as log:
-            process = subprocess.Popen(
-                [*command, "--out", str(job.folder)],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                env=os.environ | {"OMP_NUM_THREADS": "1"},  # runs are what is parallel
-                pass_fds=(self._lock,),
-                start_new_session=True,  # Ctrl-C is for us; the runs hear of it once, from us
-            )
+            return
         job.state, job.attempts = "running", job.attempts + 1
-        self._running.append((job, process))
+        self._running[number] = job
 
-    def _ended(self, stopping: bool) -> list[Job]:
-        """Settles the jobs whose process has ended; those worth another attempt."""
+    def _ended(self, stopping: bool) -> list[int]:
+        """Settles the jobs whose worker has gone, waiting a moment for one; those worth another attempt."""
         again = []
-        for job, process in list(self._running):
-            status = process.poll()
-            if status is None:
-                continue
-            self._running.remove((job, process))
-            if self._settled_after(job, status):
+        for number, exited in self._executor.events(POLL_S):
+            job = self._running.pop(number)
+            if self._settled_after(job, exited):
                 continue
             if stopping:
                 job.state, job.reason = "stopped", f"stopped after {job.done()} of {job.total} episodes"
-            elif status == MISUSED or job.attempts == ATTEMPTS:
-                job.state, job.reason = "failed", _why(job, status)
+            elif exited.status == MISUSED or job.attempts == ATTEMPTS:
+                job.state, job.reason = "failed", _why(job, exited)
             else:
                 job.state = "waiting"
-                again.append(job)
+                again.append(number)
         return again
 
-    def _settled_after(self, job: Job, status: int) -> bool:
+    def _settled_after(self, job: Job, exited: Exited) -> bool:
         job.state = "waiting"
-        return status == 0 and self._settled(job)
+        return exited.status == 0 and self._settled(job)
 
 
-def _why(job: Job, status: int) -> str:
+def _why(job: Job, exited: Exited) -> str:
     """The last thing that a failed process said."""
     lines = (job.folder / LOG).read_text(encoding="utf-8", errors="replace").splitlines()
     said = next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
-    how = f"killed by {signal.Signals(-status).name}" if status < 0 else f"ended with status {status}"
-    return f"{how} after {job.done()} of {job.total} episodes: {said} (see {job.folder / LOG})"
+    return f"{_how(exited)} after {job.done()} of {job.total} episodes: {said} (see {job.folder / LOG})"
+
+
+def _how(exited: Exited) -> str:
+    if exited.status is None:
+        return exited.reason or "ended"
+    if exited.status < 0:
+        return f"killed by {signal_name(-exited.status)}"
+    return f"ended with status {exited.status}"

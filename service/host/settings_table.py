@@ -35,6 +35,8 @@ def with_table(text: str) -> str:
 def _takes(field: dict[str, Any]) -> str:
     if "anyOf" in field:  # one of them is null, which is what no variable means
         return next(_takes(each) for each in field["anyOf"] if each["type"] != "null")
+    if "const" in field:
+        return f"`{field['const']}`"
     if "enum" in field:
         return " or ".join(f"`{each}`" for each in field["enum"])
     bounds = ", ".join(f"{sign} {field[name]:g}" for name, sign in BOUNDS.items() if name in field)

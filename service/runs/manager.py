@@ -6,6 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from risk_sac.config import CampaignSpec
+from risk_sac.execution.executor import Cause, Executor, Exited
 from risk_sac.problem import check_campaign
 from service.errors import ConflictError, StorageError
 from service.runs.disposal import dispose, settle
@@ -17,7 +18,6 @@ from service.store.reading import Store
 from service.store.records import StoredCampaign, StoredRun
 from service.store.states import State
 from service.store.writing import Ledger
-from service.workers.executor import Executor, Exited
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
 
 logger = logging.getLogger(__name__)
@@ -51,7 +51,7 @@ class Manager:
       restarts: workers that were lost and replaced, by cause.
     """
 
-    def __init__(self, settings: ServiceSettings, store: Store, executor: Executor) -> None:
+    def __init__(self, settings: ServiceSettings, store: Store, executor: Executor[Event]) -> None:
         self._settings = settings
         self._store = store
         self._ledger = Ledger(store)
@@ -214,6 +214,8 @@ class Manager:
             self._ledger.end_run(number, State.CANCELLED)
         elif self._stopping:
             self._ledger.requeue_run(number)
+        elif isinstance(last, Finished):
+            self._replace(active, Exited("worker was told to stop by somebody else", Cause.KILLED))
         else:
             self._replace(active, exited)
         if active.last is not None or active.cancelled:
@@ -252,7 +254,7 @@ class Manager:
         self._ledger.start_run(run.number)
         self._active[run.number] = active = _Active(run, campaign.project)
         try:
-            self._executor.submit(run.number, campaign.run_spec(run), folder)
+            self._executor.submit(run.number, run.attempts + 1, campaign.run_spec(run), folder)
         except OSError as error:
             del self._active[run.number]
             self._pause(refused("starting a run", folder, error), active)

@@ -1,1 +1,1 @@
-"""Where runs execute: the seam, processes of this machine, and what they say."""
+"""The worker of a run: how it is started, what it says, how it takes a run's folder over."""

@@ -144,7 +144,7 @@ def crash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], No
         count = f"echo crash >> {tmp_path}/crashes; [ $(wc -l < {tmp_path}/crashes) -gt {times} ] || kill -SEGV $$"
         python.write_text(f'#!/bin/sh\n{count}\nexec {sys.executable} "$@"\n')
         python.chmod(0o755)
-        monkeypatch.setattr(processes.sys, "executable", str(python))
+        monkeypatch.setattr(sys, "executable", str(python))
 
     return arrange
 
@@ -217,4 +217,13 @@ def test_wrong_settings_are_one_line_and_leave_no_folder(
     printed = capsys.readouterr().err
     assert printed.startswith(complaint)
     assert printed.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_executor_that_does_not_exist_is_one_line_and_leaves_no_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("RISK_SAC_EXECUTOR", "cloud")
+    assert cli.main(["evaluate", *ONE, str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err == "RISK_SAC_EXECUTOR: got 'cloud'; wanted one of local\n"
     assert not (tmp_path / "out").exists()

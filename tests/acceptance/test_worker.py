@@ -11,10 +11,11 @@ import psutil
 import pytest
 
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunSpec
+from risk_sac.execution.executor import Cause, Exited
+from risk_sac.execution.local import LocalExecutor
 from service.settings import ServiceSettings
-from service.workers.executor import Cause, Exited
-from service.workers.local import LocalExecutor
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
+from service.workers.program import program
 
 EPISODES = 20
 SPEC = RunSpec(
@@ -35,7 +36,12 @@ class Launcher:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.executor = LocalExecutor(ServiceSettings())
+        self.executor = LocalExecutor(program(ServiceSettings()))
+        self.attempts = 0
+
+    def submit(self) -> None:
+        self.attempts += 1
+        self.executor.submit(1, self.attempts, SPEC, self.folder)
 
     def work(self, until: int | None = None, then: Do | None = None) -> tuple[list[Event], Exited, float]:
         """What one worker says, why it is gone, and how long that took after something was done to it.
@@ -46,7 +52,7 @@ class Launcher:
         """
         said: list[Event] = []
         done_at = deadline = time.monotonic() + LONG_S
-        self.executor.submit(1, SPEC, self.folder)
+        self.submit()
         while time.monotonic() < deadline:
             for _, message in self.executor.events(0.01):
                 if isinstance(message, Exited):
@@ -74,7 +80,7 @@ def launcher(tmp_path: Path) -> Launcher:
 def digest(launcher: Launcher) -> str:
     """What the run comes to if it is left alone from here on."""
     said, exited, _ = launcher.work()
-    assert exited == Exited(None, Cause.ENDED), exited
+    assert exited == Exited(None, Cause.ENDED, 0), exited
     assert isinstance(said[-1], Finished)
     assert said[-1].finished
     assert [word.record.index for word in said if isinstance(word, EpisodeDone)] == list(range(EPISODES + 2))
@@ -83,7 +89,7 @@ def digest(launcher: Launcher) -> str:
 
 def test_a_worker_told_to_stop_leaves_a_checkpoint_and_goes_on_from_there(launcher: Launcher, undisturbed: str) -> None:
     said, exited, left_after_s = launcher.work(7, lambda _: launcher.executor.cancel(1, 30))
-    assert exited == Exited(None, Cause.ENDED)
+    assert exited == Exited(None, Cause.ENDED, 0)
     assert isinstance(said[-1], Finished)
     assert not said[-1].finished
     done = [word.record.index for word in said if isinstance(word, EpisodeDone)]
@@ -97,7 +103,7 @@ def test_a_worker_told_to_stop_leaves_a_checkpoint_and_goes_on_from_there(launch
 
 @pytest.mark.parametrize("moment_s", [0.2, 1.5, 4.0])
 def test_a_worker_with_nothing_to_keep_leaves_at_once(launcher: Launcher, moment_s: float) -> None:
-    launcher.executor.submit(1, SPEC, launcher.folder)
+    launcher.submit()
     time.sleep(moment_s)  # into the start of Python, an import, or the first episode's compilation
     launcher.executor.cancel(1, 30)
     told_at = time.monotonic()

@@ -10,9 +10,9 @@ from pathlib import Path
 import uvicorn
 
 from risk_sac.config import RunSpec
+from risk_sac.execution.executor import Exited
 from service.app import create_app
 from service.settings import ServiceSettings
-from service.workers.executor import Exited
 from service.workers.messages import Event
 
 
@@ -23,7 +23,7 @@ class IdleExecutor:
         self._cancelled: list[int] = []
         self._wake = threading.Event()
 
-    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
+    def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
         pass
 
     def cancel(self, number: int, grace_s: float) -> None:

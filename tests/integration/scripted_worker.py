@@ -15,9 +15,10 @@ from risk_sac.config import RunSpec
 from risk_sac.types import EpisodeRecord, Outcome, RunMetrics
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, encode
 
-WELL_BEHAVED, DIES, HANGS, BABBLES, DISK_FULL, EXITS, SEGFAULTS, FREEZES = 0, 9, 15, 7, 28, 3, 11, 19
+WELL_BEHAVED, DIES, HANGS, BABBLES, DISK_FULL, EXITS, SEGFAULTS, FREEZES, WAITS = 0, 9, 15, 7, 28, 3, 11, 19, 41
 ONCE = 100  # added to one of them: the run's second worker behaves well
 EPISODE_S = 0.05
+WAITS_AT = (10, 41)  # episodes that one that waits begins only once the test has put a file into its folder
 BEAT_S = 1.0
 
 
@@ -35,6 +36,8 @@ def main() -> None:
     for index in range(done, spec.budget.episodes):
         if stopping.is_set() and spec.seed != HANGS:
             break
+        if spec.seed == WAITS and index in WAITS_AT:
+            wait_for(folder / f"go-{index}", stopping)
         if index == 2:
             misbehave(fault(spec.seed, folder))
         time.sleep(EPISODE_S)
@@ -51,6 +54,11 @@ def keep(checkpoint: Path, done: int) -> None:
     new = checkpoint.with_suffix(".new")
     new.write_text(str(done))
     new.replace(checkpoint)
+
+
+def wait_for(file: Path, stopping: threading.Event) -> None:
+    while not file.exists() and not stopping.wait(0.02):
+        pass
 
 
 def leave_with_server() -> None:

@@ -62,13 +62,15 @@ def test_a_run_whose_workers_break_in_a_row_fails_and_nothing_else(serve, script
     assert service.wait(service.post(budget={"episodes": 1}))["state"] == "succeeded"
 
 
-def test_a_lost_worker_is_replaced_and_no_episode_is_lost_or_told_twice(serve):
+def test_a_lost_worker_is_replaced_and_no_episode_is_lost_or_told_twice(serve, scripted):
     service = serve()
-    campaign_id = service.post(seeds=[0], budget={"episodes": 80})
-    for count in (9, 40):
-        service.wait_for(campaign_id, lambda seen, count=count: seen["progress"]["episodes_done"] > count)
+    campaign_id = service.post(seeds=[scripted.WAITS], budget={"episodes": 80})
+    folder = service.data_dir / "campaigns" / campaign_id / f"low-random-{scripted.WAITS}"
+    for count in scripted.WAITS_AT:  # it waits there: a server that is slow to write would find a worker that is done
+        service.wait_for(campaign_id, lambda seen, count=count: seen["progress"]["episodes_done"] == count)
         (worker,) = service.workers()
         os.kill(worker, signal.SIGKILL)
+        (folder / f"go-{count}").touch()
     campaign = service.wait(campaign_id)
     (run,) = campaign["runs"]
     assert (run["state"], run["attempts"], run["episodes_done"]) == ("succeeded", 3, 80)

@@ -3,12 +3,13 @@ from prometheus_client import generate_latest
 from prometheus_client.parser import text_string_to_metric_families
 
 from risk_sac.config import CampaignSpec
+from risk_sac.execution.local import LocalExecutor
 from risk_sac.types import Outcome
 from service.api.telemetry.metrics import registry, request_latencies
 from service.runs.manager import Manager
 from service.settings import ServiceSettings
 from service.store.states import State
-from service.workers.local import LocalExecutor
+from service.workers.program import program
 
 SPEC = CampaignSpec(families=("low",), methods=("random", "sac"), seeds=(0, 1))
 
@@ -16,7 +17,7 @@ SPEC = CampaignSpec(families=("low",), methods=("random", "sac"), seeds=(0, 1))
 @pytest.fixture
 def manager(store, tmp_path):
     settings = ServiceSettings(data_dir=tmp_path)
-    return Manager(settings, store, LocalExecutor(settings))
+    return Manager(settings, store, LocalExecutor(program(settings)))
 
 
 @pytest.fixture

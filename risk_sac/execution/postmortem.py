@@ -2,11 +2,10 @@
 
 import os
 import signal
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from service.workers.executor import Cause, Exited
-from service.workers.messages import Failed, Finished
+from risk_sac.execution.executor import Cause, Exited
 
 TAIL_BYTES = 2000  # of a log, at most
 TAIL_LINES = 5
@@ -34,31 +33,32 @@ class WorkerLog:
         return " | ".join(line.strip() for line in lines[-TAIL_LINES:] if line.strip()) or "it left no message"
 
 
-def exited(
-    status: int, log: WorkerLog, *, last: Finished | Failed | None, given_up: Exited | None, told_to_stop: bool
-) -> Exited:
+def exited(status: int, log: WorkerLog, *, done: bool, given_up: Exited | None) -> Exited:
     """What became of a worker.
 
     Args:
       status: of its process, negative for a signal.
       log: what it printed.
-      last: its last word, if it had one.
+      done: whether it had said its last word, or was told to stop.
       given_up: what its executor killed it for, if it did.
-      told_to_stop: whether its executor asked it to stop.
     """
     reason = _reason(status, log)
-    if told_to_stop or isinstance(last, Failed) or (last is not None and last.finished):
-        return Exited(reason, Cause.ENDED)
-    if last is not None:
-        return Exited("worker was told to stop by somebody else", Cause.KILLED)
+    if done:
+        return Exited(reason, Cause.ENDED, status)
     if given_up is not None:
-        return given_up
-    return Exited(reason or "worker left without a word", Cause.KILLED if -status in _OUTSIDE else Cause.CRASHED)
+        return replace(given_up, status=status)
+    cause = Cause.KILLED if -status in _OUTSIDE else Cause.CRASHED
+    return Exited(reason or "worker left without a word", cause, status)
+
+
+def signal_name(number: int) -> str:
+    """As a user knows it."""
+    return _SIGNAL_NAMES.get(number, f"signal {number}")
 
 
 def _reason(status: int, log: WorkerLog) -> str | None:
     if status < 0:
-        return f"worker was killed by {_SIGNAL_NAMES.get(-status, f'signal {-status}')}"
+        return f"worker was killed by {signal_name(-status)}"
     if status > 0:
         return f"worker exited with status {status}: {log.tail()}"
     return None

@@ -1,0 +1,92 @@
+"""Where runs execute: the seam between who wants them, the command line or the service, and whatever has processors."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Generic, Protocol, TypeVar
+
+from risk_sac.config import RunSpec
+
+Word = TypeVar("Word")  # what a worker may say
+
+
+class Cause(StrEnum):
+    """Why a worker is gone."""
+
+    ENDED = "ended"  # it said its last word, or was told to stop
+    KILLED = "killed"  # by somebody else: the kernel for want of memory, an operator
+    STOPPED = "stopped"  # it gave no sign of life or finished nothing, and was killed for that
+    CRASHED = "crashed"  # by itself, without a last word
+
+
+@dataclass(frozen=True, slots=True)
+class Exited:
+    """The last message about an attempt: its worker is gone. `reason` says why, unless it ended in order."""
+
+    reason: str | None
+    cause: Cause = Cause.ENDED
+    status: int | None = None  # of its process, negative for a signal; None where there was none
+
+
+@dataclass(frozen=True, slots=True)
+class Heard(Generic[Word]):
+    """What a line of a worker's output comes to."""
+
+    word: Word | None  # to be passed on; None for a mere sign of life
+    progress: bool = False  # it has finished an episode
+    last: bool = False  # it has no more to say, and is to leave
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Program(Generic[Word]):
+    """How a worker is started, what it says, and what patience it is met with."""
+
+    arguments: Callable[[RunSpec, Path], Sequence[str]]
+    """For the Python interpreter, given a run and its folder."""
+    log: str
+    """File in the run's folder for what it prints, but for its words."""
+    hear: Callable[[bytes], Heard[Word]] | None
+    """Reads a line of its standard output; a ValueError says that it is none of a worker's. Such a worker gets its run
+    as a line of JSON on its standard input, whose end tells it that nobody listens any more. None: it gets no input,
+    says nothing, and writes all that it prints to its log."""
+    inherited: tuple[int, ...] = ()
+    """Open files that a worker on this machine keeps open, as a lock is."""
+    lease_s: float = math.inf
+    """It is killed once it neither says anything nor uses its processor for so long, s."""
+    stall_s: float = math.inf
+    """It is killed once it finishes no episode for so long, s."""
+    linger_s: float = math.inf
+    """It is killed once it is still there so long after its last word, s."""
+
+
+class Executor(Protocol[Word]):
+    """Executes attempts at runs elsewhere and tells what becomes of them; any thread may call it.
+
+    A run is known by a number. Each attempt at it has a higher number than the one before, and only the latest is
+    heard: what an older one still says, its end too, is dropped.
+    """
+
+    def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
+        """Start an attempt at a run, whose files go to `folder`; an older attempt that is still there is killed.
+
+        Raises:
+          OSError: it cannot be started.
+          ValueError: the run has had this attempt or a later one.
+        """
+
+    def events(self, timeout_s: float) -> list[tuple[int, Word | Exited]]:
+        """What happened since the last call, by run, waiting up to `timeout_s` for something.
+
+        The last message of every attempt that was not overtaken by another is `Exited`.
+        """
+
+    def cancel(self, number: int, grace_s: float) -> None:
+        """Ask a run to stop, and make it stop if it has not after `grace_s`; unknown runs are ignored.
+
+        Of several calls the one with the earliest end counts.
+        """
+
+    def wake(self) -> None:
+        """Let a waiting `events` return early."""

@@ -1,0 +1,24 @@
+"""Which executors there are; `RISK_SAC_EXECUTOR` chooses one, for the service and for `risk-sac evaluate` alike."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Literal
+
+from risk_sac.errors import ConfigError
+from risk_sac.execution.executor import Executor, Program
+from risk_sac.execution.local import LocalExecutor
+
+ExecutorName = Literal["local"]
+MakeExecutor = Callable[[Program[Any]], Executor[Any]]
+EXECUTORS: Mapping[ExecutorName, MakeExecutor] = {"local": LocalExecutor}
+
+
+def executor_named(name: str) -> MakeExecutor:
+    """What makes the executor of this name for one kind of worker.
+
+    Raises:
+      ConfigError: there is none of this name.
+    """
+    for known, make in EXECUTORS.items():
+        if known == name:
+            return make
+    raise ConfigError(f"got {name!r}; wanted one of {', '.join(EXECUTORS)}", field="RISK_SAC_EXECUTOR")

@@ -1,0 +1,148 @@
+"""Runs as processes of this machine."""
+
+import logging
+import math
+import threading
+import time
+from pathlib import Path
+from typing import Generic
+
+from risk_sac.config import RunSpec
+from risk_sac.execution.executor import Cause, Exited, Program, Word
+from risk_sac.execution.lease import Lease, Signs
+from risk_sac.execution.mailbox import Mailbox
+from risk_sac.execution.postmortem import exited
+from risk_sac.execution.subprocesses import Subprocess
+
+logger = logging.getLogger(__name__)
+
+LOOK_S = 0.2  # between two looks at a worker
+HELD_UP_S = 1.0  # longer between them, and it was this process that was held up
+SHOWN = 80  # characters shown of a line that is none
+
+
+class LocalExecutor(Generic[Word]):
+    """One subprocess per attempt, and one thread that listens to it, so that one that dies is noticed at once.
+
+    The thread also looks after it five times a second, for workers that do not die but overstay or fall silent.
+    """
+
+    def __init__(self, program: Program[Word]) -> None:
+        self._program = program
+        self._mailbox: Mailbox[Word] = Mailbox()
+        self._workers: dict[int, _Worker[Word]] = {}
+        self._lock = threading.Lock()
+
+    def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
+        """See `Executor.submit`."""
+        self._mailbox.admit(number, attempt)
+        with self._lock:
+            overtaken = self._workers.pop(number, None)
+        if overtaken is not None:
+            overtaken.process.kill()
+        try:
+            worker = _Worker(self._program, Subprocess(self._program, spec, folder))
+        except OSError:
+            self._mailbox.dismiss(number)
+            raise
+        with self._lock:
+            self._workers[number] = worker
+        threading.Thread(target=self._follow, args=(number, attempt, worker), name=f"run-{number}", daemon=True).start()
+
+    def events(self, timeout_s: float) -> list[tuple[int, Word | Exited]]:
+        """See `Executor.events`."""
+        return self._mailbox.take(timeout_s)
+
+    def wake(self) -> None:
+        """See `Executor.wake`."""
+        self._mailbox.wake()
+
+    def cancel(self, number: int, grace_s: float) -> None:
+        """SIGTERM now; SIGKILL once the grace time is over."""
+        with self._lock:
+            worker = self._workers.get(number)
+            if worker is not None:
+                worker.stop(grace_s)
+
+    def _follow(self, number: int, attempt: int, worker: "_Worker[Word]") -> None:
+        while (status := worker.process.status) is None:
+            self._pass_on(number, attempt, worker.words(LOOK_S))
+            worker.look(time.monotonic())
+        # What it said before it ended is there; its children may hold its output open for ever.
+        self._pass_on(number, attempt, worker.words(0))
+        worker.process.close()
+        with self._lock:
+            if self._workers.get(number) is worker:
+                del self._workers[number]
+        self._mailbox.put(number, attempt, worker.exited(status))
+
+    def _pass_on(self, number: int, attempt: int, words: list[Word]) -> None:
+        for word in words:
+            self._mailbox.put(number, attempt, word)
+
+
+class _Worker(Generic[Word]):
+    """An attempt and its executor's patience with it; but for `stop` and `kill` it belongs to one thread."""
+
+    def __init__(self, program: Program[Word], process: Subprocess) -> None:
+        self.process = process
+        self._program = program
+        self._lease = Lease(program.lease_s, program.stall_s)
+        self._lines = self._episodes = 0  # heard so far
+        self._last = self._told_to_stop = False
+        self._stop_by = self._leave_by = math.inf  # monotonic times: since it was told to; since it is not heard
+        self._given_up: Exited | None = None
+        self._looked_at = time.monotonic()
+
+    def stop(self, grace_s: float) -> None:
+        """SIGTERM the first time; SIGKILL once the shortest grace time is over."""
+        self._stop_by = min(self._stop_by, time.monotonic() + grace_s)
+        if not self._told_to_stop:
+            self._told_to_stop = True
+            self.process.terminate()
+
+    def words(self, timeout_s: float) -> list[Word]:
+        """What it says up to its last word, waiting up to `timeout_s` for something."""
+        words = []
+        for line in self.process.lines(timeout_s):
+            assert self._program.hear is not None
+            try:
+                heard = self._program.hear(line)
+            except ValueError as error:
+                logger.warning("process %d said nothing known: %s", self.process.pid, error)
+                self._give_up(f"worker wrote {line[:SHOWN]!r} where an event was wanted", Cause.CRASHED)
+                break
+            self._lines += 1
+            self._episodes += heard.progress
+            if heard.word is not None:
+                words.append(heard.word)
+            if heard.last:
+                self._last = True
+                self.process.stop_listening()
+                break
+        if not self.process.listening and self._leave_by == math.inf:
+            self._leave_by = time.monotonic() + self._program.linger_s
+        return words
+
+    def look(self, now: float) -> None:
+        """Kill it if it overstays or has fallen silent."""
+        if now >= min(self._stop_by, self._leave_by):
+            self.process.kill()
+        elif now >= self._looked_at + LOOK_S and self._leave_by == math.inf and self._given_up is None:
+            watched_s = min(now - self._looked_at, HELD_UP_S)
+            self._looked_at = now
+            lost = self._lease.passed(watched_s, Signs(self._lines, self._episodes, self.process.processor_s()))
+            if lost is not None:
+                logger.warning("process %d: %s", self.process.pid, lost)
+                self._give_up(lost, Cause.STOPPED)
+
+    def _give_up(self, reason: str, cause: Cause) -> None:
+        self._given_up = Exited(reason, cause)
+        self.process.stop_listening()
+        self.process.kill()
+
+    def exited(self, status: int) -> Exited:
+        """What became of it."""
+        silent = self._program.hear is None
+        done = self._last or self._told_to_stop or (silent and status == 0)
+        return exited(status, self.process.log, done=done, given_up=self._given_up)

@@ -1,0 +1,138 @@
+"""A worker as a subprocess of this one: started, listened to, stopped."""
+
+import contextlib
+import logging
+import os
+import select
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from risk_sac.config import RunSpec
+from risk_sac.execution.executor import Program
+from risk_sac.execution.postmortem import WorkerLog
+
+logger = logging.getLogger(__name__)
+
+# One thread per worker: the workers share the cores, and results must not depend on a thread count.
+THREADS = dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+LONGEST_LINE = 1 << 20
+
+
+class Subprocess:
+    """One attempt at a run.
+
+    Attributes:
+      log: what it prints, but for its words.
+    """
+
+    def __init__(self, program: Program[Any], spec: RunSpec, folder: Path) -> None:
+        """Starts it.
+
+        Raises:
+          OSError: its folder or its log cannot be written, or there is no room for one more process.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        path, talks = folder / program.log, program.hear is not None
+        with path.open("ab") as log:
+            self.log = WorkerLog(path, log.tell())
+            self._process = subprocess.Popen(
+                [sys.executable, *program.arguments(spec, folder)],
+                stdin=subprocess.PIPE if talks else subprocess.DEVNULL,
+                stdout=subprocess.PIPE if talks else log,
+                stderr=log,
+                env=os.environ | THREADS,
+                pass_fds=program.inherited,
+                bufsize=0,
+                start_new_session=True,  # Ctrl-C is for whoever started us; the worker hears of it from us
+            )
+        self._usage = psutil.Process(self._process.pid)
+        self._listening = talks
+        self._untold = spec.model_dump_json().encode() + b"\n" if talks else b""
+        self._unread = b""
+        if self._process.stdin is not None:
+            os.set_blocking(self._process.stdin.fileno(), False)  # a worker may be stopped before it reads
+
+    @property
+    def pid(self) -> int:
+        """Its number."""
+        return self._process.pid
+
+    @property
+    def status(self) -> int | None:
+        """Of its exit, negative for a signal; None as long as it is there."""
+        return self._process.poll()
+
+    @property
+    def listening(self) -> bool:
+        """Whether it can still be heard."""
+        return self._listening
+
+    def lines(self, timeout_s: float) -> list[bytes]:
+        """What it has said, waiting up to `timeout_s` for something, or for its end if it cannot be heard.
+
+        A line longer than `LONGEST_LINE` comes in pieces, and what its end cuts off is no line.
+        """
+        if not self._listening:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(timeout_s)
+            return []
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        poll = select.poll()  # select.select() knows no descriptor beyond 1023
+        poll.register(self._process.stdout, select.POLLIN)
+        if self._untold:
+            poll.register(self._process.stdin, select.POLLOUT)
+        ready = {descriptor for descriptor, _ in poll.poll(timeout_s * 1000)}
+        if self._process.stdin.fileno() in ready:
+            self._tell(self._process.stdin.fileno())
+        return self._read(self._process.stdout.fileno()) if self._process.stdout.fileno() in ready else []
+
+    def _tell(self, descriptor: int) -> None:
+        """Hands it some more of its run."""
+        try:
+            self._untold = self._untold[os.write(descriptor, self._untold) :]
+        except BrokenPipeError:
+            logger.warning("worker %d ended before it read its run", self.pid)  # its exit status says why
+            self._untold = b""
+
+    def _read(self, descriptor: int) -> list[bytes]:
+        new = os.read(descriptor, LONGEST_LINE)  # more than a pipe holds, so all there is
+        self._listening = bool(new)
+        *lines, self._unread = (self._unread + new).split(b"\n")
+        if len(self._unread) >= LONGEST_LINE:
+            lines.append(self._unread)
+            self._unread = b""
+        return [line + b"\n" for line in lines]
+
+    def stop_listening(self) -> None:
+        """What else it says is of no interest."""
+        self._listening = False
+
+    def processor_s(self) -> float | None:
+        """Time that its processor was used, s; None if that is unknown."""
+        try:
+            times = self._usage.cpu_times()
+        except psutil.Error:  # it is just ending
+            return None
+        return float(times.user + times.system)
+
+    def terminate(self) -> None:
+        """SIGTERM."""
+        self._process.terminate()
+
+    def kill(self) -> None:
+        """SIGKILL, which ends a stopped process too, and all that it started."""
+        if self.status is None:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self.pid, signal.SIGKILL)
+
+    def close(self) -> None:
+        """Lets go of its input and output."""
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream is not None:
+                stream.close()

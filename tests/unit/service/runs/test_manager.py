@@ -1,0 +1,73 @@
+import queue
+import time
+
+import pytest
+
+from risk_sac.config import CampaignSpec
+from risk_sac.execution.executor import Cause, Exited
+from service.runs.manager import Manager
+from service.settings import ServiceSettings
+from service.workers.messages import Failed, Finished
+
+SPEC = CampaignSpec(families=("low",), methods=("random",))
+
+
+class Scripted:
+    """An executor whose attempts do what the test says, one after the other."""
+
+    def __init__(self, *attempts):
+        self._attempts = list(attempts)
+        self._told = queue.SimpleQueue()
+        self.submitted = []
+
+    def submit(self, number, attempt, spec, folder):
+        self.submitted.append((number, attempt))
+        for message in self._attempts.pop(0):
+            self._told.put((number, message))
+
+    def events(self, timeout_s):
+        try:
+            return [self._told.get(timeout=timeout_s)]
+        except queue.Empty:
+            return []
+
+    def cancel(self, number, grace_s):
+        pass
+
+    def wake(self):
+        pass
+
+
+@pytest.fixture
+def execute(store, tmp_path):
+    """Executes a campaign of one run: how the run ends, the executor, and the manager."""
+
+    def execute(*attempts):
+        executor = Scripted(*attempts)
+        manager = Manager(ServiceSettings(data_dir=tmp_path), store, executor)
+        manager.start()
+        campaign = manager.submit(SPEC)
+        deadline = time.monotonic() + 60
+        while not (found := store.campaign(campaign.id)).state.final:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        manager.stop()
+        return found.runs[0], executor, manager
+
+    return execute
+
+
+def test_a_lost_run_is_submitted_again_as_its_next_attempt(execute, metrics):
+    lost, done = Exited("worker was killed by SIGKILL", Cause.KILLED, -9), Exited(None, Cause.ENDED, 0)
+    finished = Finished(finished=True, metrics=metrics, evaluation=None, digest="d", versions={}, wall_s=1.0)
+    run, executor, manager = execute([lost], [lost], [finished, done])
+    assert (run.state, run.attempts) == ("succeeded", 3)
+    assert executor.submitted == [(run.number, attempt) for attempt in (1, 2, 3)]
+    assert manager.restarts == {Cause.KILLED: 2}
+
+
+def test_a_worker_that_stops_although_nobody_asked_was_told_to_by_somebody_else(execute, metrics):
+    stopped = Finished(finished=False, metrics=metrics, evaluation=None, digest="", versions={}, wall_s=1.0)
+    run, _, manager = execute([stopped, Exited(None, Cause.ENDED, 0)], [Failed(reason="no"), Exited(None)])
+    assert (run.state, run.reason, run.attempts) == ("failed", "no", 2)
+    assert manager.restarts == {Cause.KILLED: 1}
