@@ -31,59 +31,25 @@ from risk_sac.metrics import (
     results_digest,
     wilson_interval,
 )
-from risk_sac.types import Collision, EpisodeRecord, Grade, Outcome, RunMetrics
-from tests.judged import judgement
+from risk_sac.types import Grade, Outcome, RunMetrics
+from tests.builders import collision, episode_record, judgement
 
 HORIZON = 150
 
 
-def collision(
-    ttc=0.3, speed=10.0, offset=0.0, robustness=-1.0, other="adv_0", ego_zone="front", other_zone="rear", **more
-):
-    values = {"time_s": 3.0, "verdicts": {"warm-up": True}} | more
-    return Collision(
-        other_id=other,
-        other_kind="vehicle",
-        other_role="adversary",
-        contact_x_m=2.0,
-        contact_y_m=0.1,
-        ego_zone=ego_zone,
-        other_zone=other_zone,
-        ego_speed_mps=12.0,
-        other_speed_mps=2.0,
-        relative_speed_mps=speed,
-        lateral_offset_m=offset,
-        min_ttc_s=ttc,
-        min_rss_margin_m=-4.0,
-        visible_for_s=2.0,
-        ego_peak_braking_mps2=4.5,
-        min_robustness=robustness,
-        simulator_agrees=True,
-        **values,
-    )
+def contact(ttc=0.3, speed=10.0, offset=0.0, robustness=-1.0, **changes):
+    """One with these outcome features."""
+    features = {"min_ttc_s": ttc, "relative_speed_mps": speed, "lateral_offset_m": offset, "min_robustness": robustness}
+    return collision(**({"time_s": 3.0} | features | changes))
 
 
 def episode(outcome=Outcome.SAFE, steps=HORIZON, cost=0.0, hit=None, **changes):
     if outcome is Outcome.REJECTED:
         steps = 0
     if hit is None and outcome in (Outcome.FAILURE, Outcome.DEGENERATE):
-        hit = collision()
-    values = {
-        "index": 0,
-        "phase": "train",
-        "seed": 1,
-        "scene": {"gap_m": 10.0, "speed_mps": 12.5},
-        "reason": "",
-        "risk_return": 1.0,
-        "shaped_return": 0.5,
-        "min_ttc_s": 0.3,
-        "min_robustness": -1.0,
-        "objective": 0.2,
-        "dual_variable": 0.7,
-        "temperature": 0.1,
-        "environment_steps": 0,
-    } | changes
-    return EpisodeRecord(outcome=outcome, steps=steps, mean_cost=cost, collision=hit, **values)
+        hit = contact()
+    values = {"scene": {"gap_m": 10.0, "speed_mps": 12.5}, "objective": 0.2, "dual_variable": 0.7, "temperature": 0.1}
+    return episode_record(outcome=outcome, steps=steps, mean_cost=cost, collision=hit, **(values | changes))
 
 
 def feed(records):
@@ -101,7 +67,7 @@ any_judgement = st.builds(
     signature=st.sampled_from(("cut-in", "pedestrian", "leader")),
 )
 any_collision = st.builds(
-    collision,
+    contact,
     judgement=st.none() | any_judgement,
     time_s=st.floats(0, 15),
     ttc=st.floats(0, math.inf),
@@ -166,11 +132,11 @@ def test_bootstrap_refuses_nothing_and_nan():
 # Literals, by hand
 
 RUN = [
-    episode(Outcome.FAILURE, 30, 0.2, collision(ttc=0.0, speed=0.0, offset=-3.5, robustness=-3.0)),
+    episode(Outcome.FAILURE, 30, 0.2, contact(ttc=0.0, speed=0.0, offset=-3.5, robustness=-3.0)),
     episode(Outcome.SAFE, 150, 0.1),
     episode(Outcome.REJECTED, cost=math.nan),  # no step, no mean cost: whatever stands there is ignored
     episode(Outcome.DEGENERATE, 70, 0.0),
-    episode(Outcome.FAILURE, 50, 0.4, collision(ttc=3.0, speed=0.0, offset=-3.5, robustness=-3.0)),
+    episode(Outcome.FAILURE, 50, 0.4, contact(ttc=3.0, speed=0.0, offset=-3.5, robustness=-3.0)),
 ]
 
 
@@ -188,8 +154,8 @@ def test_run_literals():
 
 
 def test_outcome_features_are_scaled_and_clipped():
-    np.testing.assert_allclose(outcome_features(collision(1.5, 5.0, 0.0, 0.0)), [0.5, 0.25, 0.5, 0.75])
-    np.testing.assert_allclose(outcome_features(collision(math.inf, 40.0, -9.0, -math.inf)), [1, 1, 0, 0])
+    np.testing.assert_allclose(outcome_features(contact(1.5, 5.0, 0.0, 0.0)), [0.5, 0.25, 0.5, 0.75])
+    np.testing.assert_allclose(outcome_features(contact(math.inf, 40.0, -9.0, -math.inf)), [1, 1, 0, 0])
 
 
 def test_dispersion_literals():
@@ -207,23 +173,23 @@ def test_window_forgets_all_but_the_newest_100_episodes():
 
 JUDGED = [
     # Contact at 3.9 s, and the same again, which is not distinct.
-    *[episode(Outcome.FAILURE, 39, hit=collision(time_s=3.9, judgement=judgement(conflict_s=2.5)))] * 2,
-    episode(Outcome.FAILURE, 60, hit=collision(time_s=6.0, other="adv_1", judgement=judgement(Grade.IDEAL, 3.0))),
+    *[episode(Outcome.FAILURE, 39, hit=contact(time_s=3.9, judgement=judgement(conflict_s=2.5)))] * 2,
+    episode(Outcome.FAILURE, 60, hit=contact(time_s=6.0, other_id="adv_1", judgement=judgement(Grade.IDEAL, 3.0))),
     episode(
         Outcome.FAILURE,
         150,
-        hit=collision(
+        hit=contact(
             time_s=15.0,
-            other="adv_2",
+            other_id="adv_2",
             judgement=judgement(Grade.CAREFUL, -0.4, signature="pedestrian, straight", unresponsive=True),
         ),
     ),
-    episode(Outcome.FAILURE, 20, hit=collision(time_s=2.0, other="adv_3")),  # from before contacts were judged
+    episode(Outcome.FAILURE, 20, hit=contact(time_s=2.0, other_id="adv_3")),  # from before contacts were judged
     # Its striker left the grip of its tyres: an artefact, which nobody judged and whose grade would not count.
     episode(
-        Outcome.DEGENERATE, 30, hit=collision(verdicts={"inside_grip": False}, judgement=judgement(unresponsive=True))
+        Outcome.DEGENERATE, 30, hit=contact(verdicts={"inside_grip": False}, judgement=judgement(unresponsive=True))
     ),
-    episode(Outcome.DEGENERATE, 30, hit=collision(verdicts={"ego_moving": False})),
+    episode(Outcome.DEGENERATE, 30, hit=contact(verdicts={"ego_moving": False})),
     episode(),
 ]
 
@@ -256,7 +222,7 @@ def test_histograms_have_a_bin_for_every_second_that_is_begun(horizon_steps, bin
 
 
 def test_window_of_preventable_failures_forgets_too():
-    failure = episode(Outcome.FAILURE, 10, hit=collision(judgement=judgement()))
+    failure = episode(Outcome.FAILURE, 10, hit=contact(judgement=judgement()))
     records = [failure] * 50 + [episode()] * 80 + [failure, episode(Outcome.FAILURE, 10)] * 5
     metrics = feed(records)
     assert (metrics.window_ecr, metrics.window_pcr) == (0.2, 0.15)
@@ -304,10 +270,10 @@ def test_bad_records_are_refused_and_leave_the_figures_alone():
     accumulator = MetricsAccumulator(HORIZON)
     before = accumulator.metrics()
     with pytest.raises(NotFinite, match="outcome features"):
-        accumulator.add(episode(Outcome.FAILURE, 10, hit=collision(ttc=math.nan)))
+        accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(ttc=math.nan)))
     for times in ({"time_s": math.nan}, {"judgement": judgement(conflict_s=-math.inf)}):
         with pytest.raises(NotFinite, match="finite times"):
-            accumulator.add(episode(Outcome.FAILURE, 10, hit=collision(**times)))
+            accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(**times)))
     with pytest.raises(NotFinite, match="mean_cost"):
         accumulator.add(episode(cost=math.nan))
     with pytest.raises(ValueError, match="without a collision"):
@@ -376,7 +342,7 @@ def test_dispersion_agrees_with_all_pairs(hits):
 def test_many_failures_stay_cheap_to_add():
     random = np.random.default_rng(0)
     records = [
-        episode(Outcome.FAILURE, 10, hit=collision(3 * u[0], 20 * u[1], 7 * u[2] - 3.5, 4 * u[3] - 3))
+        episode(Outcome.FAILURE, 10, hit=contact(3 * u[0], 20 * u[1], 7 * u[2] - 3.5, 4 * u[3] - 3))
         for u in random.random((5000, 4))
     ]
     began = time.process_time()

@@ -15,7 +15,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.runs import run
 from risk_sac.run_folder.results import Contact, Results, read_results, write_results
 from risk_sac.types import ConflictType, Grade, RunMetrics
-from tests.judged import judgement
+from tests.builders import judgement
 from tests.unit.failures.staged import synthetic_contact
 
 SPEC = RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=3))
