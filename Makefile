@@ -51,7 +51,7 @@ lint: $(STAMP) ## style, types and import rules
 openapi: $(STAMP) ## write openapi.yaml
 	$(PYTHON) -m service.openapi
 
-settings: $(STAMP) ## write the table of settings into README.md
+settings: $(STAMP) ## write the table of settings into service/README.md
 	$(PYTHON) -m service.host.settings_table
 
 nets: $(STAMP) ## rebuild sumo_nets/*/*.net.xml
