@@ -26,7 +26,7 @@ SPEC = RunSpec(
         agent=AgentConfig(hidden_sizes=(16, 16), batch_size=16, warmup_steps=500), checkpoint_every=3
     ),
 )
-LONG_S = 200
+LONG_S = 600
 Do = Callable[[psutil.Process], None]
 
 

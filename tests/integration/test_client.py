@@ -13,6 +13,7 @@ from risk_sac.client.answers import Event
 from risk_sac.config import Budget, CampaignSpec
 from tests.server import Service
 
+LONG_S = 600.0
 SPEC = CampaignSpec(label="a", families=("low",), methods=("random",), seeds=(0, 1), budget=Budget(episodes=6))
 
 
@@ -33,7 +34,7 @@ def connected(service: Service) -> Client:
 
 def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Client) -> None:
     seen: list[Campaign] = []
-    campaign = client.wait(client.submit(SPEC).id, seen.append, timeout_s=60)
+    campaign = client.wait(client.submit(SPEC).id, seen.append, timeout_s=LONG_S)
     assert campaign.state == "succeeded"
     assert [each.progress.episodes_done for each in seen] == sorted(each.progress.episodes_done for each in seen)
     assert campaign.progress.episodes_done == 12
@@ -45,7 +46,7 @@ def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Clie
 
 
 def test_failures_are_read_page_by_page(client: Client) -> None:
-    campaign = client.wait(client.submit(SPEC).id, timeout_s=60)
+    campaign = client.wait(client.submit(SPEC).id, timeout_s=LONG_S)
     found = list(client.failures(campaign.id, page=2))
     assert len({failure.id for failure in found}) == 6
     only = list(client.failures(campaign.id, run="low-random-1"))
@@ -108,7 +109,7 @@ def test_a_campaign_is_cancelled_and_then_deleted(client: Client) -> None:
         client.delete(campaign.id)
     assert (caught.value.status, caught.value.reason) == (409, "not_ended")
     client.cancel(campaign.id)
-    assert client.wait(campaign.id, timeout_s=60).state == "cancelled"
+    assert client.wait(campaign.id, timeout_s=LONG_S).state == "cancelled"
     assert client.cancel(campaign.id).state == "cancelled"
     client.delete(campaign.id)
     with pytest.raises(Refused) as caught:
@@ -141,7 +142,7 @@ def test_a_server_that_is_lost_and_restarted_is_a_pause(number: int, serve: Call
         for thread in (listening, restarting):
             thread.start()
         seen: list[Campaign] = []
-        assert client.wait(campaign.id, seen.append, timeout_s=100).progress.episodes_done == 80
+        assert client.wait(campaign.id, seen.append, timeout_s=LONG_S).progress.episodes_done == 80
         for thread in (listening, restarting):
             thread.join()
     assert seen[0].progress.episodes_done < 80 == seen[-1].progress.episodes_done
