@@ -5,12 +5,15 @@ and every position is the centre of the actor's body. SUMO's own conventions (fr
 degrees) end in `risk_sac.sim.sumo`.
 """
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum, StrEnum
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -139,59 +142,105 @@ class Grade(StrEnum):
     UNAVOIDABLE = "unavoidable"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReferenceOutcome:
+class Record(BaseModel):
+    """What the records share that are stored and told. A field is declared here and nowhere else.
+
+    As JSON, in the folder of a run and between processes, a number that is not finite is the string "Infinity",
+    "-Infinity" or "NaN", so that it reads back. Only the public bodies, which derive from these records, say null.
+    """
+
+    model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", use_attribute_docstrings=True)
+
+
+def _nothing_was_least(value: Any) -> Any:
+    return math.inf if value is None else value
+
+
+Real = Annotated[float, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "null"}]})]
+Least = Annotated[Real, BeforeValidator(_nothing_was_least)]
+"""The least of some values, infinite without any; folders from before infinities were strings have null for it."""
+
+
+class ReferenceOutcome(Record):
     """How a reference driver fares in the ego's place."""
 
-    avoids: bool  # does not touch, or stands when it is struck, or is struck from behind
-    impact_speed_mps: float  # of the reference driver at its contact; 0 if it avoids
+    avoids: bool
+    """Does not touch, or stands when it is struck, or is struck from behind."""
+    impact_speed_mps: Real
+    """Of the reference driver at its contact; 0 if it avoids."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Judgement:
+class Judgement(Record):
     """How a contact came about, and who would have prevented it. Times count from the adversaries' release."""
 
-    definitions: int  # version of the definitions it was judged by
+    definitions: int
+    """Version of the definitions it was judged by."""
     conflict_type: ConflictType
-    conflict_s: float  # t0, when the conflict began; negative before the release
-    conflict_x_m: float  # where the striker was then, on the map
-    conflict_y_m: float
-    position: str  # ahead | alongside: the striker, seen from the ego, when the conflict began
-    hidden: bool  # whether the ego knew nothing of the striker when the conflict began
-    ego_manoeuvre: str  # straight | left_turn | right_turn | lane_change
-    ego_response: str  # none | late_braking | braking | standing | starting
-    ground: str  # lane | junction | crossing | beside_crossing: where the striker was struck
-    broke: tuple[str, ...]  # what the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red
-    unresponsive: bool  # a visible collision course of 1.5 s or more during which the ego never braked
-    grade: Grade | None  # None where the contact is not valid
-    drivers: Mapping[str, ReferenceOutcome]  # reference driver -> how it fares; empty where the contact is not valid
-    signature: str  # the class of failures it belongs to, in words; what differs in it is distinct
+    """How the striker came into the ego's way."""
+    conflict_s: Real
+    """When the conflict began; negative before the release."""
+    conflict_x_m: Real
+    """Where the striker was then, on the map."""
+    conflict_y_m: Real
+    position: str
+    """ahead | alongside: the striker, seen from the ego, when the conflict began."""
+    hidden: bool
+    """Whether the ego knew nothing of the striker when the conflict began."""
+    ego_manoeuvre: str
+    """straight | left_turn | right_turn | lane_change"""
+    ego_response: str
+    """none | late_braking | braking | standing | starting"""
+    ground: str
+    """lane | junction | crossing | beside_crossing: where the striker was struck."""
+    broke: tuple[str, ...]
+    """What the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red."""
+    unresponsive: bool
+    """A visible collision course of 1.5 s or more during which the ego never braked."""
+    grade: Grade | None
+    """Who would have prevented it: the careful driver, only an ideal one, or nobody; null where it is not valid."""
+    drivers: Mapping[str, ReferenceOutcome]
+    """Reference driver → how it fares; empty where the contact is not valid."""
+    signature: str
+    """The class of failures it belongs to, in words; what differs in it is distinct."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Collision:
+class Collision(Record):
     """The ego's first contact with another actor, with everything later tiers need to judge it."""
 
-    time_s: float
+    time_s: Real
+    """Since the adversaries' release."""
     other_id: str
-    other_kind: str  # vehicle | pedestrian
-    other_role: str  # adversary | background
-    contact_x_m: float  # contact point in the ego's frame; x ahead of the ego's centre
-    contact_y_m: float  # positive to the ego's left
-    ego_zone: str  # front | left | right | rear: where the contact lies on the ego
-    other_zone: str  # the same on the other body
-    ego_speed_mps: float
-    other_speed_mps: float
-    relative_speed_mps: float
-    lateral_offset_m: float  # other's centre across the ego's axis at contact
-    min_ttc_s: float  # until 1 s before the contact, at which it is 0 for every collision alike
-    min_rss_margin_m: float
-    visible_for_s: float  # known to the ego without a break before contact, sensor memory included; 0 if unseen
-    ego_peak_braking_mps2: float
-    min_robustness: float  # soft-min robustness, until 1 s before the contact too
-    simulator_agrees: bool | None  # SUMO lists the same pair within 0.3 s; None for pedestrians, whom it does not know
-    verdicts: Mapping[str, bool] = field(default_factory=dict)  # rule -> passed; valid if all passed
-    judgement: Judgement | None = None  # None in what was stored before contacts were judged
+    other_kind: str
+    """vehicle | pedestrian"""
+    other_role: str
+    """adversary | background"""
+    contact_x_m: Real
+    """Contact point ahead of the ego's centre."""
+    contact_y_m: Real
+    """Contact point to the ego's left."""
+    ego_zone: str
+    """front | left | right | rear: where the contact lies on the ego."""
+    other_zone: str
+    """The same on the other body."""
+    ego_speed_mps: Real
+    other_speed_mps: Real
+    relative_speed_mps: Real
+    lateral_offset_m: Real
+    """The other's centre across the ego's axis at contact."""
+    min_ttc_s: Least
+    """Until 1 s before the contact, at which it is 0 for every collision alike."""
+    min_rss_margin_m: Least
+    visible_for_s: Real
+    """How long the ego had known of the other without a break before contact, its memory included; 0 if unseen."""
+    ego_peak_braking_mps2: Real
+    min_robustness: Least
+    """Soft minimum of the requirements, until 1 s before the contact too."""
+    simulator_agrees: bool | None
+    """Whether SUMO lists the collision within 0.3 s; null for pedestrians, whom it does not know."""
+    verdicts: Mapping[str, bool] = {}
+    """Validity rule → passed."""
+    judgement: Judgement | None = None
+    """Null in what was stored before contacts were judged."""
 
     @property
     def valid(self) -> bool:
@@ -209,27 +258,46 @@ class Collision:
         return self.valid and self.judgement is not None and self.judgement.grade is Grade.CAREFUL
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EpisodeRecord:
+Phase = Literal["search", "evaluation"]
+RECORDED: Mapping[Phase, str] = {"search": "train", "evaluation": "evaluate"}  # as records and ids name a phase
+
+
+class EpisodeRecord(Record):
     """One episode as stored, streamed and counted. Plain values only, so it is JSON as it stands."""
 
-    index: int  # 0-based within the run, rejected scenes included
-    phase: str  # train | evaluate
+    index: int
+    """0-based within the run, rejected scenes included."""
+    phase: str
+    """train | evaluate"""
     seed: int
-    scene: Mapping[str, float]
+    scene: Mapping[str, Real]
     outcome: Outcome
-    reason: str  # rejection rule or sim_crash, or the failed validity rules joined by ", "; else ""
+    reason: str
+    """Rule that rejected the scene, sim_crash, or the validity rules that the contact failed; else empty."""
     steps: int
-    risk_return: float  # Σ R_risk
-    shaped_return: float  # Σ R'
-    mean_cost: float  # mean C_soft over executed steps
-    min_ttc_s: float
-    min_robustness: float
-    objective: float | None  # f_e; None until the optimiser was told
-    dual_variable: float  # λ after the episode
-    temperature: float  # α after the episode
-    environment_steps: int  # of the run, up to and including this episode
+    risk_return: Real
+    """Σ R_risk, of the risk reward alone."""
+    shaped_return: Real
+    """Σ R', of the reward that was trained on."""
+    mean_cost: Real
+    """Mean C_soft over the executed steps."""
+    min_ttc_s: Least
+    """Null when nothing was ever on a collision course."""
+    min_robustness: Least
+    objective: float | None
+    """f_e; null until the scene optimiser was told."""
+    dual_variable: Real
+    """λ after the episode."""
+    temperature: Real
+    """α after the episode."""
+    environment_steps: int
+    """Of the run, up to and including this episode."""
     collision: Collision | None = None
+
+    @property
+    def searching(self) -> bool:
+        """Whether it belongs to the search, and not to the evaluation of the frozen policy."""
+        return self.phase == RECORDED["search"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,35 +308,58 @@ class SeriesFile:
     sha256: str  # as it was written, whatever became of it since
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunMetrics:
-    """What a run has achieved so far; the figures of design section 7 with 95 % intervals."""
+class RunMetrics(Record):
+    """What a run has achieved so far; rates come with their 95 % interval.
 
-    episodes: int  # finished, rejected scenes included
+    Fields with a default can be read from what was stored before they were counted.
+    """
+
+    episodes: int
+    """Finished, rejected scenes included."""
     rejected: int
-    raw_collisions: int  # valid and degenerate
-    failures: int  # valid
+    """Scenes that were physically infeasible and not simulated."""
+    raw_collisions: int
+    """Episodes in which the ego touched something."""
+    failures: int
+    """Valid collisions."""
     environment_steps: int
-    ecr: float  # valid collisions / episodes
-    ecr_low: float
-    ecr_high: float
-    window_ecr: float  # the same over the newest 100 episodes
-    efficiency: float  # ES
-    cost_rate: float  # rho_c
-    dispersion: float | None  # OFD; None with fewer than two failures
-    dual_variable: float  # λ
-    temperature: float  # α
-    # With defaults, so that what was stored before they were counted can still be read.
-    distinct_failures: int = 0  # valid failures that resemble no earlier one, see `risk_sac.verdicts.distinct`
-    steps_per_distinct_failure: float | None = None  # environment steps; None without a failure
-    preventable: int = 0  # valid and of grade `careful`
-    pcr: float = 0.0  # preventable / episodes
-    pcr_low: float = 0.0
-    pcr_high: float = 1.0
-    window_pcr: float = 0.0
-    distinct_preventable: int = 0  # distinct failures of grade `careful`
-    artefacts: int = 0  # contacts that the simulator or the control made
-    unresponsive: int = 0  # valid failures in which the ego never braked for what it saw
-    signatures: Mapping[str, int] = field(default_factory=dict)  # signature -> valid failures
-    conflicts_by_second: tuple[int, ...] = ()  # valid failures by the second after the release in which they began
-    contacts_by_second: tuple[int, ...] = ()  # the same by the second of the contact
+    ecr: Real
+    """Effective collision rate: valid collisions / episodes."""
+    ecr_low: Real
+    ecr_high: Real
+    window_ecr: Real
+    """ECR over the newest 100 episodes."""
+    pcr: Real = 0.0
+    """Preventable collision rate: valid collisions that the careful driver would have prevented / episodes."""
+    pcr_low: Real = 0.0
+    pcr_high: Real = 1.0
+    window_pcr: Real = 0.0
+    """PCR over the newest 100 episodes."""
+    efficiency: Real
+    """Exploration efficiency ES in [0, 1]; 1 means a failure at once."""
+    cost_rate: Real
+    """Mean realism cost per step, in [0, 1]."""
+    dispersion: float | None
+    """Outcome feature dispersion of the failures, in [0, 1]; null with fewer than two."""
+    dual_variable: Real
+    """λ."""
+    temperature: Real
+    """α."""
+    distinct_failures: int = 0
+    """Valid collisions that resemble no earlier one: another signature, or other outcome features."""
+    steps_per_distinct_failure: float | None = None
+    """Environment steps per distinct failure; null without one."""
+    preventable: int = 0
+    """Valid collisions that the careful driver would have prevented, repetitions included."""
+    distinct_preventable: int = 0
+    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
+    artefacts: int = 0
+    """Contacts that the simulator or the control made."""
+    unresponsive: int = 0
+    """Valid collisions with a visible collision course of 1.5 s or more during which the ego never braked."""
+    signatures: Mapping[str, int] = {}
+    """Signature → valid collisions, in the order in which they were first met."""
+    conflicts_by_second: tuple[int, ...] = ()
+    """Valid collisions by the second after the adversaries' release in which the conflict began."""
+    contacts_by_second: tuple[int, ...] = ()
+    """The same by the second of the contact."""

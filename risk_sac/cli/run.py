@@ -1,7 +1,6 @@
 """`risk-sac run`: one run without a server."""
 
 import argparse
-from dataclasses import asdict
 from pathlib import Path
 
 from rich.table import Table
@@ -9,6 +8,7 @@ from rich.table import Table
 from risk_sac.cli.console import INTERRUPTED, OK, Commands, console, or_dash, progress_bar
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.config.spec_file import read_spec
+from risk_sac.metrics import METRICS, Metric, pooled_counts
 from risk_sac.run_folder.results import Results
 from risk_sac.types import RunMetrics
 
@@ -31,7 +31,7 @@ def _run(options: argparse.Namespace) -> int:
     spec = read_spec(options.spec, {name: getattr(options, name) for name in names})
     from risk_sac.execution.runs import run  # here, because loading torch takes seconds
 
-    total = spec.budget.episodes + spec.budget.evaluation_episodes
+    total = spec.budget.total_episodes
     with progress_bar() as bar:
         task = bar.add_task(f"{spec.family} {spec.method}", total=total, found="")
 
@@ -72,17 +72,21 @@ def _summary(spec: RunSpec, results: Results) -> Table:
 
 
 def _figures(metrics: RunMetrics) -> dict[str, str]:
-    values = asdict(metrics)
+    shown = (metric for metric in METRICS if not metric.search_only)
     return {
         "episodes": f"{metrics.episodes} ({metrics.rejected} rejected)",
         "contacts": f"{metrics.raw_collisions} ({metrics.artefacts} artefacts)",
         "valid failures": f"{metrics.failures} ({metrics.unresponsive} unresponsive)",
         "distinct failures": f"{metrics.distinct_failures}",
         "distinct and preventable": f"{metrics.distinct_preventable}",
-        "ECR (95 %)": "{ecr:.3f} ({ecr_low:.3f} to {ecr_high:.3f})".format(**values),
-        "PCR (95 %)": "{pcr:.3f} ({pcr_low:.3f} to {pcr_high:.3f})".format(**values),
-        "efficiency ES": f"{metrics.efficiency:.3f}",
-        "realism cost per step": f"{metrics.cost_rate:.3f}",
-        "dispersion OFD": or_dash(metrics.dispersion, ".3f"),
+        **dict(_figure(metric, metrics) for metric in shown),
         "steps per distinct failure": or_dash(metrics.steps_per_distinct_failure, ".0f"),
     }
+
+
+def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
+    """What a metric is called, and what it is."""
+    name, value = f"{metric.words} {metric.heading}".strip(), metric.value(metrics)
+    interval = None if value is None else metric.interval(value, pooled_counts([metrics]))
+    text = or_dash(value, ".3f")
+    return (name, text) if interval is None else (f"{name} (95 %)", "{} ({:.3f} to {:.3f})".format(text, *interval))

@@ -38,6 +38,11 @@ class Budget(Settings):
     evaluation_episodes: Annotated[int, Field(ge=0, le=10_000)] = 0
     """Episodes of the frozen policy after the search."""
 
+    @property
+    def total_episodes(self) -> int:
+        """Episodes of both phases."""
+        return self.episodes + self.evaluation_episodes
+
 
 class RunSpec(Settings):
     """One run: the unit of scheduling, checkpoint and retry."""
@@ -50,6 +55,11 @@ class RunSpec(Settings):
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
+
+    @property
+    def id(self) -> str:
+        """Unique within its campaign."""
+        return f"{self.family}-{self.method}-{self.seed}"
 
     @property
     def digest(self) -> str:

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import campaign_yaml, read_campaign
 from risk_sac.errors import ConfigError
 from risk_sac.execution.processes import Executor, Job, Progress
@@ -55,7 +55,7 @@ def evaluate(spec: CampaignSpec, folder: Path, command: str, jobs: int, progress
         Problem.from_spec(run)  # before the folder is claimed
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
     with _claimed(spec, folder) as lock, stop_signal((*STOPPING, *hung_up)) as stopping:
-        queue = [Job(spec=run, folder=folder / RUNS / _name(run)) for run in spec.runs()]
+        queue = [Job(spec=run, folder=folder / RUNS / run.id) for run in spec.runs()]
         Executor(folder / SPEC, queue, lock, progress).execute(jobs, stopping)
         comparison = _report(spec, folder, command, queue)
         return Evaluation(
@@ -63,10 +63,6 @@ def evaluate(spec: CampaignSpec, folder: Path, command: str, jobs: int, progress
             failed=tuple(job for job in queue if job.state == "failed"),
             stopped=any(job.state in ("waiting", "stopped") for job in queue),
         )
-
-
-def _name(run: RunSpec) -> str:
-    return f"{run.family}-{run.method}-{run.seed}"
 
 
 @contextmanager

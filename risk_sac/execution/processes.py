@@ -44,7 +44,7 @@ class Job:
     @property
     def total(self) -> int:
         """Episodes of both phases."""
-        return self.spec.budget.episodes + self.spec.budget.evaluation_episodes
+        return self.spec.budget.total_episodes
 
     @property
     def finished(self) -> bool:

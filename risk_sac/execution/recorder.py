@@ -7,8 +7,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from pydantic import TypeAdapter
-
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.run_folder import checkpoint
@@ -18,8 +16,6 @@ from risk_sac.train import CHECKPOINT, Observer, RunSummary
 from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 
 logger = logging.getLogger(__name__)
-
-_LINE = TypeAdapter(EpisodeRecord)
 
 
 class Recorder:
@@ -56,13 +52,13 @@ class Recorder:
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         """Writes an episode down."""
-        self._episodes.write(_LINE.dump_json(record) + b"\n")
+        self._episodes.write(record.model_dump_json().encode() + b"\n")
         self._episodes.flush()
         if record.collision is not None:
             self._contacts.append(Contact.of(record))
         told = self.results.metrics.episodes if self.results.metrics else 0
         due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes > told
-        if due and record.phase == "train":
+        if due and record.searching:
             self._write(replace(self.results, metrics=metrics, contacts=tuple(self._contacts)))
         self._observer.episode(record, metrics, series)
 

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunSpec
-from risk_sac.metrics import bootstrap_interval
-from risk_sac.report.cells import METRICS, RESAMPLING_SEED, Cell, Metric, cell_of
-from risk_sac.report.runs import RECORDED, FinishedRun, Phase
+from risk_sac.metrics import RESAMPLING_SEED, Metric, bootstrap_interval
+from risk_sac.report.cells import Cell, cell_of, metrics_of
+from risk_sac.report.runs import FinishedRun
 from risk_sac.report.statistics import holm, vargha_delaney, wilcoxon_p
+from risk_sac.types import RECORDED, Phase
 
 REFERENCE: MethodName = "risk-sac"
 LEVEL = 0.05
@@ -148,8 +149,8 @@ def _tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[Fin
             yield from _corrected(
                 [
                     _paired_test(metric, phase, by_method[methods[0]], by_method[other], (family, methods[0], other))
-                    for metric in METRICS
-                    if metric.tested and phase in metric.phases
+                    for metric in metrics_of(phase)
+                    if metric.tested
                     for other in methods[1:]
                 ]
             )

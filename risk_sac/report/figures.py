@@ -15,16 +15,14 @@ from matplotlib.figure import Figure
 
 from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
-from risk_sac.metrics import WINDOW, preventable
-from risk_sac.report.cells import METRICS, RESAMPLING_SEED, Metric
+from risk_sac.metrics import METRICS, RESAMPLING_SEED, WINDOW, Metric, preventable
 from risk_sac.report.comparison import REFERENCE, Comparison
-from risk_sac.report.runs import FinishedRun, Phase
-from risk_sac.types import Floats, Outcome
+from risk_sac.report.runs import FinishedRun
+from risk_sac.types import Floats, Outcome, Phase
 
 Format = Literal["png", "svg"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 RESAMPLES = 2000  # per curve; a band needs less than a table
-BARS = ("ecr", "pcr", "es", "rho_c", "ofd")
 SETTLED = 10  # episodes before which a windowed rate is mostly noise
 CURVE_IN, BARS_IN, TIMES_IN, DPI = (6.4, 3.4), (7.2, 3.2), (7.2, 3.0), 200
 STYLE: dict[Any, Any] = {  # matplotlib types the keys one by one
@@ -107,7 +105,7 @@ def _figures(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
         for family in comparison.spec.families:
             if any(sum(cell.contacts_by_second) for cell in comparison.group(family, phase)):
                 figures[f"times_{family}{suffix}"] = partial(_times, comparison, family, phase)
-        for metric in (metric for metric in METRICS if metric.name in BARS):
+        for metric in (metric for metric in METRICS if not metric.search_only):
             figures[f"bars_{metric.name}{suffix}"] = partial(_bars, comparison, metric, phase)
     return figures
 
@@ -250,7 +248,7 @@ def _bars(comparison: Comparison, metric: Metric, phase: Phase) -> Figure:
     axes.set_xticks(range(len(families)), families)
     axes.tick_params(axis="x", length=0)
     axes.grid(visible=False, axis="x")
-    axes.set_ylabel(f"{metric.symbol} ({phase})")
+    axes.set_ylabel(f"{metric.heading} ({phase})")
     axes.set_ylim(bottom=0)
     interval = "; lines: 95 % bootstrap interval" if max(counts, default=0) > 1 else ""
     axes.set_title(f"mean over {_seeds(counts)}{interval}; –: no value", fontsize=9, loc="left")

@@ -5,22 +5,23 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from risk_sac.config import FamilyName, RunSpec
-from risk_sac.report.cells import METRICS, Cell, Estimate
+from risk_sac.metrics import METRICS, RATIOS, Estimate, Metric, Ratio
+from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import LEVEL, Comparison, PairedTest
 from risk_sac.report.provenance import this_platform
-from risk_sac.report.runs import Phase
 from risk_sac.report.statistics import pairs_needed, smallest_p
-from risk_sac.types import ARTEFACT_RULES
+from risk_sac.types import Phase
 
 DASH = "–"
 CONTROL = "no-adversary"
-SYMBOLS = {metric.name: metric.symbol for metric in METRICS}
-SHOWN = tuple(metric.name for metric in METRICS if metric.name != "distinct_per_1000_steps")  # as its reciprocal
-# RISK-SAC's row of the paper's Table I: ECR, ES, ρ̄_c (at most), OFD.
-PAPER: dict[FamilyName, tuple[float, float, float, float]] = {
-    "low": (0.97, 0.94, 0.15, 0.82),
-    "mixed": (0.92, 0.88, 0.25, 0.85),
-    "dense": (0.89, 0.84, 0.30, 0.92),
+ROWS: dict[str, Metric | Ratio] = {row.name: row for row in (*METRICS, *RATIOS)}
+SHARES = ("artefact_rate", "degenerate_rate", "rejected_rate")  # the last columns of the table of methods
+# RISK-SAC's row of the paper's Table I, by family.
+PAPER: dict[str, dict[FamilyName, float]] = {
+    "ecr": {"low": 0.97, "mixed": 0.92, "dense": 0.89},
+    "es": {"low": 0.94, "mixed": 0.88, "dense": 0.84},
+    "rho_c": {"low": 0.15, "mixed": 0.25, "dense": 0.30},  # at most
+    "ofd": {"low": 0.82, "mixed": 0.85, "dense": 0.92},
 }
 
 
@@ -66,30 +67,26 @@ def _missing(comparison: Comparison) -> str:
 
 def _cells(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     seeds = len(comparison.spec.seeds)
-    columns = ["method", "seeds", *(SYMBOLS[name] for name in SHOWN if _has(phase, name))]
-    columns += ["steps / distinct", "CPU s / distinct"] if phase == "search" else ["steps / distinct"]
-    columns += ["artefact", "degenerate", "rejected"]
+    columns = ["method", "seeds", *(metric.heading for metric in metrics_of(phase) if metric.tabled)]
+    columns += [_symbol("steps_per_distinct_failure"), *(["CPU s / distinct"] if phase == "search" else [])]
+    columns += map(_symbol, SHARES)
     rows = [_cell(cell, seeds) for cell in comparison.group(family, phase)]
     return f"## {family}, {phase}\n\n" + _table(columns, rows) if rows else ""
-
-
-def _has(phase: Phase, name: str) -> bool:
-    return any(metric.name == name and phase in metric.phases for metric in METRICS)
 
 
 def _cell(cell: Cell, seeds: int) -> list[str]:
     runs = len(cell.seeds)
     row = [cell.method, str(runs) if runs == seeds else f"{runs} of {seeds}"]
-    row += [_estimate(cell.estimates[name], runs) for name in SHOWN if name in cell.estimates]
+    row += [_estimate(cell.estimates[metric.name], runs) for metric in metrics_of(cell.phase) if metric.tabled]
     row.append(_number(cell.steps_per_distinct_failure, ",.0f"))
     if cell.phase == "search":
         row.append(_number(cell.cpu_s_per_distinct_failure, ",.1f"))
-    return row + [_percent(rate) for rate in (cell.artefact_rate, cell.degenerate_rate, cell.rejected_rate)]
+    return row + [_percent(getattr(cell, name)) for name in SHARES]
 
 
 def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     """From contacts to what is worth a person's time, summed over seeds."""
-    columns = ["method", "episodes", "contacts", "valid", "distinct", "preventable", "unresponsive"]
+    columns = ["method", "episodes", "contacts", "valid", "distinct", "preventable", _symbol("unresponsive_share")]
     rows = (
         [
             cell.method,
@@ -153,7 +150,7 @@ def _tests(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
 def _test(test: PairedTest) -> list[str]:
     p_holm = _p(test.p_holm)
     return [
-        SYMBOLS[test.metric],
+        _symbol(test.metric),
         test.method,
         str(test.pairs),
         _number(test.difference, "+.3f") + _interval(test.low, test.high, "+.3f"),
@@ -187,7 +184,7 @@ def _control(comparison: Comparison) -> str:
         return ""
     rows = ([cell.family, cell.phase, str(cell.episodes), _percent(cell.raw_rate)] for cell in cells)
     title = "## The simulator's own artefacts\n\nContacts of any kind with `no-adversary`, where nobody attacks.\n\n"
-    return title + _table(["family", "phase", "episodes", "raw contacts"], rows, left=2)
+    return title + _table(["family", "phase", "episodes", _symbol("raw_rate")], rows, left=2)
 
 
 def _paper(comparison: Comparison) -> str:
@@ -197,13 +194,12 @@ def _paper(comparison: Comparison) -> str:
         return ""
     rows: list[list[str]] = []
     for cell in ours:
-        means = (cell.estimates[name].mean for name in ("ecr", "es", "rho_c", "ofd"))
-        paper = PAPER[cell.family]
         rows.append([cell.family, cell.phase])
-        for name, mean, value in zip(("ecr", "es", "rho_c", "ofd"), means, paper, strict=True):
-            rows[-1] += [_number(mean, ".2f"), f"{'≤ ' if name == 'rho_c' else ''}{value:.2f}"]
+        for name, paper in PAPER.items():
+            mean = cell.estimates[name].mean
+            rows[-1] += [_number(mean, ".2f"), f"{'≤ ' if name == 'rho_c' else ''}{paper[cell.family]:.2f}"]
     columns = ["family", "phase"]
-    for symbol in ("ECR", "ES", "ρ̄_c", "OFD"):
+    for symbol in map(_symbol, PAPER):
         columns += [symbol, f"{symbol} paper"]
     title = (
         "## Beside the paper\n\nThe paper's RISK-SAC was measured in CARLA, against another ego and with other "
@@ -213,8 +209,7 @@ def _paper(comparison: Comparison) -> str:
 
 
 def _definitions() -> str:
-    lines = [f"- {metric.symbol}: {metric.meaning}." for metric in METRICS]
-    rules = ", ".join(sorted(ARTEFACT_RULES))
+    lines = [f"- {_defined(metric.name)}" for metric in METRICS]
     lines += [
         "- search: the training episodes, rejected scenes included; evaluation: the frozen policy acting by its mean.",
         "- mean over seeds and, in brackets, its 95 % interval: percentile bootstrap over seeds, which with fewer than "
@@ -222,31 +217,37 @@ def _definitions() -> str:
         "- n of m seeds: the mean is over the n runs that have a value; OFD needs two valid failures.",
         "- distinct: valid failures that resemble no earlier one of the same run: another signature, or the same one "
         "with other outcome features; summed over seeds.",
-        "- steps / distinct: environment steps over all seeds / distinct failures over all seeds.",
+        f"- {_defined('steps_per_distinct_failure')}",
         "- CPU s / distinct: the same with the processor seconds of the whole runs, evaluation episodes included; a "
         "process's start and what a crashed attempt spent are not.",
-        f"- artefact: episodes whose contact was refused by a rule that speaks of the simulator or the control "
-        f"({rules}) / episodes.",
+        f"- {_defined('artefact_rate')}",
         "- contacts, valid, distinct, preventable: what the ego touched; without artefacts and degenerate contacts; "
         "each kind once; of these, what the careful driver would have prevented (PCR counts repetitions too). What was "
         "found before contacts were judged counts as not preventable, and is in no histogram and no signature.",
         "- careful driver: UN Regulation 157's careful and competent human driver, for pedestrians and crossing "
         "vehicles after Engström et al. (arXiv 2208.08651), in the ego's place; the striker's motion is kept.",
-        "- unresponsive: valid failures with a visible collision course of at least 1.5 s during which the ego never "
-        "braked / valid failures.",
+        f"- {_defined('unresponsive_share')}",
         "- time since the release: from when the adversaries are handed to the policy to the beginning of the "
         "conflict, and to the contact; what began before the release stands in the first second.",
-        "- degenerate: all refused contacts / episodes, artefacts among them. rejected: infeasible scenes / episodes.",
+        f"- {_defined('degenerate_rate')} {_defined('rejected_rate')}",
         "- difference: mean over the seeds that both methods have a value for, first method minus the other, with a "
         "paired bootstrap 95 % interval.",
         "- A12 (Vargha-Delaney): chance that a run of the first method has the larger value; 0.5 is no difference.",
         "- p: Wilcoxon signed-rank, two-sided, exact also with ties; zero differences are left out.",
         "- p (Holm): corrected over all methods and metrics of one family and phase, which are one family of "
         f"hypotheses; bold below {LEVEL:g}.",
-        "- distinct / 1000 steps is tested in place of its reciprocal, steps / distinct, because a run without a "
-        "failure has it too.",
+        f"- {_symbol('distinct_per_1000_steps')} is tested in place of its reciprocal, "
+        f"{_symbol('steps_per_distinct_failure')}, because a run without a failure has it too.",
     ]
     return "## Definitions\n\n" + "\n".join(lines) + "\n"
+
+
+def _symbol(name: str) -> str:
+    return ROWS[name].symbol
+
+
+def _defined(name: str) -> str:
+    return f"{ROWS[name].symbol}: {ROWS[name].meaning}."
 
 
 def _repeat(comparison: Comparison) -> str:

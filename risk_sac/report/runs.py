@@ -4,20 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from risk_sac.config import FamilyName, MethodName, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import MetricsAccumulator, results_digest
+from risk_sac.run_folder.episode_json import records_from_lines
 from risk_sac.run_folder.results import EPISODES, Results, read_results
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.types import EpisodeRecord, RunMetrics
-
-Phase = Literal["search", "evaluation"]
-RECORDED: dict[Phase, str] = {"search": "train", "evaluation": "evaluate"}  # as `EpisodeRecord.phase` has it
-_RECORD: TypeAdapter[EpisodeRecord] = TypeAdapter(EpisodeRecord)
+from risk_sac.types import RECORDED, EpisodeRecord, Phase, RunMetrics
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,9 +76,9 @@ def read_records(file: Path) -> tuple[EpisodeRecord, ...]:
         ConfigError: a line is something else.
         OSError: it cannot be read.
     """
-    lines = file.read_bytes().splitlines()
+    content = file.read_bytes()
     try:
-        return tuple(_RECORD.validate_json(line) for line in lines)
+        return tuple(records_from_lines(content))
     except ValidationError as error:
         raise ConfigError(f"{file} was not written by a run: {error.errors()[0]['msg']}") from error
 

@@ -27,7 +27,7 @@ from risk_sac.risk.lexer import Token, tokens
 from risk_sac.risk.signals import SIGNALS
 
 MAX_DEPTH = 40  # nested operators
-MAX_COMPARISONS = 5000  # by the windows of one formula in one step, about 1 ms
+MAX_COMPARISONS = 4000  # by the windows of one formula in one step, about 1 ms
 MAX_MAGNITUDE = 1e9  # of any number in a formula, so that arithmetic stays finite
 
 _BOUND = re.compile(r"\d{1,6}(\.\d{0,6})?")  # no exponents: 1e999999999 would fill memory as an exact fraction

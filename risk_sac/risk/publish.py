@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from risk_sac.geometry import RelativeView, Sight, frame_view, in_sight
 from risk_sac.jit import compiled
+from risk_sac.risk.encounter import ENCOUNTER_CAP_S, time_to_encounter
 from risk_sac.risk.rss import LONGITUDINAL_CAP_M, SCALED_HIGH, RssParameters, margins
 from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
 from risk_sac.types import Bools, Floats, Frame, Kind, Signal
@@ -21,13 +22,14 @@ VEHICLE, PEDESTRIAN = int(Kind.VEHICLE), int(Kind.PEDESTRIAN)  # compiled code k
 
 # Rows of an assessment, one column for each of the `n` actors other than the ego, in its frame as in `RelativeView`.
 AHEAD, ASIDE, CLOSING_X, CLOSING_Y, COS, SIN, GAP, SEEN = range(8)
-TTC, RSS_LONGITUDINAL, RSS_LATERAL, RSS_SCALED, CHARGED = range(8, 13)
+TTC, ENCOUNTER, RSS_LONGITUDINAL, RSS_LATERAL, RSS_SCALED, CHARGED = range(8, 14)
 
 
 class LeastMargins(NamedTuple):
     """The smallest of each measure over the actors it concerns; its cap where there is none."""
 
     ttc_s: float
+    encounter_s: float
     rss_margin: float
     pedestrian_gap_m: float
     vehicle_gap_m: float
@@ -80,10 +82,12 @@ def assess(frame: Frame, rss: RssParameters, sight: Sight) -> Assessment:
 @compiled
 def _assess(
     state: Floats, kind: NDArray[np.int8], rss: RssParameters, reach_m: float, half_view_rad: float, occlusion: bool
-) -> tuple[Floats, tuple[float, float, float, float], bool]:
+) -> tuple[Floats, tuple[float, float, float, float, float], bool]:
     view = frame_view(state)
     ttc_s = time_to_collision(view)
-    rss_margins = margins(view, kind[1:] == PEDESTRIAN, rss)
+    walks = kind[1:] == PEDESTRIAN
+    rss_margins = margins(view, walks, rss)
+    encounter_s = time_to_encounter(view, walks)
     seen = in_sight(view, kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion))
     charged = in_charge(view)
     n = len(charged)
@@ -94,10 +98,10 @@ def _assess(
         others[AHEAD, i], others[ASIDE, i] = view.x[i], view.y[i]
         others[CLOSING_X, i], others[CLOSING_Y, i] = view.vx[i], view.vy[i]
         others[COS, i], others[SIN, i], others[GAP, i] = view.cos[i], view.sin[i], view.gap[i]
-        others[SEEN, i], others[TTC, i], others[CHARGED, i] = seen[i], ttc_s[i], charged[i]
+        others[SEEN, i], others[TTC, i], others[ENCOUNTER, i] = seen[i], ttc_s[i], encounter_s[i]
         others[RSS_LONGITUDINAL, i] = rss_margins.longitudinal_m[i]
         others[RSS_LATERAL, i] = rss_margins.lateral_m[i]
-        others[RSS_SCALED, i] = rss_margins.scaled[i]
+        others[RSS_SCALED, i], others[CHARGED, i] = rss_margins.scaled[i], charged[i]
     return others, least_margins(others, kind), touched
 
 
@@ -112,19 +116,20 @@ def in_charge(view: RelativeView) -> Bools:
 
 
 @compiled
-def least_margins(others: Floats, kind: NDArray[np.int8]) -> tuple[float, float, float, float]:
-    """`LeastMargins`; TTC and RSS over those the ego answers for, gaps over all."""
-    ttc, rss = TTC_CAP_S, SCALED_HIGH
+def least_margins(others: Floats, kind: NDArray[np.int8]) -> tuple[float, float, float, float, float]:
+    """`LeastMargins`; TTC and RSS over those the ego answers for, gaps and encounters over all."""
+    ttc, encounter, rss = TTC_CAP_S, ENCOUNTER_CAP_S, SCALED_HIGH
     pedestrian, vehicle = PEDESTRIAN_GAP_CAP_M, GAP_CAP_M
     for i in range(others.shape[1]):
         if others[CHARGED, i] != 0.0:
             ttc = min(ttc, others[TTC, i])
             rss = min(rss, others[RSS_SCALED, i])
+        encounter = min(encounter, others[ENCOUNTER, i])
         if kind[i + 1] == PEDESTRIAN:
             pedestrian = min(pedestrian, others[GAP, i])
         else:
             vehicle = min(vehicle, others[GAP, i])
-    return ttc, rss, pedestrian, vehicle
+    return ttc, encounter, rss, pedestrian, vehicle
 
 
 def worst_rss_margin(assessment: Assessment) -> float:
@@ -143,6 +148,7 @@ def publish(frame: Frame, before: Frame | None, least: LeastMargins) -> dict[str
     """
     return {
         "ttc_s": least.ttc_s,
+        "encounter_s": least.encounter_s,
         "rss_margin": least.rss_margin,
         "pedestrian_gap_m": least.pedestrian_gap_m,
         "vehicle_gap_m": least.vehicle_gap_m,

@@ -18,10 +18,11 @@ from risk_sac.types import Bools, Floats
 
 LONGITUDINAL_CAP_M = LATERAL_CAP_M = 50.0
 
-# Choice: the margins that undisturbed traffic leaves, so that the scaled margin is about 1 in it: to a leader
-# 8 to 15 m, to a car beside the ego in the next lane 1.1 m. A lateral scale of 5 m would leave such a car at
-# 0.2, below every leader that matters.
-LONGITUDINAL_SCALE_M = 12.0
+# Choice: the margins that undisturbed traffic leaves, so that the scaled margin is about 1 in it: along a course the
+# time by which the ego could respond later, across it the metres to a car beside the ego in the next lane. A lateral
+# scale of 5 m would leave such a car at 0.2, below every leader that matters.
+LONGITUDINAL_SCALE_S = 0.85
+SLOW_MPS = 3.0  # who is slower counts as this fast: at standstill any margin would be endless in time
 LATERAL_SCALE_M = 1.1
 SCALED_LOW, SCALED_HIGH = -3.0, 2.0
 
@@ -103,7 +104,7 @@ class Margins(NamedTuple):
 
     longitudinal_m: Floats  # negative where violated
     lateral_m: Floats
-    scaled: Floats  # the larger of the two, each divided by its scale; negative where the situation is dangerous
+    scaled: Floats  # the larger of the two, each in its scale; negative where the situation is dangerous
 
 
 @compiled
@@ -119,6 +120,10 @@ def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Marg
     that stay clear along any direction do not touch. Otherwise an oncoming car that passes a turning ego
     would count as a danger, for it moves across the ego's axes all the way. A pedestrian has no course worth
     relying on.
+
+    Choice: a margin is divided by what undisturbed traffic leaves, or by the RSS distance itself where that is more.
+    So it falls to -1 as the bodies meet. In metres it would rise before a contact: an ego that brakes hard, but too
+    late, wins back more RSS distance than it loses room.
 
     Choice: the lateral scale grows to the longitudinal one with the angle between the courses, since what is
     across the ego's course is along that of cross traffic, and as fast.
@@ -136,17 +141,18 @@ def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Marg
     for i in range(n):
         along, across = view.vx[i] + view.ego_vx, view.vy[i] + view.ego_vy  # the other's velocity in the ego's axes
         cos, sin = abs(view.cos[i]), abs(view.sin[i])
-        accel_x, brake_x, accel_y, brake_y, scale = (
+        lengthwise = LONGITUDINAL_SCALE_S * max(ego + max(-along, 0.0), SLOW_MPS)
+        crosswise = LONGITUDINAL_SCALE_S * max(ego, abs(across), SLOW_MPS) * sin + LATERAL_SCALE_M * cos
+        accel_x, brake_x, accel_y, brake_y = (
             p.accel_mps2 * cos + p.lateral_accel_mps2 * sin,
             p.brake_min_mps2 * cos + p.lateral_brake_mps2 * sin,
             p.accel_mps2 * sin + p.lateral_accel_mps2 * cos,
             p.brake_min_mps2 * sin + p.lateral_brake_mps2 * cos,
-            LONGITUDINAL_SCALE_M * sin + LATERAL_SCALE_M * cos,
         )
         if walks[i]:
             accel_x = accel_y = p.walk_accel_mps2
             brake_x = brake_y = p.walk_brake_mps2
-            scale = LATERAL_SCALE_M
+            crosswise = LATERAL_SCALE_M
 
         if view.x[i] < 0.0:
             way = stopping(max(along, 0.0), p.response_s, accel_x, brake_x)
@@ -157,26 +163,28 @@ def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Marg
             distance = behind(ego_way, along, p)
         clear = abs(view.x[i]) - view.reach[0, i] - distance
         longitudinal[i] = min(max(clear, -LONGITUDINAL_CAP_M), LONGITUDINAL_CAP_M)
+        larger = longitudinal[i] / max(lengthwise, distance)
 
         side = 1.0 if view.y[i] >= 0.0 else -1.0
-        distance = max(
+        distance = p.fluctuation_m + max(
             stopping(side * view.ego_vy, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2)
             + stopping(-side * across, p.response_s, accel_y, brake_y),
             0.0,
         )
         clear = abs(view.y[i]) - view.reach[1, i] - distance
+        larger = max(larger, clear / max(crosswise, distance))
         if not walks[i]:
             side = 1.0 if view.separation[3, i] >= 0.0 else -1.0
             ego_closing = side * (view.ego_vy * view.cos[i] - view.ego_vx * view.sin[i])
             closing = side * (along * view.sin[i] - across * view.cos[i])
-            distance = max(
+            distance = p.fluctuation_m + max(
                 stopping(ego_closing, p.response_s, accel_y, brake_y)
                 + stopping(closing, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2),
                 0.0,
             )
-            clear = max(clear, abs(view.separation[3, i]) - view.reach[3, i] - distance)
-        clear -= p.fluctuation_m
+            other_clear = abs(view.separation[3, i]) - view.reach[3, i] - distance
+            larger = max(larger, other_clear / max(crosswise, distance))
+            clear = max(clear, other_clear)
         sideways[i] = min(max(clear, -LATERAL_CAP_M), LATERAL_CAP_M)
-        larger = max(longitudinal[i] / LONGITUDINAL_SCALE_M, sideways[i] / scale)
         scaled[i] = min(max(larger, SCALED_LOW), SCALED_HIGH)
     return Margins(longitudinal, sideways, scaled)

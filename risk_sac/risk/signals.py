@@ -18,6 +18,13 @@ class SignalInfo:
 
 SIGNALS: dict[str, SignalInfo] = {
     "ttc_s": SignalInfo("s", 0.0, 10.0, "smallest time to collision of the ego with any actor"),
+    "encounter_s": SignalInfo(
+        "s",
+        0.0,
+        8.0,
+        "smallest time to encounter of the ego with any actor: a time to collision in which a near miss counts as the "
+        "time that unforeseen motion takes to close the gap; it falls steadily before a contact",
+    ),
     "rss_margin": SignalInfo(
         "1",
         -3.0,

@@ -5,7 +5,6 @@ from pydantic import TypeAdapter
 from risk_sac.types import EpisodeRecord
 
 _RECORDS = TypeAdapter(list[EpisodeRecord])
-_RECORD = TypeAdapter(EpisodeRecord)
 
 
 def records_to_json(records: list[EpisodeRecord]) -> str:
@@ -20,4 +19,4 @@ def records_from_json(text: str) -> list[EpisodeRecord]:
 
 def records_from_lines(content: bytes) -> list[EpisodeRecord]:
     """The records of an episodes.jsonl."""
-    return [_RECORD.validate_json(line) for line in content.splitlines()]
+    return [EpisodeRecord.model_validate_json(line) for line in content.splitlines()]

@@ -8,17 +8,18 @@ from typing import Any, TypeVar
 
 from risk_sac.config import Interval, Odd, Requirement, Scenery, Settings
 from risk_sac.errors import OddError
+from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.scenario.space import Parameter, SceneSpace
 
-GRAVITY_MPS2 = 9.81
 MIN_TTC_S = 1.5  # below it a conflict counts as serious in traffic conflict studies
-FREE_TTC_S = 10.0  # what the signal ttc_s says where no collision is in sight
+UNDISTURBED_ENCOUNTER_S = 4.25  # what the signal encounter_s says in undisturbed traffic
 PEDESTRIAN_GAP_M = 0.5  # what a driver leaves beside a pedestrian at walking pace, at the very least,
 PEDESTRIAN_GAP_PER_MPS = 0.1  # and so much more for each m/s: 1.9 m at 50 km/h
 PEDESTRIAN_SCALE_M = 11.0
 STANDING_MPS = 0.5  # slower than that, an ego counts as standing,
 STANDING_M = 10.0  # which is worth as much as this gap
 EMERGENCY_BRAKING_MPS2 = 9.0  # of SUMO's default passenger car, on dry asphalt
+RED_LIGHT_SCALE = 0.8  # of the grip, and so 1.25 for who need not brake and about 0.5 for who brakes at leisure
 RED_LIGHT_HOLD_S = 1.0
 BRAKING_HOLD_S = 0.5  # braking shorter than that is a correction, not an emergency stop
 
@@ -123,14 +124,15 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
     Choice: each scale is what undisturbed traffic leaves, so that its robustness is about 1 there and falls without
     a clip as danger grows; else the one with the smallest scale would be the soft minimum whatever happens.
 
-    - TTC: a second of margin after the ego's reaction, and never under MIN_TTC_S; 1 where no collision is in sight.
+    - TTC: a second of margin after the ego's reaction, and never under MIN_TTC_S. It is asked of the time to encounter,
+      in which near misses count: the bare TTC is flat at its cap until a collision course begins, and then jumps.
     - RSS: the signal is scaled already, and is negative where the situation is dangerous.
     - Pedestrians: a minimum gap that grows with the ego's speed, unless the ego stands and lets them pass; a standing
       ego has the margin of a gap of STANDING_M, whoever walks past it.
     - Red light: the braking that it takes to stop at the line must be within what the car, or the worst friction of
       the ODD, friction · g, can give; the step that crosses the line on red is far beyond it. That is held for
       RED_LIGHT_HOLD_S, not for good, or it would stay the worst margin of the episode. A car that waits at the
-      line needs no braking and has the margin 1, however near it stopped.
+      line needs no braking and has the whole margin, however near it stopped.
     - Braking: BRAKING_HOLD_S on end at nine tenths of what car and road can give means that the ego had no reserve
       left. It is flat until then, and so no part of φ.
 
@@ -144,11 +146,12 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
     Source: Hayward 1972 for TTC; the scales are medians over episodes that nobody disturbs.
     """
     ttc_s = max(MIN_TTC_S, reaction_time_s + 1.0)
+    ttc_scale_s = max(UNDISTURBED_ENCOUNTER_S - ttc_s, 1.0)
     friction = odd.environment.friction
     grip_mps2 = EMERGENCY_BRAKING_MPS2 if friction is None else friction.low * GRAVITY_MPS2
     grip_mps2 = round(min(grip_mps2, EMERGENCY_BRAKING_MPS2), 2)
     requirements = [
-        Requirement(name="safe_ttc", formula=f"ttc_s >= {ttc_s:g}", scale=FREE_TTC_S - ttc_s),
+        Requirement(name="safe_ttc", formula=f"encounter_s >= {ttc_s:g}", scale=ttc_scale_s),
         Requirement(name="rss_margin", formula="rss_margin >= 0", scale=1.0),
     ]
     if "pedestrian" in (odd.dynamic.actor_kinds or ()):
@@ -159,7 +162,8 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
         )
     if set(odd.scenery.signal_types or ()) - {"none"}:
         formula = f"historically[0,{RED_LIGHT_HOLD_S:g}] (red_light_braking_mps2 <= {grip_mps2:g})"
-        requirements.append(Requirement(name="no_red_light_entry", formula=formula, scale=grip_mps2))
+        scale = round(RED_LIGHT_SCALE * grip_mps2, 2)
+        requirements.append(Requirement(name="no_red_light_entry", formula=formula, scale=scale))
     braking_mps2 = round(0.9 * grip_mps2, 2)
     formula = f"not historically[0,{BRAKING_HOLD_S:g}] (ego_braking_mps2 >= {braking_mps2:g})"
     requirements.append(Requirement(name="bounded_braking", formula=formula, scale=braking_mps2, shapes=False))

@@ -23,6 +23,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
 from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Area, Layout, VehicleStart
+from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
 from risk_sac.sim.ego import MOTION, Belief
 from risk_sac.sim.lookout import Lookout
@@ -56,7 +57,6 @@ logger = logging.getLogger(__name__)
 NETS = files("sumo_nets")
 PEDESTRIAN_SIZE_M = 0.5
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
-GRAVITY_MPS2 = 9.81
 EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
 # So that the commanded lateral speed is the one driven; its limits are those of `risk_sac.sim.control`.
 STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFactor": "1"}

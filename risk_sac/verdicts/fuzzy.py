@@ -1,8 +1,10 @@
 """The two fuzzy surfaces of the JRC's fuzzy safety model: how uncomfortable, and how critical, a gap is.
 
 Sources: Mattas, Makridis, Botzoris, Kriston, Minarini, Papadopoulos, Re, Rognelund, Ciuffo 2020, "Fuzzy surrogate
-safety metrics for real-time assessment of rear-end collision risk", Accident Analysis & Prevention 148; UN Regulation
-157 (01 series), Annex 3, performance model 2. Written from the formulas, not from the model's code.
+safety metrics for real-time assessment of rear-end collision risk. A study based on empirical observations", Accident
+Analysis & Prevention 148, 105794; UN Regulation 157 (01 series), Annex 3, performance model 2. Written from memory of
+the formulas, not from the model's code. No public text with the equations was found, so the formulas below and their
+parameters have still to be compared with the annex.
 """
 
 from risk_sac.jit import compiled

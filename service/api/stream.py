@@ -19,15 +19,15 @@ from service.errors import NotFoundError, StorageError
 from service.store.reading import Store
 from service.store.records import StoredEpisode
 from service.views.bodies import change_body, episode_body
-from service.views.happenings import Happening, Position, read_batch
+from service.views.happenings import Happening, read_batch
 
 logger = logging.getLogger(__name__)
 
 TICK_S = 1.0  # between two looks at a campaign's revision
 RETRY_MS = 1000  # after which a client whose connection broke comes back
 KEPT = 64  # batches
-LARGEST = 2**63 - 1  # of a database key
-_NUMBERS = re.compile(r"(\d{1,19})\.(\d{1,19})", re.ASCII)
+_ID = re.compile(r"(\w+)-([1-9]\d{0,17})", re.ASCII)  # campaign; sequence of an event
+_FORMER_ID = re.compile(r"(\d{1,18})\.(\d{1,18})", re.ASCII)  # numbers of an episode and of a change
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Chunk:
     """A batch of happenings as it is sent."""
 
     data: bytes
-    position: Position
+    position: int
     more: bool
     ended: bool
 
@@ -49,7 +49,7 @@ class Streams:
         self._chunks = alru_cache(maxsize=KEPT)(self._chunk)
 
     async def follow(
-        self, campaign_id: str, position: Position, stopping: anyio.Event, *, ended: bool
+        self, campaign_id: str, position: int, stopping: anyio.Event, *, ended: bool
     ) -> AsyncIterator[bytes]:
         """What happens after a position, until the campaign's final state, its deletion, or the server's end.
 
@@ -57,7 +57,7 @@ class Streams:
 
         Args:
           campaign_id: of the campaign.
-          position: what has been told.
+          position: sequence of the last event that has been told, 0 for none.
           stopping: set when the server stops.
           ended: whether the campaign had already ended; its final state itself may be older than the record of changes.
         """
@@ -85,36 +85,43 @@ class Streams:
         while not stopping.is_set() and self._store.known_revision(campaign_id) == revision:
             await asyncio.sleep(TICK_S - loop.time() % TICK_S)
 
-    async def _chunk(self, campaign_id: str, position: Position, revision: str) -> Chunk:
+    async def _chunk(self, campaign_id: str, position: int, revision: str) -> Chunk:
         return await run_in_threadpool(self._render, campaign_id, position)
 
-    def _render(self, campaign_id: str, position: Position) -> Chunk:
+    def _render(self, campaign_id: str, position: int) -> Chunk:
         batch = read_batch(self._store, campaign_id, position)
-        data = b"".join(_event(happening) for happening in batch.happenings)
+        data = b"".join(_event(campaign_id, happening) for happening in batch.happenings)
         return Chunk(data, batch.position, batch.more, batch.ended)
 
 
-def encode_position(position: Position) -> str:
-    """An opaque id for an event."""
-    return base64.urlsafe_b64encode(f"{position.episode}.{position.change}".encode()).decode()
+def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None:
+    """The position that an id of this campaign's events was made of; None if it never was, or is none any more.
 
+    Ids from while episodes and changes were numbered apart hold where they were in each order. Their holders go on if
+    what they were told is the beginning of the one order that there is now.
 
-def decode_position(event_id: str) -> Position | None:
-    """The position that an id was made of; None if it never was."""
+    Raises:
+      NotFoundError: there is no such campaign.
+      StorageError: it cannot be read.
+    """
     try:
         text = base64.b64decode(event_id.encode("ascii"), altchars=b"-_", validate=True).decode("ascii")
     except (UnicodeError, binascii.Error):
         return None
-    match = _NUMBERS.fullmatch(text)
-    position = match and Position(int(match[1]), int(match[2]))
-    return position if position and max(position.episode, position.change) <= LARGEST else None
+    if former := _FORMER_ID.fullmatch(text):
+        return store.former_position(campaign_id, int(former[1]), int(former[2]))
+    match = _ID.fullmatch(text)
+    if match is None or match[1] != campaign_id:
+        return None
+    position = int(match[2])
+    return position if store.events(campaign_id, after=position - 1, limit=1).items else None
 
 
-def _event(happening: Happening) -> bytes:
-    what = happening.what
-    if isinstance(what, StoredEpisode):
-        name = "failure" if what.record.outcome is Outcome.FAILURE else "episode"
-        data = episode_body(what).model_dump_json()
+def _event(campaign_id: str, happening: Happening) -> bytes:
+    if isinstance(happening, StoredEpisode):
+        name = "failure" if happening.record.outcome is Outcome.FAILURE else "episode"
+        data = episode_body(happening).model_dump_json()
     else:
-        name, data = "state", change_body(what).model_dump_json()
-    return ServerSentEvent(data, event=name, id=encode_position(happening.position), sep="\n").encode()
+        name, data = "state", change_body(happening).model_dump_json()
+    event_id = base64.urlsafe_b64encode(f"{campaign_id}-{happening.sequence}".encode()).decode()  # opaque to clients
+    return ServerSentEvent(data, event=name, id=event_id, sep="\n").encode()

@@ -1,10 +1,11 @@
 """Bodies of the responses."""
 
+from risk_sac.metrics import Funnel
 from service.schemas.base import Body, Real
 from service.schemas.campaigns import Campaign, CampaignPage, CampaignSummary, Metrics, Progress, Run
 from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter
 from service.schemas.changes import StateChange
-from service.schemas.episodes import Collision, Episode, EpisodePage, Funnel, Judgement, ReferenceOutcome
+from service.schemas.episodes import Collision, Episode, EpisodePage, Judgement, ReferenceOutcome
 from service.schemas.failures import Failure, Series
 from service.schemas.health import Health, Ready
 from service.schemas.problems import FieldProblem, Problem, Reason

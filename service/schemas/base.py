@@ -1,19 +1,27 @@
-"""What all bodies share. Numbers that are not finite are null: JSON has no other word for them."""
+"""What all bodies share."""
 
-import math
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic import BaseModel, ConfigDict
 
-
-def _null_unless_finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-Real = Annotated[float | None, BeforeValidator(_null_unless_finite)]
+Real = float | None  # null where it is not finite: JSON has no other word for that
 
 
 class Body(BaseModel):
     """What all responses share."""
 
-    model_config = ConfigDict(frozen=True, from_attributes=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, from_attributes=True, use_attribute_docstrings=True, ser_json_inf_nan="null")
+
+
+def _without_defaults(schema: dict[str, Any]) -> None:
+    for each in schema["properties"].values():
+        each.pop("default", None)
+
+
+class Shown(Body):
+    """A record of the method in public: `class Metrics(RunMetrics, Shown)`; the rules of the last one win.
+
+    Its defaults are for what was stored before there was the field; a response has every field.
+    """
+
+    model_config = ConfigDict(json_schema_extra=_without_defaults, json_schema_serialization_defaults_required=True)

@@ -6,15 +6,15 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
+from risk_sac.metrics import METRICS
+from risk_sac.types import Phase
 from service.schemas import Body, Metrics, Real
 
-Phase = Literal["search", "evaluation"]
 MetricName = Annotated[
     str,
     Field(
-        description="ecr | pcr | ecr_last | pcr_last | es | rho_c | ofd | distinct_per_1000_steps; the markdown table"
-        " defines them.",
-        examples=["ecr"],
+        description=f"{' | '.join(metric.name for metric in METRICS)}; the markdown table defines them.",
+        examples=[METRICS[0].name],
     ),
 ]
 

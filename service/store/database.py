@@ -18,7 +18,7 @@ from sqlite3 import Connection as SqliteConnection
 from alembic import command
 from alembic.config import Config
 from alembic.util import CommandError
-from sqlalchemy import Engine, create_engine, event, make_url, text
+from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DatabaseError, IntegrityError, NoSuchModuleError, ProgrammingError
 
 from service.errors import StorageError
@@ -31,6 +31,9 @@ ADVISORY_LOCK = 0x5249534B  # any number that all servers of this project agree 
 LOG_HEADER = struct.Struct(">8I")  # magic, version, page size, sequence, two salts, two checksums
 LOG_FRAME = struct.Struct(">6I")  # page, size after a commit, two salts, two checksums
 
+# Options of a connection that will write. On SQLite a transaction that first reads is refused once it writes, without a
+# wait, if another one has written meanwhile.
+WRITING = {"begin": "BEGIN IMMEDIATE"}
 PRAGMAS = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000")
 
 
@@ -93,7 +96,7 @@ def _engine(url: str) -> Engine:
         if make_url(url).get_backend_name() == "sqlite":
             engine = create_engine(url, pool_size=READERS)
             event.listen(engine, "connect", _set_up)
-            event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN"))
+            event.listen(engine, "begin", _begin)
             return engine
         if make_url(url).get_backend_name() == "postgresql":
             return create_engine(url, pool_size=READERS, pool_pre_ping=True)
@@ -106,6 +109,10 @@ def _set_up(connection: SqliteConnection, _: object) -> None:
     connection.isolation_level = None  # else the driver would commit before each change of a table
     for pragma in PRAGMAS:
         connection.execute(f"PRAGMA {pragma}").close()
+
+
+def _begin(connection: Connection) -> None:
+    connection.exec_driver_sql(connection.get_execution_options().get("begin", "BEGIN"))
 
 
 def _logged_frames(database: Path) -> int:

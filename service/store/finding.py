@@ -9,10 +9,9 @@ from operator import attrgetter
 from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import Session
 
-from risk_sac.types import Grade, Outcome
+from risk_sac.types import RECORDED, Grade, Outcome
 from service.errors import NotFoundError
 from service.store.records import Page, StoredEpisode
-from service.store.snapshots import episode_record
 from service.store.tables import CampaignRow, EpisodeRow, RunRow
 
 
@@ -74,18 +73,16 @@ def episode_page(
     found = merge(*(session.scalars(each) for each in queries), key=attrgetter("number"))
     rows = list(islice(found, limit + 1))
     last = rows[limit - 1].number if len(rows) > limit else None
-    return Page(items=tuple(episode_record(row) for row in rows[:limit]), last=last)
+    return Page(items=tuple(StoredEpisode.from_row(row) for row in rows[:limit]), last=last)
 
 
 def split_failure_id(failure_id: str) -> tuple[str, str, int]:
     """Run, phase and index; an id of another shape yields a run that cannot exist."""
-    run_id, _, rest = failure_id.partition("-train-")
-    phase = "train"
-    if not rest:
-        run_id, _, rest = failure_id.partition("-evaluate-")
-        phase = "evaluate"
-    well_formed = "\0" not in run_id and rest.isascii() and rest.isdigit() and len(rest) < 10
-    return (run_id, phase, int(rest)) if well_formed else ("", phase, -1)
+    for phase in RECORDED.values():
+        run_id, _, index = failure_id.partition(f"-{phase}-")
+        if "\0" not in run_id and index.isascii() and index.isdigit() and len(index) < 10:
+            return run_id, phase, int(index)
+    return "", "", -1
 
 
 def unknown_failure(campaign_id: str, failure_id: str) -> NotFoundError:

@@ -3,7 +3,7 @@
 import time
 import zlib
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import replace
 
 from sqlalchemy import func, select
@@ -13,12 +13,12 @@ from risk_sac.types import Outcome
 from service.errors import StorageError
 from service.store.counting import HOUR_S
 from service.store.database import open_database, storage_errors
+from service.store.events import event_page, former_position
 from service.store.finding import Judged, episode_page, find_campaign, find_run, split_failure_id, unknown_failure
 from service.store.records import Page, StoredCampaign, StoredChange, StoredEpisode, StoredRun, Usage
 from service.store.revisions import Mark, Revisions
-from service.store.snapshots import campaign_record, change_record, episode_record, run_record
 from service.store.states import FINAL, State
-from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow, UsageRow
+from service.store.tables import CampaignRow, EpisodeRow, RunRow, UsageRow
 
 DAY_HOURS = 24
 
@@ -119,16 +119,23 @@ class Store:
         """What all campaigns look like now."""
         return replace(self.revisions.all, refusal=self.refusal)
 
-    def changes(self, campaign_id: str, *, after: int = 0, limit: int = 500) -> list[StoredChange]:
-        """Changes of state of a campaign and its runs in their order, from the one just after number `after`.
+    def events(self, campaign_id: str, *, limit: int, after: int = 0) -> Page[StoredEpisode | StoredChange]:
+        """Episodes of a campaign and changes of its state and its runs', in their one order, just after `after`.
 
         Raises:
           NotFoundError: there is no such campaign.
         """
         with self._reading() as session:
-            campaign = find_campaign(session, campaign_id)
-            query = select(ChangeRow).where(ChangeRow.campaign_number == campaign.number, ChangeRow.number > after)
-            return [change_record(row) for row in session.scalars(query.order_by(ChangeRow.number).limit(limit))]
+            return event_page(session, find_campaign(session, campaign_id), limit, after)
+
+    def former_position(self, campaign_id: str, episode: int, change: int) -> int | None:
+        """Where those go on who were told events while episodes and changes were numbered apart; None: nowhere.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+        """
+        with self._reading() as session:
+            return former_position(session, find_campaign(session, campaign_id), episode, change)
 
     def episodes(
         self,
@@ -174,7 +181,7 @@ class Store:
             row = session.scalars(query).one_or_none()
             if row is None:
                 raise unknown_failure(campaign_id, failure_id)
-            return episode_record(row)
+            return StoredEpisode.from_row(row)
 
     def waiting(self) -> dict[str, int]:
         """Number of the run that has waited longest, for each project that has runs in the queue."""
@@ -191,7 +198,7 @@ class Store:
         """The run with this number, which there is."""
         with self._reading() as session:
             row = session.get_one(RunRow, number)
-            return run_record(row, row.campaign.id)
+            return StoredRun.from_row(row, row.campaign.id)
 
     def usage(self, project: str) -> Usage:
         """What a project takes of the service now."""
@@ -224,7 +231,7 @@ class Store:
             yield session
 
     def _campaign(self, row: CampaignRow) -> StoredCampaign:
-        campaign = campaign_record(row, self._shown_revision(row.revision))
+        campaign = StoredCampaign.from_row(row, self._shown_revision(row.revision))
         at_work = campaign.state in (State.RUNNING, State.PAUSED)
         return campaign.paused(self.refusal) if self.refusal is not None and at_work else campaign
 
@@ -236,8 +243,9 @@ class Store:
         counted = select(func.count()).where(EpisodeRow.run_number == RunRow.number).scalar_subquery()
         with self._reading() as session:
             for table in (CampaignRow, RunRow):
-                for _ in session.scalars(select(table).execution_options(yield_per=1000)):
-                    pass
+                with closing(session.scalars(select(table).execution_options(yield_per=1000))) as rows:
+                    for _ in rows:
+                        pass
             lacking = session.scalars(select(RunRow.id).where(RunRow.episodes_done != counted)).first()
         if lacking is not None:
             raise StorageError(f"database is damaged: run {lacking!r} lacks episodes; restore a copy or move it away")

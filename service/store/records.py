@@ -1,14 +1,17 @@
-"""What the store hands out: frozen snapshots of campaigns, runs and episodes."""
+"""What the store hands out: frozen snapshots of campaigns, runs and episodes, each made of its row."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Generic, TypeVar
+from dataclasses import dataclass, fields, replace
+from functools import cache, lru_cache
+from typing import Any, Generic, Self, TypeVar
+
+from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.metrics import Funnel
 from risk_sac.types import EpisodeRecord, RunMetrics
 from service.store.states import State
+from service.store.tables import Base, CampaignRow, ChangeRow, EpisodeRow, RunRow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +44,18 @@ class StoredRun:
     digest: str | None  # of the results; None until it succeeded
     versions: Mapping[str, str]
 
+    @classmethod
+    def from_row(cls, row: RunRow, campaign_id: str) -> Self:
+        """The snapshot of a run; `row.campaign` is not asked for the id, since that costs as much as all else of it."""
+        read = {
+            "campaign_id": campaign_id,
+            "state": State(row.state),
+            "metrics": None if row.metrics is None else RunMetrics.model_validate_json(row.metrics),
+            "evaluation": None if row.evaluation is None else RunMetrics.model_validate_json(row.evaluation),
+            "versions": from_json(row.versions),
+        }
+        return cls(**_columns(cls, row) | read)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredCampaign:
@@ -58,6 +73,13 @@ class StoredCampaign:
     finished_at: float | None
     revision: str  # another one whenever anything of the campaign, its runs or episodes is
     runs: tuple[StoredRun, ...]
+
+    @classmethod
+    def from_row(cls, row: CampaignRow, revision: str) -> Self:
+        """The snapshot of a campaign and its runs."""
+        runs = tuple(StoredRun.from_row(run, row.id) for run in row.runs)
+        read = {"state": State(row.state), "spec_json": row.spec, "revision": revision, "runs": runs}
+        return cls(**_columns(cls, row) | read)
 
     @property
     def spec(self) -> CampaignSpec:
@@ -94,6 +116,17 @@ class StoredEpisode:
     series_sha256: str | None  # of that file, as it was written
     wall_s: float
     funnel: Funnel | None  # of the run's phase, this episode included; None if it is older than that
+    sequence: int  # among all events of the campaign, from 1
+
+    @classmethod
+    def from_row(cls, row: EpisodeRow) -> Self:
+        """The snapshot of an episode."""
+        read = {
+            "run_id": row.run.id,
+            "record": EpisodeRecord.model_validate_json(row.record),
+            "funnel": None if row.funnel is None else Funnel.model_validate_json(row.funnel),
+        }
+        return cls(**_columns(cls, row) | read)
 
     @property
     def id(self) -> str:
@@ -105,11 +138,16 @@ class StoredEpisode:
 class StoredChange:
     """A campaign, or one of its runs, came into another state."""
 
-    number: int  # in the order of arrival, over all campaigns
+    sequence: int  # among all events of the campaign, from 1
     run_id: str | None  # None: the campaign itself
     state: State
     reason: str | None
     at: float  # seconds since the epoch
+
+    @classmethod
+    def from_row(cls, row: ChangeRow) -> Self:
+        """The snapshot of a change."""
+        return cls(**_columns(cls, row) | {"state": State(row.state)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,3 +167,13 @@ class Page(Generic[T]):
 
     items: tuple[T, ...]
     last: int | None
+
+
+def _columns(record: type, row: Base) -> dict[str, Any]:
+    """The columns of a row that are fields of its record, as they are."""
+    return {name: getattr(row, name) for name in _shared(record, type(row))}
+
+
+@cache
+def _shared(record: Any, row: type[Base]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(record) if field.name in row.__mapper__.columns)

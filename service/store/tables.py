@@ -73,6 +73,7 @@ class CampaignRow(Checked, Base):
     started_at: Mapped[float | None]
     finished_at: Mapped[float | None]
     revision: Mapped[int] = mapped_column(default=1)
+    events: Mapped[int] = mapped_column(default=0, info=LATER)  # how many there are, which is the last one's sequence
     runs: Mapped[list["RunRow"]] = relationship(back_populates="campaign", order_by="RunRow.number")
 
 
@@ -124,6 +125,7 @@ class EpisodeRow(Checked, Base):
     __table_args__ = (
         Index("episodes_ids", "run_number", "phase", "index", unique=True),
         Index("episodes_pages", "campaign_number", "number"),
+        Index("episodes_sequence", "campaign_number", "sequence", unique=True),
         Index("episodes_runs", "run_number", "number"),
         Index("episodes_outcomes", "campaign_number", "outcome", "number"),
         *(_of_judged(f"episodes_{name}s", "campaign_number", name, "number") for name in ("grade", "signature")),
@@ -144,6 +146,7 @@ class EpisodeRow(Checked, Base):
     signature: Mapped[str | None] = mapped_column(info=LATER)  # of a contact
     broke: Mapped[str | None] = mapped_column(info=LATER)  # what its striker broke, between commas: ",red_light,"
     funnel: Mapped[str | None] = mapped_column(Text, info=LATER)  # of the run's phase, this episode included
+    sequence: Mapped[int] = mapped_column(info=LATER)  # among the campaign's events: 1, 2, …, with those of `changes`
     run: Mapped[RunRow] = relationship(lazy="joined", innerjoin=True)
 
 
@@ -151,7 +154,10 @@ class ChangeRow(Checked, Base):
     """A campaign, or one of its runs, came into another state."""
 
     __tablename__ = "changes"
-    __table_args__ = (Index("changes_pages", "campaign_number", "number"), {"sqlite_autoincrement": True})
+    __table_args__ = (
+        Index("changes_sequence", "campaign_number", "sequence", unique=True),
+        {"sqlite_autoincrement": True},
+    )
 
     number: Mapped[int] = mapped_column(primary_key=True)
     campaign_number: Mapped[int] = mapped_column(ForeignKey("campaigns.number"))
@@ -159,6 +165,7 @@ class ChangeRow(Checked, Base):
     state: Mapped[str]
     reason: Mapped[str | None]
     at: Mapped[float]
+    sequence: Mapped[int] = mapped_column(info=LATER)  # among the campaign's events: 1, 2, …, with those of `episodes`
 
 
 class UsageRow(Checked, Base):
@@ -189,7 +196,7 @@ def _summed(mapper: Mapper[Any]) -> Callable[[Checked], tuple[Any, ...]]:
 @cache
 def _added(mapper: Mapper[Any]) -> Callable[[Checked], tuple[Any, ...]]:
     names = [name for name in _checked(mapper) if mapper.columns[name].info]
-    return attrgetter(*names) if names else lambda _: ()
+    return lambda row: tuple(getattr(row, name) for name in names)
 
 
 def _checked(mapper: Mapper[Any]) -> list[str]:

@@ -12,11 +12,11 @@ from risk_sac.config import CampaignSpec
 from risk_sac.types import Outcome
 from service.errors import ConflictError
 from service.store.counting import add_usage, count, fill, tally, to_text
-from service.store.database import storage_errors
+from service.store.database import WRITING, storage_errors
+from service.store.events import hold_campaigns, next_sequence
 from service.store.finding import find_campaign
 from service.store.reading import Store
 from service.store.records import StoredCampaign
-from service.store.snapshots import campaign_record
 from service.store.states import RESUMED, State, advance, campaign_state
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 from service.workers.messages import EpisodeDone, Finished
@@ -27,6 +27,7 @@ class Ledger:
 
     def __init__(self, store: Store) -> None:
         self._store = store
+        self._engine = store.engine.execution_options(**WRITING)
         self._repeated_s: dict[int, float] = {}  # time of runs that only repeated what was known
 
     def find(self, project: str, key: str, spec: CampaignSpec) -> StoredCampaign | None:
@@ -39,7 +40,7 @@ class Ledger:
             row = session.scalars(select(CampaignRow).filter_by(project=project, idempotency_key=key)).one_or_none()
             if row is None:
                 return None
-            found = campaign_record(row, self._store.revision(row.id))
+            found = StoredCampaign.from_row(row, self._store.revision(row.id))
         if found.spec != spec:
             message = f"Idempotency-Key {key!r} belongs to campaign {found.id}, which differs; wanted another key"
             raise ConflictError(message, reason="idempotency_key_reused")
@@ -51,20 +52,20 @@ class Ledger:
         row.spec, row.state, row.created_at = spec.model_dump_json(), State.QUEUED, time.time()
         row.runs = [
             RunRow(
-                id=f"{run.family}-{run.method}-{run.seed}",
+                id=run.id,
                 family=run.family,
                 method=run.method,
                 seed=run.seed,
                 spec_digest=run.digest,
                 state=State.QUEUED,
-                episodes_total=run.budget.episodes + run.budget.evaluation_episodes,
+                episodes_total=run.budget.total_episodes,
             )
             for run in spec.runs()
         ]
         with self._writing("creating a campaign") as session:
             session.add(row)
             session.flush()
-            return campaign_record(row, str(row.revision))
+            return StoredCampaign.from_row(row, str(row.revision))
 
     def start_run(self, number: int) -> None:
         """A worker is being launched for this run."""
@@ -76,6 +77,7 @@ class Ledger:
     def add_episode(self, number: int, event: EpisodeDone) -> bool:
         """Store an episode, or replace it where a resumed run reports another outcome; False if it was known."""
         with self._writing("storing an episode", episode=True) as session:
+            (campaign,) = hold_campaigns(session, RunRow.number == number)
             run = session.get_one(RunRow, number)
             query = select(EpisodeRow).filter_by(run_number=number, phase=event.record.phase, index=event.record.index)
             row = session.scalars(query).one_or_none()
@@ -84,21 +86,21 @@ class Ledger:
                 return False
             new = row is None
             if row is None:
-                row = EpisodeRow(campaign_number=run.campaign_number, run_number=number)
+                row = EpisodeRow(campaign_number=campaign.number, run_number=number, sequence=next_sequence(campaign))
                 session.add(row)
             else:
                 count(run, Outcome(row.outcome), -1)
             fill(row, event)
             count(run, event.record.outcome, +1)
-            if event.record.phase == "train":
+            if event.record.searching:
                 run.metrics = to_text(event.metrics)
             else:
                 run.evaluation = to_text(event.metrics)
             tally(run)
             busy_s = self._repeated_s.pop(number)
             run.busy_s += busy_s
-            add_usage(session, run.campaign.project, busy_s)
-            run.campaign.revision += 1  # its state follows those of its runs, which an episode leaves alone
+            add_usage(session, campaign.project, busy_s)
+            campaign.revision += 1  # its state follows those of its runs, which an episode leaves alone
             return new
 
     def end_run(self, number: int, state: State, reason: str | None = None, result: Finished | None = None) -> None:
@@ -121,7 +123,9 @@ class Ledger:
     def pause(self, numbers: Collection[int], reason: str) -> None:
         """The disk refused these runs, which had workers."""
         with self._writing("pausing") as session:
-            for row in session.scalars(select(RunRow).where(RunRow.number.in_(numbers))):
+            paused = RunRow.number.in_(numbers)
+            hold_campaigns(session, paused)
+            for row in session.scalars(select(RunRow).where(paused)):
                 if row.state == State.RUNNING:
                     _move(session, row, State.PAUSED, reason)
                     _settle(session, row.campaign)
@@ -129,7 +133,9 @@ class Ledger:
     def resume(self) -> int:
         """Settle what has no worker any more, after a pause or an earlier server; returns how many runs wait again."""
         with self._writing("resuming") as session:
-            rows = list(session.scalars(select(RunRow).where(RunRow.state.in_(RESUMED))))
+            interrupted = RunRow.state.in_(RESUMED)
+            hold_campaigns(session, interrupted)
+            rows = list(session.scalars(select(RunRow).where(interrupted)))
             for row in rows:
                 _move(session, row, RESUMED[State(row.state)])
                 _settle(session, row.campaign)
@@ -143,12 +149,13 @@ class Ledger:
         """
         with self._writing("cancelling a campaign") as session:
             campaign = find_campaign(session, campaign_id, project)
+            session.refresh(campaign, with_for_update=True)  # held, as by `hold_campaigns`
             if State(campaign.state).final:
                 return []
             running = [run for run in campaign.runs if run.state == State.RUNNING]
             if running and campaign.state != State.CANCELLING:
                 campaign.state = advance(State(campaign.state), State.CANCELLING)
-                _log(session, campaign.number, None, State.CANCELLING, None)
+                _log(session, campaign, None, State.CANCELLING, None)
             for run in campaign.runs:
                 if run in running:
                     _move(session, run, State.CANCELLING)
@@ -175,13 +182,13 @@ class Ledger:
     @contextmanager
     def _run(self, number: int, doing: str) -> Iterator[tuple[Session, RunRow]]:
         with self._writing(doing) as session:
-            row = session.get_one(RunRow, number)
-            yield session, row
-            _settle(session, row.campaign)
+            (campaign,) = hold_campaigns(session, RunRow.number == number)
+            yield session, session.get_one(RunRow, number)
+            _settle(session, campaign)
 
     @contextmanager
     def _writing(self, doing: str, *, episode: bool = False) -> Iterator[Session]:
-        with storage_errors(doing), Session(self._store.engine, expire_on_commit=False) as session:
+        with storage_errors(doing), Session(self._engine, expire_on_commit=False) as session:
             with session.begin():
                 yield session
             for row in session.identity_map.values():
@@ -192,7 +199,7 @@ class Ledger:
 def _move(session: Session, run: RunRow, state: State, reason: str | None = None) -> None:
     run.state = advance(State(run.state), state)
     run.reason = reason
-    _log(session, run.campaign_number, run.id, state, reason)
+    _log(session, run.campaign, run.id, state, reason)
 
 
 def _settle(session: Session, campaign: CampaignRow) -> None:
@@ -208,7 +215,7 @@ def _settle(session: Session, campaign: CampaignRow) -> None:
         campaign.started_at = campaign.started_at or time.time()
     if new.final:
         campaign.finished_at = time.time()
-    _log(session, campaign.number, None, new, campaign.reason)
+    _log(session, campaign, None, new, campaign.reason)
 
 
 def _tells(run: RunRow, state: State) -> bool:
@@ -216,5 +223,7 @@ def _tells(run: RunRow, state: State) -> bool:
     return bool(run.reason) and run.state == state
 
 
-def _log(session: Session, campaign: int, run_id: str | None, state: State, reason: str | None) -> None:
-    session.add(ChangeRow(campaign_number=campaign, run_id=run_id, state=state, reason=reason, at=time.time()))
+def _log(session: Session, campaign: CampaignRow, run_id: str | None, state: State, reason: str | None) -> None:
+    row = ChangeRow(campaign_number=campaign.number, run_id=run_id, state=state, reason=reason, at=time.time())
+    row.sequence = next_sequence(campaign)
+    session.add(row)

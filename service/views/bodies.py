@@ -1,5 +1,7 @@
 """Records as response bodies."""
 
+from typing import Any
+
 from risk_sac.run_folder.results import FAILURES
 from risk_sac.types import Outcome
 from service.errors import StorageError
@@ -63,8 +65,6 @@ def tier_outcomes(tier: str) -> tuple[Outcome, ...]:
     return (Outcome.FAILURE,) if tier == "valid" else (Outcome.FAILURE, Outcome.DEGENERATE)
 
 
-def _fields(episode: StoredEpisode) -> dict[str, object]:
-    record = episode.record
-    own = ("id", "run_id", "wall_s", "funnel")
-    names = (name for name in Episode.model_fields if name not in own)
-    return {name: getattr(record, name) for name in names} | {name: getattr(episode, name) for name in own}
+def _fields(episode: StoredEpisode) -> dict[str, Any]:
+    added = {name: getattr(episode, name) for name in ("id", "run_id", "wall_s", "funnel")}
+    return episode.record.model_dump() | added

@@ -5,9 +5,18 @@ intervals are those of the report.
 """
 
 from collections.abc import Sequence
+from dataclasses import asdict
 
-from risk_sac.metrics import pooled_bins, pooled_counts, pooled_signatures
-from risk_sac.report.cells import METRICS, estimate
+from risk_sac.metrics import (
+    METRICS,
+    RATIOS,
+    Kept,
+    estimate,
+    mean_over_runs,
+    pooled_bins,
+    pooled_counts,
+    pooled_signatures,
+)
 from risk_sac.types import RunMetrics
 from service.schemas import Results, RunResult, Total
 from service.store.records import StoredCampaign, StoredRun
@@ -24,9 +33,6 @@ def results(campaign: StoredCampaign) -> Results:
     )
 
 
-_ECR, _PCR = (next(metric for metric in METRICS if metric.name == name) for name in ("ecr", "pcr"))
-
-
 def totals(runs: Sequence[StoredRun]) -> list[Total]:
     """One total per family and method, of the runs that have begun, in the order of the runs."""
     groups: dict[tuple[str, str], list[RunMetrics]] = {}
@@ -37,27 +43,15 @@ def totals(runs: Sequence[StoredRun]) -> list[Total]:
 
 
 def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
-    ecr, pcr = estimate(_ECR, group), estimate(_PCR, group)
     counts = pooled_counts(group)
-    distinct, failures = counts["distinct_failures"], counts["failures"]
-    dispersions = [metrics.dispersion for metrics in group if metrics.dispersion is not None]
     return Total.model_validate(
-        counts
+        asdict(counts)
+        | {ratio.name: ratio.formula(counts) for ratio in RATIOS}
+        | _means(group)
         | {
             "family": family,
             "method": method,
             "runs": len(group),
-            "ecr": ecr.mean,
-            "ecr_low": ecr.low,
-            "ecr_high": ecr.high,
-            "pcr": pcr.mean,
-            "pcr_low": pcr.low,
-            "pcr_high": pcr.high,
-            "efficiency": _mean([metrics.efficiency for metrics in group]),
-            "cost_rate": _mean([metrics.cost_rate for metrics in group]),
-            "dispersion": _mean(dispersions) if dispersions else None,
-            "steps_per_distinct_failure": counts["environment_steps"] / distinct if distinct else None,
-            "unresponsive_share": counts["unresponsive"] / failures if failures else None,
             "signatures": pooled_signatures(group),
             "conflicts_by_second": pooled_bins([metrics.conflicts_by_second for metrics in group]),
             "contacts_by_second": pooled_bins([metrics.contacts_by_second for metrics in group]),
@@ -65,5 +59,15 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
     )
 
 
-def _mean(values: Sequence[float]) -> float:
-    return sum(values) / len(values)
+def _means(group: Sequence[RunMetrics]) -> dict[str, float | None]:
+    """The metrics that a total has, under the names of `RunMetrics`; intervals are drawn for no others."""
+    means: dict[str, float | None] = {}
+    for metric in METRICS:
+        kept = metric.figure
+        if not isinstance(kept, Kept) or kept.field not in Total.model_fields:
+            continue
+        means[kept.field] = mean_over_runs(metric, group)
+        if kept.interval:
+            pooled = estimate(metric, group)
+            means |= {f"{kept.field}_low": pooled.low, f"{kept.field}_high": pooled.high}
+    return means

@@ -1,24 +1,23 @@
 """What a worker tells the manager: one JSON object per line on the worker's standard output.
 
-Non-finite numbers travel as the strings "Infinity", "-Infinity" and "NaN", so that every line is
-strict JSON and nothing is lost; the API turns them into null.
+Every line is strict JSON from which nothing is lost: words are written as `risk_sac.types.Record` writes them.
 """
 
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import ConfigDict, Field, TypeAdapter
 
-from risk_sac.types import EpisodeRecord, RunMetrics
+from risk_sac.types import EpisodeRecord, Record, RunMetrics
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}$")]
 
 
-class Message(BaseModel):
+class Message(Record):
     """What all events share."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings", use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid")
 
 
 class Started(Message):

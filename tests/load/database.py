@@ -172,7 +172,7 @@ def _lists(plans: Sequence[Plan]) -> dict[str, Question]:
 
 def _campaigns(plans: Sequence[Plan], large: Plan, contacts: Sequence[str]) -> dict[str, Question]:
     """What is asked about one campaign: any of them, and the largest, which has many runs."""
-    runs = [f"{run.family}-{run.method}-{run.seed}" for run in large.spec.runs()]
+    runs = [run.id for run in large.spec.runs()]
     episodes = f"/v1/campaigns/{large.id}/episodes"
     failures = f"/v1/campaigns/{large.id}/failures"
 

@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,12 @@ class Plan:
     def id(self) -> str:
         """As routes name it."""
         return f"c{self.number:016x}"
+
+    @property
+    def events(self) -> int:
+        """How many there are: each episode, and beginnings and ends of the runs and of the campaign."""
+        runs = self.spec.runs()
+        return sum(run.budget.episodes for run in runs) + 2 * (len(runs) + 1)
 
 
 def populate(data_dir: Path, campaigns: int, episodes: int) -> tuple[Plan, ...]:
@@ -125,7 +132,8 @@ def _write(connection: Connection, plans: Sequence[Plan], patterns: Patterns, la
     outcomes = _outcomes(patterns)
     _insert(connection, CampaignRow, (_campaign(plan) for plan in plans))
     _insert(connection, RunRow, (run | _counts(outcomes, run["episodes_total"]) for run in runs))
-    episodes = (episode for run in runs for episode in _episodes(run, patterns))
+    campaigns = itertools.groupby(runs, itemgetter("campaign_number"))
+    episodes = (episode for _, own in campaigns for episode in _numbered(list(own), patterns))
     _insert(connection, EpisodeRow, (row | {"number": n} for n, row in enumerate(episodes, last_episode + 1)))
     _insert(connection, ChangeRow, (change for plan in plans for change in _changes(plan)))
 
@@ -149,6 +157,7 @@ def _campaign(plan: Plan) -> Values:
         "started_at": plan.at + 1,
         "finished_at": plan.at + APART_S,
         "revision": plan.spec.budget.episodes,
+        "events": plan.events,
     }
 
 
@@ -156,7 +165,7 @@ def _runs(plan: Plan, patterns: Patterns) -> Iterator[Values]:
     for run in plan.spec.runs():
         yield patterns.run | {
             "campaign_number": plan.number,
-            "id": f"{run.family}-{run.method}-{run.seed}",
+            "id": run.id,
             "family": run.family,
             "method": run.method,
             "seed": run.seed,
@@ -183,6 +192,12 @@ def _counts(outcomes: Sequence[Outcome], episodes: int) -> Values:
     }
 
 
+def _numbered(runs: Sequence[Values], patterns: Patterns) -> Iterator[Values]:
+    """Episodes of a campaign, among its events after the beginnings of its runs and its own."""
+    episodes = itertools.chain.from_iterable(_episodes(run, patterns) for run in runs)
+    return (row | {"sequence": sequence} for sequence, row in enumerate(episodes, len(runs) + 2))
+
+
 def _episodes(run: Values, patterns: Patterns) -> Iterator[Values]:
     for index, pattern in enumerate(itertools.islice(itertools.cycle(patterns.episodes), run["episodes_total"])):
         yield pattern | {
@@ -194,7 +209,9 @@ def _episodes(run: Values, patterns: Patterns) -> Iterator[Values]:
 
 
 def _changes(plan: Plan) -> Iterator[Values]:
-    ids = [None, *(f"{run.family}-{run.method}-{run.seed}" for run in plan.spec.runs())]
-    for state, at in ((State.RUNNING, plan.at + 1), (plan.state, plan.at + APART_S)):
-        for run_id in ids:
-            yield {"campaign_number": plan.number, "run_id": run_id, "state": state, "reason": None, "at": at}
+    ids = [None, *(run.id for run in plan.spec.runs())]
+    ends = plan.events - len(ids)
+    for state, at, before in ((State.RUNNING, plan.at + 1, 0), (plan.state, plan.at + APART_S, ends)):
+        of_all = {"campaign_number": plan.number, "state": state, "reason": None, "at": at}
+        for sequence, run_id in enumerate(ids, before + 1):
+            yield of_all | {"run_id": run_id, "sequence": sequence}

@@ -78,7 +78,7 @@ def readings(data: Path) -> dict[str, object]:
 
     campaigns = read("campaigns", lambda: store.campaigns(limit=10).items)
     for campaign in () if isinstance(campaigns, Exception) else campaigns:
-        read(f"{campaign.id} changes", lambda id_=campaign.id: store.changes(id_))
+        read(f"{campaign.id} events", lambda id_=campaign.id: store.events(id_, limit=10_000).items)
         episodes = read(f"{campaign.id} episodes", lambda id_=campaign.id: store.episodes(id_, limit=1000).items)
         for episode in () if isinstance(episodes, Exception) else episodes:
             if episode.series is not None:

@@ -13,13 +13,13 @@ from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses
 from service.api.context import Service
 from service.api.stream import decode_position
 from service.store.reading import Store
-from service.views.happenings import Position, knows, read_batch
+from service.views.happenings import read_batch
 
 HEARTBEAT_S = 15.0
 GRACE_S = 1.0  # for streams to end by themselves when the server stops
 
 EXAMPLE = {
-    "id": "MTIuMw==",
+    "id": "YzRkYThkZmRiYWQ1NDYwNDUtMTU=",
     "event": "failure",
     "data": '{"id":"low-risk-sac-0-train-11","run_id":"low-risk-sac-0","outcome":"failure", …}',
 }
@@ -74,12 +74,14 @@ async def get_events(
     )
 
 
-def _start(store: Store, campaign_id: str, project: str | None, event_id: str | None) -> tuple[Position | None, bool]:
+def _start(store: Store, campaign_id: str, project: str | None, event_id: str | None) -> tuple[int | None, bool]:
     """Where to begin, None where nothing is left to tell; and whether the campaign has ended."""
     campaign = store.campaign(campaign_id, project)
-    position = decode_position(event_id) if event_id else Position()
-    if position is None or not knows(store, campaign_id, position):
-        raise invalid_field("Last-Event-ID", event_id, "the id of an event of this campaign, unchanged")
+    position = decode_position(store, campaign_id, event_id) if event_id else 0
+    if position is None:
+        raise invalid_field(
+            "Last-Event-ID", event_id, "the id of an event of this campaign, unchanged; else leave it out"
+        )
     ended = campaign.state.final
     told = ended and not read_batch(store, campaign_id, position, limit=1).happenings
     return None if told else position, ended

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -25,7 +23,7 @@ def test_frames_before_the_release_come_before_it() -> None:
 def test_the_conflict_begins_as_long_before_the_contact_as_its_judgement_says() -> None:
     for series in (synthetic_series(), with_release()):
         assert Recording(synthetic_contact(), series).conflict_s == pytest.approx(-1.2)
-    early = replace(JUDGED, conflict_s=-1.0)  # before the release
+    early = JUDGED.model_copy(update={"conflict_s": -1.0})  # before the release
     assert Recording(synthetic_contact(early), with_release()).conflict_s == pytest.approx(-2.95)
     assert Recording(synthetic_contact(early), synthetic_series()).conflict_s is None  # which began at the release
     assert Recording(synthetic_contact(None), synthetic_series()).conflict_s is None

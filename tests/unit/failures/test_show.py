@@ -1,5 +1,4 @@
 import struct
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +25,7 @@ def png_size(file: Path) -> tuple[int, int]:
 
 @pytest.mark.parametrize("conflict_s", [0.75, -1.0])
 def test_release_and_conflict_are_marked_in_every_panel_and_the_conflict_from_above(conflict_s: float) -> None:
-    contact = synthetic_contact(replace(JUDGED, conflict_s=conflict_s))
+    contact = synthetic_contact(JUDGED.model_copy(update={"conflict_s": conflict_s}))
     view, *panels = draw_recording("mixed", Recording(contact, with_release())).axes
     for panel in panels:
         upright = [float(np.ravel(line.get_xdata())[0]) for line in panel.lines if line.get_linestyle() == ":"]

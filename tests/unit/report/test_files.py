@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -235,5 +236,33 @@ def test_a_run_from_before_contacts_were_judged_can_still_be_read(runs, tmp_path
     assert read_results(tmp_path).metrics.pcr_high == 1.0
 
 
+@pytest.mark.parametrize("written", ['"Infinity"', "null"])
+def test_a_run_in_which_nothing_was_ever_close_can_be_read(runs, tmp_path, written):
+    """Its minima are infinite, for which earlier versions wrote null."""
+    records = [never_close(record) for record in runs[0].records]
+    results = Results(
+        spec=runs[0].spec,
+        spec_digest=runs[0].spec.digest,
+        finished=True,
+        digest=results_digest(records),
+        contacts=tuple(Contact.of(record) for record in records if record.collision is not None),
+    )
+    write_results(tmp_path, results)
+    stored = unseal((tmp_path / RESULTS).read_bytes()).decode()
+    lines = "".join(record.model_dump_json() + "\n" for record in records)
+    assert '"min_ttc_s": "Infinity"' in stored
+    (tmp_path / RESULTS).write_bytes(seal(stored.replace('"Infinity"', written).encode()))
+    (tmp_path / EPISODES).write_text(lines.replace('"Infinity"', written))
+    assert read_run(tmp_path).records == tuple(records)
+    assert read_results(tmp_path).contacts == results.contacts
+
+
+def never_close(record):
+    least = {"min_ttc_s": math.inf, "min_robustness": math.inf}
+    collision = record.collision and record.collision.model_copy(update=least | {"min_rss_margin_m": math.inf})
+    return record.model_copy(update=least | {"collision": collision})
+
+
 def unjudged(record):
-    return replace(record, collision=record.collision and replace(record.collision, judgement=None))
+    collision = record.collision and record.collision.model_copy(update={"judgement": None})
+    return record.model_copy(update={"collision": collision})

@@ -4,8 +4,10 @@ from dataclasses import replace
 import pytest
 
 from risk_sac.geometry import Sight, relative_view
+from risk_sac.risk.encounter import ENCOUNTER_CAP_S
 from risk_sac.risk.publish import (
     CROSSED_ON_RED_M,
+    ENCOUNTER,
     GAP_CAP_M,
     PEDESTRIAN_GAP_CAP_M,
     RED_LIGHT_BRAKING_CAP_MPS2,
@@ -47,9 +49,11 @@ def frame_of(
     )
 
 
-def signals_of(frame: Frame, ttc: list[float], rss: list[float]) -> dict[str, float]:
+def signals_of(
+    frame: Frame, ttc: list[float], rss: list[float], encounter: list[float] | None = None
+) -> dict[str, float]:
     others = assess(frame, RssParameters(), SEES_ALL).others.copy()
-    others[TTC], others[RSS_SCALED] = ttc, rss
+    others[TTC], others[RSS_SCALED], others[ENCOUNTER] = ttc, rss, ttc if encounter is None else encounter
     return publish(frame, None, LeastMargins(*least_margins(others, frame.kind)))
 
 
@@ -68,6 +72,7 @@ def test_every_published_signal_and_no_other_has_a_value() -> None:
 def test_nothing_to_measure_takes_the_caps() -> None:
     assert signals_of(frame_of(), [], []) == {
         "ttc_s": TTC_CAP_S,
+        "encounter_s": ENCOUNTER_CAP_S,
         "rss_margin": SCALED_HIGH,
         "pedestrian_gap_m": PEDESTRIAN_GAP_CAP_M,
         "vehicle_gap_m": GAP_CAP_M,
@@ -81,6 +86,7 @@ def test_nothing_to_measure_takes_the_caps() -> None:
 def test_the_caps_are_the_ends_of_the_published_ranges() -> None:
     for name, cap in (
         ("ttc_s", TTC_CAP_S),
+        ("encounter_s", ENCOUNTER_CAP_S),
         ("rss_margin", SCALED_HIGH),
         ("pedestrian_gap_m", PEDESTRIAN_GAP_CAP_M),
         ("vehicle_gap_m", GAP_CAP_M),
@@ -93,7 +99,8 @@ def test_the_caps_are_the_ends_of_the_published_ranges() -> None:
 
 def test_the_least_value_among_those_in_charge_is_published() -> None:
     frame = frame_of((30, 0, VEHICLE), (50, 3, VEHICLE), (-20, 0, VEHICLE))
-    published = signals_of(frame, [4.0, 2.5, 0.5], [0.3, -0.2, -2.0])
+    published = signals_of(frame, [4.0, 2.5, 0.5], [0.3, -0.2, -2.0], [3.5, 2.4, 7.0])
+    assert published["encounter_s"] == 2.4  # in which the tailgater's counts, faded out by its own measure
     assert published["ttc_s"] == 2.5  # the tailgater's 0.5 s does not count
     assert published["rss_margin"] == -0.2
 

@@ -13,7 +13,7 @@ from risk_sac.risk.rss import (
     LATERAL_CAP_M,
     LATERAL_SCALE_M,
     LONGITUDINAL_CAP_M,
-    LONGITUDINAL_SCALE_M,
+    LONGITUDINAL_SCALE_S,
     SCALED_HIGH,
     SCALED_LOW,
     RssParameters,
@@ -206,7 +206,9 @@ def test_overlapping_bodies_are_in_danger_both_ways() -> None:
 
 def test_the_scaled_margin_is_the_larger_of_both_each_in_its_scale() -> None:
     leader, beside = (34.0, 0, 0, 8, 0), (1.0, 3.0, 0, 10, 0)
-    assert scaled(view_of(10.0, leader)) == pytest.approx([5 / LONGITUDINAL_SCALE_M])
+    assert scaled(view_of(10.0, leader)) == pytest.approx(
+        [5 / 25]
+    )  # 25 m are wanted, more than what is driven in 0.85 s
     assert scaled(view_of(10.0, beside)) == pytest.approx([(1 - 0.85) / LATERAL_SCALE_M])
 
 
@@ -265,4 +267,21 @@ def test_the_margin_falls_all_the_way_to_a_leader_that_stands() -> None:
     far_to_near = [scaled(view_of(12.0, (x, 0.2, 0, 0, 0)), RssParameters())[0] for x in np.arange(40.0, 4.0, -0.5)]
     assert np.all(np.diff(far_to_near) < 0)
     assert far_to_near[0] > 0.5
-    assert far_to_near[-1] < -1
+    assert far_to_near[-1] == pytest.approx(-1, abs=0.1)
+
+
+def test_a_leader_that_leaves_more_than_the_distance_is_measured_in_time() -> None:
+    # 29 m - 20²/16 = 4 m are wanted, less than what the ego drives in 0.85 s
+    assert scaled(view_of(10.0, (12.0, 0, 0, 20, 0))) == pytest.approx([(8 - 4) / (10 * LONGITUDINAL_SCALE_S)])
+
+
+@pytest.mark.parametrize("braking_mps2", [6.0, 8.0, 9.0])
+def test_an_ego_that_brakes_too_late_wins_no_margin_back(braking_mps2: float) -> None:
+    """It would in metres: braking harder than b_min shortens the distance by more than the room it costs."""
+    contact_mps = 4.0
+    falling = []
+    for speed_mps in np.arange(12.0, contact_mps, -0.25):
+        gap_m = (speed_mps**2 - contact_mps**2) / (2 * braking_mps2)
+        falling.append(scaled(view_of(speed_mps, (4.0 + gap_m, 0.2, 0, 0, 0)), RssParameters())[0])
+    assert np.all(np.diff(falling) < 0)
+    assert falling[-1] > -1.0

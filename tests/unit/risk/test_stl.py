@@ -151,7 +151,7 @@ FORMULAS: dict[str, Any] = {
     ),
 }
 SHIPPED_FORMULAS: dict[str, Any] = {
-    "safe_ttc": (">=", "ttc_s", 1.5),
+    "safe_ttc": (">=", "encounter_s", 1.5),
     "rss_margin": (">=", "rss_margin", 0),
     "pedestrian_gap": (
         "or",
@@ -328,7 +328,7 @@ BAD: list[tuple[str, int | None, str]] = [  # formula, position, reason
     ("rise(ttc_s >= 1)", 0, "'rise' is not supported; use p and not prev p"),
     ("sqrt(ttc_s) >= 1", 0, "'sqrt' is not supported"),
     ("true and ttc_s >= 1", 0, "'true' is not supported; use a comparison"),
-    ("tcc_s >= 1", 0, "unknown signal 'tcc_s'; the published ones are ttc_s, rss_margin"),
+    ("tcc_s >= 1", 0, "unknown signal 'tcc_s'; the published ones are ttc_s, encounter_s"),
     ("ego.speed >= 1", 3, "unknown character '.'"),
     ("ttc_s ≥ 1", 6, "unknown character '≥'"),
     ("ttc_s >= 1; import os", 10, "unknown character ';'"),
@@ -362,7 +362,7 @@ BAD: list[tuple[str, int | None, str]] = [  # formula, position, reason
     ("historically[0,20](ttc_s >= 1)", 0, "reach 20 s back; an episode lasts 15 s"),
     ("historically[0,999999](ttc_s >= 1)", 0, "reach 999999 s back"),
     ("once[0,8] once[0,8] ttc_s >= 1", 0, "reach 16 s back; an episode lasts 15 s"),
-    (f"({TTC}) since[0,12] ({GAP})", 1, "need 7260 comparisons per step; wanted at most 5000"),
+    (f"({TTC}) since[0,12] ({GAP})", 1, "need 7260 comparisons per step; wanted at most 4000"),
     ("ttc_s * 1e300 >= 1", 8, r"may reach 1e\+300"),
     ("ttc_s >= 1e999", 9, "may reach inf"),
     ("*".join(["vehicle_gap_m"] * 8) + " >= 1", None, "wanted at most 1e\\+09"),

@@ -80,7 +80,7 @@ def test_impact_speed_of_the_bound() -> None:
 
 def test_a_driver_that_does_not_perceive_in_time_strikes_as_the_ego_did() -> None:
     found = outcomes(standing_in_the_way(5.0))["careful"]  # 0.33 s
-    assert found == ReferenceOutcome(avoids=False, impact_speed_mps=pytest.approx(15.0))
+    assert (found.avoids, found.impact_speed_mps) == (False, pytest.approx(15.0))
 
 
 def test_a_driver_counts_on_its_own_where_the_ego_braked_harder() -> None:

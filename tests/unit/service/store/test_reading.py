@@ -1,5 +1,4 @@
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -17,8 +16,8 @@ SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3,
 
 
 def judged(event, kind):
-    collision = replace(event.record.collision, judgement=kind)
-    return event.model_copy(update={"record": replace(event.record, collision=collision)})
+    collision = event.record.collision.model_copy(update={"judgement": kind})
+    return event.model_copy(update={"record": event.record.model_copy(update={"collision": collision})})
 
 
 def test_a_record_comes_back_with_its_numbers_that_are_not_finite(store, ledger, episode):
@@ -89,7 +88,7 @@ def test_changes_of_state_come_in_their_order(store, ledger):
     number = start(store, ledger)
     ledger.requeue_run(number, "worker was killed by SIGKILL")
     ledger.cancel(campaign.id)
-    changes = store.changes(campaign.id)
+    changes = store.events(campaign.id, limit=100).items
     assert [(change.run_id, change.state) for change in changes[:4]] == [
         ("low-risk-sac-3", State.RUNNING),
         (None, State.RUNNING),
@@ -98,7 +97,8 @@ def test_changes_of_state_come_in_their_order(store, ledger):
     ]
     assert changes[2].reason == "worker was killed by SIGKILL"
     assert (changes[-1].run_id, changes[-1].state) == (None, State.CANCELLED)
-    assert store.changes(campaign.id, after=changes[3].number) == changes[4:]
+    assert [change.sequence for change in changes] == list(range(1, len(changes) + 1))
+    assert store.events(campaign.id, after=4, limit=100).items == changes[4:]
 
 
 def test_another_project_sees_nothing(store, ledger, episode):

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import pytest
 
 from risk_sac.config import CampaignSpec
@@ -177,7 +175,7 @@ def test_a_run_has_the_sums_of_what_its_phases_counted(store, ledger, episode, m
     number = start(store, ledger)
     ledger.add_episode(number, episode(0, Outcome.FAILURE))
     assert tallies(store, campaign) == (1, 1, 1)
-    counted = replace(metrics, distinct_failures=4, preventable=3, distinct_preventable=2)
+    counted = metrics.model_copy(update={"distinct_failures": 4, "preventable": 3, "distinct_preventable": 2})
     evaluated = episode(0, Outcome.FAILURE, phase="evaluate").model_copy(update={"metrics": counted})
     ledger.add_episode(number, evaluated)
     assert tallies(store, campaign) == (5, 4, 3)

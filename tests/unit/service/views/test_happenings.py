@@ -1,3 +1,7 @@
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from threading import Barrier, Event
+
 import pytest
 
 from risk_sac.config import CampaignSpec
@@ -5,95 +9,139 @@ from risk_sac.types import Outcome
 from service.errors import NotFoundError
 from service.store.records import StoredEpisode
 from service.store.states import State
-from service.views.happenings import Position, knows, read_batch
+from service.views.happenings import read_batch
 from service.workers.messages import Finished
-
-START = Position()
 
 
 @pytest.fixture
-def campaign(ledger, episode, metrics):
-    """Two runs of five episodes that took turns, and ended one after the other."""
+def done(metrics):
+    return Finished(finished=True, metrics=metrics, evaluation=None, digest="d", versions={}, wall_s=1.0)
+
+
+@pytest.fixture
+def campaign(ledger, episode, done):
+    """Two runs of five episodes that took turns, the first of which was begun twice."""
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",), seeds=(0, 1)))
-    numbers = [run.number for run in campaign.runs]
+    first, second = numbers = [run.number for run in campaign.runs]
     for number in numbers:
         ledger.start_run(number)
     for index in range(5):
         for number in numbers:
             ledger.add_episode(number, episode(index, Outcome.FAILURE if index == 2 else Outcome.SAFE))
-    done = Finished(finished=True, metrics=metrics, evaluation=None, digest="d", versions={}, wall_s=1.0)
-    for number in numbers:
-        ledger.end_run(number, State.SUCCEEDED, result=done)
+        if index == 1:
+            ledger.requeue_run(first)
+            ledger.start_run(first)
+    ledger.end_run(first, State.SUCCEEDED, result=done)
+    ledger.end_run(second, State.SUCCEEDED, result=done)
     return campaign
 
 
-def story(store, campaign, position=START, limit=100):
+def story(store, campaign, position=0, limit=100):
     """All that is told from a position on, in as many batches as it takes, and the positions."""
     told, positions = [], []
     while True:
         batch = read_batch(store, campaign.id, position, limit)
         assert batch.happenings, "a batch that ends nothing must tell something"
-        told += [_short(happening.what) for happening in batch.happenings]
-        positions += [happening.position for happening in batch.happenings]
+        assert len(batch.happenings) <= limit
+        told += map(short, batch.happenings)
+        positions += [happening.sequence for happening in batch.happenings]
         position = batch.position
         if batch.ended:
+            assert not batch.more
             return told, positions
 
 
-def _short(what):
-    if isinstance(what, StoredEpisode):
-        return what.id
-    return f"{what.run_id or 'campaign'} {what.state}"
+def short(happening):
+    if isinstance(happening, StoredEpisode):
+        return happening.id
+    return f"{happening.run_id or 'campaign'} {happening.state}"
 
 
-def test_a_run_starts_before_its_episodes_and_ends_after_them(store, campaign):
-    told, _ = story(store, campaign)
+def test_all_is_told_in_the_order_in_which_it_was_written(store, campaign):
+    told, positions = story(store, campaign)
     episodes = [f"low-random-{run}-train-{index}" for index in range(5) for run in (0, 1)]
     begins = ["low-random-0 running", "campaign running", "low-random-1 running"]
+    again = ["low-random-0 queued", "low-random-0 running"]
     ends = ["low-random-0 succeeded", "low-random-1 succeeded", "campaign succeeded"]
-    assert told == begins + episodes + ends
+    assert told == begins + episodes[:4] + again + episodes[4:] + ends
+    assert positions == list(range(1, len(told) + 1))
 
 
-@pytest.mark.parametrize("limit", [1, 2, 3, 7])
-def test_small_batches_tell_the_same_but_for_the_order_of_episodes_and_beginnings(store, campaign, limit):
-    told, positions = story(store, campaign, limit=limit)
-    whole, _ = story(store, campaign)
-    assert sorted(told) == sorted(whole)
-    assert told[-1] == whole[-1]
-    assert len(set(positions)) == len(positions)
-
-
-@pytest.mark.parametrize("limit", [1, 2, 100])
+@pytest.mark.parametrize("limit", [1, 2, 3, 7, 100])
 def test_whoever_comes_back_is_told_exactly_the_rest(store, campaign, limit):
     told, positions = story(store, campaign)
-    for index, position in enumerate(positions[:-1]):
-        rest, _ = story(store, campaign, position, limit)
-        assert sorted(rest) == sorted(told[index + 1 :])
-        assert rest[-1] == "campaign succeeded"
+    for index, position in enumerate([0, *positions[:-1]]):
+        assert story(store, campaign, position, limit) == (told[index:], positions[index:])
+
+
+def test_many_writers_and_readers_agree_on_one_order(store, ledger, episode, done):
+    """Each run is begun, loses its worker, is begun again and ends while the others are at work, and readers read."""
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",), seeds=(0, 1, 2, 3)))
+    together, failed = Barrier(len(campaign.runs)), Event()
+
+    def work(number):
+        together.wait()
+        ledger.start_run(number)
+        for index in range(20):
+            if index % 7 == 6:
+                ledger.requeue_run(number)
+                ledger.start_run(number)
+            ledger.add_episode(number, episode(index))
+        ledger.end_run(number, State.SUCCEEDED, result=done)
+
+    def read(limit):
+        """What somebody is told who always wants to know what is new."""
+        told, position, ended = [], 0, False
+        while not ended and not failed.is_set():
+            batch = read_batch(store, campaign.id, position, limit)
+            told += batch.happenings
+            position, ended = batch.position, batch.ended
+        return told
+
+    with ThreadPoolExecutor(7) as pool:
+        readers = [pool.submit(read, limit) for limit in (1, 5, 100)]
+        try:
+            for writer in [pool.submit(work, run.number) for run in campaign.runs]:
+                writer.result()
+        except BaseException:
+            failed.set()
+            raise
+        heard = [reader.result() for reader in readers]
+    told, positions = story(store, campaign)
+    assert positions == list(range(1, len(told) + 1))
+    assert sum("train" in each for each in told) == 80
+    assert len(set(pairwise("train" in each for each in told))) > 2, "episodes and changes lie among one another"
+    for mine in heard:
+        assert [short(each) for each in mine] == told
+    for index, position in enumerate(positions[:-1], 1):
+        assert story(store, campaign, position, 30)[0] == told[index:]
 
 
 def test_what_goes_on_has_not_ended(store, ledger, episode):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
-    assert read_batch(store, campaign.id, Position()).happenings == ()
+    assert read_batch(store, campaign.id, 0).happenings == ()
     ledger.start_run(campaign.runs[0].number)
     ledger.add_episode(campaign.runs[0].number, episode(0))
-    batch = read_batch(store, campaign.id, Position())
-    assert [_short(each.what) for each in batch.happenings][-1] == "low-random-0-train-0"
+    batch = read_batch(store, campaign.id, 0)
+    assert [short(each) for each in batch.happenings][-1] == "low-random-0-train-0"
     assert not batch.ended
     assert not batch.more
 
 
-def test_a_campaign_knows_only_positions_of_its_own(store, ledger, campaign):
-    other = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
-    _, positions = story(store, campaign)
-    assert all(knows(store, campaign.id, position) for position in [Position(), *positions])
-    assert knows(store, other.id, Position())
-    assert not any(knows(store, other.id, position) for position in positions)
-    last = positions[-1]
-    for wrong in (Position(last.episode + 1, last.change), Position(last.episode, last.change + 1), Position(-1, 0)):
-        assert not knows(store, campaign.id, wrong)
+def test_an_episode_that_comes_out_otherwise_keeps_its_place(store, ledger, episode):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
+    number = campaign.runs[0].number
+    ledger.start_run(number)
+    for index in range(2):
+        ledger.add_episode(number, episode(index))
+    before = read_batch(store, campaign.id, 0).happenings
+    ledger.add_episode(number, episode(0, Outcome.FAILURE))
+    ledger.add_episode(number, episode(2))
+    after = read_batch(store, campaign.id, 0).happenings
+    assert [short(each) for each in after] == [*map(short, before), "low-random-0-train-2"]
+    assert [each.sequence for each in after] == [1, 2, 3, 4, 5]
 
 
 def test_a_campaign_that_is_gone_has_no_feed(store):
     with pytest.raises(NotFoundError):
-        read_batch(store, "none", Position())
+        read_batch(store, "none", 0)

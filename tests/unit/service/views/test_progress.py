@@ -71,7 +71,7 @@ def test_progress_counts_all_runs_and_shows_those_at_work(ledger, metrics):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random")))
     ended = replace(RUN, state=State.SUCCEEDED, episodes_done=100, failures=5, raw_collisions=9, metrics=metrics)
     ended = replace(ended, distinct_failures=4, preventable=3, distinct_preventable=2)
-    present = replace(metrics, dual_variable=0.9, window_ecr=0.1, window_pcr=0.05)
+    present = metrics.model_copy(update={"dual_variable": 0.9, "window_ecr": 0.1, "window_pcr": 0.05})
     at_work = replace(RUN, episodes_done=50, failures=1, distinct_failures=1, metrics=present)
     shown = progress(replace(campaign, state=State.RUNNING, runs=(ended, at_work)), workers=1)
     assert (shown.episodes_done, shown.episodes_total) == (150, 200)

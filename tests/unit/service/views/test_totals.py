@@ -9,7 +9,7 @@ from service.views.totals import results
 
 def test_totals_are_per_family_and_method_over_the_seeds(ledger, metrics):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random"), seeds=(0, 1)))
-    sac = [replace(metrics, ecr=0.25), replace(metrics, ecr=0.75, failures=3, dispersion=0.5)]
+    sac = [metrics.model_copy(update=each) for each in ({"ecr": 0.25}, {"ecr": 0.75, "failures": 3, "dispersion": 0.5})]
     runs = tuple(
         replace(run, metrics=sac[run.seed] if run.method == "sac" else None, state=State.RUNNING)
         for run in campaign.runs
@@ -25,19 +25,19 @@ def test_totals_are_per_family_and_method_over_the_seeds(ledger, metrics):
 
 def test_totals_have_the_funnel_and_its_histograms(ledger, metrics):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0, 1)))
-    second = replace(
-        metrics,
-        raw_collisions=5,
-        failures=3,
-        distinct_failures=2,
-        preventable=2,
-        distinct_preventable=1,
-        pcr=0.5,
-        unresponsive=1,
-        signatures={"pedestrian": 2, "cut-in, straight": 1},
-        conflicts_by_second=(1, 1, 1, 0),
-        contacts_by_second=(0, 0, 1, 2),
-    )
+    found = {
+        "raw_collisions": 5,
+        "failures": 3,
+        "distinct_failures": 2,
+        "preventable": 2,
+        "distinct_preventable": 1,
+        "pcr": 0.5,
+        "unresponsive": 1,
+        "signatures": {"pedestrian": 2, "cut-in, straight": 1},
+        "conflicts_by_second": (1, 1, 1, 0),
+        "contacts_by_second": (0, 0, 1, 2),
+    }
+    second = metrics.model_copy(update=found)
     runs = tuple(replace(run, metrics=(metrics, second)[run.seed]) for run in campaign.runs)
     (total,) = results(replace(campaign, runs=runs)).totals
     assert (total.raw_collisions, total.failures, total.distinct_failures) == (7, 4, 3)

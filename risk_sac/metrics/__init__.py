@@ -1,0 +1,43 @@
+"""What a run achieved: ECR, PCR, ES, ρ̄_c and OFD with their 95 % intervals, and the digest of its records.
+
+A figure is a row of `rows`: its names, its formula, and how runs are pooled. `tally` counts what formulas take.
+
+Source: RISK-SAC, Sec. IV (evaluation metrics); what the paper leaves open is marked as a choice.
+"""
+
+from risk_sac.metrics.accumulator import MetricsAccumulator
+from risk_sac.metrics.counts import COUNTS, Counts, Funnel, pooled_counts
+from risk_sac.metrics.digest import results_digest
+from risk_sac.metrics.features import FEATURES, outcome_features
+from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, wilson_interval
+from risk_sac.metrics.metric import Kept, Metric, Ratio
+from risk_sac.metrics.pooling import Estimate, estimate, mean_over_runs, pooled_bins, pooled_signatures
+from risk_sac.metrics.rows import METRICS, RATIOS
+from risk_sac.metrics.tally import WINDOW, Tally, preventable
+
+__all__ = [
+    "COUNTS",
+    "FEATURES",
+    "METRICS",
+    "RATIOS",
+    "RESAMPLING_SEED",
+    "WINDOW",
+    "Counts",
+    "Estimate",
+    "Funnel",
+    "Kept",
+    "Metric",
+    "MetricsAccumulator",
+    "Ratio",
+    "Tally",
+    "bootstrap_interval",
+    "estimate",
+    "mean_over_runs",
+    "outcome_features",
+    "pooled_bins",
+    "pooled_counts",
+    "pooled_signatures",
+    "preventable",
+    "results_digest",
+    "wilson_interval",
+]

@@ -1,0 +1,59 @@
+"""`RunMetrics` of the episodes so far."""
+
+from typing import Any
+
+from risk_sac.metrics.counts import COUNTS
+from risk_sac.metrics.metric import Kept
+from risk_sac.metrics.rows import METRICS, steps_per_distinct_failure
+from risk_sac.metrics.tally import Tally
+from risk_sac.types import EpisodeRecord, RunMetrics
+
+
+class MetricsAccumulator:
+    """`RunMetrics` kept up to date.
+
+    Adding a run's stored records again, in order, restores it exactly.
+    """
+
+    def __init__(self, horizon_steps: int) -> None:
+        self._tally = Tally(horizon_steps=horizon_steps)
+        self._dual_variable = self._temperature = 0.0
+
+    def add(self, record: EpisodeRecord) -> RunMetrics:
+        """Count one more episode.
+
+        Raises:
+            NotFinite: as `Tally.add`.
+            ValueError: as `Tally.add`.
+        """
+        self._tally.add(record)
+        self._dual_variable, self._temperature = record.dual_variable, record.temperature
+        return self.metrics()
+
+    def metrics(self) -> RunMetrics:
+        """The figures over all episodes added so far."""
+        tally = self._tally
+        return RunMetrics(
+            **{name: getattr(tally, name) for name in COUNTS},
+            **_kept(tally),
+            steps_per_distinct_failure=steps_per_distinct_failure(tally),
+            dual_variable=self._dual_variable,
+            temperature=self._temperature,
+            signatures=dict(tally.signatures),
+            conflicts_by_second=tuple(tally.conflicts_by_second),
+            contacts_by_second=tuple(tally.contacts_by_second),
+        )
+
+
+def _kept(tally: Tally) -> dict[str, Any]:
+    """Field of `RunMetrics` -> its value, for all metrics that have one."""
+    found: dict[str, float | None] = {}
+    for metric in METRICS:
+        kept = metric.figure
+        if not isinstance(kept, Kept):
+            continue
+        value = found[kept.field] = kept.formula(tally)
+        if kept.interval and value is not None:
+            interval = metric.interval(value, tally)
+            found[f"{kept.field}_low"], found[f"{kept.field}_high"] = interval or (None, None)
+    return found

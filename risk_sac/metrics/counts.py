@@ -1,0 +1,50 @@
+"""What is counted of a run, and the funnel of it. Pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+from risk_sac.types import Record, RunMetrics
+
+
+@dataclass(kw_only=True)
+class Counts:
+    """The counts of a run, as `RunMetrics` has them; several runs have their sums."""
+
+    episodes: int = 0
+    rejected: int = 0
+    raw_collisions: int = 0
+    failures: int = 0
+    distinct_failures: int = 0
+    preventable: int = 0
+    distinct_preventable: int = 0
+    artefacts: int = 0
+    unresponsive: int = 0
+    environment_steps: int = 0
+
+
+COUNTS = tuple(each.name for each in fields(Counts))
+
+
+def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
+    """Each count summed over the runs; what two runs found alike counts twice."""
+    return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in COUNTS})
+
+
+class Funnel(Record):
+    """From what the ego touched to what is worth a person's time; each count is part of the one before."""
+
+    contacts: int
+    valid: int
+    distinct: int
+    preventable: int
+    """Distinct failures that the careful driver would have prevented."""
+
+    @classmethod
+    def of(cls, metrics: RunMetrics) -> "Funnel":
+        """The funnel of a run."""
+        return cls(
+            contacts=metrics.raw_collisions,
+            valid=metrics.failures,
+            distinct=metrics.distinct_failures,
+            preventable=metrics.distinct_preventable,
+        )

@@ -1,0 +1,60 @@
+"""95 % intervals of a rate and of a mean. Pure."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from risk_sac.errors import NotFinite
+
+NORMAL_QUANTILE = 1.959963984540054  # two-sided 95 %
+RESAMPLES = 10_000
+RESAMPLING_SEED = 0
+
+
+def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a rate.
+
+    Args:
+        successes: k, 0 <= k <= n.
+        trials: n; with 0 nothing is known and the interval is [0, 1].
+
+    Returns:
+        (low, high) within [0, 1]; contains k/n.
+
+    Source: Wilson 1927, Probable inference, the law of succession, and statistical inference.
+    """
+    if trials == 0:
+        return 0.0, 1.0
+    z2 = NORMAL_QUANTILE**2
+    rate = successes / trials
+    centre = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
+    half = NORMAL_QUANTILE * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2)) / (1 + z2 / trials)
+    # At rates of 0 and 1 the bound equals the rate; rounding must not push it past.
+    return max(0.0, min(centre - half, rate)), min(1.0, max(centre + half, rate))
+
+
+def bootstrap_interval(values: Sequence[float], seed: int) -> tuple[float, float]:
+    """Percentile bootstrap 95 % interval of the mean over seeds.
+
+    With fewer than about ten seeds it is narrower than its name; one seed gives a point.
+
+    Args:
+        values: one figure per seed, at least one.
+        seed: of the resampling; the same seed gives the same interval.
+
+    Returns:
+        (low, high) within [min, max] of the values.
+
+    Raises:
+        ValueError: there are no values.
+        NotFinite: a value is NaN or infinite.
+    """
+    if not values:
+        raise ValueError("values is empty; wanted one figure per seed")
+    sample = np.asarray(values, dtype=np.float64)
+    if not np.isfinite(sample).all():
+        raise NotFinite(f"values is {list(values)}; wanted finite figures, one per seed")
+    drawn = np.random.default_rng(seed).integers(len(sample), size=(RESAMPLES, len(sample)))
+    low, high = np.quantile(sample[drawn].mean(axis=1), (0.025, 0.975)).clip(sample.min(), sample.max())
+    return float(low), float(high)

@@ -1,0 +1,199 @@
+"""The metrics: their formulas, and a row for each. Pure.
+
+Source: RISK-SAC, Sec. IV; what the paper leaves open is marked as a choice.
+"""
+
+import math
+
+from risk_sac.metrics.counts import Counts
+from risk_sac.metrics.features import FEATURES
+from risk_sac.metrics.metric import Derived, Kept, Metric, Ratio
+from risk_sac.metrics.tally import WINDOW, Tally
+from risk_sac.types import ARTEFACT_RULES
+
+PER_STEPS = 1000  # environment steps over which the rate of distinct failures is taken
+
+
+def effective_collision_rate(counts: Counts) -> float:
+    """ECR: valid collisions per episode, rejected scenes included; 0 without episodes. Source: Sec. IV."""
+    return _share(counts.failures, counts.episodes)
+
+
+def preventable_collision_rate(counts: Counts) -> float:
+    """PCR: valid collisions of grade `careful` per episode, rejected scenes included; 0 without episodes."""
+    return _share(counts.preventable, counts.episodes)
+
+
+def newest_effective_collision_rate(tally: Tally) -> float:
+    """ECR over the newest episodes."""
+    return _share(tally.newest_failures, tally.newest_episodes)
+
+
+def newest_preventable_collision_rate(tally: Tally) -> float:
+    """PCR over the newest episodes."""
+    return _share(tally.newest_preventable, tally.newest_episodes)
+
+
+def efficiency_score(tally: Tally) -> float:
+    """How much of the horizon an episode saves by failing early, ES.
+
+    ES = 1 - (mean steps to the first valid collision) / T
+
+    Choice: an episode without a valid collision counts T, and so does a rejected scene.
+
+    Returns:
+        In [0, 1]; 0 without episodes or without failures.
+
+    Source: RISK-SAC, Sec. IV.
+    """
+    return 1 - tally.steps_to_failure / (tally.episodes * tally.horizon_steps) if tally.episodes else 0.0
+
+
+def cost_rate(tally: Tally) -> float:
+    """Mean realism cost C_soft per executed step, ρ̄_c; 0 without steps.
+
+    Rejected scenes executed none; `RunMetrics.rejected` counts them. Source: RISK-SAC, Sec. IV.
+    """
+    return tally.cost / max(1, tally.environment_steps)
+
+
+def outcome_dispersion(tally: Tally) -> float | None:
+    """Mean distance between two failures, OFD.
+
+    OFD = 2 / (n (n - 1)) Σ_{i<j} ||x_i - x_j|| / √(number of features)
+
+    Returns:
+        In [0, 1]; None with fewer than two failures.
+
+    Source: RISK-SAC, Sec. IV; √features brings the largest distance to 1.
+    """
+    pairs: float = tally.failures * (tally.failures - 1) / 2
+    return tally.distance / pairs / math.sqrt(len(FEATURES)) if pairs else None
+
+
+def distinct_failure_rate(counts: Counts) -> float | None:
+    """Distinct failures per `PER_STEPS` environment steps; None without steps."""
+    return PER_STEPS * counts.distinct_failures / counts.environment_steps if counts.environment_steps else None
+
+
+def steps_per_distinct_failure(counts: Counts) -> float | None:
+    """Environment steps per distinct failure; None without one."""
+    return counts.environment_steps / counts.distinct_failures if counts.distinct_failures else None
+
+
+def _share(count: int, of: int) -> float:
+    return count / max(1, of)
+
+
+def _all(counts: Counts) -> int:
+    return counts.episodes
+
+
+def _newest(counts: Counts) -> int:
+    return min(WINDOW, counts.episodes)
+
+
+METRICS = (
+    Metric(
+        name="ecr",
+        symbol="ECR",
+        meaning="valid failures / episodes",
+        figure=Kept(field="ecr", formula=effective_collision_rate, interval=True),
+        trials=_all,
+    ),
+    Metric(
+        name="pcr",
+        symbol="PCR",
+        meaning="preventable failures / episodes: valid ones that the careful driver would have prevented",
+        figure=Kept(field="pcr", formula=preventable_collision_rate, interval=True),
+        trials=_all,
+    ),
+    Metric(
+        name="ecr_last",
+        symbol=f"ECR last {WINDOW}",
+        meaning=f"ECR of the last {WINDOW} search episodes, or of all where there are fewer",
+        figure=Kept(field="window_ecr", formula=newest_effective_collision_rate),
+        trials=_newest,
+        search_only=True,
+        tested=False,
+    ),
+    Metric(
+        name="pcr_last",
+        symbol=f"PCR last {WINDOW}",
+        meaning=f"PCR of the last {WINDOW} search episodes, or of all where there are fewer",
+        figure=Kept(field="window_pcr", formula=newest_preventable_collision_rate),
+        trials=_newest,
+        search_only=True,
+        tested=False,
+    ),
+    Metric(
+        name="es",
+        symbol="ES",
+        words="efficiency",
+        meaning="1 − (mean steps to the valid failure) / T; an episode without one counts the horizon T",
+        figure=Kept(field="efficiency", formula=efficiency_score),
+    ),
+    Metric(
+        name="rho_c",
+        symbol="ρ̄_c",
+        words="realism cost per step",
+        meaning="mean realism cost C_soft per executed step, in [0, 1]; lower is more realistic",
+        figure=Kept(field="cost_rate", formula=cost_rate),
+    ),
+    Metric(
+        name="ofd",
+        symbol="OFD",
+        words="dispersion",
+        meaning="mean distance between two valid failures of a run in outcome features, in [0, 1]",
+        figure=Kept(field="dispersion", formula=outcome_dispersion),
+    ),
+    Metric(
+        name="distinct_per_1000_steps",
+        symbol=f"distinct / {PER_STEPS} steps",
+        meaning=f"distinct valid failures per {PER_STEPS} environment steps",
+        figure=Derived(formula=distinct_failure_rate),
+        search_only=True,
+        tabled=False,  # its reciprocal is
+    ),
+)
+
+RATIOS = (
+    Ratio(
+        name="steps_per_distinct_failure",
+        symbol="steps / distinct",
+        meaning="environment steps over all seeds / distinct failures over all seeds",
+        formula=steps_per_distinct_failure,
+    ),
+    Ratio(
+        name="raw_rate",
+        symbol="raw contacts",
+        meaning="contacts of any kind / episodes",
+        formula=lambda counts: _share(counts.raw_collisions, counts.episodes),
+    ),
+    Ratio(
+        name="artefact_rate",
+        symbol="artefact",
+        meaning="episodes whose contact was refused by a rule that speaks of the simulator or the control "
+        f"({', '.join(sorted(ARTEFACT_RULES))}) / episodes",
+        formula=lambda counts: _share(counts.artefacts, counts.episodes),
+    ),
+    Ratio(
+        name="degenerate_rate",
+        symbol="degenerate",
+        meaning="all refused contacts / episodes, artefacts among them",
+        formula=lambda counts: _share(counts.raw_collisions - counts.failures, counts.episodes),
+    ),
+    Ratio(
+        name="rejected_rate",
+        symbol="rejected",
+        meaning="infeasible scenes / episodes",
+        formula=lambda counts: _share(counts.rejected, counts.episodes),
+    ),
+    Ratio(
+        name="unresponsive_share",
+        symbol="unresponsive",
+        meaning="valid failures with a visible collision course of at least 1.5 s during which the ego never braked / "
+        "valid failures",
+        formula=lambda counts: counts.unresponsive / counts.failures if counts.failures else None,
+    ),
+)

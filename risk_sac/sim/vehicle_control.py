@@ -1,0 +1,180 @@
+"""From an action to a vehicle's command that keeps its kinematic limits.
+
+Each limit holds on the motion that is driven, not only on what was asked for: acceleration tapers before standstill
+and top speed, speed before a bend, and lateral speed before the road's edge, so that no clipping causes a jolt.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from risk_sac.jit import compiled
+from risk_sac.scenario.limits import Limits
+from risk_sac.sim.bends import BODY_M, CAP, HERE, SOON, bends, index
+from risk_sac.sim.paths import Along, Path
+from risk_sac.sim.sumo import Room, VehicleCommand
+from risk_sac.sim.taper import clip, taper
+from risk_sac.types import STEP_S, Floats
+
+CORRECTION_PER_M = 0.05  # curvature that is left for steering in the tightest bend, and so before a road's edge
+TURNING_BACK = 0.85  # share of the heading that leaves just enough room; a step of 0.1 s resolves no more
+EDGE_M = 0.03  # of the road that is kept free: what a car overshoots by that brakes while it straightens
+SKID = 0.98  # who is too fast for a curve keeps a fifth of its grip for braking, or it would never slow down
+
+
+class Bounds(NamedTuple):
+    """What compiled code knows of a vehicle's `Limits`; named as there."""
+
+    speed_mps: float
+    accel_mps2: float
+    brake_mps2: float
+    grip_mps2: float
+    jerk_mps3: float
+    lateral_mps: float
+    lateral_accel_mps2: float
+    curvature_per_m: float
+    cornering_mps2: float
+    slip: float
+    preview_s: float  # as long as it takes to get from full acceleration to the braking that bends are approached with
+
+    @classmethod
+    def of(cls, limits: Limits) -> "Bounds":
+        """Those of some limits."""
+        preview_s = (limits.accel_mps2 + limits.approach_mps2) / limits.jerk_mps3
+        return cls(**{name: getattr(limits, name) for name in cls._fields[:-1]}, preview_s=preview_s)
+
+
+@dataclass(slots=True)
+class VehicleControl:
+    """Turns actions into bounded speed and lateral speed; remembers what it last commanded.
+
+    The friction circle is shared in this order: the bend of the lane, a lane change, braking and accelerating.
+    """
+
+    limits: Limits
+    speed_mps: float
+    accel_mps2: float = 0.0
+    lateral_mps: float = 0.0
+    _bounds: Floats = field(init=False)
+    _path: Path | None = field(init=False, default=None)
+    _bends: Floats = field(init=False)  # of that path
+    _at_m: float = field(init=False, default=0.0)  # where on it
+    _behind_per_m: float = field(init=False, default=0.0)  # bend before that path, which the body has yet to leave
+
+    def __post_init__(self) -> None:
+        self._bounds = np.array(Bounds.of(self.limits))
+
+    def step(self, drive: float, steer: float, room: Room, along: Along, intended_mps2: float = 0.0) -> VehicleCommand:
+        """One step of 0.1 s.
+
+        Args:
+          drive: longitudinal acceleration as a share of the limit, -1 (hardest braking) to 1.
+          steer: lateral velocity as a share of the limit, -1 (right) to 1 (left).
+          room: what is left of the road on both sides.
+          along: where it is on the path it takes if it does not steer.
+          intended_mps2: what its driver would do if nobody commanded it.
+        """
+        if along.path is not self._path:
+            if self._path is not None:
+                self._behind_per_m = float(self._bends[SOON, index(self._bends, self._at_m)])
+            self._path, self._bends = along.path, bends(along.path, self.limits)
+        self._at_m = along.station_m
+        self.speed_mps, self.accel_mps2, self.lateral_mps = _drive(
+            self._bounds,
+            self._bends,
+            along.station_m,
+            self._behind_per_m,
+            self.speed_mps,
+            self.accel_mps2,
+            self.lateral_mps,
+            drive,
+            steer,
+            room.left_m,
+            room.right_m,
+            intended_mps2,
+        )
+        return VehicleCommand(self.speed_mps, self.lateral_mps)
+
+
+@compiled
+def _drive(
+    bounds: Floats,
+    bends: Floats,
+    station_m: float,
+    behind_per_m: float,
+    speed: float,
+    accel: float,
+    lateral: float,
+    drive: float,
+    steer: float,
+    left_m: float,
+    right_m: float,
+    intended: float,
+) -> tuple[float, float, float]:
+    """Speed, acceleration and lateral speed of the next step."""
+    b = bounds
+    limits = Bounds(b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7], b[8], b[9], b[10])
+    at, soon = index(bends, station_m), index(bends, station_m + speed * limits.preview_s)
+    behind = behind_per_m if station_m < BODY_M else 0.0
+    curvature, ahead = max(bends[HERE, at], behind), max(bends[SOON, at], behind)
+    cap = min(bends[CAP, at], bends[CAP, soon])
+    accel = _accelerate(limits, speed, accel, drive, intended, curvature, ahead, cap)
+    after = clip(speed + accel * STEP_S, 0.0, limits.speed_mps)
+    left_over = max(limits.curvature_per_m - curvature, CORRECTION_PER_M)
+    return after, accel, _steer(limits, speed, after, lateral, steer, left_m, right_m, left_over)
+
+
+@compiled
+def _accelerate(
+    limits: Bounds,
+    speed: float,
+    accel: float,
+    drive: float,
+    intended: float,
+    curvature: float,
+    ahead: float,
+    cap_mps: float,
+) -> float:
+    # Choice: the less a command says, the more the driver's own intention counts. Doing nothing is then to drive on
+    # as anybody would, and not to run into whoever stands ahead or over a red light.
+    wanted = drive * (limits.accel_mps2 if drive >= 0 else limits.brake_mps2) + (1.0 - abs(drive)) * intended
+    bend = max(curvature * speed**2, min(ahead * speed**2, limits.cornering_mps2))
+    across = min(bend + limits.lateral_accel_mps2, SKID * limits.grip_mps2)
+    grip = math.sqrt(limits.grip_mps2**2 - across**2)
+    low = max(-limits.brake_mps2, -grip, -taper(speed, limits.jerk_mps3))
+    high = min(limits.accel_mps2, grip, taper(limits.speed_mps - speed, limits.jerk_mps3))
+    high = max(min(high, (cap_mps - speed) / limits.preview_s), low)
+    change = limits.jerk_mps3 * STEP_S
+    return clip(clip(wanted, low, high), accel - change, accel + change)
+
+
+@compiled
+def _steer(
+    limits: Bounds,
+    before: float,
+    speed: float,
+    lateral: float,
+    steer: float,
+    left_m: float,
+    right_m: float,
+    curvature: float,
+) -> float:
+    """Moves across the lane as a car can: on a path whose curvature is bounded, so not at a standstill.
+
+    Keeping its heading, a car that brakes loses lateral speed with the longitudinal; `limits.slip` is such that
+    this alone is within the limit on lateral acceleration, and both bounds below always leave something.
+    """
+    room_m = max((left_m if steer >= 0 else right_m) - EDGE_M, 0.0)
+    # The heading θ that leaves room to turn back at curvature κ after the d metres of a full braking, in which a tight
+    # bend may leave nothing for turning: θ d + θ² / 2κ = room.
+    stopping_m = speed**2 / (2 * limits.brake_mps2)
+    heading = CORRECTION_PER_M * (math.sqrt(stopping_m**2 + 2 * room_m / CORRECTION_PER_M) - stopping_m)
+    slip = min(limits.slip, TURNING_BACK * heading)
+    reach = min(limits.lateral_mps, slip * speed, taper(room_m, limits.lateral_accel_mps2))
+    wanted = clip(steer * limits.lateral_mps, -reach, reach)
+    same_heading = lateral * speed / before if before > 0.0 else 0.0
+    turn, change = curvature * speed**2 * STEP_S, limits.lateral_accel_mps2 * STEP_S
+    wanted = clip(wanted, same_heading - turn, same_heading + turn)
+    return clip(wanted, lateral - change, lateral + change)

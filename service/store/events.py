@@ -1,0 +1,73 @@
+"""The one order of a campaign's events: its episodes, and the changes of its state and its runs'.
+
+Both take the next number of their campaign in the transaction that writes them, which holds the campaign's row until it
+ends. So numbers become visible in their order and leave no gap: whoever has read up to one has read all before it.
+"""
+
+from operator import attrgetter
+
+from sqlalchemy import ColumnElement, func, select
+from sqlalchemy.orm import Session
+
+from service.errors import StorageError
+from service.store.records import Page, StoredChange, StoredEpisode
+from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
+
+
+def hold_campaigns(session: Session, runs: ColumnElement[bool]) -> list[CampaignRow]:
+    """Campaigns of these runs, to be read before anything else that is to be changed.
+
+    On PostgreSQL nobody else writes them until the transaction ends; on SQLite the whole database is one writer's.
+    """
+    of_runs = select(RunRow.campaign_number).where(runs)
+    query = select(CampaignRow).where(CampaignRow.number.in_(of_runs))
+    return list(session.scalars(query.order_by(CampaignRow.number).with_for_update()))  # ordered against deadlocks
+
+
+def next_sequence(campaign: CampaignRow) -> int:
+    """The number of the event that is about to be written; the campaign must be held."""
+    campaign.events += 1
+    return campaign.events
+
+
+def event_page(session: Session, campaign: CampaignRow, limit: int, after: int) -> Page[StoredEpisode | StoredChange]:
+    """Events just after number `after`.
+
+    Raises:
+      StorageError: one is missing.
+    """
+    # No further than the campaign said: the two tables are read one after the other, and what is written in between
+    # would show in the second one without what came before it.
+    last = min(after + limit, campaign.events)
+    if last <= after:
+        return Page(items=(), last=None)
+    episodes = select(EpisodeRow).where(EpisodeRow.sequence.between(after + 1, last))
+    changes = select(ChangeRow).where(ChangeRow.sequence.between(after + 1, last))
+    found: list[StoredEpisode | StoredChange] = [
+        *map(StoredEpisode.from_row, session.scalars(episodes.filter_by(campaign_number=campaign.number))),
+        *map(StoredChange.from_row, session.scalars(changes.filter_by(campaign_number=campaign.number))),
+    ]
+    if len(found) != last - after:
+        raise StorageError(f"events {after + 1} to {last} of campaign {campaign.id} are {len(found)}; restore a copy")
+    items = tuple(sorted(found, key=attrgetter("sequence")))
+    return Page(items=items, last=last if last < campaign.events else None)
+
+
+def former_position(session: Session, campaign: CampaignRow, episode: int, change: int) -> int | None:
+    """Where somebody goes on who was told all up to an episode and a change, each by its row's number; 0 for none.
+
+    None: there are no such rows, or what they were told is not the beginning of the order that there is now.
+    """
+    told = []
+    for table, number in ((EpisodeRow, episode), (ChangeRow, change)):
+        count, last, sequence = session.execute(
+            select(func.count(), func.max(table.number), func.max(table.sequence)).where(
+                table.campaign_number == campaign.number, table.number <= number
+            )
+        ).one()
+        if (last or 0) != number:
+            return None
+        told.append((count, sequence or 0))
+    counts, sequences = zip(*told, strict=True)
+    position: int = max(sequences)
+    return position if position == sum(counts) else None

@@ -1,0 +1,179 @@
+import math
+import time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from risk_sac.errors import NotFinite
+from risk_sac.metrics import WINDOW, Funnel, MetricsAccumulator, wilson_interval
+from risk_sac.metrics.rows import (
+    cost_rate,
+    effective_collision_rate,
+    efficiency_score,
+    outcome_dispersion,
+    preventable_collision_rate,
+)
+from risk_sac.types import Outcome, RunMetrics
+from risk_sac.verdicts.distinct import distinct_failures
+from tests.builders import judgement
+from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
+
+
+def test_run_literals():
+    metrics = feed(RUN)
+    assert (metrics.episodes, metrics.rejected, metrics.raw_collisions, metrics.failures) == (5, 1, 3, 2)
+    assert metrics.environment_steps == 300
+    assert metrics.ecr == metrics.window_ecr == 0.4
+    assert (metrics.ecr_low, metrics.ecr_high) == wilson_interval(2, 5)
+    assert metrics.efficiency == pytest.approx(1 - (30 + 150 + 150 + 150 + 50) / (5 * 150))
+    assert metrics.cost_rate == pytest.approx((0.2 * 30 + 0.1 * 150 + 0.4 * 50) / 300)
+    assert metrics.dispersion == pytest.approx(0.5)  # one feature of four differs, by its whole range: 1/√4
+    assert (metrics.distinct_failures, metrics.steps_per_distinct_failure) == (1, 300)  # unjudged, alike
+    assert (metrics.dual_variable, metrics.temperature) == (0.7, 0.1)
+
+
+def test_window_forgets_all_but_the_newest_100_episodes():
+    records = [episode(Outcome.FAILURE, 10)] * 50 + [episode()] * 80 + [episode(Outcome.FAILURE, 10)] * 5
+    metrics = feed(records)
+    assert metrics.window_ecr == effective_collision_rate(counted(records[-WINDOW:])) == 0.2
+    assert metrics.ecr == pytest.approx(55 / 135)
+
+
+def test_funnel_literals():
+    metrics = feed(JUDGED)
+    assert Funnel.of(metrics) == Funnel(contacts=7, valid=5, distinct=4, preventable=2)
+    assert (metrics.preventable, metrics.artefacts, metrics.unresponsive) == (3, 1, 1)
+    assert metrics.pcr == metrics.window_pcr == preventable_collision_rate(counted(JUDGED)) == 3 / 8
+    # Wilson for 3 of 8 by hand: centre (0.375 + 0.2401)/1.4802 = 0.4155, half width 0.2787.
+    assert (metrics.pcr_low, metrics.pcr_high) == pytest.approx((0.1368, 0.6943), abs=5e-4)
+
+
+def test_signatures_are_counted_in_the_order_in_which_they_were_met():
+    assert list(feed(JUDGED).signatures.items()) == [("cut-in, straight", 3), ("pedestrian, straight", 1)]
+    assert list(feed(JUDGED[::-1]).signatures) == ["pedestrian, straight", "cut-in, straight"]
+
+
+def test_histogram_literals():
+    """2.5 s twice, 3.0 s, and one conflict from before the release; contacts at 3.9 s twice, at 6 and 15 s."""
+    metrics = feed(JUDGED)
+    assert metrics.conflicts_by_second == (1, 0, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+    assert metrics.contacts_by_second == (0, 0, 0, 2, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1)
+
+
+@pytest.mark.parametrize(("horizon_steps", "bins"), [(150, 15), (151, 16), (10, 1), (1, 1), (29, 3), (30, 3)])
+def test_histograms_have_a_bin_for_every_second_that_is_begun(horizon_steps, bins):
+    metrics = MetricsAccumulator(horizon_steps).metrics()
+    assert metrics.conflicts_by_second == metrics.contacts_by_second == (0,) * bins
+
+
+def test_window_of_preventable_failures_forgets_too():
+    failure = episode(Outcome.FAILURE, 10, hit=contact(judgement=judgement()))
+    records = [failure] * 50 + [episode()] * 80 + [failure, episode(Outcome.FAILURE, 10)] * 5
+    metrics = feed(records)
+    assert (metrics.window_ecr, metrics.window_pcr) == (0.2, 0.15)
+    assert metrics.window_pcr == preventable_collision_rate(counted(records[-WINDOW:]))
+
+
+def test_run_without_episodes():
+    metrics = feed([])
+    assert (metrics.ecr, metrics.ecr_low, metrics.ecr_high, metrics.window_ecr) == (0, 0, 1, 0)
+    assert (metrics.efficiency, metrics.cost_rate, metrics.dispersion) == (0, 0, None)
+    assert (metrics.distinct_failures, metrics.steps_per_distinct_failure) == (0, None)
+    assert (metrics.pcr, metrics.pcr_low, metrics.pcr_high, metrics.window_pcr) == (0, 0, 1, 0)
+    assert preventable_collision_rate(counted([])) == 0
+
+
+def test_run_of_rejected_scenes_only_earns_no_efficiency():
+    metrics = feed([episode(Outcome.REJECTED)] * 3)
+    assert (metrics.rejected, metrics.ecr, metrics.efficiency, metrics.cost_rate) == (3, 0, 0, 0)
+    assert metrics.steps_per_distinct_failure is None
+
+
+def test_one_failure_has_no_dispersion():
+    assert feed([episode(Outcome.FAILURE, 10)]).dispersion is None
+
+
+def test_bad_records_are_refused_and_leave_the_figures_alone():
+    accumulator = MetricsAccumulator(HORIZON)
+    before = accumulator.metrics()
+    with pytest.raises(NotFinite, match="outcome features"):
+        accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(ttc=math.nan)))
+    for times in ({"time_s": math.nan}, {"judgement": judgement(conflict_s=-math.inf)}):
+        with pytest.raises(NotFinite, match="finite times"):
+            accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(**times)))
+    with pytest.raises(NotFinite, match="no NaN"):  # of what tells distinct failures apart
+        accumulator.add(episode(Outcome.FAILURE, 10, hit=contact().model_copy(update={"ego_speed_mps": math.nan})))
+    with pytest.raises(NotFinite, match="mean_cost"):
+        accumulator.add(episode(cost=math.nan))
+    with pytest.raises(ValueError, match="without a collision"):
+        accumulator.add(episode(Outcome.FAILURE, 10).model_copy(update={"collision": None}))
+    assert accumulator.metrics() == before
+    with pytest.raises(ValueError, match="horizon_steps"):
+        MetricsAccumulator(0)
+
+
+@settings(deadline=None)
+@given(any_run)
+def test_figures_stay_in_their_ranges(records):
+    metrics = feed(records)
+    assert 0 <= metrics.ecr_low <= metrics.ecr <= metrics.ecr_high <= 1
+    assert 0 <= metrics.window_ecr <= 1
+    assert 0 <= metrics.efficiency <= 1
+    assert 0 <= metrics.cost_rate <= 1
+    assert metrics.dispersion is None or 0 <= metrics.dispersion <= 1
+    assert 0 <= metrics.pcr_low <= metrics.pcr <= metrics.pcr_high <= 1
+    assert 0 <= metrics.window_pcr <= metrics.window_ecr
+    assert metrics.pcr <= metrics.ecr
+    funnel = Funnel.of(metrics)
+    assert funnel.contacts >= funnel.valid >= funnel.distinct >= funnel.preventable >= 0
+    assert metrics.unresponsive <= metrics.failures
+    assert metrics.distinct_preventable <= metrics.preventable
+
+
+@settings(deadline=None)
+@given(any_run)
+def test_incremental_equals_batch(records):
+    metrics = feed(records)
+    hits = [record.collision for record in records if record.outcome is Outcome.FAILURE]
+    assert metrics.ecr == effective_collision_rate(counted(records))
+    assert metrics.window_ecr == effective_collision_rate(counted(records[-WINDOW:]))
+    assert metrics.pcr == preventable_collision_rate(counted(records))
+    assert metrics.window_pcr == preventable_collision_rate(counted(records[-WINDOW:]))
+    distinct = [hits[position] for position in distinct_failures(hits)]
+    assert metrics.distinct_preventable == sum(hit.preventable for hit in distinct)
+    judged = [hit for hit in hits if hit.judgement is not None]
+    assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(judged)
+    assert sum(metrics.signatures.values()) == len(judged)
+    assert metrics.efficiency == pytest.approx(efficiency_score(counted(records)), abs=1e-12)
+    assert metrics.cost_rate == pytest.approx(cost_rate(counted(records)), abs=1e-12)
+    assert metrics.distinct_failures == len(distinct_failures(hits))
+    assert metrics.dispersion == pytest.approx(outcome_dispersion(counted(records)), abs=1e-12)
+
+
+@settings(deadline=None)
+@given(any_run)
+def test_adding_stored_records_again_restores_the_same_figures(records):
+    assert feed(records) == feed(records)
+
+
+def test_many_failures_stay_cheap_to_add():
+    random = np.random.default_rng(0)
+    records = [
+        episode(Outcome.FAILURE, 10, hit=contact(3 * u[0], 20 * u[1], 7 * u[2] - 3.5, 4 * u[3] - 3))
+        for u in random.random((5000, 4))
+    ]
+    began = time.process_time()
+    metrics = feed(records)
+    assert time.process_time() - began < 5  # about 1 s; all pairs at every add would be minutes
+    assert metrics.dispersion == pytest.approx(0.7777 / 2, abs=0.01)  # mean distance in the unit 4-cube
+
+
+def test_metrics_from_before_contacts_were_judged_can_still_be_read():
+    stored = feed(RUN).model_dump()
+    new = ("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts")
+    for name in (*new, "unresponsive", "signatures", "conflicts_by_second", "contacts_by_second"):
+        del stored[name]
+    metrics = RunMetrics.model_validate(stored)
+    assert (metrics.failures, metrics.preventable, metrics.pcr_low, metrics.pcr_high) == (2, 0, 0, 1)
+    assert Funnel.of(metrics) == Funnel(contacts=3, valid=2, distinct=1, preventable=0)

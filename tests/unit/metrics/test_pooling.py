@@ -1,0 +1,43 @@
+import pytest
+
+from risk_sac.metrics import (
+    METRICS,
+    RESAMPLING_SEED,
+    Estimate,
+    bootstrap_interval,
+    estimate,
+    mean_over_runs,
+    pooled_bins,
+    pooled_counts,
+    pooled_signatures,
+    wilson_interval,
+)
+from tests.unit.metrics.episodes import JUDGED, RUN, feed
+
+
+def test_runs_are_pooled_by_sums_and_signatures_keep_their_order():
+    metrics = [feed(JUDGED), feed(JUDGED[3:])]
+    counts = pooled_counts(metrics)
+    assert (counts.episodes, counts.raw_collisions, counts.failures) == (13, 11, 7)
+    assert (counts.distinct_failures, counts.preventable, counts.distinct_preventable) == (6, 4, 3)
+    assert (counts.artefacts, counts.unresponsive, counts.environment_steps) == (2, 2, 518 + 380)
+    assert list(pooled_signatures(metrics).items()) == [("cut-in, straight", 3), ("pedestrian, straight", 2)]
+
+
+def test_histograms_of_runs_from_before_there_were_any_add_nothing():
+    assert pooled_bins([(1, 2), (), (3, 0, 1)]) == (4, 2, 1)
+    assert pooled_bins([(), ()]) == pooled_bins([]) == ()
+
+
+def test_metrics_are_pooled_by_their_mean_over_the_runs_that_have_a_value():
+    rows = {metric.name: metric for metric in METRICS}
+    one, other = feed(RUN), feed(JUDGED)
+    assert estimate(rows["ecr"], [one]) == Estimate(
+        mean=0.4, low=wilson_interval(2, 5)[0], high=wilson_interval(2, 5)[1], runs=1
+    )
+    low, high = bootstrap_interval([0.4, 0.625], RESAMPLING_SEED)
+    assert estimate(rows["ecr"], [one, other]) == Estimate(mean=pytest.approx(0.5125), low=low, high=high, runs=2)
+    without = feed(RUN[:1])
+    assert estimate(rows["ofd"], [one, without]) == Estimate(mean=one.dispersion, low=None, high=None, runs=1)
+    assert mean_over_runs(rows["ofd"], [without]) is None
+    assert estimate(rows["ofd"], [without]) == Estimate(mean=None, low=None, high=None, runs=0)

@@ -1,0 +1,130 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from risk_sac.metrics import COUNTS, METRICS, RATIOS, Counts, Kept, Tally, outcome_features, wilson_interval
+from risk_sac.metrics.features import Spread
+from risk_sac.metrics.rows import (
+    cost_rate,
+    distinct_failure_rate,
+    effective_collision_rate,
+    efficiency_score,
+    newest_effective_collision_rate,
+    newest_preventable_collision_rate,
+    outcome_dispersion,
+    preventable_collision_rate,
+    steps_per_distinct_failure,
+)
+from risk_sac.types import RunMetrics
+from tests.unit.metrics.episodes import JUDGED, any_collision, feed
+
+
+def dispersion_of(features):
+    spread = Spread()
+    for each in features:
+        spread.add(each)
+    return outcome_dispersion(Tally(horizon_steps=1, failures=len(features), distance=spread.distance))
+
+
+def test_formula_literals():
+    tally = Tally(
+        horizon_steps=150,
+        episodes=8,
+        failures=4,
+        preventable=2,
+        distinct_failures=3,
+        environment_steps=600,
+        steps_to_failure=900,
+        cost=150.0,
+        distance=6.0,
+        newest_episodes=5,
+        newest_failures=3,
+        newest_preventable=1,
+    )
+    assert (effective_collision_rate(tally), preventable_collision_rate(tally)) == (0.5, 0.25)
+    assert (newest_effective_collision_rate(tally), newest_preventable_collision_rate(tally)) == (0.6, 0.2)
+    assert efficiency_score(tally) == 1 - 900 / (8 * 150) == 0.25
+    assert cost_rate(tally) == 0.25
+    assert outcome_dispersion(tally) == 0.5  # 6 over six pairs, over √4
+    assert (distinct_failure_rate(tally), steps_per_distinct_failure(tally)) == (5, 200)
+
+
+def test_formulas_of_a_run_without_episodes():
+    tally = Tally(horizon_steps=150)
+    assert effective_collision_rate(tally) == preventable_collision_rate(tally) == 0
+    assert newest_effective_collision_rate(tally) == newest_preventable_collision_rate(tally) == 0
+    assert efficiency_score(tally) == cost_rate(tally) == 0
+    assert outcome_dispersion(tally) is distinct_failure_rate(tally) is None
+    assert {ratio.name: ratio.formula(Counts()) for ratio in RATIOS} == {
+        "steps_per_distinct_failure": None,
+        "raw_rate": 0,
+        "artefact_rate": 0,
+        "degenerate_rate": 0,
+        "rejected_rate": 0,
+        "unresponsive_share": None,
+    }
+
+
+def test_ratio_literals():
+    counts = Counts(
+        episodes=20,
+        rejected=1,
+        raw_collisions=9,
+        failures=5,
+        distinct_failures=2,
+        artefacts=3,
+        unresponsive=2,
+        environment_steps=700,
+    )
+    assert {ratio.name: ratio.formula(counts) for ratio in RATIOS} == {
+        "steps_per_distinct_failure": 350,
+        "raw_rate": 0.45,
+        "artefact_rate": 0.15,
+        "degenerate_rate": 0.2,
+        "rejected_rate": 0.05,
+        "unresponsive_share": 0.4,
+    }
+
+
+def test_rows_have_names_of_their_own():
+    rows = (*METRICS, *RATIOS)
+    assert len({row.name for row in rows}) == len({row.symbol for row in rows}) == len(rows)
+    assert all(row.meaning and not row.meaning.endswith(".") for row in rows)
+
+
+def test_run_metrics_have_every_count_and_every_figure_that_is_kept():
+    kept = [metric.figure for metric in METRICS if isinstance(metric.figure, Kept)]
+    ends = [f"{each.field}_{end}" for each in kept if each.interval for end in ("low", "high")]
+    assert {*COUNTS, *(each.field for each in kept), *ends} <= RunMetrics.__annotations__.keys()
+    assert all(metric.trials for metric in METRICS if isinstance(metric.figure, Kept) and metric.figure.interval)
+
+
+def test_a_metric_is_read_from_the_metrics_of_a_run():
+    metrics = feed(JUDGED)
+    rows = {metric.name: metric for metric in METRICS}
+    ecr, distinct = rows["ecr"], rows["distinct_per_1000_steps"]
+    assert ecr.value(metrics) == metrics.ecr
+    assert distinct.value(metrics) == 1000 * 4 / 518
+    assert ecr.interval(metrics.ecr, Counts(episodes=8)) == wilson_interval(5, 8)
+    assert distinct.interval(1.0, Counts(episodes=8)) is None
+
+
+def test_dispersion_literals():
+    assert dispersion_of(np.array([[0.0] * 4, [1.0] * 4])) == pytest.approx(1.0)
+    corners = np.array([[0.0, 0, 0, 0], [0.6, 0, 0, 0], [0.6, 0.8, 0, 0]])
+    assert dispersion_of(corners) == pytest.approx((0.6 + 0.8 + 1.0) / 3 / 2)
+
+
+def test_one_failure_has_no_dispersion():
+    assert dispersion_of(np.zeros((1, 4))) is None
+
+
+@settings(deadline=None)
+@given(st.lists(any_collision, min_size=2, max_size=12))
+def test_dispersion_agrees_with_all_pairs(hits):
+    features = np.array([outcome_features(hit) for hit in hits])
+    pairs = [math.dist(a, b) for i, a in enumerate(features) for b in features[:i]]
+    assert dispersion_of(features) == pytest.approx(sum(pairs) / len(pairs) / 2, abs=1e-12)

@@ -1,0 +1,188 @@
+"""The one order of events, and how it came over what had been numbered apart.
+
+`before_sequences.sql` was written by the version before: three runs of one campaign, the first of which lost its worker
+once, and whose second and third waited again when the server stopped; a campaign that ended meanwhile, and one that
+waits.
+"""
+
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import create_engine
+
+from risk_sac.config import CampaignSpec
+from service.errors import StorageError, TransitionError
+from service.store.reading import Store
+from service.store.records import StoredEpisode
+from service.store.states import State
+from service.store.writing import Ledger
+
+BEFORE_SEQUENCES = Path(__file__).with_name("before_sequences.sql")
+TABLES = ("campaigns", "runs", "episodes", "changes")
+# What somebody was told who followed the first campaign: numbers of the last episode and the last change, each time.
+FOLLOWED = (
+    *((0, 1), (0, 2), (0, 3), (1, 3), (2, 3), (4, 3), (6, 3), (6, 6), (7, 6), (7, 7), (8, 7), (8, 10), (9, 10)),
+    *((9, 11), (10, 11), (11, 11), (12, 11), (12, 12), (13, 12), (13, 13)),
+)
+
+
+@pytest.fixture
+def former_url(database_url):
+    """A database from before there was one order."""
+    engine, config = create_engine(database_url), Config()
+    config.set_main_option("script_location", "service.store:migrations")
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "0003")
+        for line in BEFORE_SEQUENCES.read_text(encoding="utf-8").splitlines():
+            connection.exec_driver_sql(line)
+        if engine.dialect.name == "postgresql":  # which did not give the numbers itself
+            for table in TABLES:
+                connection.exec_driver_sql(f"SELECT setval(pg_get_serial_sequence('{table}', 'number'), 100)")
+    engine.dispose()
+    return database_url
+
+
+@pytest.fixture
+def upgraded(former_url):
+    store = Store(former_url)
+    yield store
+    store.close()
+
+
+def first_id(store):
+    return store.campaigns(limit=3).items[-1].id
+
+
+def read_first(url):
+    with closing(Store(url)) as store:
+        return store.events(first_id(store), limit=100)
+
+
+def told(store, campaign_id, after=0):
+    events = store.events(campaign_id, limit=100, after=after).items
+    return [each.id if isinstance(each, StoredEpisode) else f"{each.run_id} {each.state}" for each in events]
+
+
+def test_what_was_numbered_apart_comes_into_one_order(upgraded):
+    posted, ended, running = upgraded.campaigns(limit=3).items
+    assert told(upgraded, posted.id) == []
+    episodes = ["low-random-0-train-0", "low-random-0-train-1"]
+    ends = ["low-random-0 succeeded", "None succeeded"]
+    assert told(upgraded, ended.id) == ["low-random-0 running", "None running", *episodes, *ends]
+    assert [each.replace("low-random-", "").replace("-train-", ".") for each in told(upgraded, running.id)] == [
+        *(
+            "0 running",
+            "None running",
+            "1 running",
+            "0 queued",
+            "0 running",
+        ),  # when it waited, nobody can tell any more
+        *("0.0", "1.0", "0.1", "1.1", "1.2", "0.2", "0 succeeded", "2 running", "1.3", "2.0", "1.4", "2.1"),
+        *("2 queued", "1.5", "1 queued"),
+    ]
+    for campaign in (ended, running):
+        events = upgraded.events(campaign.id, limit=100).items
+        assert [each.sequence for each in events] == list(range(1, len(events) + 1))
+
+
+def test_what_is_there_keeps_its_checksums_and_goes_on(upgraded, episode):
+    campaign_id = first_id(upgraded)
+    with upgraded.engine.connect() as connection:
+        for table in TABLES:
+            assert connection.exec_driver_sql(f"SELECT count(*) FROM {table} WHERE checksum IS NULL").scalar() == 0
+    before = told(upgraded, campaign_id)
+    ledger = Ledger(upgraded)
+    number = upgraded.waiting()["default"]
+    ledger.start_run(number)
+    ledger.add_episode(number, episode(6))
+    assert told(upgraded, campaign_id) == [*before, "low-random-1 running", "low-random-1-train-6"]
+
+
+@pytest.mark.parametrize("table", ["campaigns", "episodes", "changes"])
+def test_a_row_that_was_damaged_before_is_not_sealed_anew(former_url, table):
+    change = {"campaigns": "label = 'x'", "episodes": "wall_s = 7", "changes": "state = 'failed'"}[table]
+    engine = create_engine(former_url)
+    with engine.begin() as connection:
+        connection.exec_driver_sql(f"UPDATE {table} SET {change} WHERE number = 1")
+    engine.dispose()
+    with pytest.raises(StorageError, match=f"of the table '{table}' is damaged"):
+        read_first(former_url)
+
+
+def test_a_former_position_is_taken_up_exactly_or_not_at_all(upgraded):
+    campaign_id = first_id(upgraded)
+    with upgraded.engine.connect() as connection:
+        events = {  # sequence: table and number
+            sequence: (table, number)
+            for table in ("episodes", "changes")
+            for sequence, number in connection.exec_driver_sql(
+                f"SELECT sequence, number FROM {table} WHERE campaign_number = 1"
+            )
+        }
+    known = [(table, number) for _, (table, number) in sorted(events.items())]
+    assert len(known) == 20
+    numbers = {kind: [0, *(number for table, number in known if table == kind)] for kind in ("episodes", "changes")}
+    for episode in numbers["episodes"]:
+        for change in numbers["changes"]:
+            limits = {"episodes": episode, "changes": change}
+            heard = {(table, number) for table, number in known if number <= limits[table]}
+            wanted = len(heard) if heard == set(known[: len(heard)]) else None
+            assert upgraded.former_position(campaign_id, episode, change) == wanted, limits
+    resumed = [each for each in FOLLOWED if upgraded.former_position(campaign_id, *each) is not None]
+    assert {(9, 11), (12, 12), (13, 13)} <= set(resumed)
+    assert len(resumed) > len(FOLLOWED) // 2
+    assert told(upgraded, campaign_id, after=upgraded.former_position(campaign_id, 13, 13)) == []
+
+
+@pytest.mark.parametrize("position", [(3, 1), (99, 13), (13, 99), (0, 4)])
+def test_a_former_position_of_another_campaign_is_none_of_this_one(upgraded, position):
+    assert upgraded.former_position(first_id(upgraded), *position) is None
+
+
+def test_a_page_of_events_ends_where_it_says(store, ledger, episode):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
+    ledger.start_run(campaign.runs[0].number)
+    for index in range(3):
+        ledger.add_episode(campaign.runs[0].number, episode(index))
+    assert store.events(campaign.id, limit=4).last == 4
+    assert store.events(campaign.id, limit=5).last is None
+    assert len(store.events(campaign.id, limit=4, after=3).items) == 2
+    for after in (5, 6, 1 << 62):
+        assert store.events(campaign.id, limit=4, after=after).items == ()
+
+
+@pytest.mark.parametrize("damage", ["DELETE FROM changes", "UPDATE changes SET sequence = 9"])
+def test_an_event_that_is_missing_is_noticed(store, ledger, damage):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
+    ledger.start_run(campaign.runs[0].number)
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql(f"{damage} WHERE number = 2")
+    with pytest.raises(StorageError, match="events 1 to 2 of campaign"):
+        store.events(campaign.id, limit=9)
+
+
+def test_a_sequence_that_changed_on_the_disk_is_noticed(store, ledger, episode):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
+    ledger.start_run(campaign.runs[0].number)
+    with store.engine.begin() as connection:
+        for change in ("7 WHERE number = 1", "1 WHERE number = 2", "2 WHERE number = 1"):  # two change places
+            connection.exec_driver_sql(f"UPDATE changes SET sequence = {change}")
+    with pytest.raises(StorageError, match="of the table 'changes' is damaged"):
+        store.events(campaign.id, limit=9)
+
+
+def test_a_refused_write_takes_no_number(store, ledger, episode):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
+    number = campaign.runs[0].number
+    ledger.start_run(number)
+    with pytest.raises(TransitionError):
+        ledger.start_run(number)
+    ledger.add_episode(number, episode(0))
+    ledger.add_episode(number, episode(0))  # told again by a run that was taken up
+    ledger.requeue_run(number)
+    assert [each.sequence for each in store.events(campaign.id, limit=9).items] == [1, 2, 3, 4, 5]
+    assert store.campaign(campaign.id).state is State.QUEUED
