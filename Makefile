@@ -26,8 +26,9 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP) ## start the service, run a campaign over REST, write results/demo.json
 	$(PYTHON) -m service.demo
 
+# By file: two processes would each make what the tests of a file share. In order: the long ones come first.
 test: lint ## check the code and run the whole suite
-	$(PYTHON) -m pytest -n 2
+	$(PYTHON) -m pytest -n 2 --dist loadscope --no-loadscope-reorder
 
 serve: $(STAMP) ## run the service on http://127.0.0.1:8000
 	RISK_SAC_HOST=127.0.0.1 RISK_SAC_PORT=8000 $(PYTHON) -m service
@@ -35,9 +36,10 @@ serve: $(STAMP) ## run the service on http://127.0.0.1:8000
 bench: $(STAMP) ## measure speed as ratios
 	$(PYTHON) -m pytest -m bench -s tests/benchmarks/bench_*.py
 
+# What is marked `torture`, and what the suite does in part.
 torture: $(STAMP) ## kill, fill, damage and fuzz the service in earnest, about two hours
-	RISK_SAC_TORTURE=full RISK_SAC_SCHEMATHESIS_CASES=20000 $(PYTHON) -m pytest --timeout 7200 \
-		tests/torture tests/contract/test_fuzzing.py
+	RISK_SAC_TORTURE=full RISK_SAC_SCHEMATHESIS_CASES=20000 $(PYTHON) -m pytest -m "not bench" --timeout 7200 \
+		tests/torture tests/contract/test_fuzzing.py tests/acceptance/test_pendulum.py
 
 load: $(STAMP) ## poll and follow the service while it searches, and fill its database; half an hour on a quiet machine
 	$(PYTHON) -m tests.load.run
@@ -51,7 +53,7 @@ lint: $(STAMP) ## style, types and import rules
 openapi: $(STAMP) ## write openapi.yaml
 	$(PYTHON) -m service.openapi
 
-settings: $(STAMP) ## write the table of settings into README.md
+settings: $(STAMP) ## write the table of settings into service/README.md
 	$(PYTHON) -m service.host.settings_table
 
 nets: $(STAMP) ## rebuild sumo_nets/*/*.net.xml

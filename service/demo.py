@@ -26,6 +26,8 @@ from service.settings import ServiceSettings
 START_S = 60.0
 STOP_S = 60.0
 AWAY_S = 10.0  # nobody starts it again
+# README has a line for each.
+COLUMNS = ("method", "epi-\nsodes", "con-\ntacts", "valid", "distinct", "preven-\ntable", "ECR", "PCR", "PCR's\n95 %")
 
 Json = dict[str, Any]
 
@@ -167,17 +169,7 @@ def _run_folder(data_dir: Path, campaign: Json, run_id: str) -> Path:
 
 def _summarise(found: Json, console: Console) -> None:
     table = Table(title="What the search found", box=SIMPLE_HEAD, padding=0)  # 80 columns hold the longest method
-    for name in (
-        "method",
-        "epi-\nsodes",
-        "con-\ntacts",
-        "valid",
-        "distinct",
-        "preven-\ntable",
-        "ECR",
-        "PCR",
-        "PCR's\n95 %",
-    ):
+    for name in COLUMNS:
         table.add_column(name, justify="left" if name == "method" else "right")
     for total in found["results"]["totals"]:
         table.add_row(

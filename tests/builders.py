@@ -1,16 +1,39 @@
-"""Frames to test with: what a test does not speak of is at rest, straight ahead and of a car's size."""
+"""Frames and records to test with, from what a test speaks of; the rest is ordinary.
+
+In frames it is at rest, straight ahead and of a car's size. Records tell of an ego that runs into the car before it.
+"""
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from risk_sac.sim.ego import MOTION, Belief
-from risk_sac.types import Floats, Frame, Kind, Role, Row, Signal
+from risk_sac.types import (
+    Collision,
+    ConflictType,
+    EpisodeRecord,
+    Floats,
+    Frame,
+    Grade,
+    Judgement,
+    Kind,
+    Outcome,
+    ReferenceOutcome,
+    Role,
+    Row,
+    RunMetrics,
+    Signal,
+)
+
+if TYPE_CHECKING:
+    from risk_sac.sim.ego import Belief
 
 ROWS = {name: row.index for name, row in vars(Frame).items() if isinstance(row, Row)}
 CAR_M, WALKER_M = (4.6, 1.85), (0.5, 0.5)
+AVOIDS = ReferenceOutcome(avoids=True, impact_speed_mps=0.0)
+TOUCHES = ReferenceOutcome(avoids=False, impact_speed_mps=6.5)
 
 
 def frame_of(
@@ -66,8 +89,10 @@ def moved(frame: Frame, **rows: float | Sequence[float] | Floats) -> Frame:
 
 def belief_of(
     frame: Frame, hidden: Collection[str] = (), expected: Mapping[str, Sequence[float]] | None = None
-) -> Belief:
+) -> "Belief":
     """That the ego knows nothing of some actors, and expects others at x, y, heading with a velocity."""
+    from risk_sac.sim.ego import MOTION, Belief  # here, because it loads a compiler, which workers of records need not
+
     where = np.full((len(MOTION), len(frame.ids)), np.nan)
     for id_, motion in (expected or {}).items():
         where[:, frame.ids.index(id_)] = motion
@@ -87,3 +112,94 @@ class Told:
     def look(self, frame: Frame) -> Belief:
         self._frames += 1
         return self.tell(frame, self._frames - 1)
+
+
+def judgement(grade: Grade | None = Grade.CAREFUL, conflict_s: float = 2.5, **changes: Any) -> Judgement:
+    """Of a vehicle that cuts in while the ego drives straight; the drivers' outcomes follow from the grade."""
+    values: dict[str, Any] = {
+        "definitions": 1,
+        "conflict_type": ConflictType.CUT_IN,
+        "conflict_x_m": 301.0,
+        "conflict_y_m": -2.5,
+        "position": "ahead",
+        "hidden": False,
+        "ego_manoeuvre": "straight",
+        "ego_response": "late_braking",
+        "ground": "lane",
+        "broke": ("red_light", "speeding"),
+        "unresponsive": False,
+        "drivers": {
+            "careful": AVOIDS if grade is Grade.CAREFUL else TOUCHES,
+            "bound": TOUCHES if grade is Grade.UNAVOIDABLE else AVOIDS,
+        },
+        "signature": "cut-in, straight",
+    }
+    return Judgement(grade=grade, conflict_s=conflict_s, **(values | changes))
+
+
+def collision(**changes: Any) -> Collision:
+    """The ego's front against the rear of the car before it; not judged, and by no rule refused."""
+    values: dict[str, Any] = {
+        "time_s": 3.2,
+        "other_id": "lead",
+        "other_kind": "vehicle",
+        "other_role": "adversary",
+        "contact_x_m": 2.3,
+        "contact_y_m": 0.1,
+        "ego_zone": "front",
+        "other_zone": "rear",
+        "ego_speed_mps": 9.0,
+        "other_speed_mps": 2.0,
+        "relative_speed_mps": 7.0,
+        "lateral_offset_m": 0.1,
+        "min_ttc_s": 0.3,
+        "min_rss_margin_m": -3.0,
+        "visible_for_s": 3.0,
+        "ego_peak_braking_mps2": 4.5,
+        "min_robustness": -1.0,
+        "simulator_agrees": True,
+        "verdicts": {"inside_limits": True, "ego_moving": True},
+    }
+    return Collision(**(values | changes))
+
+
+def episode_record(index: int = 0, outcome: Outcome = Outcome.SAFE, **changes: Any) -> EpisodeRecord:
+    """Of the search; none before it was longer or shorter, and one that was refused has no step."""
+    steps = changes.get("steps", 0 if outcome is Outcome.REJECTED else 100)
+    values: dict[str, Any] = {
+        "phase": "train",
+        "seed": index,
+        "scene": {"lead_gap_m": 12.5},
+        "reason": "",
+        "steps": steps,
+        "risk_return": 1.0,
+        "shaped_return": 0.5,
+        "mean_cost": 0.1,
+        "min_ttc_s": 0.3,
+        "min_robustness": -1.0,
+        "objective": None,
+        "dual_variable": 0.3,
+        "temperature": 0.2,
+        "environment_steps": steps * (index + 1),
+    }
+    return EpisodeRecord(index=index, outcome=outcome, **(values | changes))
+
+
+def run_metrics(episodes: int = 4, **changes: Any) -> RunMetrics:
+    """Of so many episodes of 100 steps without a contact."""
+    values: dict[str, Any] = {
+        "rejected": 0,
+        "raw_collisions": 0,
+        "failures": 0,
+        "environment_steps": 100 * episodes,
+        "ecr": 0.0,
+        "ecr_low": 0.0,
+        "ecr_high": 0.5,
+        "window_ecr": 0.0,
+        "efficiency": 0.0,
+        "cost_rate": 0.0,
+        "dispersion": None,
+        "dual_variable": 0.0,
+        "temperature": 0.0,
+    }
+    return RunMetrics(episodes=episodes, **(values | changes))

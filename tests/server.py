@@ -16,6 +16,7 @@ import httpx
 
 ROOT = Path(__file__).parents[1]
 SCRIPTED = ROOT / "tests" / "integration"  # workers that do what a test needs
+LONG_S = 600.0  # what has not happened by then never will, however busy the machine
 
 
 class Service:
@@ -37,7 +38,7 @@ class Service:
             **{f"RISK_SAC_{name.upper()}": str(value) for name, value in settings.items()},
             **environment,
         }
-        self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=30)
+        self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=120)
         self.process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
@@ -54,7 +55,7 @@ class Service:
 
     def stop(self, number: int = signal.SIGTERM) -> int:
         self.process.send_signal(number)
-        return self.process.wait(30)
+        return self.process.wait(LONG_S)
 
     def post(self, **spec: Any) -> str:
         response = self.client.post("/v1/campaigns", json={"families": ["low"], "methods": ["random"]} | spec)
@@ -66,17 +67,17 @@ class Service:
         assert response.status_code == 200, response.text
         return response.json()
 
-    def wait(self, campaign_id: str, timeout_s: float = 120) -> dict[str, Any]:
+    def wait(self, campaign_id: str, timeout_s: float = LONG_S) -> dict[str, Any]:
         """The campaign, once it has ended."""
         return self.wait_for(campaign_id, lambda seen: seen["state"] in ("succeeded", "failed", "cancelled"), timeout_s)
 
     def wait_for(
-        self, campaign_id: str, holds: Callable[[dict[str, Any]], bool], timeout_s: float = 120
+        self, campaign_id: str, holds: Callable[[dict[str, Any]], bool], timeout_s: float = LONG_S
     ) -> dict[str, Any]:
         self.wait_until(lambda: holds(self.get(campaign_id)), timeout_s)
         return self.get(campaign_id)
 
-    def wait_until(self, holds: Callable[[], bool], timeout_s: float = 120, *, alive: bool = True) -> None:
+    def wait_until(self, holds: Callable[[], bool], timeout_s: float = LONG_S, *, alive: bool = True) -> None:
         deadline = time.monotonic() + timeout_s
         while not holds():
             assert not alive or self.process.poll() is None, f"the server died: {self.log.read_text()[-2000:]}"

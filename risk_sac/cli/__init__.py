@@ -5,6 +5,7 @@ import shlex
 import sys
 from collections.abc import Sequence
 
+from risk_sac import __version__
 from risk_sac.cli.audit import add_audit
 from risk_sac.cli.campaigns import add_campaigns
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
@@ -42,6 +43,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="risk-sac", description="Finds scenes and adversaries that make an ego crash.", epilog=EPILOG
     )
+    parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     for add in COMMANDS:

@@ -1,6 +1,6 @@
 """The rules by which a contact that is no artefact is degenerate: the ego had no part in it, or no chance.
 
-Source: design of the tiers in the README.
+Source: the grades in risk_sac/verdicts/README.md.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""`python -m service.host.settings_table [FILE]`: write the table of environment variables into the README."""
+"""`python -m service.host.settings_table [FILE]`: write the table of environment variables into service/README.md."""
 
 import json
 import sys
@@ -53,5 +53,5 @@ def _default(field: dict[str, Any]) -> str:
 
 
 if __name__ == "__main__":
-    readme = Path(sys.argv[1] if len(sys.argv) > 1 else "README.md")
+    readme = Path(sys.argv[1] if len(sys.argv) > 1 else "service/README.md")
     readme.write_text(with_table(readme.read_text(encoding="utf-8")), encoding="utf-8")

@@ -38,7 +38,7 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def risk_sac_run(folder: Path, episodes: int) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(folder, episodes), capture_output=True, text=True, timeout=120)
+    return subprocess.run(command(folder, episodes), capture_output=True, text=True)
 
 
 def test_three_episodes_from_start_to_summary(tmp_path: Path) -> None:
@@ -61,13 +61,11 @@ def test_interrupted_and_resumed_run_equals_an_uninterrupted_one(tmp_path: Path)
         text=True,
     )
     episodes = parts / "episodes.jsonl"
-    deadline = time.monotonic() + 60
     while not (episodes.exists() and episodes.read_text().count("\n") >= 2):
         assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline, "no two episodes within 60 s"
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
-    printed, complaint = process.communicate(timeout=60)
+    printed, complaint = process.communicate()
     assert process.returncode == 130, complaint
     assert re.search(r"Stopped after [2-5] of 6 episodes\. The same command again goes on", printed)
     assert results(parts)["finished"] is False

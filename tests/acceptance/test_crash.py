@@ -28,7 +28,7 @@ sys.exit(cli.main(sys.argv[1:]))
 def test_the_episode_is_left_out_and_counted(tmp_path: Path) -> None:
     command = ["run", "--family", "low", "--method", "random", "--episodes", "3", "--out", str(tmp_path / "run")]
     ends = [
-        subprocess.run([sys.executable, "-c", RISK_SAC, *command], capture_output=True, timeout=100).returncode
+        subprocess.run([sys.executable, "-c", RISK_SAC, *command], capture_output=True).returncode
         for _ in range(FATAL + 1)
     ]
     assert ends == [*FATAL * [-11], 0]

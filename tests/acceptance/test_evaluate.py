@@ -38,7 +38,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The working folder of a comparison that was never interrupted."""
     folder = tmp_path_factory.mktemp("whole")
     (folder / "spec.yaml").write_text(SPEC)
-    done = subprocess.run([*RISK_SAC, "evaluate", *FLAGS], capture_output=True, text=True, timeout=200, cwd=folder)
+    done = subprocess.run([*RISK_SAC, "evaluate", *FLAGS], capture_output=True, text=True, cwd=folder)
     assert done.returncode == 0, done.stderr
     assert f"Report of {RUNS} of {RUNS} runs" in done.stdout
     return folder
@@ -75,7 +75,7 @@ def test_command_on_the_page_gives_the_digest_of_the_row(whole: Path) -> None:
     match = re.search(r"^risk-sac (run --spec .*)$", page, re.MULTILINE)
     assert match
     command = match[1].replace("--method random --seed 0", "--method sac --seed 1").split()
-    subprocess.run([*RISK_SAC, *command], check=True, capture_output=True, timeout=100, cwd=whole)
+    subprocess.run([*RISK_SAC, *command], check=True, capture_output=True, cwd=whole)
     (row,) = [row for row in table(whole)["runs"] if (row["method"], row["seed"]) == ("sac", 1)]
     assert json.loads((whole / "repeated" / "results.json").read_text())["digest"] == row["digest"]
 
@@ -113,7 +113,7 @@ def test_an_interrupted_comparison_goes_on_and_equals_one_that_never_was(whole: 
     runs = tmp_path / "out" / "runs"
     wait_for(process, lambda: any(path.stat().st_size for path in runs.glob("*-sac-*/episodes.jsonl")))
     os.kill(process.pid, signal.SIGINT)
-    printed, complaint = process.communicate(timeout=60)
+    printed, complaint = process.communicate()
     assert process.returncode == 130, complaint
     assert "The same command again goes on" in printed
     partial = table(tmp_path)
@@ -122,16 +122,14 @@ def test_an_interrupted_comparison_goes_on_and_equals_one_that_never_was(whole: 
     assert any(re.match(r"stopped after \d of 7 episodes", run["reason"]) for run in partial["missing"])
     assert "## Missing" in (tmp_path / "out" / "table.md").read_text()
 
-    resumed = subprocess.run([*RISK_SAC, "evaluate", *FLAGS], capture_output=True, text=True, timeout=200, cwd=tmp_path)
+    resumed = subprocess.run([*RISK_SAC, "evaluate", *FLAGS], capture_output=True, text=True, cwd=tmp_path)
     assert resumed.returncode == 0, resumed.stderr
     assert table(tmp_path) == table(whole)
 
 
 def wait_for(process: subprocess.Popen[str], condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 100
     while not condition():
         assert process.poll() is None, process.communicate()
-        assert time.monotonic() < deadline
         time.sleep(0.02)
 
 

@@ -22,7 +22,7 @@ from service.store.records import StoredCampaign, StoredRun
 from service.store.states import State
 from service.store.writing import Ledger
 from service.workers.messages import EpisodeDone, Finished
-from tests.judged import judgement
+from tests.builders import collision, episode_record, judgement
 
 BEGAN = 1_750_000_000.0
 ENDED_ID, LIVE_ID, CANCELLED_ID, POSTED_ID = (f"c{number:016x}" for number in range(1, 5))
@@ -30,61 +30,39 @@ VERSIONS = {"numpy": "2.4", "sumo": "1.28"}
 FOUND, NOTHING = ".fF.dr", ".a.r.."  # a letter for each episode, see `OUTCOMES`
 
 
-def collision(judged: Judgement | None = None, broken: str = "", least_ttc_s: float = 0.3) -> Collision:
-    return Collision(
-        time_s=3.2,
-        other_id="lead",
-        other_kind="vehicle",
-        other_role="adversary",
-        contact_x_m=2.3,
-        contact_y_m=0.1,
-        ego_zone="front",
-        other_zone="rear",
-        ego_speed_mps=9.0,
-        other_speed_mps=2.0,
-        relative_speed_mps=7.0,
-        lateral_offset_m=0.1,
-        min_ttc_s=least_ttc_s,
-        min_rss_margin_m=-3.0,
-        visible_for_s=3.0,
-        ego_peak_braking_mps2=4.5,
-        min_robustness=-1.0,
-        simulator_agrees=True,
-        verdicts={rule: rule != broken for rule in ("inside_limits", "ego_moving")},
-        judgement=judged,
-    )
+def hit(judged: Judgement | None = None, broken: str = "", least_ttc_s: float = 0.3) -> Collision:
+    verdicts = {rule: rule != broken for rule in ("inside_limits", "ego_moving")}
+    return collision(min_ttc_s=least_ttc_s, verdicts=verdicts, judgement=judged)
 
 
 OUTCOMES = {
     ".": (Outcome.SAFE, "", None),
     "r": (Outcome.REJECTED, "sim_crash", None),
-    "f": (Outcome.FAILURE, "", collision(judgement())),
-    "F": (Outcome.FAILURE, "", collision(judgement(Grade.IDEAL, -0.5, unresponsive=True, signature="leader"))),
-    "a": (Outcome.DEGENERATE, "inside_limits", collision(broken="inside_limits", least_ttc_s=math.inf)),
-    "d": (Outcome.DEGENERATE, "ego_moving", collision(broken="ego_moving")),
+    "f": (Outcome.FAILURE, "", hit(judgement())),
+    "F": (Outcome.FAILURE, "", hit(judgement(Grade.IDEAL, -0.5, unresponsive=True, signature="leader"))),
+    "a": (Outcome.DEGENERATE, "inside_limits", hit(broken="inside_limits", least_ttc_s=math.inf)),
+    "d": (Outcome.DEGENERATE, "ego_moving", hit(broken="ego_moving")),
 }
 
 
 def record(index: int, letter: str, phase: str) -> EpisodeRecord:
-    outcome, reason, hit = OUTCOMES[letter]
-    return EpisodeRecord(
-        index=index,
+    outcome, reason, contact = OUTCOMES[letter]
+    return episode_record(
+        index,
+        outcome,
         phase=phase,
         seed=index + 7,
         scene={"lead_gap_m": 12.5 + index},
-        outcome=outcome,
         reason=reason,
         steps=0 if letter == "r" else 50,
-        risk_return=1.0,
-        shaped_return=0.5,
+        environment_steps=50 * (index + 1),
         mean_cost=0.25,
-        min_ttc_s=9.5 if hit is None else hit.min_ttc_s,
-        min_robustness=0.2 if hit is None else -1.0,
+        min_ttc_s=9.5 if contact is None else contact.min_ttc_s,
+        min_robustness=0.2 if contact is None else -1.0,
         objective=None if index == 0 else 0.75,
         dual_variable=0.5 * index,
         temperature=0.25,
-        environment_steps=50 * (index + 1),
-        collision=hit,
+        collision=contact,
     )
 
 

@@ -13,7 +13,7 @@ from service.host.settings_table import BEGIN, END, with_table
 from service.settings import ServiceSettings
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README = (ROOT / "service" / "README.md").read_text(encoding="utf-8")
 DOCKERFILE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
 COMPOSE = (ROOT / "docker" / "compose.yaml").read_text(encoding="utf-8")
 # A shell's own, which name the image, what is published and where secrets lie.

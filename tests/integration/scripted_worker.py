@@ -12,8 +12,9 @@ import time
 from pathlib import Path
 
 from risk_sac.config import RunSpec
-from risk_sac.types import EpisodeRecord, Outcome, RunMetrics
+from risk_sac.types import EpisodeRecord, RunMetrics
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, encode
+from tests.builders import episode_record, run_metrics
 
 WELL_BEHAVED, DIES, HANGS, BABBLES, DISK_FULL, EXITS, SEGFAULTS, FREEZES, WAITS = 0, 9, 15, 7, 28, 3, 11, 19, 41
 ONCE = 100  # added to one of them: the run's second worker behaves well
@@ -104,43 +105,11 @@ def send(word: Event | Heartbeat) -> None:
 
 
 def record(index: int) -> EpisodeRecord:
-    return EpisodeRecord(
-        index=index,
-        phase="train",
-        seed=index,
-        scene={},
-        outcome=Outcome.SAFE,
-        reason="",
-        steps=100,
-        risk_return=0.0,
-        shaped_return=0.0,
-        mean_cost=0.0,
-        min_ttc_s=float("inf"),
-        min_robustness=0.0,
-        objective=None,
-        dual_variable=0.0,
-        temperature=0.0,
-        environment_steps=100 * (index + 1),
-    )
+    return episode_record(index, scene={}, min_ttc_s=float("inf"))
 
 
 def metrics(episodes: int) -> RunMetrics:
-    return RunMetrics(
-        episodes=episodes,
-        rejected=0,
-        raw_collisions=0,
-        failures=0,
-        environment_steps=100 * episodes,
-        ecr=0.0,
-        ecr_low=0.0,
-        ecr_high=0.5,
-        window_ecr=0.0,
-        efficiency=0.0,
-        cost_rate=0.0,
-        dispersion=None,
-        dual_variable=0.0,
-        temperature=0.0,
-    )
+    return run_metrics(episodes)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from risk_sac.client import Campaign, Client, Refused
 from risk_sac.config import Budget, CampaignSpec
 from tests.server import Service
 
+LONG_S = 600.0
 SPEC = CampaignSpec(label="a", families=("low",), methods=("random",), seeds=(0, 1), budget=Budget(episodes=6))
 
 
@@ -31,7 +32,7 @@ def connected(service: Service) -> Client:
 
 def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Client) -> None:
     seen: list[Campaign] = []
-    campaign = client.wait(client.submit(SPEC).id, seen.append, timeout_s=60)
+    campaign = client.wait(client.submit(SPEC).id, seen.append, timeout_s=LONG_S)
     assert campaign.state == "succeeded"
     assert [each.progress.episodes_done for each in seen] == sorted(each.progress.episodes_done for each in seen)
     assert campaign.progress.episodes_done == 12
@@ -43,7 +44,7 @@ def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Clie
 
 
 def test_failures_are_read_page_by_page(client: Client) -> None:
-    campaign = client.wait(client.submit(SPEC).id, timeout_s=60)
+    campaign = client.wait(client.submit(SPEC).id, timeout_s=LONG_S)
     found = list(client.failures(campaign.id, page=2))
     assert len({failure.id for failure in found}) == 6
     only = list(client.failures(campaign.id, run="low-random-1"))
@@ -51,16 +52,18 @@ def test_failures_are_read_page_by_page(client: Client) -> None:
     assert client.failure(campaign.id, only[0].id).index == only[0].index
 
 
-def test_the_events_tell_of_every_episode_and_of_the_end(client: Client) -> None:
-    campaign = client.submit(SPEC)
-    events = list(client.events(campaign.id))
-    episodes = [event.data for event in events if event.name in ("episode", "failure")]
-    assert sorted((each["run_id"], each["index"]) for each in episodes) == [
-        (run, index) for run in ("low-random-0", "low-random-1") for index in range(6)
-    ]
-    assert (events[-1].name, events[-1].data["run_id"], events[-1].data["state"]) == ("state", None, "succeeded")
-    assert list(client.events(campaign.id, events[3].id)) == events[4:]
-    assert list(client.events(campaign.id, events[-1].id)) == []
+@pytest.mark.parametrize("workers", [1, 2])  # the runs come one after the other, or side by side
+def test_the_events_tell_of_every_episode_and_of_the_end(workers: int, serve: Callable[..., Service]) -> None:
+    with connected(serve("striking_worker", max_workers=workers)) as client:
+        campaign = client.submit(SPEC)
+        events = list(client.events(campaign.id))
+        episodes = [event.data for event in events if event.name in ("episode", "failure")]
+        assert sorted((each["run_id"], each["index"]) for each in episodes) == [
+            (run, index) for run in ("low-random-0", "low-random-1") for index in range(6)
+        ]
+        assert (events[-1].name, events[-1].data["run_id"], events[-1].data["state"]) == ("state", None, "succeeded")
+        assert list(client.events(campaign.id, events[3].id)) == events[4:]
+        assert list(client.events(campaign.id, events[-1].id)) == []
 
 
 def test_the_same_key_gives_the_same_campaign_and_never_another_one(client: Client) -> None:
@@ -88,7 +91,7 @@ def test_a_campaign_is_cancelled_and_then_deleted(client: Client) -> None:
         client.delete(campaign.id)
     assert (caught.value.status, caught.value.reason) == (409, "not_ended")
     client.cancel(campaign.id)
-    assert client.wait(campaign.id, timeout_s=60).state == "cancelled"
+    assert client.wait(campaign.id, timeout_s=LONG_S).state == "cancelled"
     assert client.cancel(campaign.id).state == "cancelled"
     client.delete(campaign.id)
     with pytest.raises(Refused) as caught:
@@ -121,7 +124,7 @@ def test_a_server_that_is_lost_and_restarted_is_a_pause(number: int, serve: Call
         for thread in (listening, restarting):
             thread.start()
         seen: list[Campaign] = []
-        assert client.wait(campaign.id, seen.append, timeout_s=100).progress.episodes_done == 80
+        assert client.wait(campaign.id, seen.append, timeout_s=LONG_S).progress.episodes_done == 80
         for thread in (listening, restarting):
             thread.join()
     assert seen[0].progress.episodes_done < 80 == seen[-1].progress.episodes_done

@@ -128,7 +128,7 @@ def test_figures_asked_for_at_once_are_the_files_of_the_report(get, comparison):
     files = [file for item in listed["items"] for file in item["files"]]
     with ThreadPoolExecutor(8) as pool:
         # One is drawn at a time, so on a busy machine the last of eight waits long.
-        answers = list(pool.map(lambda file: get(file["href"].partition(listed_at(file))[2], timeout=240), files))
+        answers = list(pool.map(lambda file: get(file["href"].partition(listed_at(file))[2], timeout=600), files))
     for file, answer in zip(files, answers, strict=True):
         name = file["href"].rpartition("/")[2].removesuffix(f".{file['format']}")
         assert answer.status_code == 200

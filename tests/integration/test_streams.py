@@ -12,12 +12,14 @@ import time
 import httpx
 import pytest
 
+LONG_S = 600
+
 
 def events(client, campaign_id, after=None):
     """Events of one connection, as dictionaries of their fields."""
     headers = {"Last-Event-ID": after} if after else {}
     path = f"/v1/campaigns/{campaign_id}/events"
-    with client.stream("GET", path, headers=headers, timeout=40) as response:
+    with client.stream("GET", path, headers=headers, timeout=120) as response:
         if response.status_code == 204:
             return
         assert response.status_code == 200, response.read()
@@ -99,7 +101,7 @@ def test_streams_through_killed_servers_tell_everything_once(serve):
         service.start()
     service.wait(campaign_id)
     for follower in followers:
-        follower.join(60)
+        follower.join(LONG_S)
         assert not follower.is_alive()
     listed = [item["id"] for item in service.get(campaign_id, "/episodes", limit=500)["items"]]
     assert len(listed) == 240

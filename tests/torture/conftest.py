@@ -1,4 +1,7 @@
-"""Faults in earnest: a few of each in the test suite, the full counts with RISK_SAC_TORTURE=full (`make torture`)."""
+"""Faults in earnest: the full counts with RISK_SAC_TORTURE=full (`make torture`), a few of each without.
+
+The suite itself uploads a part of the hostile files, and leaves all that is marked `torture` alone.
+"""
 
 import os
 from collections.abc import Callable, Iterator
@@ -14,7 +17,7 @@ FULL = os.environ.get("RISK_SAC_TORTURE") == "full"
 
 @pytest.fixture(scope="session")
 def times() -> Callable[[int, int], int]:
-    """How often to do something: seldom in the suite, often in earnest."""
+    """How often to do something: seldom, or often in earnest."""
     return lambda seldom, often: often if FULL else seldom
 
 

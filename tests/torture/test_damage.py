@@ -31,6 +31,7 @@ SPEC = {
     "learner": {"checkpoint_every": 2},
 }
 DATABASE = "risk-sac.db"
+pytestmark = pytest.mark.torture  # the suite damages checkpoints, rows and results one by one
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import pytest
 from tests.server import servers
 from tests.torture.disk import Disk, compiler
 
+pytestmark = pytest.mark.torture  # the suite fills the disk of scripted and of real workers
 SPEC = {"families": ["low"], "methods": ["bo-only"], "budget": {"episodes": 4}, "learner": {"checkpoint_every": 1}}
 
 

@@ -15,6 +15,7 @@ from tests.server import Service, servers
 
 Outcome = tuple[dict[str, str], list[str]]
 LONG_S = 900
+pytestmark = pytest.mark.torture  # the suite kills a server and workers at chosen moments
 
 
 @pytest.fixture(scope="module")

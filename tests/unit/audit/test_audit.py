@@ -8,50 +8,7 @@ from risk_sac.audit.run import parts_of, read, run
 from risk_sac.audit.table import markdown, searched
 from risk_sac.cli import main
 from risk_sac.config import EgoConfig
-from risk_sac.types import Collision, ConflictType, Grade, Judgement
-
-
-def collision(**changes: object) -> Collision:
-    judgement = Judgement(
-        definitions=1,
-        conflict_type=ConflictType.CUT_IN,
-        conflict_s=2.5,
-        conflict_x_m=0.0,
-        conflict_y_m=0.0,
-        position="ahead",
-        hidden=False,
-        ego_manoeuvre="straight",
-        ego_response="braking",
-        ground="lane",
-        broke=(),
-        unresponsive=False,
-        grade=Grade.CAREFUL,
-        drivers={},
-        signature="cut-in",
-    )
-    values = {
-        "time_s": 4.0,
-        "other_id": "left",
-        "other_kind": "vehicle",
-        "other_role": "adversary",
-        "contact_x_m": 2.3,
-        "contact_y_m": 0.0,
-        "ego_zone": "front",
-        "other_zone": "rear",
-        "ego_speed_mps": 9.0,
-        "other_speed_mps": 5.0,
-        "relative_speed_mps": 4.0,
-        "lateral_offset_m": 0.0,
-        "min_ttc_s": 1.0,
-        "min_rss_margin_m": -1.0,
-        "visible_for_s": 4.0,
-        "ego_peak_braking_mps2": 4.5,
-        "min_robustness": -1.0,
-        "simulator_agrees": True,
-        "verdicts": {"no_teleport": True},
-        "judgement": judgement,
-    }
-    return Collision(**(values | changes))  # type: ignore[arg-type]
+from tests.builders import collision, judgement
 
 
 def test_an_audit_plays_every_control_in_parts_of_fifty() -> None:
@@ -83,8 +40,9 @@ def test_an_audit_goes_on_where_it_was_stopped(tmp_path: Path) -> None:
 
 
 def test_the_table_counts_by_grade_and_lists_what_should_not_be() -> None:
-    hit = collision()
-    refused = collision(verdicts={"no_sideswipe": False})
+    judged = judgement(signature="cut-in")
+    hit = collision(other_id="left", time_s=4.0, judgement=judged)
+    refused = collision(other_id="left", time_s=4.0, verdicts={"no_sideswipe": False}, judgement=judged)
     played = {("low", control.name): [Played(index=0, steps=150)] for control in CONTROLS}
     played["low", IDLE.name] = [
         Played(index=0, steps=40, mean_cost=0.5, collision=hit),

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from risk_sac import cli
+from risk_sac import __version__, cli
 from risk_sac.cli.show import _contacts
 from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.execution.runs import run
 from risk_sac.run_folder.results import Contact, Results, read_results, write_results
 from risk_sac.types import ConflictType, Grade, RunMetrics
-from tests.judged import judgement
+from tests.builders import judgement
 from tests.unit.failures.staged import synthetic_contact
 
 SPEC = RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=3))
@@ -223,3 +223,9 @@ def test_unknown_command_is_misuse(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         cli.main(["launch"])
     assert "invalid choice" in capsys.readouterr().err
+
+
+def test_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="0"):
+        cli.main(["--version"])
+    assert capsys.readouterr().out == f"risk-sac {__version__}\n"

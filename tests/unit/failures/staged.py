@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from risk_sac.run_folder.results import Contact
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.space import SceneSpace
-from risk_sac.types import Collision, ConflictType, EpisodeRecord, Judgement, Outcome
-from tests.judged import judgement
+from risk_sac.types import ConflictType, Judgement, Outcome
+from tests.builders import collision, episode_record, judgement
 
 JUDGED = judgement(
     conflict_type=ConflictType.PEDESTRIAN,
@@ -21,46 +21,31 @@ JUDGED = judgement(
 def synthetic_contact(judged: Judgement | None = JUDGED) -> Contact:
     """The ego drives east at 10 m/s into a pedestrian who walks north; the contact is 1.95 s after the release."""
     space: SceneSpace = FAMILIES["mixed"].space
-    collision = Collision(
+    hit = collision(
         time_s=1.95,
         other_id="pedestrian",
         other_kind="pedestrian",
-        other_role="adversary",
-        contact_x_m=2.3,
         contact_y_m=-0.5,
-        ego_zone="front",
         other_zone="left",
         ego_speed_mps=10.0,
         other_speed_mps=1.0,
         relative_speed_mps=10.05,
         lateral_offset_m=-0.5,
         min_ttc_s=0.1,
-        min_rss_margin_m=-3.0,
         visible_for_s=1.0,
         ego_peak_braking_mps2=0.0,
-        min_robustness=-1.0,
-        simulator_agrees=True,
         verdicts={"ego_moving": True},
         judgement=judged,
     )
-    episode = EpisodeRecord(
-        index=7,
-        phase="train",
+    episode = episode_record(
+        7,
+        Outcome.FAILURE,
         seed=1,
         scene=space.from_unit(np.full(space.dimension, 0.4)).values,
-        outcome=Outcome.FAILURE,
-        reason="",
         steps=20,
-        risk_return=1.0,
-        shaped_return=1.0,
-        mean_cost=0.1,
-        min_ttc_s=0.1,
-        min_robustness=-1.0,
-        objective=0.0,
-        dual_variable=0.0,
-        temperature=0.2,
         environment_steps=20,
-        collision=collision,
+        min_ttc_s=0.1,
+        collision=hit,
     )
     return Contact.of(episode)
 

@@ -6,60 +6,26 @@ from itertools import combinations
 from hypothesis import strategies as st
 
 from risk_sac.metrics import WINDOW, MetricsAccumulator, Tally, outcome_features, preventable
-from risk_sac.types import Collision, EpisodeRecord, Grade, Outcome
+from risk_sac.types import Grade, Outcome
 from risk_sac.verdicts.distinct import distinct_failures
-from tests.judged import judgement
+from tests.builders import collision, episode_record, judgement
 
 HORIZON = 150
 
 
-def collision(
-    ttc=0.3, speed=10.0, offset=0.0, robustness=-1.0, other="adv_0", ego_zone="front", other_zone="rear", **more
-):
-    values = {"time_s": 3.0, "verdicts": {"warm-up": True}} | more
-    return Collision(
-        other_id=other,
-        other_kind="vehicle",
-        other_role="adversary",
-        contact_x_m=2.0,
-        contact_y_m=0.1,
-        ego_zone=ego_zone,
-        other_zone=other_zone,
-        ego_speed_mps=12.0,
-        other_speed_mps=2.0,
-        relative_speed_mps=speed,
-        lateral_offset_m=offset,
-        min_ttc_s=ttc,
-        min_rss_margin_m=-4.0,
-        visible_for_s=2.0,
-        ego_peak_braking_mps2=4.5,
-        min_robustness=robustness,
-        simulator_agrees=True,
-        **values,
-    )
+def contact(ttc=0.3, speed=10.0, offset=0.0, robustness=-1.0, **changes):
+    """One with these outcome features."""
+    features = {"min_ttc_s": ttc, "relative_speed_mps": speed, "lateral_offset_m": offset, "min_robustness": robustness}
+    return collision(**({"time_s": 3.0} | features | changes))
 
 
 def episode(outcome=Outcome.SAFE, steps=HORIZON, cost=0.0, hit=None, **changes):
     if outcome is Outcome.REJECTED:
         steps = 0
     if hit is None and outcome in (Outcome.FAILURE, Outcome.DEGENERATE):
-        hit = collision()
-    values = {
-        "index": 0,
-        "phase": "train",
-        "seed": 1,
-        "scene": {"gap_m": 10.0, "speed_mps": 12.5},
-        "reason": "",
-        "risk_return": 1.0,
-        "shaped_return": 0.5,
-        "min_ttc_s": 0.3,
-        "min_robustness": -1.0,
-        "objective": 0.2,
-        "dual_variable": 0.7,
-        "temperature": 0.1,
-        "environment_steps": 0,
-    } | changes
-    return EpisodeRecord(outcome=outcome, steps=steps, mean_cost=cost, collision=hit, **values)
+        hit = contact()
+    values = {"scene": {"gap_m": 10.0, "speed_mps": 12.5}, "objective": 0.2, "dual_variable": 0.7, "temperature": 0.1}
+    return episode_record(outcome=outcome, steps=steps, mean_cost=cost, collision=hit, **(values | changes))
 
 
 def feed(records):
@@ -98,7 +64,7 @@ any_judgement = st.builds(
     signature=st.sampled_from(("cut-in", "pedestrian", "leader")),
 )
 any_collision = st.builds(
-    collision,
+    contact,
     judgement=st.none() | any_judgement,
     time_s=st.floats(0, 15),
     ttc=st.floats(0, math.inf),
@@ -117,32 +83,32 @@ any_run = st.lists(any_episode, max_size=40)
 
 
 RUN = [
-    episode(Outcome.FAILURE, 30, 0.2, collision(ttc=0.0, speed=0.0, offset=-3.5, robustness=-3.0)),
+    episode(Outcome.FAILURE, 30, 0.2, contact(ttc=0.0, speed=0.0, offset=-3.5, robustness=-3.0)),
     episode(Outcome.SAFE, 150, 0.1),
     episode(Outcome.REJECTED, cost=math.nan),  # no step, no mean cost: whatever stands there is ignored
     episode(Outcome.DEGENERATE, 70, 0.0),
-    episode(Outcome.FAILURE, 50, 0.4, collision(ttc=3.0, speed=0.0, offset=-3.5, robustness=-3.0)),
+    episode(Outcome.FAILURE, 50, 0.4, contact(ttc=3.0, speed=0.0, offset=-3.5, robustness=-3.0)),
 ]
 
 
 JUDGED = [
     # Contact at 3.9 s, and the same again, which is not distinct.
-    *[episode(Outcome.FAILURE, 39, hit=collision(time_s=3.9, judgement=judgement(conflict_s=2.5)))] * 2,
-    episode(Outcome.FAILURE, 60, hit=collision(time_s=6.0, other="adv_1", judgement=judgement(Grade.IDEAL, 3.0))),
+    *[episode(Outcome.FAILURE, 39, hit=contact(time_s=3.9, judgement=judgement(conflict_s=2.5)))] * 2,
+    episode(Outcome.FAILURE, 60, hit=contact(time_s=6.0, other_id="adv_1", judgement=judgement(Grade.IDEAL, 3.0))),
     episode(
         Outcome.FAILURE,
         150,
-        hit=collision(
+        hit=contact(
             time_s=15.0,
-            other="adv_2",
+            other_id="adv_2",
             judgement=judgement(Grade.CAREFUL, -0.4, signature="pedestrian, straight", unresponsive=True),
         ),
     ),
-    episode(Outcome.FAILURE, 20, hit=collision(time_s=2.0, other="adv_3")),  # from before contacts were judged
+    episode(Outcome.FAILURE, 20, hit=contact(time_s=2.0, other_id="adv_3")),  # from before contacts were judged
     # Its striker left the grip of its tyres: an artefact, which nobody judged and whose grade would not count.
     episode(
-        Outcome.DEGENERATE, 30, hit=collision(verdicts={"inside_grip": False}, judgement=judgement(unresponsive=True))
+        Outcome.DEGENERATE, 30, hit=contact(verdicts={"inside_grip": False}, judgement=judgement(unresponsive=True))
     ),
-    episode(Outcome.DEGENERATE, 30, hit=collision(verdicts={"ego_moving": False})),
+    episode(Outcome.DEGENERATE, 30, hit=contact(verdicts={"ego_moving": False})),
     episode(),
 ]

@@ -16,8 +16,8 @@ from risk_sac.metrics.rows import (
 )
 from risk_sac.types import Outcome, RunMetrics
 from risk_sac.verdicts.distinct import distinct_failures
-from tests.judged import judgement
-from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, collision, counted, episode, feed
+from tests.builders import judgement
+from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
 
 
 def test_run_literals():
@@ -68,7 +68,7 @@ def test_histograms_have_a_bin_for_every_second_that_is_begun(horizon_steps, bin
 
 
 def test_window_of_preventable_failures_forgets_too():
-    failure = episode(Outcome.FAILURE, 10, hit=collision(judgement=judgement()))
+    failure = episode(Outcome.FAILURE, 10, hit=contact(judgement=judgement()))
     records = [failure] * 50 + [episode()] * 80 + [failure, episode(Outcome.FAILURE, 10)] * 5
     metrics = feed(records)
     assert (metrics.window_ecr, metrics.window_pcr) == (0.2, 0.15)
@@ -98,12 +98,12 @@ def test_bad_records_are_refused_and_leave_the_figures_alone():
     accumulator = MetricsAccumulator(HORIZON)
     before = accumulator.metrics()
     with pytest.raises(NotFinite, match="outcome features"):
-        accumulator.add(episode(Outcome.FAILURE, 10, hit=collision(ttc=math.nan)))
+        accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(ttc=math.nan)))
     for times in ({"time_s": math.nan}, {"judgement": judgement(conflict_s=-math.inf)}):
         with pytest.raises(NotFinite, match="finite times"):
-            accumulator.add(episode(Outcome.FAILURE, 10, hit=collision(**times)))
+            accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(**times)))
     with pytest.raises(NotFinite, match="no NaN"):  # of what tells distinct failures apart
-        accumulator.add(episode(Outcome.FAILURE, 10, hit=collision().model_copy(update={"ego_speed_mps": math.nan})))
+        accumulator.add(episode(Outcome.FAILURE, 10, hit=contact().model_copy(update={"ego_speed_mps": math.nan})))
     with pytest.raises(NotFinite, match="mean_cost"):
         accumulator.add(episode(cost=math.nan))
     with pytest.raises(ValueError, match="without a collision"):
@@ -160,7 +160,7 @@ def test_adding_stored_records_again_restores_the_same_figures(records):
 def test_many_failures_stay_cheap_to_add():
     random = np.random.default_rng(0)
     records = [
-        episode(Outcome.FAILURE, 10, hit=collision(3 * u[0], 20 * u[1], 7 * u[2] - 3.5, 4 * u[3] - 3))
+        episode(Outcome.FAILURE, 10, hit=contact(3 * u[0], 20 * u[1], 7 * u[2] - 3.5, 4 * u[3] - 3))
         for u in random.random((5000, 4))
     ]
     began = time.process_time()

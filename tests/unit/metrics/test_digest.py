@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from risk_sac.metrics import results_digest
-from tests.judged import judgement
+from tests.builders import judgement
 from tests.unit.metrics.episodes import RUN, episode
 
 

@@ -4,17 +4,17 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics
+from risk_sac.types import Outcome, RunMetrics
 from service.store.reading import Store
 from service.store.writing import Ledger
 from service.workers.messages import EpisodeDone
-from tests.judged import judgement
+from tests.builders import collision, episode_record, judgement, run_metrics
 
 
 @pytest.fixture
 def metrics() -> RunMetrics:
-    return RunMetrics(
-        episodes=4,
+    return run_metrics(
+        4,
         rejected=1,
         raw_collisions=2,
         failures=1,
@@ -47,48 +47,21 @@ def metrics() -> RunMetrics:
 @pytest.fixture
 def episode(metrics: RunMetrics) -> Callable[..., EpisodeDone]:
     """Builds the report of an episode; a contact has a minimum TTC of NaN, all have one of infinity."""
-    contact = Collision(
-        time_s=3.2,
-        other_id="lead",
-        other_kind="vehicle",
-        other_role="adversary",
-        contact_x_m=2.3,
-        contact_y_m=0.1,
-        ego_zone="front",
-        other_zone="rear",
-        ego_speed_mps=9.0,
-        other_speed_mps=2.0,
-        relative_speed_mps=7.0,
-        lateral_offset_m=0.1,
-        min_ttc_s=math.nan,
-        min_rss_margin_m=-3.0,
-        visible_for_s=3.0,
-        ego_peak_braking_mps2=4.5,
-        min_robustness=-math.inf,
-        simulator_agrees=True,
-        verdicts={"feasible": True},
-        judgement=judgement(),
+    contact = collision(
+        min_ttc_s=math.nan, min_robustness=-math.inf, verdicts={"feasible": True}, judgement=judgement()
     )
 
     def build(index: int, outcome: Outcome = Outcome.SAFE, phase: str = "train", wall_s: float = 0.5) -> EpisodeDone:
         touched = outcome in (Outcome.FAILURE, Outcome.DEGENERATE)
-        record = EpisodeRecord(
-            index=index,
+        record = episode_record(
+            index,
+            outcome,
             phase=phase,
             seed=7,
-            scene={"lead_gap_m": 12.5},
-            outcome=outcome,
-            reason="",
             steps=100,
-            risk_return=1.0,
             shaped_return=2.0,
-            mean_cost=0.1,
             min_ttc_s=math.inf,
             min_robustness=0.2,
-            objective=None,
-            dual_variable=0.3,
-            temperature=0.2,
-            environment_steps=100 * (index + 1),
             collision=contact if touched else None,
         )
         return EpisodeDone(record=record, metrics=metrics, series="a.npz" if touched else None, wall_s=wall_s)

@@ -1,53 +1,26 @@
 import random
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.errors import NotFinite
-from risk_sac.types import Collision, ConflictType, Judgement
+from risk_sac.types import Collision
 from risk_sac.verdicts.distinct import DistinctFailures, cell_of, distinct_failures
-
-JUDGED = Judgement(
-    definitions=1,
-    conflict_type=ConflictType.LEADER,
-    conflict_s=2.0,
-    conflict_x_m=0.0,
-    conflict_y_m=0.0,
-    position="ahead",
-    hidden=False,
-    ego_manoeuvre="straight",
-    ego_response="none",
-    ground="lane",
-    broke=(),
-    unresponsive=False,
-    grade=None,
-    drivers={},
-    signature="leader",
-)
+from tests.builders import collision, judgement
 
 
-def failure(signature: str | None = "leader", ego: float = 6.0, other: float = 2.0, after: float = 1.0) -> Collision:
-    return Collision(
+def failure(
+    signature: str | None = "leader", ego: float = 6.0, other: float = 2.0, after: float = 1.0, **changes: Any
+) -> Collision:
+    return collision(
         time_s=2.0 + after,
-        other_id="adv_0",
-        other_kind="vehicle",
-        other_role="adversary",
-        contact_x_m=2.0,
-        contact_y_m=0.1,
-        ego_zone="front",
-        other_zone="rear",
         ego_speed_mps=ego,
         other_speed_mps=other,
         relative_speed_mps=ego - other,
-        lateral_offset_m=0.0,
-        min_ttc_s=1.0,
-        min_rss_margin_m=0.0,
-        visible_for_s=3.0,
-        ego_peak_braking_mps2=1.0,
-        min_robustness=-3.0,
-        simulator_agrees=True,
-        judgement=None if signature is None else JUDGED.model_copy(update={"signature": signature}),
+        judgement=None if signature is None else judgement(None, 2.0, signature=signature),
+        **changes,
     )
 
 
@@ -68,7 +41,7 @@ any_failure = st.builds(
         (failure(after=2.1), True),
         (failure("cut-in"), True),
         (failure(None), True),
-        (failure().model_copy(update={"ego_zone": "left", "other_id": "adv_1", "min_robustness": 0.0}), False),
+        (failure(ego_zone="left", other_id="adv_1", min_robustness=0.0), False),
     ],
 )
 def test_signature_first_and_then_the_cell(second: Collision, distinct: bool) -> None:

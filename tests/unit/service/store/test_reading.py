@@ -10,7 +10,7 @@ from service.store.finding import Judged
 from service.store.reading import Store
 from service.store.states import State
 from tests.begun import start
-from tests.judged import judgement
+from tests.builders import judgement
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
 
