@@ -58,10 +58,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._reward = reward
         self._controlled = controlled
         sensor, horizon_steps = problem.ego.sensor, problem.family.horizon_steps
-        in_view = sight(sensor, problem.visibility_m)
-        self._perception = Perception(sensor.memory_s if sensor else 0.0, in_view)
+        self._perception = Perception(sensor.memory_s if sensor else 0.0, sight(sensor, problem.visibility_m))
         self._sim = SumoSimulation(problem.ego, self._perception)
-        self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, in_view, reward.softmin_sharpness)
+        self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, reward.softmin_sharpness)
         self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
         self.observation_size = self._encoder.size
         self.action_size = 2 * len(problem.family.adversaries)
@@ -117,7 +116,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         if self._reflex is not None:
             self._sim.brake(self._reflex.braking(self._frame, self._ego_path(), self._in_sight()))
         before, self._frame = self._frame, self._sim.step()
-        previous, self._measures = self._measures, self._gauge.measure(self._frame, before)
+        previous, self._measures = self._measures, self._measure(before)
         self._steps += 1
         self._inside_limits &= not self._controlled or self._adversaries.keep_limits(self._frame)
         self._teleported |= bool(self._frame.teleported)
@@ -182,13 +181,17 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _lead_in(self, start: Frame) -> None:
         """Traffic, before anybody attacks: SUMO drives all vehicles, and pedestrians go on as the scene says."""
-        self._frame, self._measures = start, self._gauge.measure(start, None)
+        self._frame = start
+        self._measures = self._measure(None)
         self._trace.append(start, self._measures, None)
         for _ in range(round(LEAD_IN_S / STEP_S)):
             self._sim.walk_on()
             before, self._frame = self._frame, self._sim.step()
-            self._measures = self._gauge.measure(self._frame, before)
+            self._measures = self._measure(before)
             self._trace.append(self._frame, self._measures, None)
+
+    def _measure(self, before: Frame | None) -> Measures:
+        return self._gauge.measure(self._frame, before, self._perception.seen)
 
     def _check_feasible(self, scene: Scene) -> None:
         """C_hard of Eq. 5, when the adversaries are released."""

@@ -102,14 +102,14 @@ def belief_of(
 class Told:
     """Senses of an ego that is told what to make of the k-th frame of an episode."""
 
-    def __init__(self, tell: Callable[[Frame, int], Belief]) -> None:
+    def __init__(self, tell: "Callable[[Frame, int], Belief]") -> None:
         self.tell = tell
         self._frames = 0
 
     def reset(self) -> None:
         self._frames = 0
 
-    def look(self, frame: Frame) -> Belief:
+    def look(self, frame: Frame) -> "Belief":
         self._frames += 1
         return self.tell(frame, self._frames - 1)
 

@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from risk_sac.config import Requirement
-from risk_sac.geometry import Sight
 from risk_sac.risk.publish import Assessment, assess, publish
 from risk_sac.risk.rss import RssParameters
 from risk_sac.risk.stl import Monitor, soft_min
-from risk_sac.types import STEP_S, Floats, Frame
+from risk_sac.types import STEP_S, Bools, Floats, Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +32,6 @@ class Gauge:
         requirements: Sequence[Requirement],
         horizon_steps: int,
         rss: RssParameters,
-        sight: Sight,
         softmin_sharpness: float,
     ) -> None:
         """Compiles the requirements.
@@ -42,12 +40,10 @@ class Gauge:
           requirements: to be monitored.
           horizon_steps: the longest episode.
           rss: parameters of the safe distances.
-          sight: what the ego can see at best.
           softmin_sharpness: β of Eq. 7.
         """
         self._monitor = Monitor(requirements, STEP_S, horizon_steps)
         self._rss = rss
-        self._sight = sight
         self._sharpness = softmin_sharpness
         self.names = self._monitor.names
 
@@ -55,14 +51,15 @@ class Gauge:
         """Forgets the previous episode."""
         self._monitor.reset()
 
-    def measure(self, frame: Frame, before: Frame | None) -> Measures:
+    def measure(self, frame: Frame, before: Frame | None, seen: Bools) -> Measures:
         """Measures the next frame.
 
         Args:
           frame: all actors now.
           before: the previous frame, None at the start.
+          seen: which of the others the ego sees.
         """
-        assessment = assess(frame, self._rss, self._sight)
+        assessment = assess(frame, self._rss, seen)
         signals = publish(frame, before, assessment.least)
         robustness = self._monitor.update(signals)
         return Measures(assessment, signals, robustness, soft_min(robustness[self._monitor.shapes], self._sharpness))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.geometry import RelativeView, Sight, frame_view, in_sight
+from risk_sac.geometry import RelativeView, frame_view
 from risk_sac.jit import compiled
 from risk_sac.risk.encounter import ENCOUNTER_CAP_S, time_to_encounter
 from risk_sac.risk.rss import LONGITUDINAL_CAP_M, SCALED_HIGH, RssParameters, margins
@@ -17,7 +17,7 @@ PEDESTRIAN_GAP_CAP_M = 30.0
 RED_LIGHT_BRAKING_CAP_MPS2 = 12.0
 STOP_TOLERANCE_M = 0.5  # past the line: creeping up to it is no braking
 CROSSED_ON_RED_M = -1.0
-VEHICLE, PEDESTRIAN = int(Kind.VEHICLE), int(Kind.PEDESTRIAN)  # compiled code knows no enums of int8
+PEDESTRIAN = int(Kind.PEDESTRIAN)  # compiled code knows no enums of int8
 
 
 # Rows of an assessment, one column for each of the `n` actors other than the ego, in its frame as in `RelativeView`.
@@ -73,22 +73,21 @@ class Assessment(NamedTuple):
         return margin
 
 
-def assess(frame: Frame, rss: RssParameters, sight: Sight) -> Assessment:
+def assess(frame: Frame, rss: RssParameters, seen: Bools) -> Assessment:
     """All measures of a frame, in one compiled call."""
-    others, least, touched = _assess(frame.state, frame.kind, rss, *sight)
+    others, least, touched = _assess(frame.state, frame.kind, rss, seen)
     return Assessment(others, LeastMargins(*least), touched)
 
 
 @compiled
 def _assess(
-    state: Floats, kind: NDArray[np.int8], rss: RssParameters, reach_m: float, half_view_rad: float, occlusion: bool
+    state: Floats, kind: NDArray[np.int8], rss: RssParameters, seen: Bools
 ) -> tuple[Floats, tuple[float, float, float, float, float], bool]:
     view = frame_view(state)
     ttc_s = time_to_collision(view)
     walks = kind[1:] == PEDESTRIAN
     rss_margins = margins(view, walks, rss)
     encounter_s = time_to_encounter(view, walks)
-    seen = in_sight(view, kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion))
     charged = in_charge(view)
     n = len(charged)
     others = np.empty((CHARGED + 1, n))

@@ -58,6 +58,9 @@ class Perception:
     """Whom the ego sees, and whom it remembers.
 
     An actor is remembered for the sensor's memory after it went out of sight, and expected to go on as it did then.
+
+    Attributes:
+      seen: which of the others of the latest frame are in sight, `n - 1`.
     """
 
     def __init__(self, memory_s: float, sight: Sight) -> None:
@@ -75,10 +78,12 @@ class Perception:
         """Forgets the previous episode."""
         self._ids: tuple[str, ...] = ()
         self._memory = np.empty((THEN + len(MOTION), 0))
+        self.seen: Bools = np.empty(0, dtype=np.bool_)
 
     def look(self, frame: Frame) -> Belief:
         """See `Senses.look`."""
-        return self.update(frame, _seen(frame.state, frame.kind, *self._sight))
+        self.seen = _seen(frame.state, frame.kind, *self._sight)
+        return self.update(frame, self.seen)
 
     def update(self, frame: Frame, seen: Bools) -> Belief:
         """Takes note of who is in sight.

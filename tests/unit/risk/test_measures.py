@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from risk_sac.config import Requirement
-from risk_sac.geometry import Sight
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import assess, publish
 from risk_sac.risk.rss import RssParameters
@@ -11,7 +10,7 @@ from risk_sac.types import Frame
 from tests.builders import frame_of
 
 RSS = RssParameters(response_s=0.5, brake_min_mps2=6.0, brake_max_mps2=6.0)
-SIGHT = Sight(reach_m=80.0, half_view_rad=np.pi, occlusion=True)
+SEEN = np.array([True])
 REQUIREMENTS = (
     Requirement(name="far", formula="vehicle_gap_m >= 10", scale=10.0),
     Requirement(name="apart", formula="historically(vehicle_gap_m >= 5)", scale=10.0),
@@ -19,7 +18,7 @@ REQUIREMENTS = (
 
 
 def gauge() -> Gauge:
-    return Gauge(REQUIREMENTS, 100, RSS, SIGHT, softmin_sharpness=20.0)
+    return Gauge(REQUIREMENTS, 100, RSS, softmin_sharpness=20.0)
 
 
 def behind(gap_m: float) -> Frame:
@@ -28,12 +27,12 @@ def behind(gap_m: float) -> Frame:
 
 
 def measured(subject: Gauge, *gaps_m: float) -> list[Measures]:
-    return [subject.measure(behind(gap_m), None) for gap_m in gaps_m]
+    return [subject.measure(behind(gap_m), None, SEEN) for gap_m in gaps_m]
 
 
 def test_a_frame_is_measured_by_the_functions_of_the_paper() -> None:
     (measures,) = measured(gauge(), 20.0)
-    assessment = assess(behind(20.0), RSS, SIGHT)
+    assessment = assess(behind(20.0), RSS, SEEN)
     assert np.array_equal(measures.assessment.others, assessment.others)
     assert measures.signals == publish(behind(20.0), None, assessment.least)
     assert measures.robustness.tolist() == pytest.approx([1.0, 1.5])

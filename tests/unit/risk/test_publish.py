@@ -1,9 +1,10 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from risk_sac.geometry import Sight, relative_view
+from risk_sac.geometry import relative_view
 from risk_sac.risk.encounter import ENCOUNTER_CAP_S
 from risk_sac.risk.publish import (
     CROSSED_ON_RED_M,
@@ -28,7 +29,6 @@ from risk_sac.types import Frame, Kind, Signal
 from tests import builders
 
 VEHICLE, PEDESTRIAN = Kind.VEHICLE, Kind.PEDESTRIAN
-SEES_ALL = Sight(math.inf, math.pi, occlusion=False)
 
 
 def frame_of(
@@ -52,7 +52,7 @@ def frame_of(
 def signals_of(
     frame: Frame, ttc: list[float], rss: list[float], encounter: list[float] | None = None
 ) -> dict[str, float]:
-    others = assess(frame, RssParameters(), SEES_ALL).others.copy()
+    others = assess(frame, RssParameters(), np.ones(len(frame.ids) - 1, dtype=np.bool_)).others.copy()
     others[TTC], others[RSS_SCALED], others[ENCOUNTER] = ttc, rss, ttc if encounter is None else encounter
     return publish(frame, None, LeastMargins(*least_margins(others, frame.kind)))
 
