@@ -17,6 +17,7 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.geometry import overlapping_pairs, relative_view
 from risk_sac.observation import LIMIT, Encoder
 from risk_sac.problem import Problem
+from risk_sac.records import Collision
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import adversaries_cost, broken_hard_rule
@@ -29,7 +30,7 @@ from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import STEP_S, Bools, Collision, Frame, Kind, Scene
+from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
 from risk_sac.verdicts.artefact import Handling
 from risk_sac.verdicts.collision import Acquaintance, collision_of
 from risk_sac.verdicts.evidence import Evidence, Ground

@@ -16,6 +16,7 @@ from risk_sac.config import METHODS, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.metrics import MetricsAccumulator, results_digest
 from risk_sac.problem import Problem
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import sha256
@@ -23,7 +24,6 @@ from risk_sac.run_folder.episode_json import records_from_json, records_to_json
 from risk_sac.run_folder.results import FAILURES, series_name
 from risk_sac.run_folder.series import write_series
 from risk_sac.scene_optimizer import BotorchOptimizer, SceneOptimizer, SobolOptimizer
-from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 
 logger = logging.getLogger(__name__)
 

@@ -17,11 +17,11 @@ import torch
 from risk_sac.agents.replay import Transition
 from risk_sac.config import RunSpec
 from risk_sac.errors import InfeasibleScene
+from risk_sac.records import Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run import RunState, RunSummary
 from risk_sac.run_folder.crashes import CrashGuard
-from risk_sac.types import Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
 
 SIM_CRASH = "sim_crash"  # reason of a rejection
 

@@ -19,8 +19,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from risk_sac.client import Campaign, Client, ClientError, Unreachable
+from risk_sac.records import Grade
 from risk_sac.run_folder.results import FAILURES, series_name
-from risk_sac.types import Grade
 from service.settings import ServiceSettings
 
 START_S = 60.0

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
-from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
 from service.workers.takeover import take_over
 

@@ -10,22 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from risk_sac.types import (
+from risk_sac.records import (
     Collision,
     ConflictType,
     EpisodeRecord,
-    Floats,
-    Frame,
     Grade,
     Judgement,
-    Kind,
     Outcome,
     ReferenceOutcome,
-    Role,
-    Row,
     RunMetrics,
-    Signal,
 )
+from risk_sac.types import Floats, Frame, Kind, Role, Row, Signal
 
 if TYPE_CHECKING:
     from risk_sac.sim.ego import Belief

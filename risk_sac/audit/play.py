@@ -11,7 +11,7 @@ from risk_sac.config import FamilyName, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
 from risk_sac.problem import Problem
-from risk_sac.types import Collision
+from risk_sac.records import Collision
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

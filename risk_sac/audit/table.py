@@ -9,9 +9,9 @@ from risk_sac.audit.controls import CONTROLS, IDLE, LADDER, NOBODY
 from risk_sac.audit.play import Played
 from risk_sac.config import FamilyName
 from risk_sac.metrics import wilson_interval
+from risk_sac.records import Collision, ConflictType, EpisodeRecord
 from risk_sac.run_folder.episode_json import records_from_lines
 from risk_sac.run_folder.results import EPISODES, read_results
-from risk_sac.types import Collision, ConflictType, EpisodeRecord
 from risk_sac.verdicts.distinct import distinct_failures
 
 Rows = list[list[str]]

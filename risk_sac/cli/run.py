@@ -9,8 +9,8 @@ from risk_sac.cli.console import INTERRUPTED, OK, Commands, console, or_dash, pr
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.config.spec_file import read_spec
 from risk_sac.metrics import METRICS, Metric, pooled_counts
+from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import Results
-from risk_sac.types import RunMetrics
 
 
 def add_run(commands: Commands) -> None:

@@ -7,8 +7,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.console import OK, Commands, console
+from risk_sac.records import Judgement
 from risk_sac.run_folder.results import Results, read_results
-from risk_sac.types import Judgement
 
 
 def add_show(commands: Commands) -> None:

@@ -24,7 +24,7 @@ from risk_sac.client.errors import StreamLost
 from risk_sac.client.follow import AWAY_S, SILENCE_S, Follower
 from risk_sac.client.transport import Transport
 from risk_sac.config import CampaignSpec
-from risk_sac.types import Grade
+from risk_sac.records import Grade
 
 TIMEOUT_S = 30.0  # of silence within one answer
 PATIENCE_S = 10.0  # with a service that does not answer

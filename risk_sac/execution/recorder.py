@@ -9,12 +9,12 @@ from typing import Self
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import set_aside
 from risk_sac.run_folder.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
 from risk_sac.train import Observer
-from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 
 logger = logging.getLogger(__name__)
 

@@ -8,9 +8,9 @@ from risk_sac.config import RunSpec
 from risk_sac.execution.recorder import Recorder
 from risk_sac.execution.stopping import stop_signal
 from risk_sac.problem import Problem
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import Results
 from risk_sac.train import train
-from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 
 Progress = Callable[[int, RunMetrics | None], None]
 """Told of the episodes done so far and of the metrics of the current phase."""

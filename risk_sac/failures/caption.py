@@ -2,7 +2,7 @@
 
 from risk_sac.config import FamilyName
 from risk_sac.failures.recording import Recording
-from risk_sac.types import Collision
+from risk_sac.records import Collision
 
 
 def caption(family: FamilyName, recording: Recording) -> str:

@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.records import Collision
 from risk_sac.run_folder.results import Contact
-from risk_sac.types import Collision, Floats
+from risk_sac.types import Floats
 
 
 @dataclass(frozen=True)

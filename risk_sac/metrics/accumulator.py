@@ -6,7 +6,7 @@ from risk_sac.metrics.counts import COUNTS
 from risk_sac.metrics.metric import Kept
 from risk_sac.metrics.rows import METRICS, steps_per_distinct_failure
 from risk_sac.metrics.tally import Tally
-from risk_sac.types import EpisodeRecord, RunMetrics
+from risk_sac.records import EpisodeRecord, RunMetrics
 
 
 class MetricsAccumulator:

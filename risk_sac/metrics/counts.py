@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
-from risk_sac.types import Record, RunMetrics
+from risk_sac.records import Record, RunMetrics
 
 
 @dataclass(kw_only=True)

@@ -5,7 +5,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from risk_sac.types import EpisodeRecord, Record
+from risk_sac.records import EpisodeRecord, Record
 
 
 def results_digest(records: Sequence[EpisodeRecord]) -> str:

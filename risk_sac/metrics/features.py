@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.errors import NotFinite
-from risk_sac.types import Collision, Floats
+from risk_sac.records import Collision
+from risk_sac.types import Floats
 
 
 class Feature(NamedTuple):

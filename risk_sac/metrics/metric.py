@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from risk_sac.metrics.counts import Counts, pooled_counts
 from risk_sac.metrics.intervals import wilson_interval
 from risk_sac.metrics.tally import Tally
-from risk_sac.types import RunMetrics
+from risk_sac.records import RunMetrics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

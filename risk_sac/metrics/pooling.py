@@ -8,7 +8,7 @@ from itertools import zip_longest
 from risk_sac.metrics.counts import pooled_counts
 from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval
 from risk_sac.metrics.metric import Metric
-from risk_sac.types import RunMetrics
+from risk_sac.records import RunMetrics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from risk_sac.errors import NotFinite
 from risk_sac.metrics.counts import Counts
 from risk_sac.metrics.features import Spread, outcome_features
-from risk_sac.types import STEP_S, Collision, EpisodeRecord, Outcome
+from risk_sac.records import Collision, EpisodeRecord, Outcome
+from risk_sac.types import STEP_S
 from risk_sac.verdicts.distinct import DistinctFailures
 
 STEPS_PER_S = round(1 / STEP_S)

@@ -15,8 +15,8 @@ from risk_sac.metrics import (
     pooled_counts,
     pooled_signatures,
 )
+from risk_sac.records import Phase
 from risk_sac.report.runs import FinishedRun
-from risk_sac.types import Phase
 
 
 def metrics_of(phase: Phase) -> tuple[Metric, ...]:

@@ -6,10 +6,10 @@ from itertools import groupby
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunSpec
 from risk_sac.metrics import RESAMPLING_SEED, Metric, bootstrap_interval
+from risk_sac.records import RECORDED, Phase
 from risk_sac.report.cells import Cell, cell_of, metrics_of
 from risk_sac.report.runs import FinishedRun
 from risk_sac.report.statistics import holm, vargha_delaney, wilcoxon_p
-from risk_sac.types import RECORDED, Phase
 
 REFERENCE: MethodName = "risk-sac"
 LEVEL = 0.05

@@ -16,9 +16,10 @@ from matplotlib.figure import Figure
 from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import METRICS, RESAMPLING_SEED, WINDOW, Metric, preventable
+from risk_sac.records import Outcome, Phase
 from risk_sac.report.comparison import REFERENCE, Comparison
 from risk_sac.report.runs import FinishedRun
-from risk_sac.types import Floats, Outcome, Phase
+from risk_sac.types import Floats
 
 Format = Literal["png", "svg"]
 FORMATS: tuple[Format, ...] = get_args(Format)

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from risk_sac.config import FamilyName, RunSpec
 from risk_sac.metrics import METRICS, RATIOS, Estimate, Metric, Ratio
+from risk_sac.records import Phase
 from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import LEVEL, Comparison, PairedTest
 from risk_sac.report.provenance import this_platform
 from risk_sac.report.statistics import pairs_needed, smallest_p
-from risk_sac.types import Phase
 
 DASH = "–"
 CONTROL = "no-adversary"

@@ -10,10 +10,10 @@ from pydantic import ValidationError
 from risk_sac.config import FamilyName, MethodName, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import MetricsAccumulator, results_digest
+from risk_sac.records import RECORDED, EpisodeRecord, Phase, RunMetrics
 from risk_sac.run_folder.episode_json import records_from_lines
 from risk_sac.run_folder.results import EPISODES, Results, read_results
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.types import RECORDED, EpisodeRecord, Phase, RunMetrics
 
 
 @dataclass(frozen=True, kw_only=True)

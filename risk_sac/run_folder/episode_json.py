@@ -2,7 +2,7 @@
 
 from pydantic import TypeAdapter
 
-from risk_sac.types import EpisodeRecord
+from risk_sac.records import EpisodeRecord
 
 _RECORDS = TypeAdapter(list[EpisodeRecord])
 

@@ -15,9 +15,9 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.records import EpisodeRecord, RunMetrics
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.seal import seal, unseal
-from risk_sac.types import EpisodeRecord, RunMetrics
 
 RESULTS = "results.json"
 EPISODES = "episodes.jsonl"

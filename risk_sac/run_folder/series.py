@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.records import SeriesFile
 from risk_sac.risk.measures import Measures
 from risk_sac.risk.publish import Assessment
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.types import Bools, Floats, Frame, SeriesFile
+from risk_sac.types import Bools, Floats, Frame
 from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
 
 PER_ACTOR = (*MOTION, "link")

@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from risk_sac.records import Collision
 from risk_sac.risk.measures import Measures
 from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.sim.collision import Contact
-from risk_sac.types import STEP_S, Collision, Frame, Kind, Role
+from risk_sac.types import STEP_S, Frame, Kind, Role
 from risk_sac.verdicts.artefact import Handling, artefact_verdicts
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from risk_sac.jit import compiled
-from risk_sac.types import Bools, ConflictType, Floats, Kind
+from risk_sac.records import ConflictType
+from risk_sac.types import Bools, Floats, Kind
 from risk_sac.verdicts.along import AlongSeries, along_series
 from risk_sac.verdicts.areas import soon_inside
 from risk_sac.verdicts.course import CORRIDOR_M, HORIZON_S, Body, entry_distance, time_to_touch

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from risk_sac.errors import NotFinite
-from risk_sac.types import Collision
+from risk_sac.records import Collision
 
 
 class Axis(NamedTuple):

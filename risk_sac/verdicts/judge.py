@@ -1,6 +1,6 @@
 """The judgement of one contact, from its evidence alone."""
 
-from risk_sac.types import Judgement
+from risk_sac.records import Judgement
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.ego import manoeuvre, response
 from risk_sac.verdicts.evidence import Evidence

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from risk_sac.types import Bools, ConflictType, Floats, Kind
+from risk_sac.records import ConflictType
+from risk_sac.types import Bools, Floats, Kind
 from risk_sac.verdicts.areas import inside
 from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.evidence import Evidence, Letters

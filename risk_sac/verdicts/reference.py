@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from risk_sac.geometry import box_view, contact_point, zone
+from risk_sac.records import ConflictType, Grade, ReferenceOutcome
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.types import ConflictType, Grade, ReferenceOutcome
 from risk_sac.verdicts.along import AlongSeries
 from risk_sac.verdicts.conflict import Conflict, ego_path, seen_along
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S

@@ -8,7 +8,8 @@ pedestrian). Traffic from the left and from the right is told apart: it has othe
 
 import math
 
-from risk_sac.types import ConflictType, Role
+from risk_sac.records import ConflictType
+from risk_sac.types import Role
 from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.evidence import Evidence
 

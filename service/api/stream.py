@@ -13,10 +13,10 @@ from async_lru import alru_cache
 from sse_starlette import ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.types import Outcome
+from risk_sac.records import Outcome
 from service.errors import NotFoundError, StorageError
 from service.store.reading import Store
-from service.store.records import StoredEpisode
+from service.store.stored import StoredEpisode
 from service.views.bodies import change_body, episode_body
 from service.views.happenings import Happening, read_batch
 

@@ -28,7 +28,7 @@ from service.networks.packaging import Packaging
 from service.networks.report import CheckReport
 from service.networks.sandbox import CHECKER, inspect
 from service.networks.schemas import BoundingBox, Network, NetworkFile, Record
-from service.store.records import Page
+from service.store.stored import Page
 
 logger = logging.getLogger(__name__)
 

@@ -15,8 +15,8 @@ from service.runs.retention import Retention
 from service.runs.storage_pause import StoragePause, refused
 from service.settings import ServiceSettings
 from service.store.reading import Store
-from service.store.records import StoredCampaign, StoredRun
 from service.store.states import State
+from service.store.stored import StoredCampaign, StoredRun
 from service.store.writing import Ledger
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
 

@@ -2,7 +2,7 @@
 
 from service.errors import QuotaError
 from service.settings import ServiceSettings
-from service.store.records import Usage
+from service.store.stored import Usage
 
 RETRY_S = 60.0
 HOUR_S = 3600.0

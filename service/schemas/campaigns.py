@@ -3,7 +3,7 @@
 from datetime import datetime
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
-from risk_sac.types import RunMetrics
+from risk_sac.records import RunMetrics
 from service.schemas.base import Body, Real, Shown
 from service.store.states import State
 

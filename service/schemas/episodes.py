@@ -2,23 +2,23 @@
 
 from collections.abc import Mapping
 
-from risk_sac import types
+from risk_sac import records
 from risk_sac.metrics import Funnel
 from service.schemas.base import Body, Shown
 
 
-class ReferenceOutcome(types.ReferenceOutcome, Shown):
+class ReferenceOutcome(records.ReferenceOutcome, Shown):
     """How a reference driver fares in the ego's place."""
 
 
-class Judgement(types.Judgement, Shown):
+class Judgement(records.Judgement, Shown):
     """How a contact came about, and who would have prevented it. Times count from the adversaries' release."""
 
     drivers: Mapping[str, ReferenceOutcome]
     """Reference driver → how it fares; empty where the contact is not valid."""
 
 
-class Collision(types.Collision, Shown):
+class Collision(records.Collision, Shown):
     """The ego's first contact, with what is needed to judge it."""
 
     judgement: Judgement | None
@@ -30,7 +30,7 @@ class _OfARun(Shown):
     run_id: str
 
 
-class Episode(types.EpisodeRecord, _OfARun):
+class Episode(records.EpisodeRecord, _OfARun):
     """One episode."""
 
     collision: Collision | None

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.metrics import METRICS
-from risk_sac.types import Phase
+from risk_sac.records import Phase
 from service.schemas import Body, Metrics, Real
 
 MetricName = Annotated[

@@ -6,7 +6,7 @@ from pydantic_core import from_json, to_json
 from sqlalchemy.orm import Session
 
 from risk_sac.metrics import Funnel
-from risk_sac.types import EpisodeRecord, Outcome
+from risk_sac.records import EpisodeRecord, Outcome
 from service.store.tables import EpisodeRow, RunRow, UsageRow
 from service.workers.messages import EpisodeDone
 

@@ -10,7 +10,7 @@ from sqlalchemy import ColumnElement, func, select
 from sqlalchemy.orm import Session
 
 from service.errors import StorageError
-from service.store.records import Page, StoredChange, StoredEpisode
+from service.store.stored import Page, StoredChange, StoredEpisode
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 
 

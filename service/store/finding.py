@@ -9,9 +9,9 @@ from operator import attrgetter
 from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import Session
 
-from risk_sac.types import RECORDED, Grade, Outcome
+from risk_sac.records import RECORDED, Grade, Outcome
 from service.errors import NotFoundError
-from service.store.records import Page, StoredEpisode
+from service.store.stored import Page, StoredEpisode
 from service.store.tables import CampaignRow, EpisodeRow, RunRow
 
 

@@ -9,15 +9,15 @@ from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
-from risk_sac.types import Outcome
+from risk_sac.records import Outcome
 from service.errors import ConflictError
 from service.store.counting import add_usage, count, fill, tally, to_text
 from service.store.database import WRITING, storage_errors
 from service.store.events import hold_campaigns, next_sequence
 from service.store.finding import find_campaign
 from service.store.reading import Store
-from service.store.records import StoredCampaign
 from service.store.states import RESUMED, State, advance, campaign_state
+from service.store.stored import StoredCampaign
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 from service.workers.messages import EpisodeDone, Finished
 

@@ -2,12 +2,12 @@
 
 from typing import Any
 
+from risk_sac.records import Outcome
 from risk_sac.run_folder.results import FAILURES
-from risk_sac.types import Outcome
 from service.errors import StorageError
 from service.schemas import Campaign, CampaignSummary, Episode, Failure, Run, StateChange
 from service.settings import ServiceSettings
-from service.store.records import StoredCampaign, StoredChange, StoredEpisode
+from service.store.stored import StoredCampaign, StoredChange, StoredEpisode
 from service.views.progress import progress
 from service.views.series import load_series
 

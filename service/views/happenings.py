@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from service.store.reading import Store
-from service.store.records import StoredChange, StoredEpisode
+from service.store.stored import StoredChange, StoredEpisode
 
 BATCH = 100  # at most so many at once
 

@@ -3,10 +3,10 @@
 import math
 from collections.abc import Sequence
 
-from risk_sac.types import RunMetrics
+from risk_sac.records import RunMetrics
 from service.schemas import Progress
-from service.store.records import StoredCampaign, StoredRun
 from service.store.states import State
+from service.store.stored import StoredCampaign, StoredRun
 
 LOOKS = 20  # that somebody who follows a campaign takes from now to its end
 SOONEST_S, LATEST_S = 1, 30

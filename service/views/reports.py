@@ -9,8 +9,8 @@ from risk_sac.report import Comparison, FinishedRun, compare, figure_bytes, figu
 from risk_sac.report.figures import Format
 from service.errors import NotFoundError
 from service.settings import ServiceSettings
-from service.store.records import StoredCampaign, StoredRun
 from service.store.states import State
+from service.store.stored import StoredCampaign, StoredRun
 
 
 def edition(campaign: StoredCampaign) -> str:

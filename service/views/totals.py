@@ -17,9 +17,9 @@ from risk_sac.metrics import (
     pooled_counts,
     pooled_signatures,
 )
-from risk_sac.types import RunMetrics
+from risk_sac.records import RunMetrics
 from service.schemas import Results, RunResult, Total
-from service.store.records import StoredCampaign, StoredRun
+from service.store.stored import StoredCampaign, StoredRun
 
 
 def results(campaign: StoredCampaign) -> Results:

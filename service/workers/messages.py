@@ -1,6 +1,6 @@
 """What a worker tells the manager: one JSON object per line on the worker's standard output.
 
-Every line is strict JSON from which nothing is lost: words are written as `risk_sac.types.Record` writes them.
+Every line is strict JSON from which nothing is lost: words are written as `risk_sac.records.Record` writes them.
 """
 
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
-from risk_sac.types import EpisodeRecord, Record, RunMetrics
+from risk_sac.records import EpisodeRecord, Record, RunMetrics
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}$")]

@@ -17,8 +17,8 @@ import torch
 from llvmlite import binding
 
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, ReplayConfig, RunSpec, SceneOptimizerConfig
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.train import train
-from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 
 RECORDED = Path(__file__).with_suffix(".json")
 METHODS = ("random", "bo-only", "risk-sac")

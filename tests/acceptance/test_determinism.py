@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, ReplayConfig, RunSpec, SceneOptimizerConfig
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder.checkpoint import previous
 from risk_sac.run_folder.episode_json import records_to_json
 from risk_sac.run_folder.results import FAILURES
 from risk_sac.train import train
-from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 
 EPISODES, EVALUATION = 6, 1
 # Small enough for seconds, and still learning, modelling and replaying by priority before the run is over.

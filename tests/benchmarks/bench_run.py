@@ -12,10 +12,10 @@ from risk_sac.config import Budget, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.execution.recorder import Recorder
 from risk_sac.execution.runs import run
+from risk_sac.records import RunMetrics
 from risk_sac.run import RunState
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scene_optimizer import BotorchOptimizer
-from risk_sac.types import RunMetrics
 
 WARM_UP, EPISODES = 30, 60  # the first 1000 steps and 16 scenes are drawn without a model; then what is measured
 LIMIT = 0.15

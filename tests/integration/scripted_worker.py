@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from risk_sac.config import RunSpec
-from risk_sac.types import EpisodeRecord, RunMetrics
+from risk_sac.records import EpisodeRecord, RunMetrics
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, encode
 from tests.builders import episode_record, run_metrics
 

@@ -6,7 +6,7 @@ Those in episodes 1, 7, 13, … are preventable.
 import scripted_worker
 
 from risk_sac.metrics import wilson_interval
-from risk_sac.types import EpisodeRecord, Grade, Outcome, RunMetrics
+from risk_sac.records import EpisodeRecord, Grade, Outcome, RunMetrics
 from tests.builders import collision, episode_record, judgement, run_metrics
 
 _record = scripted_worker.record

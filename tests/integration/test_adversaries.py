@@ -10,12 +10,13 @@ import pytest
 
 from risk_sac.config import AgentConfig, Budget, EgoConfig, FamilyName, LearnerConfig, RunSpec
 from risk_sac.env import Observation, RiskSacEnv, make_default
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import GRAVITY_MPS2, Limits, limits_from_odd
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.train import train
-from risk_sac.types import STEP_S, EpisodeRecord, Floats, Frame, RunMetrics, SeriesFile
+from risk_sac.types import STEP_S, Floats, Frame
 from tests.builders import moved
 
 ROUNDING = 0.02  # of SUMO's positions and speeds, divided by the step where a derivative is taken

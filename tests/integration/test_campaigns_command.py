@@ -19,7 +19,7 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.client import Client
-from risk_sac.types import Grade
+from risk_sac.records import Grade
 from tests.server import Service
 
 SUBMIT = ["submit", "--families", "low", "--methods", "random", "--seeds", "2", "--episodes", "6"]

@@ -17,11 +17,12 @@ from risk_sac.agents.random import RandomAgent
 from risk_sac.config import EgoConfig, FamilyName
 from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.geometry import box_view, contact_point, zone
+from risk_sac.records import Collision
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.placing import STEERED
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import STEP_S, Collision, Frame
+from risk_sac.types import STEP_S, Frame
 from risk_sac.verdicts.conflict import Conflict, find_conflict
 from risk_sac.verdicts.course import touches
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S, careful, ideal

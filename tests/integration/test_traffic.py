@@ -8,7 +8,7 @@ import pytest
 from risk_sac.config import FamilyName, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.problem import Problem
-from risk_sac.types import Collision
+from risk_sac.records import Collision
 
 EPISODES = 40
 each_family = pytest.mark.parametrize("family", ["low", "mixed", "dense"])

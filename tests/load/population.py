@@ -15,8 +15,8 @@ from sqlalchemy import Connection, func, insert, inspect, select
 from sqlalchemy.orm import Session
 
 from risk_sac.config import METHODS, CampaignSpec
+from risk_sac.records import Outcome
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.types import Outcome
 from service.store.database import open_database
 from service.store.states import State
 from service.store.tables import CampaignRow, ChangeRow, Checked, EpisodeRow, RunRow, checksum

@@ -16,9 +16,10 @@ from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.env import RiskSacEnv, make_default, register_envs
 from risk_sac.errors import InfeasibleScene, SceneError
 from risk_sac.problem import Problem
+from risk_sac.records import Collision
 from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.types import Collision, Frame, Kind, Scene
+from risk_sac.types import Frame, Kind, Scene
 
 NAMES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
 LEAD_IN_STEPS = 15

@@ -11,7 +11,7 @@ from risk_sac.cli.campaigns.output import print_answer, results_table
 from risk_sac.cli.campaigns.progress import shown
 from risk_sac.cli.console import Commands, complain
 from risk_sac.client import Client, Results
-from risk_sac.types import Grade
+from risk_sac.records import Grade
 
 NAMED_FAILURES = 5  # of a run, in a JUnit report
 

@@ -27,8 +27,8 @@ from service.api.answers.responses import (
 from service.api.context import Context, Service
 from service.api.posted_campaign import DOCUMENTED_BODY, PostedCampaign
 from service.schemas import Body, Campaign, CampaignPage, Results
-from service.store.records import StoredCampaign
 from service.store.states import State
+from service.store.stored import StoredCampaign
 from service.views.bodies import campaign_body, summary_body
 from service.views.progress import retry_after_s
 from service.views.totals import results

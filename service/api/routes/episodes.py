@@ -4,14 +4,14 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query
 
-from risk_sac.types import Grade, Outcome
+from risk_sac.records import Grade, Outcome
 from service.api.access import CurrentCaller
 from service.api.answers.pages import Cursor, Limit, decode_cursor, encode_cursor
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN
 from service.api.context import Service
 from service.schemas import EpisodePage, Failure
 from service.store.finding import Judged
-from service.store.records import Page, StoredEpisode
+from service.store.stored import Page, StoredEpisode
 from service.views.bodies import episode_body, failure_body, tier_outcomes
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)

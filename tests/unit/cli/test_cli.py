@@ -13,8 +13,8 @@ from risk_sac.cli.show import _contacts
 from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.execution.runs import run
+from risk_sac.records import ConflictType, Grade, RunMetrics
 from risk_sac.run_folder.results import Contact, Results, read_results, write_results
-from risk_sac.types import ConflictType, Grade, RunMetrics
 from tests.builders import judgement
 from tests.unit.failures.staged import synthetic_contact
 

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.records import ConflictType, Judgement, Outcome
 from risk_sac.run_folder.results import Contact
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.space import SceneSpace
-from risk_sac.types import ConflictType, Judgement, Outcome
 from tests.builders import collision, episode_record, judgement
 
 JUDGED = judgement(

@@ -9,10 +9,10 @@ from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.show import draw, draw_recording
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import Contact
 from risk_sac.run_folder.series import write_series
 from risk_sac.train import train
-from risk_sac.types import EpisodeRecord, RunMetrics, SeriesFile
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 
 

@@ -6,7 +6,7 @@ from itertools import combinations
 from hypothesis import strategies as st
 
 from risk_sac.metrics import WINDOW, MetricsAccumulator, Tally, outcome_features, preventable
-from risk_sac.types import Grade, Outcome
+from risk_sac.records import Grade, Outcome
 from risk_sac.verdicts.distinct import distinct_failures
 from tests.builders import collision, episode_record, judgement
 

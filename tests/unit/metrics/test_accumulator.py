@@ -14,7 +14,7 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.types import Outcome, RunMetrics
+from risk_sac.records import Outcome, RunMetrics
 from risk_sac.verdicts.distinct import distinct_failures
 from tests.builders import judgement
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed

@@ -18,7 +18,7 @@ from risk_sac.metrics.rows import (
     preventable_collision_rate,
     steps_per_distinct_failure,
 )
-from risk_sac.types import RunMetrics
+from risk_sac.records import RunMetrics
 from tests.unit.metrics.episodes import JUDGED, any_collision, feed
 
 

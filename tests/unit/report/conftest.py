@@ -4,8 +4,8 @@ import pytest
 
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.metrics import results_digest
+from risk_sac.records import Collision, Grade, Judgement, Outcome
 from risk_sac.report import FinishedRun
-from risk_sac.types import Collision, Grade, Judgement, Outcome
 from tests.builders import collision, episode_record, judgement
 
 

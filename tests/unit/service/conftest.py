@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.types import Outcome, RunMetrics
+from risk_sac.records import Outcome, RunMetrics
 from service.store.reading import Store
 from service.store.writing import Ledger
 from service.workers.messages import EpisodeDone

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.types import ConflictType, Kind
+from risk_sac.records import ConflictType
+from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.evidence import Evidence
 from tests.unit.verdicts.staged import (

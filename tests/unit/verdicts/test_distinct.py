@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.errors import NotFinite
-from risk_sac.types import Collision
+from risk_sac.records import Collision
 from risk_sac.verdicts.distinct import DistinctFailures, cell_of, distinct_failures
 from tests.builders import collision, judgement
 

@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from risk_sac.records import ConflictType, Grade, Judgement
 from risk_sac.scenario.layout import Area
-from risk_sac.types import ConflictType, Grade, Judgement, Kind, Role
+from risk_sac.types import Kind, Role
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import DEFINITIONS, judge
 from tests.unit.verdicts.staged import (

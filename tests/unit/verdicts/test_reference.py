@@ -9,7 +9,8 @@ import pytest
 from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
-from risk_sac.types import Grade, Kind, ReferenceOutcome
+from risk_sac.records import Grade, ReferenceOutcome
+from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
 from risk_sac.verdicts.reference import grade, reference_outcomes, replayed_contact_s

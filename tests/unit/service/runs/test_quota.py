@@ -3,7 +3,7 @@ import pytest
 from service.errors import QuotaError
 from service.runs.quota import check_quota, exhausted
 from service.settings import ServiceSettings
-from service.store.records import Usage
+from service.store.stored import Usage
 
 SETTINGS = ServiceSettings(quota_queued_runs=10, quota_cpu_hours=2.0)
 

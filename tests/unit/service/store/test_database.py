@@ -9,7 +9,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
 from risk_sac.config import CampaignSpec
-from risk_sac.types import Grade
+from risk_sac.records import Grade
 from service.errors import StorageError
 from service.store import database
 from service.store.finding import Judged

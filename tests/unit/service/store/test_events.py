@@ -16,8 +16,8 @@ from sqlalchemy import create_engine
 from risk_sac.config import CampaignSpec
 from service.errors import StorageError, TransitionError
 from service.store.reading import Store
-from service.store.records import StoredEpisode
 from service.store.states import State
+from service.store.stored import StoredEpisode
 from service.store.writing import Ledger
 
 BEFORE_SEQUENCES = Path(__file__).with_name("before_sequences.sql")

@@ -4,7 +4,7 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.metrics import Funnel
-from risk_sac.types import Grade, Outcome
+from risk_sac.records import Grade, Outcome
 from service.errors import NotFoundError, StorageError
 from service.store.finding import Judged
 from service.store.reading import Store

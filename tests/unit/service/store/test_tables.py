@@ -1,7 +1,7 @@
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.types import Outcome
+from risk_sac.records import Outcome
 from service.errors import StorageError
 from tests.begun import start
 

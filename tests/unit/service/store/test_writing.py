@@ -1,7 +1,7 @@
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.types import Outcome
+from risk_sac.records import Outcome
 from service.errors import ConflictError, NotFoundError, TransitionError
 from service.store.states import State
 from service.workers.messages import Finished

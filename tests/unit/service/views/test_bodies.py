@@ -1,8 +1,8 @@
 import json
 
 from risk_sac.metrics import Funnel
-from risk_sac.types import Outcome
-from service.store.records import StoredEpisode
+from risk_sac.records import Outcome
+from service.store.stored import StoredEpisode
 from service.views.bodies import episode_body
 
 

@@ -5,10 +5,10 @@ from threading import Barrier, Event
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.types import Outcome
+from risk_sac.records import Outcome
 from service.errors import NotFoundError
-from service.store.records import StoredEpisode
 from service.store.states import State
+from service.store.stored import StoredEpisode
 from service.views.happenings import read_batch
 from service.workers.messages import Finished
 

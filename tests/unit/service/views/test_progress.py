@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.config import CampaignSpec
-from service.store.records import StoredRun
 from service.store.states import State
+from service.store.stored import StoredRun
 from service.views.progress import eta_s, progress, retry_after_s
 
 RUN = StoredRun(

@@ -4,7 +4,7 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from risk_sac.types import Outcome
+from risk_sac.records import Outcome
 from service.workers.messages import Failed, Finished, Heartbeat, Started, decode, encode
 
 

@@ -4,7 +4,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.local import LocalExecutor
-from risk_sac.types import Outcome
+from risk_sac.records import Outcome
 from service.api.telemetry.metrics import registry, request_latencies
 from service.runs.manager import Manager
 from service.settings import ServiceSettings

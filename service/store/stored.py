@@ -9,7 +9,7 @@ from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.metrics import Funnel
-from risk_sac.types import EpisodeRecord, RunMetrics
+from risk_sac.records import EpisodeRecord, RunMetrics
 from service.store.states import State
 from service.store.tables import Base, CampaignRow, ChangeRow, EpisodeRow, RunRow
 
