@@ -2,6 +2,7 @@
 
 from risk_sac.metrics import Funnel
 from service.schemas.base import Body, Real
+from service.schemas.campaign_results import Results, RunResult, Total
 from service.schemas.campaigns import Campaign, CampaignPage, CampaignSummary, Metrics, Progress, Run
 from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter
 from service.schemas.changes import StateChange
@@ -9,7 +10,6 @@ from service.schemas.episodes import Collision, Episode, EpisodePage, Judgement,
 from service.schemas.failures import Failure, Series
 from service.schemas.health import Health, Ready
 from service.schemas.problems import FieldProblem, Problem, Reason
-from service.schemas.results import Results, RunResult, Total
 
 __all__ = [
     "Body",

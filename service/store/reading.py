@@ -12,9 +12,9 @@ from risk_sac.records import Outcome
 from service.errors import StorageError
 from service.store.counting import HOUR_S
 from service.store.database import open_database, storage_errors
-from service.store.events import event_page, former_position
 from service.store.finding import Judged, episode_page, find_campaign, find_run, split_failure_id, unknown_failure
 from service.store.revisions import Revisions
+from service.store.sequence import event_page, former_position
 from service.store.states import FINAL, State
 from service.store.stored import Page, StoredCampaign, StoredChange, StoredEpisode, StoredRun, Usage
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, UsageRow

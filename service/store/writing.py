@@ -13,9 +13,9 @@ from risk_sac.records import Outcome
 from service.errors import ConflictError
 from service.store.counting import add_usage, count, fill, tally, to_text
 from service.store.database import WRITING, storage_errors
-from service.store.events import hold_campaigns, next_sequence
 from service.store.finding import find_campaign
 from service.store.reading import Store
+from service.store.sequence import hold_campaigns, next_sequence
 from service.store.states import RESUMED, State, advance, campaign_state
 from service.store.stored import StoredCampaign
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
