@@ -9,34 +9,15 @@ from hypothesis import strategies as st
 
 from risk_sac.geometry import RelativeView, relative_view, time_to_contact
 from risk_sac.risk.encounter import BEHIND_S_PER_M, DRIFT_MPS, SPEED_SHARE, WALK_MPS, time_to_encounter
-from risk_sac.types import Frame, Kind, Role, Signal
+from tests.builders import frame_of
 
 Other = tuple[float, float, float, float, float]
 
 
 def view_of(ego_mps: float, other: Other) -> RelativeView:
     """The ego at the origin, driving along x; the other is x, y, heading, vx, vy; both 4 m by 2 m."""
-    columns = np.array([(0.0, 0.0, 0.0, ego_mps, 0.0), other]).T
-    frame = Frame(
-        time_s=0.0,
-        ids=("ego", "other"),
-        kind=np.full(2, Kind.VEHICLE, dtype=np.int8),
-        role=np.array([Role.EGO, Role.ADVERSARY]),
-        x_m=columns[0],
-        y_m=columns[1],
-        heading_rad=columns[2],
-        vx_mps=columns[3],
-        vy_mps=columns[4],
-        speed_mps=np.hypot(columns[3], columns[4]),
-        lateral_mps=np.zeros(2),
-        accel_mps2=np.zeros(2),
-        length_m=np.full(2, 4.0),
-        width_m=np.full(2, 2.0),
-        lane_offset_m=np.zeros(2),
-        link=np.zeros(2, dtype=np.uint8),
-        signal=Signal.NONE,
-        stop_line_m=math.inf,
-    )
+    x, y, heading, vx, vy = np.array([(0.0, 0.0, 0.0, ego_mps, 0.0), other]).T
+    frame = frame_of(x_m=x, y_m=y, heading_rad=heading, vx_mps=vx, vy_mps=vy, length_m=4.0, width_m=2.0)
     return relative_view(frame)
 
 
