@@ -86,7 +86,7 @@ def test_measuring_does_not_act(family: FamilyName, monkeypatch: pytest.MonkeyPa
     with closing(make_default(family)) as env:
         measured = episode(env, 3)
         measures = iter(env.trace.measures)
-        monkeypatch.setattr(env._gauge, "measure", lambda frame, before: next(measures))
+        monkeypatch.setattr(env._gauge, "measure", lambda *_: next(measures))
         assert same(episode(env, 3), measured)
 
 
