@@ -29,7 +29,7 @@ STOPPED = problem(503, "Campaigns make no progress")
 UNREADY = problem(503, "The disk or the database refuses")
 
 _RETRY = header(
-    "Seconds until a look pays: a twentieth of the time left; absent once the campaign has ended.",
+    "Seconds to wait before asking again: a twentieth of the time left; absent once the campaign has ended.",
     "integer",
     required=False,
 )
