@@ -23,7 +23,6 @@ PER_ACTOR = (
     "accel_mps2",
     "lane_offset_m",
 )
-AREAS = ("crossings", "junctions", "roadway")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
