@@ -4,29 +4,8 @@ from datetime import datetime
 
 from pydantic import BaseModel, ConfigDict
 
-from service.networks.report import Kind
+from service.networks.report import BoundingBox, NetworkFile
 from service.schemas import Body
-
-
-class NetworkFile(Body):
-    """One of the files of a network, as the service has written it anew."""
-
-    name: str
-    """Given by the service; the names in an archive are not kept."""
-    kind: Kind
-    """Told by its root element."""
-    bytes: int
-    elements: int
-    sha256: str
-
-
-class BoundingBox(Body):
-    """What all lanes lie in, m in the net's own coordinates."""
-
-    west: float
-    south: float
-    east: float
-    north: float
 
 
 class Network(Body):

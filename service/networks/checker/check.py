@@ -12,7 +12,7 @@ from service.networks.checker.document import Count, Observer, read, root_of
 from service.networks.checker.roads import Demand, Net
 from service.networks.errors import UploadError
 from service.networks.packaging import Packaging
-from service.networks.report import CheckedFile, CheckReport, Kind, Summary
+from service.networks.report import CheckReport, Kind, NetworkFile, Summary
 
 
 def check(upload: Path, packaging: Packaging) -> CheckReport:
@@ -28,7 +28,7 @@ def check(upload: Path, packaging: Packaging) -> CheckReport:
     return CheckReport(summary=summary, files=tuple(files), warnings=tuple(warnings))
 
 
-def rewrite(found: Sequence[bytes]) -> tuple[list[CheckedFile], Summary]:
+def rewrite(found: Sequence[bytes]) -> tuple[list[NetworkFile], Summary]:
     """Write each document anew in the current folder, under a name of ours; the net is the first.
 
     Raises:
@@ -56,13 +56,13 @@ def _kind(number: int, data: bytes) -> Kind:
         return Kind(root)
 
 
-def _rewrite_one(number: int, kind: Kind, data: bytes, elements: Count, observer: Observer) -> CheckedFile:
+def _rewrite_one(number: int, kind: Kind, data: bytes, elements: Count, observer: Observer) -> NetworkFile:
     with _naming(number, kind):
         document = read(data, kind, elements, observer)
     text = document.text.encode()
     name = f"{kind}.xml" if kind is Kind.NET else f"{kind}-{number}.xml"
     Path(name).write_bytes(text)
-    return CheckedFile(name, kind, len(text), document.elements, hashlib.sha256(text).hexdigest())
+    return NetworkFile(name, kind, len(text), document.elements, hashlib.sha256(text).hexdigest())
 
 
 @contextmanager
