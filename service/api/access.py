@@ -9,7 +9,7 @@ from fastapi import Depends, Request
 
 from service.api.answers.problems import ProblemError
 from service.keys.key import Scope
-from service.schemas import Reason
+from service.schemas.problems import Reason
 
 CALLER = "risk_sac.caller"  # in the ASGI scope, where the gate puts it
 

@@ -15,7 +15,7 @@ from starlette.concurrency import run_in_threadpool
 
 from risk_sac.records import Outcome
 from service.errors import NotFoundError, StorageError
-from service.schemas import StateChange
+from service.schemas.changes import StateChange
 from service.store.reading import Store
 from service.store.stored import StoredChange, StoredEpisode
 from service.views.bodies import episode_body

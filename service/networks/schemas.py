@@ -5,7 +5,7 @@ from datetime import datetime
 from pydantic import BaseModel, ConfigDict
 
 from service.networks.report import BoundingBox, NetworkFile
-from service.schemas import Body
+from service.schemas.base import Body
 
 
 class Network(Body):

@@ -8,7 +8,8 @@ from pydantic import Field
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.metrics import METRICS
 from risk_sac.records import Phase
-from service.schemas import Body, Metrics, Real
+from service.schemas.base import Body, Real
+from service.schemas.campaigns import Metrics
 
 MetricName = Annotated[
     str,

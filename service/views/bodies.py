@@ -4,7 +4,9 @@ from typing import Any
 
 from risk_sac.run_folder.results import FAILURES
 from service.errors import StorageError
-from service.schemas import Campaign, CampaignSummary, Episode, Failure, Run
+from service.schemas.campaigns import Campaign, CampaignSummary, Run
+from service.schemas.episodes import Episode
+from service.schemas.failures import Failure
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign, StoredEpisode
 from service.views.progress import progress

@@ -7,7 +7,7 @@ from fastapi import Query
 
 from service.api.answers.fields import shown
 from service.api.answers.problems import invalid
-from service.schemas import FieldProblem
+from service.schemas.problems import FieldProblem
 
 Limit = Annotated[int, Query(ge=1, le=500, description="Most items on a page.")]
 Cursor = Annotated[str | None, Query(max_length=100, description="The `next` of an earlier page.")]

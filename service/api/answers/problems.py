@@ -14,7 +14,7 @@ from starlette.routing import compile_path
 from risk_sac.errors import ConfigError
 from service.api.answers.fields import field_problems, parse, shown
 from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
-from service.schemas import FieldProblem, Problem, Reason
+from service.schemas.problems import FieldProblem, Problem, Reason
 
 logger = logging.getLogger(__name__)
 

@@ -4,7 +4,7 @@ from fastapi import APIRouter
 
 from risk_sac.config import METHODS
 from risk_sac.scenario.families import FAMILIES
-from service.schemas import Families, Family, Methods, NamedMethod, SceneParameter
+from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 

@@ -9,7 +9,8 @@ from service.api.access import CurrentCaller
 from service.api.answers.pages import Cursor, Limit, decode_cursor, encode_cursor
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN
 from service.api.context import Service
-from service.schemas import EpisodePage, Failure
+from service.schemas.episodes import EpisodePage
+from service.schemas.failures import Failure
 from service.store.finding import Judged
 from service.store.stored import Page, StoredEpisode
 from service.views.bodies import episode_body, failure_body

@@ -10,7 +10,8 @@ from service.api.answers.problems import ProblemError
 from service.api.answers.responses import STOPPED, UNREADY, Responses
 from service.api.context import Service
 from service.keys.key import Scope
-from service.schemas import Health, Ready, Reason
+from service.schemas.health import Health, Ready
+from service.schemas.problems import Reason
 from service.store.statistics import check_readable
 
 EXAMPLE = 'risk_sac_episodes_total{family="low",method="risk-sac"} 4711.0\n…'
