@@ -37,6 +37,15 @@ class ProblemError(Exception):
         *errors: FieldProblem,
         headers: dict[str, str] | None = None,
     ) -> None:
+        """A problem.
+
+        Args:
+          status: of the response; the problem's type is stable for each.
+          reason: stable for each cause.
+          detail: what was got, what was wanted, and the remedy.
+          errors: the fields to blame.
+          headers: of the response.
+        """
         super().__init__(detail)
         self.status = status
         self.reason = reason
@@ -61,40 +70,24 @@ def add_problem_handlers(app: FastAPI) -> None:
         app.add_exception_handler(kind, _answer)
 
 
-def problem_response(
-    path: str,
-    status: HTTPStatus,
-    reason: Reason,
-    detail: str,
-    *errors: FieldProblem,
-    headers: dict[str, str] | None = None,
-) -> JSONResponse:
-    """A problem as a response, which is an ASGI application: middleware has no more than a path to say.
-
-    Args:
-      path: of the request.
-      status: of the response; the problem's type is stable for each.
-      reason: stable for each cause.
-      detail: what was got, what was wanted, and the remedy.
-      errors: the fields to blame.
-      headers: of the response.
-    """
+def problem_response(path: str, problem: ProblemError) -> JSONResponse:
+    """A problem as a response, which is an ASGI application: middleware has no more than a path to say."""
     body = Problem(
-        type=f"urn:risk-sac:problem:{status.name.lower().replace('_', '-')}",
-        title=status.phrase,
-        status=status,
-        reason=reason,
-        detail=detail,
+        type=f"urn:risk-sac:problem:{problem.status.name.lower().replace('_', '-')}",
+        title=problem.status.phrase,
+        status=problem.status,
+        reason=problem.reason,
+        detail=str(problem),
         instance=path,
-        errors=list(errors),
+        errors=list(problem.errors),
     )
-    return JSONResponse(body.model_dump(mode="json"), status, headers=headers, media_type="application/problem+json")
+    content, headers = body.model_dump(mode="json"), problem.headers
+    return JSONResponse(content, problem.status, headers=headers, media_type="application/problem+json")
 
 
 async def _answer(request: Request, error: Exception) -> JSONResponse:
     problem = error if isinstance(error, ProblemError) else _problem(request, error)
-    path, headers = request.url.path, problem.headers
-    return problem_response(path, problem.status, problem.reason, str(problem), *problem.errors, headers=headers)
+    return problem_response(request.url.path, problem)
 
 
 def _problem(request: Request, error: Exception) -> ProblemError:
