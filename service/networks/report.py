@@ -31,16 +31,6 @@ class NetworkFile:
 
 
 @dataclass(frozen=True, slots=True)
-class BoundingBox:
-    """What all lanes lie in, m in the net's own coordinates."""
-
-    west: float
-    south: float
-    east: float
-    north: float
-
-
-@dataclass(frozen=True, slots=True)
 class Summary:
     """What a net has; edges and lanes are those outside junctions."""
 
@@ -48,7 +38,7 @@ class Summary:
     junctions: int
     lanes: int
     length_m: float  # of the edges, each counted once however many lanes it has
-    bounding_box: BoundingBox
+    bounding_box: tuple[float, float, float, float]  # of the lanes: west, south, east, north, m
 
 
 @dataclass(frozen=True, slots=True)

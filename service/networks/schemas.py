@@ -4,8 +4,17 @@ from datetime import datetime
 
 from pydantic import BaseModel, ConfigDict
 
-from service.networks.report import BoundingBox, NetworkFile
+from service.networks.report import NetworkFile
 from service.schemas.base import Body
+
+
+class BoundingBox(Body):
+    """What all lanes lie in, m in the net's own coordinates."""
+
+    west: float
+    south: float
+    east: float
+    north: float
 
 
 class Network(Body):

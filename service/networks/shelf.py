@@ -28,7 +28,7 @@ from service.networks.incoming import Incoming
 from service.networks.packaging import Packaging
 from service.networks.report import CheckReport
 from service.networks.sandbox import CHECKER, inspect
-from service.networks.schemas import Network, Record
+from service.networks.schemas import BoundingBox, Network, Record
 from service.store.stored import Page
 
 logger = logging.getLogger(__name__)
@@ -187,7 +187,8 @@ def _network(report: CheckReport, label: str, sha256: str, size: int) -> Network
     number = int(now * 1000) << _RANDOM_BITS | secrets.randbits(_RANDOM_BITS)
     assert report.summary is not None
     sent = {"label": label, "created_at": datetime.fromtimestamp(now, UTC), "sha256": sha256, "bytes": size}
-    found = asdict(report.summary) | {"files": report.files, "warnings": report.warnings}
+    box = dict(zip(BoundingBox.model_fields, report.summary.bounding_box, strict=True))
+    found = asdict(report.summary) | {"files": report.files, "warnings": report.warnings, "bounding_box": box}
     return Network.model_validate({"id": f"n{number:016x}"} | sent | found)
 
 

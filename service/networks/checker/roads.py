@@ -6,7 +6,7 @@ from service.networks.checker.document import Attributes
 from service.networks.checker.values import points
 from service.networks.errors import UploadError
 from service.networks.limits import MAX_EDGES, MAX_LANES
-from service.networks.report import BoundingBox, Summary
+from service.networks.report import Summary
 
 _DRIVEN = ("normal", "connector")
 
@@ -73,7 +73,7 @@ class Net:
             junctions=sum(1 for kind in self.junctions.values() if kind != "internal"),
             lanes=sum(edge.lanes for edge in driven),
             length_m=round(self._length_m, 3),
-            bounding_box=BoundingBox(*self._box),
+            bounding_box=(self._box[0], self._box[1], self._box[2], self._box[3]),
         )
 
     def _edge(self, attributes: Attributes) -> None:

@@ -1,5 +1,4 @@
 from collections.abc import Callable
-from dataclasses import astuple
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -94,7 +93,7 @@ def test_a_summary_counts_roads_and_not_what_lies_inside_junctions() -> None:
     summary = net.finish()
     assert (NETS[0].name, summary.edges, summary.junctions, summary.lanes) == ("dense.net.xml", 8, 5, 24)
     assert summary.length_m == pytest.approx(1843.2)
-    assert astuple(summary.bounding_box) == (-250.0, -250.0, 250.0, 250.0)
+    assert summary.bounding_box == (-250.0, -250.0, 250.0, 250.0)
 
 
 def demand() -> Demand:
