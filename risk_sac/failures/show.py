@@ -3,12 +3,13 @@
 Where the contact was judged, the moment at which the conflict began is marked as well.
 """
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from risk_sac.canvas import canvas, picture
 from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
 from risk_sac.failures.caption import caption
@@ -26,24 +27,30 @@ PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
 VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
 
 
-def draw(family: FamilyName, contact: Contact, folder: Path, picture: Path) -> None:
+def draw(family: FamilyName, contact: Contact, folder: Path, file: Path) -> None:
     """Draws a contact into a file.
 
     Args:
       family: of the run.
       contact: of the run's results.
       folder: where results.json lies.
-      picture: its suffix names the format: png, pdf or svg.
+      file: its suffix names the format: png, pdf or svg.
 
     Raises:
       ConfigError: the format is none of these.
       OSError: the time series is gone or the picture cannot be written.
     """
-    if picture.suffix not in (".png", ".pdf", ".svg"):
-        raise ConfigError(f"got {str(picture)!r}; wanted a name that ends in .png, .pdf or .svg", field="out")
+    if file.suffix not in (".png", ".pdf", ".svg"):
+        raise ConfigError(f"got {str(file)!r}; wanted a name that ends in .png, .pdf or .svg", field="out")
     recording = Recording(contact, read_series(folder / contact.series))
-    picture.parent.mkdir(parents=True, exist_ok=True)
-    draw_recording(family, recording).savefig(picture, dpi=DPI)
+    content = recording_bytes(family, recording, file.suffix.removeprefix("."))
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(content)
+
+
+def recording_bytes(family: FamilyName, recording: Recording, format_: str) -> bytes:
+    """The picture of a contact as a file: png, pdf or svg."""
+    return picture(partial(draw_recording, family, recording), format_, DPI, {})
 
 
 def draw_recording(family: FamilyName, recording: Recording) -> Figure:
@@ -51,8 +58,7 @@ def draw_recording(family: FamilyName, recording: Recording) -> Figure:
     low, high = _extent(recording)
     view_in = PANEL_WIDTH_IN * (high - low)[1] / (high - low)[0]
     heights = (view_in, *(PANEL_IN for _ in PANELS))
-    figure = Figure(figsize=(WIDTH_IN, sum(heights) + 1.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = canvas((WIDTH_IN, sum(heights) + 1.2))
     view, *axes = figure.subplots(len(heights), 1, height_ratios=heights)
     figure.suptitle(caption(family, recording), fontsize=11)
     draw_from_above(view, family, recording)
