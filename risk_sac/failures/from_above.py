@@ -9,10 +9,10 @@ from matplotlib.patches import Polygon
 import sumo_nets
 from risk_sac.config import FamilyName
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.roads import read_surfaces
+from risk_sac.failures.roads import Surface, read_surfaces
 from risk_sac.failures.style import BYSTANDER_COLOUR, CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, legend
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.types import Kind, Role
+from risk_sac.types import Kind, Role, Scene
 
 SURFACE_COLOURS = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
 GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the contact, where the two bodies are drawn as well
@@ -20,8 +20,7 @@ GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the contact, where the two bodies are 
 
 def draw_from_above(axis: Axes, family: FamilyName, recording: Recording) -> None:
     """Draws everything on the ground; who calls it chooses what part of the ground is seen."""
-    layout = FAMILIES[family].layout(recording.contact.episode.scene)
-    for surface in read_surfaces(Path(sumo_nets.__path__[0]) / layout.net):
+    for surface in _roads(family, recording.contact.episode.scene):
         colour = SURFACE_COLOURS[surface.use]
         axis.add_patch(Polygon(surface.outline, facecolor=colour, edgecolor="0.7", linewidth=0.5))
     for actor in range(1, len(recording.series["ids"])):
@@ -33,6 +32,13 @@ def draw_from_above(axis: Axes, family: FamilyName, recording: Recording) -> Non
     _draw_conflict(axis, recording)
     axis.set(xlabel="x, m", ylabel="y, m")
     legend(axis)
+
+
+def _roads(family: FamilyName, scene: Scene) -> list[Surface]:
+    """Those of the scene's net; none for a scene from before its family had all the parameters it has now."""
+    if not set(FAMILIES[family].space.names) <= scene.keys():
+        return []
+    return read_surfaces(Path(sumo_nets.__path__[0]) / FAMILIES[family].layout(scene).net)
 
 
 def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, ghosts: tuple[float, ...]) -> None:
