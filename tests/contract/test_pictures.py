@@ -1,5 +1,6 @@
-"""The picture of a contact over REST: a real server with known campaigns."""
+"""The picture of a contact over REST, by the client and from a terminal: a real server with known campaigns."""
 
+import json
 import struct
 import threading
 from collections.abc import Iterator
@@ -8,6 +9,8 @@ from concurrent.futures import ThreadPoolExecutor
 import httpx
 import pytest
 
+from risk_sac import cli
+from risk_sac.client import Client, Refused, Series
 from risk_sac.run_folder.results import FAILURES, series_name
 from service.settings import ServiceSettings
 from service.store.database import READERS
@@ -115,3 +118,85 @@ def test_no_more_than_a_bounded_number_waits_and_others_are_told_when_to_come_ba
         drawn.gate.set()
         assert [answer.result().status_code for answer in served] == [200, 200]
     assert client.get(third).status_code == 200
+
+
+def test_the_client_has_the_picture_and_the_series_as_arrays_with_units(client):
+    with Client(str(client.base_url)) as remote:
+        failure = remote.failure(ENDED_ID, f"{RUN}-train-1")
+        assert isinstance(failure.series, Series)
+        assert failure.series.ids == ["ego", "lead"]
+        assert failure.series.x_m == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
+        assert failure.series.visible == [[None, True], [None, None], [None, False]]
+        assert failure.series.released_s is None
+        assert failure.model_dump(mode="json") == client.get(f"{FOLDER}/{RUN}-train-1").json()
+        assert remote.picture(ENDED_ID, failure.id) == client.get(f"{FOLDER}/{RUN}-train-1/picture.png").content
+        with pytest.raises(Refused) as refused:
+            remote.picture(ENDED_ID, f"{RUN}-train-0")
+        assert refused.value.reason == "unknown_id"
+
+
+@pytest.fixture
+def call(client, monkeypatch, capsys):
+    """What a command about failures prints, and its exit status."""
+    monkeypatch.setenv("RISK_SAC_URL", str(client.base_url))
+
+    def called(*arguments):
+        capsys.readouterr()
+        status = cli.main(["campaigns", "failures", *map(str, arguments)])
+        return status, capsys.readouterr()
+
+    return called
+
+
+def test_failures_are_listed_in_a_terminal_by_kind_and_grade(call, client):
+    status, printed = call("list", ENDED_ID)
+    assert status == 0
+    assert "…" not in printed.out
+    assert max(map(len, printed.out.splitlines())) <= 80
+    for word in (f"{RUN}-train-1", f"{RUN}-train-2", "careful", "ideal", "leader"):
+        assert word in printed.out
+    _, printed = call("list", ENDED_ID, "--json")
+    assert json.loads(printed.out) == client.get(FOLDER).json()["items"]
+
+
+def test_a_list_of_failures_is_filtered_and_says_that_there_are_more(call, client):
+    for flags, query in (
+        (["--grade", "ideal"], {"grade": "ideal"}),
+        (["--signature", "leader"], {"signature": "leader"}),
+        (["--broke", "speeding"], {"broke": "speeding"}),
+        (["--run", "low-random-3"], {"run": "low-random-3"}),
+        (["--raw"], {"tier": "raw"}),
+    ):
+        _, printed = call("list", ENDED_ID, *flags, "--json")
+        assert json.loads(printed.out) == client.get(FOLDER, params=query).json()["items"]
+        assert "more" not in printed.err
+    status, printed = call("list", ENDED_ID, "--limit", 1)
+    assert status == 0
+    assert "There are more" in printed.err
+
+
+def test_a_failure_is_shown_in_words_and_drawn_without_the_folder_of_the_server(call, client, tmp_path):
+    file = tmp_path / "new" / "a.png"
+    status, printed = call("show", ENDED_ID, f"{RUN}-train-2", "--out", file)
+    assert status == 0
+    assert file.read_bytes() == client.get(f"{FOLDER}/{RUN}-train-2/picture.png").content
+    words = (f"{RUN}-train-2: failure", "kind       leader", "grade      ideal", "the other  broke")
+    assert all(word in printed.out for word in words)
+    assert "of adversary 'lead'" in printed.out
+    assert str(file) in printed.err
+    _, printed = call("show", ENDED_ID, f"{RUN}-train-2", "--out", file, "--json")
+    assert json.loads(printed.out) == client.get(f"{FOLDER}/{RUN}-train-2").json()
+
+
+def test_a_failure_whose_picture_cannot_be_had_is_exit_status_2(call, settings, tmp_path):
+    status, printed = call("show", ENDED_ID, "x", "--out", tmp_path / "a.png")
+    assert status == 2
+    assert "answered 404" in printed.err
+    status, printed = call("show", ENDED_ID, f"{RUN}-train-1", "--out", tmp_path / "a.svg")
+    assert status == 2
+    assert printed.err.startswith("--out: got ")
+    (settings.run_folder(ENDED_ID, RUN) / FAILURES / series_name(1)).unlink()
+    status, printed = call("show", ENDED_ID, f"{RUN}-train-1", "--out", tmp_path / "a.png")
+    assert status == 2
+    assert "is gone" in printed.err
+    assert not (tmp_path / "a.png").exists()
