@@ -51,6 +51,7 @@ class Pictures:
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
         self._threads = anyio.CapacityLimiter(AT_ONCE)
+        self._begun = 0  # pictures that are being drawn, or wait
         self._drawn = alru_cache(maxsize=KEPT)(self._draw)  # who asks for one that is being drawn waits for it
 
     async def png(self, subject: Subject) -> bytes:
@@ -63,10 +64,13 @@ class Pictures:
         return await self._drawn(subject)
 
     async def _draw(self, subject: Subject) -> bytes:
-        waiting = self._threads.statistics().tasks_waiting
-        if waiting >= MOST_WAITING:
-            raise TooManyWaiting(f"{waiting} pictures wait to be drawn; wanted fewer than {MOST_WAITING}")
-        return await to_thread.run_sync(self._draw_now, subject, limiter=self._threads)
+        if self._begun >= AT_ONCE + MOST_WAITING:
+            raise TooManyWaiting(f"{MOST_WAITING} pictures wait to be drawn; wanted fewer")
+        self._begun += 1
+        try:
+            return await to_thread.run_sync(self._draw_now, subject, limiter=self._threads)
+        finally:
+            self._begun -= 1
 
     def _draw_now(self, subject: Subject) -> bytes:
         episode = subject.episode
