@@ -7,6 +7,9 @@ with Client("http://127.0.0.1:8000") as client:
     client.wait(campaign.id)
     for total in client.results(campaign.id).totals:
         ...
+    for found in client.failures(campaign.id):
+        series = client.failure(campaign.id, found.id).series  # arrays, a row per step: series.speed_mps, series.ttc_s
+        Path(f"{found.id}.png").write_bytes(client.picture(campaign.id, found.id))
 """
 
 from risk_sac.client.answers import (

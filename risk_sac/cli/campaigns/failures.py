@@ -29,7 +29,9 @@ def add_list_failures(failures: Commands) -> None:
     parser = failures.add_parser("list", help="a campaign's failures, in the order they were found")
     parser.set_defaults(command=_list)
     parser.add_argument("id", metavar="ID", help="of the campaign")
-    parser.add_argument("--grade", choices=list(Grade), help="only of this grade; careful: preventable")
+    parser.add_argument(
+        "--grade", choices=[grade.value for grade in Grade], help="only of this grade; careful: preventable"
+    )
     for name, which in FILTERS.items():
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only those {which}")
     parser.add_argument("--raw", action="store_true", help="contacts too that a rule refused")
