@@ -16,7 +16,7 @@ from service.api.answers.problems import add_problem_handlers
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
 from service.api.guards import add_guards
-from service.api.routes import campaigns, catalogue, episodes, events, networks, operations, reports
+from service.api.routes import campaigns, catalogue, episodes, events, networks, operations, pictures, reports
 from service.api.stream import Streams
 from service.api.telemetry.metrics import registry, request_latencies
 from service.api.telemetry.requests import Observe
@@ -28,6 +28,7 @@ from service.runs.manager import Manager
 from service.settings import ServiceSettings
 from service.store.database import READERS, held
 from service.store.reading import Store
+from service.views.pictures import Pictures
 from service.views.reports import Reports
 from service.workers.messages import Event
 from service.workers.program import program
@@ -53,7 +54,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
     app = FastAPI(
         title="RISK-SAC", description=DESCRIPTION, version=__version__, lifespan=lifespan, redirect_slashes=False
     )
-    for routes in (campaigns, episodes, events, reports, networks, catalogue, operations):
+    for routes in (campaigns, episodes, pictures, events, reports, networks, catalogue, operations):
         app.include_router(routes.router)
     add_problem_handlers(app)
     app.add_middleware(AnswerCache)
@@ -83,9 +84,16 @@ def opened(settings: ServiceSettings, executor: Executor[Event], latencies: Hist
 
 
 def _context(settings: ServiceSettings, store: Store, manager: Manager, latencies: Histogram) -> Context:
-    metrics = registry(latencies, store, manager)
-    networks = Shelf(settings.networks_dir)
-    return Context(settings, store, manager, Reports(settings), networks, Streams(store), metrics)
+    return Context(
+        settings,
+        store,
+        manager,
+        Reports(settings),
+        Pictures(settings),
+        Shelf(settings.networks_dir),
+        Streams(store),
+        registry(latencies, store, manager),
+    )
 
 
 def _data_folder(settings: ServiceSettings) -> IO[bytes]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, get_args
 
 from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, complain, console, progress_bar
+from risk_sac.cli.text import counted
 from risk_sac.config import METHODS, FamilyName
 from risk_sac.config.spec_file import read_campaign
 
@@ -42,7 +43,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     for job in evaluation.failed:
         complain(f"{job.name}: {job.reason}")
     comparison = evaluation.comparison
-    runs = f"{len(comparison.runs)} of {len(comparison.runs) + len(comparison.missing)} runs"
+    runs = f"{len(comparison.runs)} of {counted(len(comparison.runs) + len(comparison.missing), 'run')}"
     console.print(f"Report of {runs}: {options.out}/table.md, table.json, table.csv, figures/", soft_wrap=True)
     if evaluation.stopped:
         console.print("Stopped. The same command again goes on from there.")
@@ -54,6 +55,6 @@ def _drawn(board: Board, jobs: "Sequence[Job]") -> None:
     done = {job.name: job.total if job.state == "finished" else job.done() for job in jobs}
     finished = sum(job.state == "finished" for job in jobs)
     failed = sum(job.state == "failed" for job in jobs)
-    found = f"{finished}/{len(jobs)} runs" + (f", {failed} failed" if failed else "")
+    found = f"{finished}/{counted(len(jobs), 'run')}" + (f", {failed} failed" if failed else "")
     at_work = {job.name: (done[job.name], job.total) for job in jobs if job.state == "running"}
     board.show(sum(done.values()), sum(job.total for job in jobs), found, at_work)

@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.table import Table
 
 from risk_sac.cli.console import INTERRUPTED, OK, Commands, console, or_dash, progress_bar
+from risk_sac.cli.text import counted
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.config.spec_file import read_spec
 from risk_sac.metrics import METRICS, Metric, pooled_counts
@@ -43,7 +44,9 @@ def _run(options: argparse.Namespace) -> int:
         done = (results.metrics.episodes if results.metrics else 0) + (
             results.evaluation.episodes if results.evaluation else 0
         )
-        console.print(f"Stopped after {done} of {total} episodes. The same command again goes on from there.")
+        console.print(
+            f"Stopped after {done} of {counted(total, 'episode')}. The same command again goes on from there."
+        )
         return INTERRUPTED
     console.print(_summary(spec, results))
     console.print(f"Results: {options.out}/results.json")
@@ -75,7 +78,7 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
     shown = (metric for metric in METRICS if not metric.search_only)
     return {
         "episodes": f"{metrics.episodes} ({metrics.rejected} rejected)",
-        "contacts": f"{metrics.raw_collisions} ({metrics.artefacts} artefacts)",
+        "contacts": f"{metrics.raw_collisions} ({counted(metrics.artefacts, 'artefact')})",
         "valid failures": f"{metrics.failures} ({metrics.unresponsive} unresponsive)",
         "distinct failures": f"{metrics.distinct_failures}",
         "distinct and preventable": f"{metrics.distinct_preventable}",

@@ -7,6 +7,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.console import OK, Commands, console
+from risk_sac.cli.text import in_words
 from risk_sac.records import Judgement
 from risk_sac.run_folder.results import Results, read_results
 
@@ -54,7 +55,7 @@ def _contacts(results: Results) -> Table:
             f"{collision.ego_speed_mps:.1f}\n{collision.other_speed_mps:.1f}",
             f"{collision.ego_zone}\n{collision.other_zone}",
             "" if judgement is None else _conflict(judgement),
-            contact.episode.reason or ("" if judgement is None else ", ".join(judgement.broke).replace("_", " ")),
+            in_words([contact.episode.reason] if contact.episode.reason or judgement is None else judgement.broke),
         )
     return table
 

@@ -7,19 +7,25 @@ with Client("http://127.0.0.1:8000") as client:
     client.wait(campaign.id)
     for total in client.results(campaign.id).totals:
         ...
+    for found in client.failures(campaign.id):
+        series = client.failure(campaign.id, found.id).series  # arrays, a row per step: series.speed_mps, series.ttc_s
+        Path(f"{found.id}.png").write_bytes(client.picture(campaign.id, found.id))
 """
 
 from risk_sac.client.answers import (
     Campaign,
     CampaignSummary,
+    Collision,
     Episode,
     Event,
     Failure,
+    Judgement,
     Metrics,
     Progress,
     Results,
     Run,
     RunResult,
+    Series,
     Total,
 )
 from risk_sac.client.client import Client
@@ -38,10 +44,12 @@ __all__ = [
     "CampaignSummary",
     "Client",
     "ClientError",
+    "Collision",
     "Episode",
     "Event",
     "Failure",
     "FieldProblem",
+    "Judgement",
     "Metrics",
     "Overdue",
     "Progress",
@@ -49,6 +57,7 @@ __all__ = [
     "Results",
     "Run",
     "RunResult",
+    "Series",
     "StreamLost",
     "Total",
     "UnexpectedAnswer",

@@ -8,6 +8,7 @@ from typing import Any, Generic, Self, TypeVar
 import httpx
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from risk_sac import series
 from risk_sac.client.errors import UnexpectedAnswer
 
 FINAL = frozenset({"succeeded", "failed", "cancelled"})  # states that nothing follows
@@ -157,6 +158,32 @@ class Results(Record):
     totals: list[Total]
 
 
+class Judgement(Record):
+    """How a contact came about, and who would have prevented it."""
+
+    conflict_type: str  # cut_in | leader | pedestrian | crossing_vehicle
+    conflict_s: float | None  # when the conflict began, since the adversaries' release
+    hidden: bool  # whether the ego knew nothing of the striker then
+    broke: tuple[str, ...]  # what the striker broke, such as red_light
+    grade: str | None  # careful | ideal | unavoidable; None where the contact is not valid
+    signature: str  # the class of failures it belongs to, in words
+
+
+class Collision(Record):
+    """The ego's contact with another actor."""
+
+    time_s: float | None  # since the adversaries' release
+    other_id: str
+    other_kind: str  # vehicle | pedestrian
+    other_role: str  # adversary | background
+    ego_zone: str  # front | left | right | rear
+    other_zone: str
+    ego_speed_mps: float | None
+    other_speed_mps: float | None
+    verdicts: Mapping[str, bool]  # validity rule -> passed
+    judgement: Judgement | None  # None in what is older than judgements
+
+
 class Episode(Record):
     """One episode."""
 
@@ -167,15 +194,19 @@ class Episode(Record):
     outcome: str
     reason: str
     steps: int
-    collision: dict[str, Any] | None  # with its `judgement`
+    collision: Collision | None
     funnel: dict[str, int] | None  # of the run's phase, this episode included
+
+
+class Series(series.Series, Record):
+    """Arrays over the steps of an episode; each name ends with its unit, and each field says its shape."""
 
 
 class Failure(Episode):
     """A contact of the ego with its full time series."""
 
-    series: dict[str, Any] | None
-    series_problem: str | None
+    series: Series | None
+    series_problem: str | None  # why there is none
 
 
 T = TypeVar("T")

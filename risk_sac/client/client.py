@@ -20,7 +20,7 @@ from risk_sac.client.answers import (
     Record,
     Results,
 )
-from risk_sac.client.errors import StreamLost
+from risk_sac.client.errors import StreamLost, UnexpectedAnswer
 from risk_sac.client.follow import AWAY_S, SILENCE_S, Follower
 from risk_sac.client.transport import Transport
 from risk_sac.config import CampaignSpec
@@ -29,6 +29,7 @@ from risk_sac.records import Grade
 TIMEOUT_S = 30.0  # of silence within one answer
 PATIENCE_S = 10.0  # with a service that does not answer
 PAGE = 100  # items that are asked for at a time
+PNG = "image/png"
 RECONNECT_S = 1.0  # between two streams of events
 
 Query = dict[str, str | int | None]
@@ -146,6 +147,14 @@ class Client:
     def failure(self, campaign_id: str, failure_id: str) -> Failure:
         """One collision with its full time series."""
         return self._get(Failure, f"{_path(campaign_id)}/failures/{_part(failure_id)}")
+
+    def picture(self, campaign_id: str, failure_id: str) -> bytes:
+        """One collision as a picture, PNG: both paths from above, and what was measured along the way."""
+        path = f"{_path(campaign_id)}/failures/{_part(failure_id)}/picture.png"
+        response = self._transport.ask("GET", path, patience_s=self._patience_s)
+        if response.headers.get("content-type") != PNG:
+            raise UnexpectedAnswer(response, PNG)
+        return response.content
 
     def table(self, campaign_id: str, format_: Literal["json", "md", "csv"] = "md") -> str:
         """The methods compared over seeds by the runs that have finished."""

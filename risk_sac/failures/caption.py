@@ -1,32 +1,50 @@
 """A contact in words: what stands above its picture."""
 
+import textwrap
+
 from risk_sac.config import FamilyName
 from risk_sac.failures.recording import Recording
-from risk_sac.records import Collision
+from risk_sac.records import Collision, Grade
+
+WIDTH = 120  # characters that the page holds
+PREVENTED = {
+    Grade.CAREFUL: "a careful driver would have prevented it",
+    Grade.IDEAL: "only full braking at once would have prevented it",
+    Grade.UNAVOIDABLE: "not even full braking at once would have prevented it",
+}
 
 
 def caption(family: FamilyName, recording: Recording) -> str:
-    """Which contact of which run, what touched what, and what its judgement says."""
-    collision = recording.collision
-    reason = f" ({recording.contact.episode.reason})" if recording.contact.episode.reason else ""
-    return (
-        f"{family} · episode {recording.contact.id} · {recording.contact.episode.outcome}{reason}\n"
-        f"the ego's {collision.ego_zone} at {collision.ego_speed_mps:.1f} m/s, the {collision.other_zone} of "
-        f"{collision.other_role} {collision.other_id!r} at {collision.other_speed_mps:.1f} m/s; "
-        f"visible for {collision.visible_for_s:.1f} s" + _judged(collision)
-    )
+    """Which contact of which run, what touched what, and what its judgement says; no line is too long for the page."""
+    episode, collision = recording.contact.episode, recording.collision
+    failed = f" · failed rules: {_words(episode.reason)}" if episode.reason else ""
+    lines = [
+        f"{family} · episode {recording.contact.id} · {episode.outcome}{failed}",
+        f"the ego's {collision.ego_zone}, at {collision.ego_speed_mps:.1f} m/s, touched the {collision.other_zone} of "
+        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {_seen(collision)}",
+        *_judged(collision),
+    ]
+    return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
 
 
-def _judged(collision: Collision) -> str:
-    """Lines with who would have prevented it, how and where it began, and whether the striker was in the wrong."""
+def _seen(collision: Collision) -> str:
+    seen_s = collision.visible_for_s
+    return f"which it had seen for {seen_s:.1f} s" if seen_s > 0 else "which it had not seen"
+
+
+def _judged(collision: Collision) -> list[str]:
+    """Lines with its kind, how it began, who would have prevented it, and whether the striker was in the wrong."""
     judgement = collision.judgement
     if judgement is None:
-        return ""
-    grade = f"grade {judgement.grade}" if judgement.grade else "no grade"
-    broke = ", ".join(judgement.broke) or "nothing"
+        return []
     before_s = collision.time_s - judgement.conflict_s
-    return (
-        f"\n{grade} · {judgement.conflict_type} from {before_s:.1f} s before the contact, {judgement.conflict_s:.1f} s "
-        f"after the release, at ({judgement.conflict_x_m:.1f}, {judgement.conflict_y_m:.1f}) m\n"
-        f"the striker broke {broke}".replace("_", " ")
-    )
+    grade = "" if judgement.grade is None else f" · grade {judgement.grade}: {PREVENTED[judgement.grade]}"
+    return [
+        judgement.signature,
+        f"the conflict began {before_s:.1f} s before the contact{grade}",
+        f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'}",
+    ]
+
+
+def _words(names: str) -> str:
+    return names.replace("_", " ")

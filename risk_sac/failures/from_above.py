@@ -1,6 +1,8 @@
 """The view from above: the roads, both paths, and the bodies at the contact and before it."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -9,57 +11,81 @@ from matplotlib.patches import Polygon
 import sumo_nets
 from risk_sac.config import FamilyName
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.roads import read_surfaces
+from risk_sac.failures.roads import Surface, read_surfaces
 from risk_sac.failures.style import BYSTANDER_COLOUR, CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, legend
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.types import Kind, Role
 
 SURFACE_COLOURS = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
 GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the contact, where the two bodies are drawn as well
+OUTLINE: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.3", "linewidth": 0.8}
+CONFLICT: dict[str, Any] = {"facecolor": "none", "edgecolor": CONFLICT_COLOUR, "linewidth": 1.4, "linestyle": "--"}
 
 
-def draw_from_above(axis: Axes, family: FamilyName, recording: Recording) -> None:
-    """Draws everything on the ground; who calls it chooses what part of the ground is seen."""
-    layout = FAMILIES[family].layout(recording.contact.episode.scene)
-    for surface in read_surfaces(Path(sumo_nets.__path__[0]) / layout.net):
+def draw_from_above(axis: Axes, family: FamilyName, recording: Recording, apart_m: float) -> None:
+    """Draws everything on the ground; who calls it chooses what part of the ground is seen.
+
+    Args:
+      axis: to draw on.
+      family: of the scene.
+      recording: of the contact.
+      apart_m: earlier places of a body that are nearer to each other are drawn as one.
+    """
+    for surface in _roads(family, recording.contact.episode.scene):
         colour = SURFACE_COLOURS[surface.use]
         axis.add_patch(Polygon(surface.outline, facecolor=colour, edgecolor="0.7", linewidth=0.5))
     for actor in range(1, len(recording.series["ids"])):
         if actor != recording.other:
-            _draw_actor(axis, recording, actor, BYSTANDER_COLOUR, ghosts=())
-    _draw_actor(axis, recording, recording.other, OTHER_COLOUR, GHOSTS_S)
-    _draw_actor(axis, recording, 0, EGO_COLOUR, GHOSTS_S)
+            _draw_actor(axis, recording, actor, BYSTANDER_COLOUR)
+    for actor, colour in ((recording.other, OTHER_COLOUR), (0, EGO_COLOUR)):
+        _draw_actor(axis, recording, actor, colour, involved=True)
+        for times_s in _ghosts(recording, actor, apart_m):
+            _draw_body(axis, recording, actor, -times_s[0], **OUTLINE | {"edgecolor": colour})
+            _label_body(axis, recording, actor, times_s, colour)
     _draw_contact_point(axis, recording)
     _draw_conflict(axis, recording)
     axis.set(xlabel="x, m", ylabel="y, m")
-    legend(axis)
+    axis.add_patch(Polygon(np.empty((0, 2)), label="earlier", **OUTLINE))  # for the legend alone
+    if len(recording.series["ids"]) > 2:
+        grey: dict[str, Any] = {"facecolor": BYSTANDER_COLOUR, "edgecolor": BYSTANDER_COLOUR, "alpha": 0.2}
+        axis.add_patch(Polygon(np.empty((0, 2)), label="others", **grey))
+    legend(axis, title="filled: at the contact")
 
 
-def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, ghosts: tuple[float, ...]) -> None:
-    """Path, body at the contact, and bodies at the earlier times with their labels."""
-    involved = bool(ghosts)
+def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float]]:
+    """The times of `GHOSTS_S` that were recorded, together where the body was in about the same place."""
+    groups: list[list[float]] = []
+    for before_s in GHOSTS_S:
+        if -before_s < recording.time_s[0]:
+            continue
+        there = recording.pose(actor, -before_s)[:2]
+        if groups and np.hypot(*np.subtract(there, recording.pose(actor, -groups[-1][0])[:2])) < apart_m:
+            groups[-1].append(before_s)
+        else:
+            groups.append([before_s])
+    return groups
+
+
+def _roads(family: FamilyName, scene: Mapping[str, float]) -> list[Surface]:
+    """Those of the scene's net; none for a scene from before its family had all the parameters it has now."""
+    if not set(FAMILIES[family].space.names) <= scene.keys():
+        return []
+    return read_surfaces(Path(sumo_nets.__path__[0]) / FAMILIES[family].layout(scene).net)
+
+
+def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, *, involved: bool = False) -> None:
+    """Path, and body at the contact."""
     name = str(recording.series["ids"][actor])
     driver = Role(int(recording.series["role"][actor])).name.lower()
     x, y = recording["x_m"][:, actor], recording["y_m"][:, actor]
     axis.plot(x, y, color=colour, linewidth=1.2 if involved else 0.6, alpha=1.0 if involved else 0.5)
-    label = "ego" if actor == 0 else f"{name} ({driver})"
-    for before_s in ghosts:
-        if -before_s >= recording.time_s[0]:
-            _draw_body(axis, recording, actor, -before_s, facecolor="none", edgecolor=colour, linewidth=0.8)
-            _label_body(axis, recording, actor, -before_s, colour)
-    if np.isfinite(x[-1]):
-        _draw_body(
-            axis,
-            recording,
-            actor,
-            0.0,
-            facecolor=colour,
-            edgecolor=colour,
-            alpha=0.6 if involved else 0.2,
-            label=label if involved else None,
-        )
-        if not involved:
-            axis.annotate(name, (x[-1], y[-1]), fontsize=6, color=colour, ha="center", va="center", clip_on=True)
+    if not np.isfinite(x[-1]):
+        return
+    label = ("ego" if actor == 0 else f"{name} ({driver})") if involved else None
+    alpha = 0.6 if involved else 0.2
+    _draw_body(axis, recording, actor, 0.0, facecolor=colour, edgecolor=colour, alpha=alpha, label=label)
+    if not involved:
+        axis.annotate(name, (x[-1], y[-1]), fontsize=6, color=colour, ha="center", va="center", clip_on=True)
 
 
 def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **style: object) -> None:
@@ -75,18 +101,19 @@ def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **st
         axis.plot(arrow[:, 0], arrow[:, 1], color=str(style["edgecolor"]), linewidth=0.6)
 
 
-def _label_body(axis: Axes, recording: Recording, actor: int, time_s: float, colour: str) -> None:
-    """The time beside a body, on the side that faces away from the other one."""
-    x, y, heading = recording.pose(actor, time_s)
-    partner_x, partner_y, _ = recording.pose(recording.other if actor == 0 else 0, time_s)
+def _label_body(axis: Axes, recording: Recording, actor: int, times_s: list[float], colour: str) -> None:
+    """The times beside a body, on the side that faces away from the other one."""
+    x, y, heading = recording.pose(actor, -times_s[0])
+    partner_x, partner_y, _ = recording.pose(recording.other if actor == 0 else 0, -times_s[0])
     left = np.array((-np.sin(heading), np.cos(heading)))
     away = -left if left @ (partner_x - x, partner_y - y) > 0 else left
+    side = "left" if away[0] > 0.5 else "right" if away[0] < -0.5 else "center"
     axis.annotate(
-        f"−{-time_s:g} s",
+        ", ".join(f"−{each:g}" for each in times_s) + " s",
         tuple(np.array((x, y)) + away * recording["width_m"][actor] / 2),
-        tuple(away * (16, 8)),
+        tuple(away * (4, 8)),
         textcoords="offset points",
-        ha="center",
+        ha=side,
         va="center",
         fontsize=7,
         color=colour,
@@ -99,17 +126,17 @@ def _draw_contact_point(axis: Axes, recording: Recording) -> None:
     along, across = recording.collision.contact_x_m, recording.collision.contact_y_m
     cos, sin = np.cos(heading), np.sin(heading)
     place = x + along * cos - across * sin, y + along * sin + across * cos
-    axis.plot(*place, marker="x", color="black", markersize=7, linestyle="none", zorder=5, label="contact")
+    axis.plot(*place, marker="x", color="black", markersize=7, linestyle="none", zorder=5, label="touched here")
 
 
 def _draw_conflict(axis: Axes, recording: Recording) -> None:
-    """Where the striker was when the conflict began, and both bodies at that moment."""
+    """Both bodies when the conflict began, and where the striker was then."""
     judgement, begin_s = recording.collision.judgement, recording.conflict_s
     if judgement is None or begin_s is None:
         return
     for actor in (0, recording.other):
         if np.isfinite(recording.pose(actor, begin_s)).all():
-            style = {"facecolor": "none", "edgecolor": CONFLICT_COLOUR, "linewidth": 1.4, "linestyle": "--"}
-            _draw_body(axis, recording, actor, begin_s, **style)
+            label = "as the conflict began" if actor == 0 else None
+            _draw_body(axis, recording, actor, begin_s, label=label, **CONFLICT)
     place = judgement.conflict_x_m, judgement.conflict_y_m
-    axis.plot(*place, marker="D", color=CONFLICT_COLOUR, markersize=5, linestyle="none", zorder=5, label="conflict")
+    axis.plot(*place, marker="D", color=CONFLICT_COLOUR, markersize=5, linestyle="none", zorder=5)

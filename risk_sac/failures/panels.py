@@ -1,13 +1,15 @@
 """What was measured along the way: one panel per kind of measurement, over time counted from the contact."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
 
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.style import (
     CONFLICT_COLOUR,
     EGO_COLOUR,
+    HIDDEN_COLOUR,
     OTHER_COLOUR,
     RELEASE_COLOUR,
     SEEN_COLOUR,
@@ -19,6 +21,8 @@ from risk_sac.risk.ttc import TTC_CAP_S
 def _speeds(axis: Axes, recording: Recording) -> None:
     _both(axis, recording, "speed_mps")
     axis.set_ylabel("speed\nm/s")
+    if any(True for _ in recording.hidden()):
+        axis.add_patch(Rectangle((0, 0), 0, 0, color=HIDDEN_COLOUR, label="hidden from the ego"))
     legend(axis)
 
 
@@ -41,7 +45,7 @@ def _distance(axis: Axes, recording: Recording) -> None:
 
 def _ttc(axis: Axes, recording: Recording) -> None:
     axis.plot(recording.time_s, recording["ttc_s"][:, recording.other], color="black", linewidth=1.2)
-    axis.set(ylabel="TTC\ns", ylim=(0, TTC_CAP_S * 1.05))
+    axis.set(ylabel=f"time to\ncollision, s\n({TTC_CAP_S:g}: none)", ylim=(0, TTC_CAP_S * 1.05))
 
 
 def _robustness(axis: Axes, recording: Recording) -> None:
@@ -51,7 +55,7 @@ def _robustness(axis: Axes, recording: Recording) -> None:
         recording.time_s, recording["soft_min"], color="black", linestyle="--", linewidth=1.4, label="soft minimum"
     )
     axis.axhline(0, color="0.6", linewidth=0.6)
-    axis.set_ylabel("robustness\nscaled")
+    axis.set_ylabel("requirements\nbroken below 0")
     legend(axis)
 
 
@@ -59,29 +63,36 @@ PANELS: tuple[Callable[[Axes, Recording], None], ...] = (_speeds, _accelerations
 
 
 def mark_instants(axis: Axes, recording: Recording) -> None:
-    """The contact, since when the other was in view, where it was hidden before, release and begin of the conflict."""
-    axis.axvline(0, color="black", linewidth=0.8, linestyle="--")
+    """Upright lines at the instants, and grey ground where the ego did not see the other."""
     axis.grid(visible=True, linewidth=0.3)
     for start, end in recording.hidden():
-        axis.axvspan(start, end, color="0.9", zorder=0)
-    first_visible = recording.time_s[-1] - recording.collision.visible_for_s
-    _mark(axis, first_visible, "in view", SEEN_COLOUR, row=0)
-    _mark(axis, recording.released_s, "release", RELEASE_COLOUR, row=1)
+        axis.axvspan(start, end, color=HIDDEN_COLOUR, zorder=0)
+    for time_s, _, colour in _instants(recording):
+        axis.axvline(time_s, color=colour, linewidth=1.0, linestyle="--" if time_s == 0 else ":")
+
+
+def name_instants(axis: Axes, recording: Recording) -> None:
+    """Names above the first panel, each in a row of its own so that they do not cover each other."""
+    for row, (time_s, name, colour) in enumerate(_instants(recording)):
+        axis.annotate(
+            name,
+            (time_s, 1),
+            (0, 3 + 9 * row),
+            xycoords=axis.get_xaxis_transform(),
+            textcoords="offset points",
+            va="bottom",
+            ha="right" if time_s == 0 else "left",
+            fontsize=7,
+            color=colour,
+            annotation_clip=True,
+        )
+
+
+def _instants(recording: Recording) -> Iterator[tuple[float, str, str]]:
+    """What there is to mark: when, its name, and its colour."""
+    yield 0.0, "contact", "black"
+    if recording.collision.visible_for_s > 0:
+        yield recording.time_s[-1] - recording.collision.visible_for_s, "in the ego's view from here", SEEN_COLOUR
+    yield recording.released_s, "adversaries released", RELEASE_COLOUR
     if recording.conflict_s is not None:
-        _mark(axis, recording.conflict_s, "conflict", CONFLICT_COLOUR, row=2)
-
-
-def _mark(axis: Axes, time_s: float, name: str, colour: str, row: int) -> None:
-    """An instant with its name at the top, in a row of its own so that names do not cover each other."""
-    axis.axvline(time_s, color=colour, linewidth=1.0, linestyle=":")
-    axis.annotate(
-        name,
-        (time_s, 1),
-        (2, -2 - 9 * row),
-        xycoords=axis.get_xaxis_transform(),
-        textcoords="offset points",
-        va="top",
-        fontsize=7,
-        color=colour,
-        annotation_clip=True,
-    )
+        yield recording.conflict_s, "conflict begins", CONFLICT_COLOUR

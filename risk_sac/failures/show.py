@@ -3,17 +3,18 @@
 Where the contact was judged, the moment at which the conflict began is marked as well.
 """
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from risk_sac.canvas import canvas, picture
 from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
 from risk_sac.failures.caption import caption
 from risk_sac.failures.from_above import draw_from_above
-from risk_sac.failures.panels import PANELS, mark_instants
+from risk_sac.failures.panels import PANELS, mark_instants, name_instants
 from risk_sac.failures.recording import Recording
 from risk_sac.run_folder.results import Contact
 from risk_sac.run_folder.series import read_series
@@ -23,27 +24,34 @@ VIEW_S, PANELS_S = 3.0, 8.0  # before the contact: what the view from above hold
 MARGIN_M = 5.0
 WIDTH_IN, PANEL_IN, DPI = 11.0, 1.5, 110
 PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
+LABEL_IN = 0.25  # what a label needs on the page
 VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
 
 
-def draw(family: FamilyName, contact: Contact, folder: Path, picture: Path) -> None:
+def draw(family: FamilyName, contact: Contact, folder: Path, file: Path) -> None:
     """Draws a contact into a file.
 
     Args:
       family: of the run.
       contact: of the run's results.
       folder: where results.json lies.
-      picture: its suffix names the format: png, pdf or svg.
+      file: its suffix names the format: png, pdf or svg.
 
     Raises:
       ConfigError: the format is none of these.
       OSError: the time series is gone or the picture cannot be written.
     """
-    if picture.suffix not in (".png", ".pdf", ".svg"):
-        raise ConfigError(f"got {str(picture)!r}; wanted a name that ends in .png, .pdf or .svg", field="out")
+    if file.suffix not in (".png", ".pdf", ".svg"):
+        raise ConfigError(f"got {str(file)!r}; wanted a name that ends in .png, .pdf or .svg", field="out")
     recording = Recording(contact, read_series(folder / contact.series))
-    picture.parent.mkdir(parents=True, exist_ok=True)
-    draw_recording(family, recording).savefig(picture, dpi=DPI)
+    content = recording_bytes(family, recording, file.suffix.removeprefix("."))
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(content)
+
+
+def recording_bytes(family: FamilyName, recording: Recording, format_: str) -> bytes:
+    """The picture of a contact as a file: png, pdf or svg."""
+    return picture(partial(draw_recording, family, recording), format_, DPI, {})
 
 
 def draw_recording(family: FamilyName, recording: Recording) -> Figure:
@@ -51,17 +59,17 @@ def draw_recording(family: FamilyName, recording: Recording) -> Figure:
     low, high = _extent(recording)
     view_in = PANEL_WIDTH_IN * (high - low)[1] / (high - low)[0]
     heights = (view_in, *(PANEL_IN for _ in PANELS))
-    figure = Figure(figsize=(WIDTH_IN, sum(heights) + 1.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = canvas((WIDTH_IN, sum(heights) + 1.2))
     view, *axes = figure.subplots(len(heights), 1, height_ratios=heights)
     figure.suptitle(caption(family, recording), fontsize=11)
-    draw_from_above(view, family, recording)
+    draw_from_above(view, family, recording, apart_m=LABEL_IN * (high - low)[0] / PANEL_WIDTH_IN)
     view.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     for axis, panel in zip(axes, PANELS, strict=True):
         panel(axis, recording)
         mark_instants(axis, recording)
         axis.sharex(axes[0])
         axis.label_outer()
+    name_instants(axes[0], recording)
     axes[0].set_xlim(max(recording.time_s[0], -PANELS_S), 0.15)
     axes[-1].set_xlabel("time before the contact, s")
     return figure
@@ -73,7 +81,7 @@ def _extent(recording: Recording) -> tuple[Floats, Floats]:
     shown = recording.time_s >= min(-VIEW_S, max(begin_s, -PANELS_S) if begin_s is not None else 0.0)
     pair = [0, recording.other]
     points = np.concatenate([recording[name][shown][:, pair].reshape(1, -1) for name in ("x_m", "y_m")])
-    low, high = points.min(axis=1) - MARGIN_M, points.max(axis=1) + MARGIN_M
+    low, high = np.nanmin(points, axis=1) - MARGIN_M, np.nanmax(points, axis=1) + MARGIN_M
     width, height = high - low
     height = max(height, width * VIEW_IN[0] / PANEL_WIDTH_IN)
     width = max(width, height * PANEL_WIDTH_IN / VIEW_IN[1])

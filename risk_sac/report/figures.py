@@ -1,18 +1,15 @@
 """The comparison as pictures: how the methods search (the paper's Fig. 4a), what they reach (Fig. 4b-d), λ and α."""
 
-import io
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, get_args
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from risk_sac.canvas import canvas, picture
 from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import METRICS, RESAMPLING_SEED, WINDOW, Metric, preventable
@@ -26,7 +23,7 @@ FORMATS: tuple[Format, ...] = get_args(Format)
 RESAMPLES = 2000  # per curve; a band needs less than a table
 SETTLED = 10  # episodes before which a windowed rate is mostly noise
 CURVE_IN, BARS_IN, TIMES_IN, DPI = (6.4, 3.4), (7.2, 3.2), (7.2, 3.0), 200
-STYLE: dict[Any, Any] = {  # matplotlib types the keys one by one
+STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -35,10 +32,7 @@ STYLE: dict[Any, Any] = {  # matplotlib types the keys one by one
     "grid.color": "0.9",
     "grid.linewidth": 0.6,
     "legend.frameon": False,
-    "svg.hashsalt": "risk-sac",  # the same ids in every drawing
 }
-
-_STYLED = threading.Lock()  # matplotlib has one style per process
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,12 +80,7 @@ def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
     figures = _figures(comparison)
     if name not in figures:
         raise ConfigError(f"got {name!r}; wanted one of {', '.join(figures) or 'none: no run has finished'}")
-    with _STYLED, mpl.rc_context(STYLE):
-        figure = figures[name]()
-        file = io.BytesIO()
-        metadata = {"Date": None} if format_ == "svg" else {"Software": None}
-        figure.savefig(file, format=format_, dpi=DPI, metadata=metadata)
-    return file.getvalue()
+    return picture(figures[name], format_, DPI, STYLE)
 
 
 def _figures(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
@@ -259,7 +248,7 @@ def _bars(comparison: Comparison, metric: Metric, phase: Phase) -> Figure:
 
 def _times(comparison: Comparison, family: FamilyName, phase: Phase) -> Figure:
     """Histograms of the time from the adversaries' release to the conflict and to the contact."""
-    figure = _empty(TIMES_IN)
+    figure = canvas(TIMES_IN)
     conflict, contact = figure.subplots(1, 2, sharex=True, sharey=True)
     counts = []
     for cell in (cell for cell in comparison.group(family, phase) if any(cell.contacts_by_second)):
@@ -276,14 +265,8 @@ def _times(comparison: Comparison, family: FamilyName, phase: Phase) -> Figure:
 
 
 def _canvas(size: tuple[float, float]) -> tuple[Figure, Axes]:
-    figure = _empty(size)
+    figure = canvas(size)
     return figure, figure.add_subplot()
-
-
-def _empty(size: tuple[float, float]) -> Figure:
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
 
 
 def _seeds(counts: Sequence[int]) -> str:

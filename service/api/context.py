@@ -11,6 +11,7 @@ from service.networks.shelf import Shelf
 from service.runs.manager import Manager
 from service.settings import ServiceSettings
 from service.store.reading import Store
+from service.views.pictures import Pictures
 from service.views.reports import Reports
 
 
@@ -22,6 +23,7 @@ class Context:
     store: Store
     manager: Manager
     reports: Reports
+    pictures: Pictures
     networks: Shelf
     streams: Streams
     metrics: CollectorRegistry

@@ -24,6 +24,8 @@ class Reason(StrEnum):
     UPLOAD_TOO_SLOW = "upload_too_slow"
     UPLOAD_REFUSED = "upload_refused"
     UPLOADS_BUSY = "uploads_busy"
+    PICTURES_BUSY = "pictures_busy"
+    SERIES_LOST = "series_lost"
     TOO_MANY_NETWORKS = "too_many_networks"
     UNSUPPORTED_MEDIA_TYPE = "unsupported_media_type"
     INVALID_FIELD = "invalid_field"

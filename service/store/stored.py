@@ -7,7 +7,7 @@ from typing import Any, Generic, Self, TypeVar
 
 from pydantic_core import from_json
 
-from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.config import CampaignSpec, FamilyName, RunSpec
 from risk_sac.metrics import Funnel
 from risk_sac.records import EpisodeRecord, RunMetrics
 from service.store.states import State
@@ -21,7 +21,7 @@ class StoredRun:
     number: int  # in the order of the queue, over all campaigns
     campaign_id: str
     id: str  # family-method-seed, unique within the campaign
-    family: str
+    family: FamilyName
     method: str
     seed: int
     spec_digest: str

@@ -1,5 +1,6 @@
 """Records as response bodies."""
 
+from pathlib import Path
 from typing import Any
 
 from risk_sac.run_folder.results import FAILURES
@@ -37,13 +38,21 @@ def failure_body(campaign_id: str, episode: StoredEpisode, settings: ServiceSett
     """A contact with its time series, or with the reason why there is none."""
     body = _fields(episode)
     try:
-        if episode.series is None:
-            raise StorageError("no time series was recorded")
-        folder = settings.run_folder(campaign_id, episode.run_id) / FAILURES
-        body |= {"series": load_series(folder / episode.series, episode.series_sha256), "series_problem": None}
+        body |= {"series": load_series(*series_file(campaign_id, episode, settings)), "series_problem": None}
     except StorageError as error:
         body |= {"series": None, "series_problem": str(error)}
     return Failure.model_validate(body)
+
+
+def series_file(campaign_id: str, episode: StoredEpisode, settings: ServiceSettings) -> tuple[Path, str | None]:
+    """Where a contact's time series lies, and its SHA-256.
+
+    Raises:
+      StorageError: none was recorded.
+    """
+    if episode.series is None:
+        raise StorageError("no time series was recorded")
+    return settings.run_folder(campaign_id, episode.run_id) / FAILURES / episode.series, episode.series_sha256
 
 
 def _fields(episode: StoredEpisode) -> dict[str, Any]:

@@ -18,7 +18,16 @@ _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 
 
 def load_series(path: Path, sha256: str | None) -> Series:
-    """Read an .npz of arrays; numbers that are not finite become None.
+    """The series as a body; numbers that are not finite become None.
+
+    Raises:
+      StorageError: as `load_arrays`.
+    """
+    return Series.model_validate({name: _plain(name, array) for name, array in load_arrays(path, sha256).items()})
+
+
+def load_arrays(path: Path, sha256: str | None) -> dict[str, NDArray[Any]]:
+    """The series as its worker wrote it, an .npz of arrays.
 
     Args:
       path: the file.
@@ -32,7 +41,7 @@ def load_series(path: Path, sha256: str | None) -> Series:
         _verify(path, content, sha256)
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             names = (name for name, field in Series.model_fields.items() if field.is_required() or name in arrays)
-            return Series.model_validate({name: _plain(name, arrays[name]) for name in names})
+            return {name: arrays[name] for name in names}
     except FileNotFoundError as error:
         raise StorageError(f"the time series {path.name!r} is gone") from error
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:

@@ -21,7 +21,9 @@ def test_committed_document_is_what_the_app_generates():
 
 
 def test_served_document_is_the_committed_one(base_url):
-    assert httpx.get(f"{base_url}/openapi.json").json() == yaml.safe_load(COMMITTED.read_text(encoding="utf-8"))
+    assert httpx.get(f"{base_url}/openapi.json", timeout=120).json() == yaml.safe_load(
+        COMMITTED.read_text(encoding="utf-8")
+    )
 
 
 def test_every_error_is_declared_as_a_problem():

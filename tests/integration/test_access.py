@@ -47,6 +47,7 @@ ROUTES = {
     ("GET", f"{CAMPAIGN}/episodes"): ("read", 200),
     ("GET", f"{CAMPAIGN}/failures"): ("read", 200),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/picture.png"): ("read", 404),  # no time series was recorded
     ("GET", f"{CAMPAIGN}/table"): ("read", 200),
     ("GET", f"{CAMPAIGN}/figures"): ("read", 200),
     ("GET", f"{CAMPAIGN}/figures/{{name}}.{{format}}"): ("read", 404),  # no run has finished

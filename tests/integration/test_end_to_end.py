@@ -69,3 +69,10 @@ def test_every_contact_can_be_read_with_its_full_time_series_and_drawn(serve, tm
     picture = tmp_path / "contact.png"
     assert cli.main(["show", str(folder), str(contacts[0]["index"]), "--out", str(picture)]) == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
+    url = f"http://127.0.0.1:{service.port}"
+    remote = ["campaigns", "failures", "show", campaign_id, contacts[0]["id"], "--url", url, "--out", str(picture)]
+    assert cli.main(remote) == 0
+    assert (
+        picture.read_bytes()
+        == service.client.get(f"{url}/v1/campaigns/{campaign_id}/failures/{contacts[0]['id']}/picture.png").content
+    )

@@ -2,16 +2,19 @@
 
 import argparse
 
+from risk_sac.cli.campaigns.failures import add_list_failures, add_show_failure
 from risk_sac.cli.campaigns.manage import add_cancel, add_delete, add_list
 from risk_sac.cli.campaigns.submit import add_submit
 from risk_sac.cli.campaigns.watch import add_results, add_watch
 from risk_sac.cli.console import COULD_NOT_RUN, Commands
 
 COMMANDS = (add_submit, add_list, add_watch, add_results, add_cancel, add_delete)
+OF_FAILURES = (add_list_failures, add_show_failure)
 EPILOG = """exit status:
   0    fine
-  1    the ECR of a family and method, as `results` shows it, is above --max-ecr, or its PCR above --max-pcr; the rate
-       itself is compared, whatever its 95 % interval, and controls such as no-adversary count like any other method
+  1    the ECR of a family and method is not shown to be within --max-ecr, or its PCR within --max-pcr: the upper end of
+       its 95 % interval lies above the bound; --judge-by rate compares the rate itself. Controls such as no-adversary
+       count like any other method
   2    it could not run: the campaign failed, was cancelled or (with a bound) has not ended; the service refuses or
        does not answer; the time is up; an argument is wrong
   130  interrupted; the campaign goes on
@@ -30,9 +33,15 @@ def add_campaigns(commands: Commands) -> None:
     campaigns = group.add_subparsers(required=True, metavar="COMMAND")
     for add in COMMANDS:
         add(campaigns)
-    for parser in (group, *campaigns.choices.values()):
+    leaves = list(campaigns.choices.values())
+    of_failures = campaigns.add_parser("failures", help="what a campaign found, one by one")
+    failures = of_failures.add_subparsers(required=True, metavar="COMMAND")
+    for add_one in OF_FAILURES:
+        add_one(failures)
+    leaves += failures.choices.values()
+    for parser in (group, of_failures, *leaves):
         parser.epilog, parser.formatter_class = EPILOG, argparse.RawDescriptionHelpFormatter
-    for parser in campaigns.choices.values():
+    for parser in leaves:
         parser.set_defaults(on_error=COULD_NOT_RUN)
         parser.add_argument("--url", metavar="URL", help="of the service")
         parser.add_argument("--json", action="store_true", help="one JSON document instead of text and tables")

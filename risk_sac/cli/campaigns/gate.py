@@ -2,10 +2,19 @@
 
 import argparse
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, OK
-from risk_sac.client import Metrics, Results, Total
+from risk_sac.cli.text import counted
+from risk_sac.client import Results, Total
+from risk_sac.errors import ConfigError
+from risk_sac.metrics import wilson_interval
+
+JudgedBy = Literal["interval", "rate"]
+JUDGED_BY: tuple[JudgedBy, ...] = get_args(JudgedBy)
+COUNTED = {"ECR": "valid failure", "PCR": "preventable failure"}
 
 
 def rate(text: str) -> float:
@@ -22,11 +31,21 @@ class Bounds:
 
     ecr: float | None = None
     pcr: float | None = None
+    judged_by: JudgedBy = "interval"
 
     @classmethod
     def of(cls, options: argparse.Namespace) -> "Bounds":
-        """Those of the command line."""
-        return cls(ecr=options.max_ecr, pcr=options.max_pcr)
+        """Those of the command line.
+
+        Raises:
+          ConfigError: nothing could ever keep one.
+        """
+        bounds = cls(ecr=options.max_ecr, pcr=options.max_pcr, judged_by=options.judge_by)
+        for name, bound in bounds.items():
+            if bound == 0 and bounds.judged_by == "interval":
+                message = "got 0, and the interval of no rate ends there; wanted more, or --judge-by rate as well"
+                raise ConfigError(message, field=f"--max-{name.lower()}")
+        return bounds
 
     def items(self) -> tuple[tuple[str, float], ...]:
         """Rate -> its bound, for those that have one."""
@@ -34,21 +53,56 @@ class Bounds:
         return tuple((name, bound) for name, bound in both if bound is not None)
 
 
-def measured_rate(measured: Total | Metrics, name: str) -> float | None:
-    """The ECR or the PCR."""
-    return measured.ecr if name == "ECR" else measured.pcr
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """A rate of one family and method beside its bound."""
+
+    name: str  # ECR | PCR
+    bound: float
+    judged_by: JudgedBy
+    rate: float
+    upper: float  # end of its 95 % interval
+    failures: int  # that the rate counts
+    episodes: int
+
+    @property
+    def verdict(self) -> Literal["above", "may be above", "within"]:
+        """How the rate lies to its bound; one that is equal is within."""
+        if self.rate > self.bound:
+            return "above"
+        return "may be above" if self.judged_by == "interval" and self.upper > self.bound else "within"
+
+    def __str__(self) -> str:
+        interval = f", 95 % interval up to {self.upper:.3f}" if self.judged_by == "interval" else ""
+        counts = f"{counted(self.failures, COUNTED[self.name])} in {counted(self.episodes, 'episode')}"
+        return f"{self.rate:.3f}{interval} ({counts})"
 
 
-def exceeded(measured: Total | Metrics | None, bounds: Bounds) -> dict[str, float]:
-    """Rates above their bounds: the rate itself, whatever its interval; one that is equal is not above."""
-    if measured is None:
-        return {}
-    rates = {name: (measured_rate(measured, name), bound) for name, bound in bounds.items()}
-    return {name: rate for name, (rate, bound) in rates.items() if rate is not None and rate > bound}
+def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
+    """The rates of a family and method that have a bound, and have been measured."""
+    measured = {
+        "ECR": (total.ecr, total.ecr_high, total.failures),
+        "PCR": (total.pcr, total.pcr_high, total.preventable),
+    }
+    for name, bound in bounds.items():
+        found, high, failures = measured[name]
+        if found is None:
+            continue
+        # A bootstrap over few seeds ends at the worst of them: at 0 where none has failed, however short they were.
+        upper = max(high or 0.0, wilson_interval(failures, total.episodes)[1])
+        yield Comparison(
+            name=name,
+            bound=bound,
+            judged_by=bounds.judged_by,
+            rate=found,
+            upper=upper,
+            failures=failures,
+            episodes=total.episodes,
+        )
 
 
 def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
-    """The exit status, and what to say about it.
+    """The exit status, and why.
 
     Args:
       results: of a campaign, which counts as measured once it has succeeded.
@@ -60,13 +114,16 @@ def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
         return OK, ""
     if not results.complete:
         return COULD_NOT_RUN, f"the campaign is {results.state}, and its rates can still change; wait with `watch`"
-    complaints = [
-        f"{name} above {bound:g}: "
-        + ", ".join(f"{total.family} {total.method} {found[name]:.3f}" for total, found in above)
-        for name, bound in bounds.items()
-        if (above := [(total, found) for total in results.totals if name in (found := exceeded(total, bounds))])
-    ]
-    return (ABOVE, "; ".join(complaints)) if complaints else (OK, "")
+    reasons: dict[str, list[str]] = {}
+    for total in results.totals:
+        for each in comparisons(total, bounds):
+            said = f"{each.name} {each.verdict} {each.bound:g}"
+            reasons.setdefault(said, []).append(f"{total.family} {total.method} {each}")
+    passed = all(each.verdict == "within" for total in results.totals for each in comparisons(total, bounds))
+    lines = [f"{said}: {', '.join(whose)}" for said, whose in reasons.items()]
+    if any("may be above" in said for said in reasons):
+        lines.append("More episodes narrow an interval; --judge-by rate ignores it.")
+    return (OK if passed else ABOVE), "\n".join(lines)
 
 
 _WORDS = {"failed": "failed", "cancelled": "was cancelled"}

@@ -1,4 +1,7 @@
-"""What a campaign found as JUnit XML, which CI systems show: a suite per family, a case per run. Pure."""
+"""What a campaign found as JUnit XML, which CI systems show: a suite per family, a case per run. Pure.
+
+Where there are bounds, each family and method has one more case, which fails as the exit status does.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,22 +9,29 @@ from junitparser import Error, Failure, Skipped
 from junitparser.junitparser import FinalResult
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
-from risk_sac.cli.campaigns.gate import Bounds, exceeded
-from risk_sac.cli.text import printable
-from risk_sac.client import Metrics, Results, RunResult
+from risk_sac.cli.campaigns.failures import look_command
+from risk_sac.cli.campaigns.gate import Bounds, comparisons
+from risk_sac.cli.text import counted, printable
+from risk_sac.client import Episode, Metrics, Results, RunResult, Total
 
 
-def junit(results: Results, url: str, bounds: Bounds, failures: Mapping[str, Sequence[str]]) -> JUnitXml:
+def junit(
+    results: Results, service_url: str, url: str, bounds: Bounds, failures: Mapping[str, Sequence[Episode]]
+) -> JUnitXml:
     """The report of a campaign.
 
-    A run has failed where a rate of its own lies above its bound, and is an error where it failed or was cancelled.
+    A run is an error where it failed or was cancelled, and names its failures whatever the bounds are.
 
     Args:
       results: of the campaign.
+      service_url: where the service is.
       url: of the campaign, for whoever reads the report.
-      bounds: on the rates of each run.
-      failures: ids of the first failures of a run, by its id.
+      bounds: on the rates of each family and method.
+      failures: the first failures of a run, by its id.
     """
+    named = {
+        run.id: _named(run, service_url, url, results.campaign_id, failures.get(run.id, ())) for run in results.runs
+    }
     report = JUnitXml("risk-sac")
     for family in dict.fromkeys(run.family for run in results.runs):
         suite = TestSuite(family)
@@ -29,47 +39,74 @@ def junit(results: Results, url: str, bounds: Bounds, failures: Mapping[str, Seq
         properties = {"campaign": results.campaign_id, "url": url, **_versions(runs)}
         for name, value in properties.items():
             suite.add_property(printable(name), printable(value))
-        suite.add_testcases([_case(run, url, bounds, failures.get(run.id, ())) for run in runs])
+        suite.add_testcases([_case(run, named[run.id]) for run in runs])
+        if bounds.items():
+            totals = [total for total in results.totals if total.family == family]
+            suite.add_testcases([_gate(total, results, bounds, named) for total in totals])
         report.add_testsuite(suite)
     report.update_statistics()
     return report
 
 
-def _case(run: RunResult, url: str, bounds: Bounds, failures: Sequence[str]) -> TestCase:
+def _case(run: RunResult, named: str) -> TestCase:
     case = TestCase(f"seed {run.seed}", printable(f"{run.family}.{run.method}"), round(run.busy_s, 3))
     for name, value in (("run", run.id), ("spec_digest", run.spec_digest), ("digest", run.digest)):
         if value is not None:
             case.add_property(name, printable(value))
     if run.metrics is not None:
         case.add_property("funnel", _funnel(run.metrics))
-    result = _result(run, bounds)
+    if named:
+        case.system_out = named
+    result = _result(run)
     if result is not None:
-        result.text = printable("\n".join(f"{url}/failures/{failure}" for failure in failures))
         case.append(result)
     return case
 
 
-def _result(run: RunResult, bounds: Bounds) -> FinalResult | None:
-    """None where all is fine."""
+def _result(run: RunResult) -> FinalResult | None:
+    """None where all of it was measured."""
     if run.state in ("failed", "cancelled"):
         return Error(printable(f"{run.state}: {run.reason}" if run.reason else run.state), run.state)
-    if run.state != "succeeded":
-        return Skipped(f"{run.state}: its rates can still change")
-    above = exceeded(run.metrics, bounds)
-    if run.metrics is None or not above:
-        return None
-    counts = {"ECR": f"{run.metrics.failures} valid", "PCR": f"{run.metrics.preventable} preventable"}
-    found = (
-        f"{name} {above[name]:.3f} > {bound:g}: {counts[name]} failures in {run.metrics.episodes} episodes"
-        for name, bound in bounds.items()
-        if name in above
-    )
-    return Failure("; ".join(found), " ".join(above).lower())
+    return None if run.state == "succeeded" else Skipped(f"{run.state}: its rates can still change")
+
+
+def _gate(total: Total, results: Results, bounds: Bounds, named: Mapping[str, str]) -> TestCase:
+    """Whether a family and method keeps the bounds, over all its runs."""
+    case = TestCase("all seeds", printable(f"{total.family}.{total.method}"))
+    found = list(comparisons(total, bounds))
+    broken = [each for each in found if each.verdict != "within"]
+    said = "; ".join(f"{each.name} {each.verdict} {each.bound:g}: {each}" for each in broken or found)
+    if results.state != "succeeded":
+        case.append(Skipped(f"the campaign is {results.state}: not all of it was measured"))
+    elif broken:
+        failure = Failure(said, " ".join(each.name for each in broken).lower())
+        runs = (run for run in results.runs if (run.family, run.method) == (total.family, total.method))
+        failure.text = "\n\n".join(named[run.id] for run in runs if named[run.id])
+        case.append(failure)
+    else:
+        case.system_out = said
+    return case
+
+
+def _named(run: RunResult, service_url: str, url: str, campaign_id: str, failures: Sequence[Episode]) -> str:
+    """The first failures of a run, each with how to look at it, and how to have them all again."""
+    if not failures or run.metrics is None:
+        return ""
+    lines = [f"{run.id}: {counted(run.metrics.failures, 'valid failure')}, of which the first {len(failures)}:"]
+    for failure in failures:
+        judgement = failure.collision and failure.collision.judgement
+        kind = f"{judgement.signature}; grade {judgement.grade}" if judgement else "not judged"
+        lines += [f"{failure.id}: {kind}", f"  {look_command(service_url, campaign_id, failure.id)}"]
+    pick = f"--family {run.family} --method {run.method} --seed {run.seed} --out {run.id}"
+    lines.append(f"To have them again without the service: save {url}/spec?format=yaml as spec.yaml, then")
+    lines.append(f"  risk-sac run --spec spec.yaml {pick}")
+    return printable("\n".join(lines))
 
 
 def _funnel(metrics: Metrics) -> str:
     return (
-        f"{metrics.raw_collisions} contacts, {metrics.failures} valid, {metrics.distinct_failures} distinct, "
+        f"{counted(metrics.raw_collisions, 'contact')}, {metrics.failures} valid, "
+        f"{metrics.distinct_failures} distinct, "
         f"{metrics.distinct_preventable} preventable"
     )
 

@@ -3,7 +3,7 @@
 import argparse
 import itertools
 
-from risk_sac.cli.campaigns.output import campaigns_table, line, print_answer
+from risk_sac.cli.campaigns.output import at_least_one, campaigns_table, line, print_answer
 from risk_sac.cli.campaigns.progress import shown
 from risk_sac.cli.console import OK, Commands
 from risk_sac.client import Client
@@ -18,7 +18,7 @@ def add_list(campaigns: Commands) -> None:
     parser.set_defaults(command=_list)
     for name in FILTERS:
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only with this {name}")
-    parser.add_argument("--limit", type=_count, default=LISTED, metavar="N", help=f"at most (default: {LISTED})")
+    parser.add_argument("--limit", type=at_least_one, default=LISTED, metavar="N", help=f"at most (default: {LISTED})")
 
 
 def add_cancel(campaigns: Commands) -> None:
@@ -59,10 +59,3 @@ def _delete(options: argparse.Namespace) -> int:
         client.delete(options.id)
     print_answer(options, {"id": options.id, "deleted": True}, f"{options.id} deleted")
     return OK
-
-
-def _count(text: str) -> int:
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"got {text}; wanted 1 or more")
-    return number

@@ -10,9 +10,9 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.campaigns.gate import Bounds, exceeded
+from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons
 from risk_sac.cli.console import console, or_dash
-from risk_sac.cli.text import on_one_line
+from risk_sac.cli.text import counted, on_one_line
 from risk_sac.client import CampaignSummary, Results
 
 Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]
@@ -26,9 +26,17 @@ def print_answer(options: argparse.Namespace, answer: Answer, text: Table | str)
         console.out(json.dumps(_plain(answer), allow_nan=False), highlight=False)
 
 
+def at_least_one(text: str) -> int:
+    """A number of rows, from the command line."""
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"got {text}; wanted 1 or more")
+    return number
+
+
 def line(campaign: CampaignSummary) -> str:
     """Where a campaign stands."""
-    episodes = f"{campaign.progress.episodes_done}/{campaign.progress.episodes_total} episodes"
+    episodes = f"{campaign.progress.episodes_done}/{counted(campaign.progress.episodes_total, 'episode')}"
     return f"{campaign.id} {campaign.state}: {episodes}, {figures(campaign)}"
 
 
@@ -37,7 +45,7 @@ def figures(campaign: CampaignSummary) -> str:
     progress = campaign.progress
     eta = "?" if progress.eta_s is None else f"{progress.eta_s:.0f} s"
     reason = f"; {campaign.state}, {on_one_line(campaign.reason)}" if campaign.reason else ""
-    found = f"{progress.failures} failures, {progress.distinct_preventable} distinct and preventable"
+    found = f"{counted(progress.failures, 'failure')}, {progress.distinct_preventable} distinct and preventable"
     rates = f"ECR {or_dash(progress.window_ecr, '.2f')}, PCR {or_dash(progress.window_pcr, '.2f')}"
     return f"{found}, {rates}, ETA {eta}{reason}"
 
@@ -62,7 +70,7 @@ def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
 
 
 def results_table(results: Results, bounds: Bounds) -> Table:
-    """Per family and method the funnel, and its rates above their intervals; rates above a bound are red and say so.
+    """Per family and method the funnel, and its rates above their intervals; what breaks a bound is red and says so.
 
     80 columns hold it.
     """
@@ -73,22 +81,23 @@ def results_table(results: Results, bounds: Bounds) -> Table:
     for name in ("epi-\nsodes", "con-\ntacts", "valid", "dis-\ntinct", "preven-\ntable", "ECR\n95 %", "PCR\n95 %"):
         table.add_column(name, no_wrap=True, justify="right")
     for total in results.totals:
-        above = exceeded(total, bounds)
+        broken = {each.name: each for each in comparisons(total, bounds) if each.verdict != "within"}
         table.add_row(
             total.family,
-            f"{total.method}\n{total.runs} run{'' if total.runs == 1 else 's'}",
+            f"{total.method}\n{counted(total.runs, 'run')}",
             *map(str, (total.episodes, total.raw_collisions, total.failures)),
             *map(str, (total.distinct_failures, total.distinct_preventable)),
-            _rate(total.ecr, total.ecr_low, total.ecr_high, above="ECR" in above),
-            _rate(total.pcr, total.pcr_low, total.pcr_high, above="PCR" in above),
-            style="red" if above else None,
+            _rate(total.ecr, total.ecr_low, total.ecr_high, broken.get("ECR")),
+            _rate(total.pcr, total.pcr_low, total.pcr_high, broken.get("PCR")),
+            style="red" if broken else None,
         )
     return table
 
 
-def _rate(rate: float | None, low: float | None, high: float | None, *, above: bool) -> str:
+def _rate(rate: float | None, low: float | None, high: float | None, broken: Comparison | None) -> str:
     interval = f"{or_dash(low, '.2f')}-{or_dash(high, '.2f')}"
-    return f"{or_dash(rate, '.2f')}\n{interval}" + ("\nabove" if above else "")
+    said = "" if broken is None else "\nabove" if broken.verdict == "above" else f"\nup to {broken.upper:.2f}"
+    return f"{or_dash(rate, '.2f')}\n{interval}{said}"
 
 
 def _plain(answer: Answer) -> Any:

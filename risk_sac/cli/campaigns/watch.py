@@ -5,12 +5,12 @@ import itertools
 import math
 from pathlib import Path
 
-from risk_sac.cli.campaigns.gate import Bounds, exceeded, rate, verdict
+from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, rate, verdict
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.cli.campaigns.output import print_answer, results_table
 from risk_sac.cli.campaigns.progress import shown
-from risk_sac.cli.console import Commands, complain
-from risk_sac.client import Client, Results
+from risk_sac.cli.console import OK, Commands, complain, notes
+from risk_sac.client import Client, Episode, Results
 from risk_sac.records import Grade
 
 NAMED_FAILURES = 5  # of a run, in a JUnit report
@@ -39,11 +39,13 @@ def add_watch_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def prepare(options: argparse.Namespace) -> None:
-    """Makes the folder of the report, so that nothing is waited for in vain.
+    """Checks the bounds and makes the folder of the report, so that nothing is waited for in vain.
 
     Raises:
-      OSError: it cannot be made.
+      ConfigError: nothing could keep the bounds.
+      OSError: the folder cannot be made.
     """
+    Bounds.of(options)
     if options.junit is not None:
         options.junit.parent.mkdir(parents=True, exist_ok=True)
 
@@ -80,26 +82,46 @@ def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> 
         if run.state == "failed":
             complain(f"{run.id}: {run.reason}")
     status, reason = verdict(results, bounds)
-    if reason:
+    if status == OK and reason:
+        notes.print(reason, markup=False, soft_wrap=True)
+    elif reason:
         complain(reason)
     return status
 
 
 def _report(client: Client, results: Results, bounds: Bounds, file: Path) -> None:
-    failures = {}
-    for run in results.runs:
-        if above := exceeded(run.metrics, bounds):
-            grade = None if "ECR" in above else Grade.CAREFUL  # what is too much
-            found = client.failures(results.campaign_id, run=run.id, grade=grade)
-            failures[run.id] = [each.id for each in itertools.islice(found, NAMED_FAILURES)]
-    junit(results, client.url_of(results.campaign_id), bounds, failures).write(str(file), pretty=True)
+    failures = {
+        run.id: _first_failures(client, results.campaign_id, run.id)
+        for run in results.runs
+        if run.metrics is not None and run.metrics.failures
+    }
+    url = client.url_of(results.campaign_id)
+    junit(results, client.url, url, bounds, failures).write(str(file), pretty=True)
+
+
+def _first_failures(client: Client, campaign_id: str, run_id: str) -> list[Episode]:
+    """Of a run, the preventable ones first."""
+    found: dict[str, Episode] = {}
+    for grade in (Grade.CAREFUL, None):
+        failures = client.failures(campaign_id, run=run_id, grade=grade, page=NAMED_FAILURES)
+        found |= {failure.id: failure for failure in itertools.islice(failures, NAMED_FAILURES)}
+    return list(found.values())[:NAMED_FAILURES]
 
 
 def _add_gate_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--max-ecr", type=rate, metavar="X", help="exit with 1 where an ECR is above it")
-    parser.add_argument("--max-pcr", type=rate, metavar="X", help="exit with 1 where a PCR is above it")
+    parser.add_argument("--max-ecr", type=rate, metavar="X", help="exit with 1 unless every ECR is within it")
+    parser.add_argument("--max-pcr", type=rate, metavar="X", help="exit with 1 unless every PCR is within it")
     parser.add_argument(
-        "--junit", type=Path, metavar="FILE.xml", help="report for CI: a suite per family, a case per run"
+        "--judge-by",
+        choices=JUDGED_BY,
+        default=JUDGED_BY[0],
+        help="what has to lie within: the upper end of the rate's 95 %% interval, or the rate (default: interval)",
+    )
+    parser.add_argument(
+        "--junit",
+        type=Path,
+        metavar="FILE.xml",
+        help="report for CI: a suite per family, a case per run and per method, failures named",
     )
 
 

@@ -13,7 +13,7 @@ from risk_sac.cli.show import _contacts
 from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.execution.runs import run
-from risk_sac.records import ConflictType, Grade, RunMetrics
+from risk_sac.records import ConflictType, Grade, Outcome, RunMetrics
 from risk_sac.run_folder.results import Contact, Results, read_results, write_results
 from tests.builders import judgement
 from tests.unit.failures.staged import synthetic_contact
@@ -79,6 +79,19 @@ def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(
     printed = capsys.readouterr().out
     assert "…" not in printed
     for word in (grade or "failure", "crossing vehicle", "-11.2, -1301 -1202", "wrong"):
+        assert word in printed
+
+
+def test_the_list_names_failed_rules_in_full_within_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
+    """Beside the longest name of a conflict and of an actor there is."""
+    rules = "conflict_after_release, ego_model_saw, no_spawn_overlap"
+    contact = synthetic_contact(judgement(None, conflict_type=ConflictType.CROSSING))
+    failed = contact.episode.model_copy(update={"outcome": Outcome.DEGENERATE, "reason": rules})
+    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(replace(contact, episode=failed),))
+    Console(width=80).print(_contacts(results))
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    for word in rules.replace(",", "").replace("_", " ").split():
         assert word in printed
 
 

@@ -5,32 +5,36 @@ import pytest
 
 from risk_sac.cli.campaigns.gate import Bounds, rate, verdict
 from risk_sac.client import Results
+from risk_sac.errors import ConfigError
 
 TOTAL = {
     "family": "low",
     "method": "sac",
     "runs": 1,
-    "episodes": 100,
-    "raw_collisions": 12,
-    "failures": 10,
+    "episodes": 1000,
+    "raw_collisions": 120,
+    "failures": 100,
     "ecr": 0.1,
-    "ecr_low": 0.05,
-    "ecr_high": 0.18,
+    "ecr_low": 0.083,
+    "ecr_high": 0.12,
     "efficiency": 0.0,
     "cost_rate": 0.0,
     "dispersion": None,
     "distinct_failures": 3,
     "steps_per_distinct_failure": None,
-    "preventable": 4,
+    "preventable": 40,
     "distinct_preventable": 1,
     "pcr": 0.04,
-    "pcr_low": 0.01,
-    "pcr_high": 0.1,
+    "pcr_low": 0.03,
+    "pcr_high": 0.054,
     "unresponsive": 0,
     "signatures": {},
     "conflicts_by_second": [],
     "contacts_by_second": [],
 }
+FEW = {"episodes": 60, "failures": 3, "ecr": 0.05, "ecr_low": 0.017, "ecr_high": 0.137}
+MANY = {"method": "random", "failures": 200, "ecr": 0.2, "ecr_high": 0.226}
+HINT = "\nMore episodes narrow an interval; --judge-by rate ignores it."
 
 
 def results(state: str, *totals: dict[str, Any]) -> Results:
@@ -41,30 +45,82 @@ def results(state: str, *totals: dict[str, Any]) -> Results:
     )
 
 
+def by_rate(**bounds: float) -> Bounds:
+    return Bounds(judged_by="rate", **bounds)
+
+
 def test_without_a_bound_any_number_of_failures_is_fine() -> None:
     assert verdict(results("succeeded", {"ecr": 1.0}), Bounds()) == (0, "")
 
 
-def test_an_ecr_above_the_bound_is_named() -> None:
-    found = results("succeeded", {"ecr": 0.05}, {"method": "random", "ecr": 0.2})
-    assert verdict(found, Bounds(ecr=0.1)) == (1, "ECR above 0.1: low random 0.200")
+def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() -> None:
+    status, reason = verdict(results("succeeded", FEW), Bounds(ecr=0.1))
+    assert status == 1
+    assert reason == (
+        "ECR may be above 0.1: low sac 0.050, 95 % interval up to 0.137 (3 valid failures in 60 episodes)" + HINT
+    )
+    assert verdict(results("succeeded", FEW), Bounds(ecr=0.14))[0] == 0
+
+
+def test_a_rate_that_keeps_its_bound_says_by_how_much() -> None:
+    status, reason = verdict(results("succeeded", {}), Bounds(ecr=0.2))
+    assert (status, reason) == (
+        0,
+        "ECR within 0.2: low sac 0.100, 95 % interval up to 0.120 (100 valid failures in 1000 episodes)",
+    )
+
+
+def test_the_rate_alone_is_judged_where_that_is_asked_for() -> None:
+    assert verdict(results("succeeded", FEW), by_rate(ecr=0.1)) == (
+        0,
+        "ECR within 0.1: low sac 0.050 (3 valid failures in 60 episodes)",
+    )
+    assert verdict(results("succeeded", {"ecr": 0.1, "ecr_high": 0.9}), by_rate(ecr=0.1))[0] == 0
+    assert verdict(results("succeeded", {"ecr": 0.11, "ecr_low": 0.0}), by_rate(ecr=0.1))[0] == 1
+
+
+def test_what_is_above_and_what_may_be_are_told_apart() -> None:
+    status, reason = verdict(results("succeeded", FEW, MANY), Bounds(ecr=0.1))
+    assert status == 1
+    assert reason.splitlines() == [
+        "ECR may be above 0.1: low sac 0.050, 95 % interval up to 0.137 (3 valid failures in 60 episodes)",
+        "ECR above 0.1: low random 0.200, 95 % interval up to 0.226 (200 valid failures in 1000 episodes)",
+        HINT.strip(),
+    ]
 
 
 def test_a_pcr_above_its_bound_is_named_whatever_the_ecr() -> None:
-    found = results("succeeded", {"ecr": 0.9, "pcr": 0.1}, {"method": "random", "ecr": 0.2, "pcr": 0.2})
-    assert verdict(found, Bounds(pcr=0.1)) == (1, "PCR above 0.1: low random 0.200")
-    assert verdict(found, Bounds(pcr=0.2)) == (0, "")
-    both = verdict(found, Bounds(ecr=0.5, pcr=0.05))
-    assert both == (1, "ECR above 0.5: low sac 0.900; PCR above 0.05: low sac 0.100, low random 0.200")
+    worse = {"method": "random", "pcr": 0.2, "preventable": 1, "failures": 5, "episodes": 5}
+    found = results("succeeded", {}, worse)
+    status, reason = verdict(found, by_rate(ecr=0.5, pcr=0.1))
+    assert status == 1
+    assert "PCR above 0.1: low random 0.200 (1 preventable failure in 5 episodes)" in reason
+    assert verdict(found, by_rate(ecr=0.5, pcr=0.2))[0] == 0
 
 
-def test_an_ecr_at_the_bound_is_fine_and_its_interval_is_not_looked_at() -> None:
-    assert verdict(results("succeeded", {"ecr": 0.1, "ecr_high": 0.9}), Bounds(ecr=0.1))[0] == 0
-    assert verdict(results("succeeded", {"ecr": 0.11, "ecr_low": 0.0}), Bounds(ecr=0.1))[0] == 1
+def test_few_short_runs_without_a_failure_prove_nothing() -> None:
+    """A bootstrap over two seeds says 0 to 0, whatever their length."""
+    none = {"runs": 2, "episodes": 10, "failures": 0, "ecr": 0.0, "ecr_low": 0.0, "ecr_high": 0.0}
+    status, reason = verdict(results("succeeded", none), Bounds(ecr=0.1))
+    assert status == 1
+    assert (
+        "low sac 0.000, 95 % interval up to 0.278 (0 valid failures in 10 episodes)" in reason
+    )  # 1.96² / (10 + 1.96²)
+
+
+@pytest.mark.parametrize(("field", "bounds"), [("--max-ecr", {"max_ecr": 0.0}), ("--max-pcr", {"max_pcr": 0.0})])
+def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field: str, bounds: dict[str, float]) -> None:
+    options = argparse.Namespace(**{"max_ecr": None, "max_pcr": None, "judge_by": "interval"} | bounds)
+    with pytest.raises(ConfigError, match="wanted more, or --judge-by rate") as error:
+        Bounds.of(options)
+    assert error.value.field == field
+    options.judge_by = "rate"
+    assert Bounds.of(options).items() == ((field.removeprefix("--max-").upper(), 0.0),)
 
 
 def test_controls_count_like_any_other_method() -> None:
-    assert verdict(results("succeeded", {"method": "no-adversary", "ecr": 0.01}), Bounds(ecr=0.0))[0] == 1
+    found = {"method": "no-adversary", "ecr": 0.01, "failures": 10}
+    assert verdict(results("succeeded", found), by_rate(ecr=0.0))[0] == 1
 
 
 @pytest.mark.parametrize("bounds", [Bounds(), Bounds(ecr=0.5), Bounds(pcr=0.5)])
@@ -80,7 +136,7 @@ def test_a_campaign_that_goes_on_cannot_be_judged_yet() -> None:
 
 
 def test_a_method_without_an_episode_is_not_above() -> None:
-    assert verdict(results("succeeded", {"ecr": None, "pcr": None}), Bounds(ecr=0.0, pcr=0.0))[0] == 0
+    assert verdict(results("succeeded", {"ecr": None, "pcr": None}), by_rate(ecr=0.0, pcr=0.0))[0] == 0
 
 
 @pytest.mark.parametrize("text", ["-0.1", "1.1", "nan", "inf"])

@@ -5,7 +5,8 @@ from typing import Any
 
 from risk_sac.cli.campaigns.gate import Bounds
 from risk_sac.cli.campaigns.junit import junit
-from risk_sac.client import Results
+from risk_sac.client import Episode, Results
+from tests.unit.cli.test_gate import TOTAL
 
 METRICS = {
     "episodes": 40,
@@ -37,23 +38,64 @@ RUN = {
     "busy_s": 12.5,
 }
 BOUNDS = Bounds(ecr=0.1)
+SERVICE = "http://host"
 URL = "http://host/v1/campaigns/c1"
+FAILURES = {
+    "low-sac-0": [
+        Episode.model_validate(
+            {
+                "id": f"low-sac-0-train-{index}",
+                "run_id": "low-sac-0",
+                "index": index,
+                "phase": "train",
+                "outcome": "failure",
+                "reason": "",
+                "steps": 50,
+                "collision": {
+                    "time_s": 2.0,
+                    "other_id": "left",
+                    "other_kind": "vehicle",
+                    "other_role": "adversary",
+                    "ego_zone": "front",
+                    "other_zone": "rear",
+                    "ego_speed_mps": 8.0,
+                    "other_speed_mps": 1.0,
+                    "verdicts": {},
+                    "judgement": {
+                        "conflict_type": "cut_in",
+                        "conflict_s": 0.5,
+                        "hidden": False,
+                        "broke": [],
+                        "grade": "careful",
+                        "signature": "cut-in, ahead, in a lane; ego goes straight, brakes",
+                    },
+                },
+                "funnel": None,
+            }
+        )
+        for index in (3, 9)
+    ]
+}
 
 
 def report(
-    *runs: dict[str, Any], bounds: Bounds = BOUNDS, failures: Mapping[str, Sequence[str]] | None = None
+    *runs: dict[str, Any],
+    bounds: Bounds = BOUNDS,
+    failures: Mapping[str, Sequence[Episode]] | None = None,
+    totals: Sequence[dict[str, Any]] = (),
+    state: str = "succeeded",
 ) -> ElementTree.Element:
     results = Results.model_validate(
         {
             "campaign_id": "c1",
-            "state": "running",
-            "complete": False,
-            "totals": [],
+            "state": state,
+            "complete": state == "succeeded",
+            "totals": [TOTAL | total for total in totals],
             "runs": [RUN | run for run in runs],
         }
     )
     written = io.BytesIO()
-    junit(results, URL, bounds, failures or {}).write(written, pretty=True)
+    junit(results, SERVICE, URL, bounds, failures or {}).write(written, pretty=True)
     return ElementTree.fromstring(written.getvalue())
 
 
@@ -69,33 +111,61 @@ def test_every_family_is_a_suite_and_every_run_a_case() -> None:
     assert root[0].find("testcase").attrib["time"] == "12.5"  # type: ignore[union-attr]
     assert {name: root.attrib[name] for name in ("tests", "failures", "errors")} == {
         "tests": "3",
-        "failures": "3",
+        "failures": "0",
         "errors": "0",
     }
 
 
-def test_a_run_above_the_bound_fails_and_names_its_first_failures() -> None:
-    (failure,) = report({}, failures={"low-sac-0": ["low-sac-0-train-3", "low-sac-0-train-9"]}).iter("failure")
-    assert failure.attrib["message"] == "ECR 0.250 > 0.1: 10 valid failures in 40 episodes"
-    assert failure.text == f"{URL}/failures/low-sac-0-train-3\n{URL}/failures/low-sac-0-train-9"
-
-
-def test_a_run_above_the_bound_on_preventable_failures_says_so() -> None:
-    (failure,) = report({}, bounds=Bounds(ecr=0.5, pcr=0.1)).iter("failure")
-    assert (failure.attrib["type"], failure.attrib["message"]) == (
-        "pcr",
-        "PCR 0.150 > 0.1: 6 preventable failures in 40 episodes",
+def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_does() -> None:
+    root = report({}, {"seed": 1, "id": "low-sac-1"}, totals=[{"runs": 2, "ecr": 0.25, "failures": 250}])
+    cases = [(case.attrib["classname"], case.attrib["name"]) for case in root.iter("testcase")]
+    assert cases == [("low.sac", "seed 0"), ("low.sac", "seed 1"), ("low.sac", "all seeds")]
+    (failure,) = root.iter("failure")
+    assert failure.attrib["message"] == (
+        "ECR above 0.1: 0.250, 95 % interval up to 0.278 (250 valid failures in 1000 episodes)"
     )
-    (both,) = report({}, bounds=Bounds(ecr=0.2, pcr=0.1)).iter("failure")
+
+
+def test_a_method_that_may_be_above_the_bound_fails_too() -> None:
+    few = {"episodes": 60, "failures": 3, "ecr": 0.05, "ecr_low": 0.017, "ecr_high": 0.137}
+    (failure,) = report({}, totals=[few]).iter("failure")
+    assert failure.attrib["message"].startswith("ECR may be above 0.1: 0.050, 95 % interval up to 0.137 (3 valid")
+    (case,) = (
+        case
+        for case in report({}, totals=[{}], bounds=Bounds(ecr=0.5)).iter("testcase")
+        if "all" in case.attrib["name"]
+    )
+    assert case.findtext("system-out", "").strip().startswith("ECR within 0.5: 0.100, 95 % interval up to 0.120")
+
+
+def test_failures_are_named_with_their_kind_how_to_look_at_them_and_how_to_have_them_again() -> None:
+    told = [
+        "low-sac-0: 10 valid failures, of which the first 2:",
+        "low-sac-0-train-3: cut-in, ahead, in a lane; ego goes straight, brakes; grade careful",
+        "  risk-sac campaigns failures show c1 low-sac-0-train-3 --url http://host",
+        "low-sac-0-train-9: cut-in, ahead, in a lane; ego goes straight, brakes; grade careful",
+        "  risk-sac campaigns failures show c1 low-sac-0-train-9 --url http://host",
+        f"To have them again without the service: save {URL}/spec?format=yaml as spec.yaml, then",
+        "  risk-sac run --spec spec.yaml --family low --method sac --seed 0 --out low-sac-0",
+    ]
+    green = report({}, failures=FAILURES, bounds=Bounds())
+    assert (next(green.iter("system-out")).text or "").splitlines() == told
+    (failure,) = report({}, failures=FAILURES, totals=[{"ecr": 0.25}]).iter("failure")
+    assert (failure.text or "").splitlines() == told
+
+
+def test_a_method_above_the_bound_on_preventable_failures_says_so() -> None:
+    (failure,) = report({}, bounds=Bounds(ecr=0.5, pcr=0.02), totals=[{}]).iter("failure")
+    assert failure.attrib["type"] == "pcr"
+    assert failure.attrib["message"].startswith("PCR above 0.02: 0.040, 95 % interval up to 0.054 (40 preventable")
+    (both,) = report({}, bounds=Bounds(ecr=0.05, pcr=0.02), totals=[{}]).iter("failure")
     assert both.attrib["type"] == "ecr pcr"
-    assert both.attrib["message"] == (
-        "ECR 0.250 > 0.2: 10 valid failures in 40 episodes; PCR 0.150 > 0.1: 6 preventable failures in 40 episodes"
-    )
 
 
-def test_a_run_at_the_bound_and_a_run_without_one_pass() -> None:
-    assert not list(report({}, bounds=Bounds(ecr=0.25, pcr=0.15)).iter("failure"))
-    assert not list(report({}, bounds=Bounds()).iter("failure"))
+def test_a_method_at_the_bound_and_one_without_one_pass() -> None:
+    at = Bounds(ecr=0.1, pcr=0.04, judged_by="rate")
+    assert not list(report({}, bounds=at, totals=[{}]).iter("failure"))
+    assert not list(report({}, bounds=Bounds(), totals=[{}]).iter("failure"))
 
 
 def test_a_run_that_failed_or_was_cancelled_is_an_error_and_one_that_goes_on_is_skipped() -> None:
@@ -104,9 +174,11 @@ def test_a_run_that_failed_or_was_cancelled_is_an_error_and_one_that_goes_on_is_
         {"state": "cancelled"},
         {"state": "running"},
         {"state": "queued", "metrics": None},
+        totals=[{"ecr": 0.9}],
+        state="running",
     )
     assert [error.attrib["message"] for error in root.iter("error")] == ["failed: the policy is NaN", "cancelled"]
-    assert len(list(root.iter("skipped"))) == 2
+    assert len(list(root.iter("skipped"))) == 3  # and the judgement of the method
     assert not list(root.iter("failure"))
 
 

@@ -1,4 +1,5 @@
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +31,7 @@ def test_release_and_conflict_are_marked_in_every_panel_and_the_conflict_from_ab
     for panel in panels:
         upright = [float(np.ravel(line.get_xdata())[0]) for line in panel.lines if line.get_linestyle() == ":"]
         assert upright == pytest.approx([-0.95, -1.95, conflict_s - 1.95])
-        assert [text.get_text() for text in panel.texts] == ["in view", "release", "conflict"]
-    (mark,) = (line for line in view.lines if line.get_label() == "conflict")
+    (mark,) = (line for line in view.lines if line.get_marker() == "D")
     assert (np.ravel(mark.get_xdata())[0], np.ravel(mark.get_ydata())[0]) == (302.0, -3.25)
     ghosts = [patch for patch in view.patches if patch.get_linestyle() == "--"]
     centres = [patch.get_path().vertices[:-1].mean(axis=0) for patch in ghosts]
@@ -41,12 +41,45 @@ def test_release_and_conflict_are_marked_in_every_panel_and_the_conflict_from_ab
     assert low < 280 + 10 * conflict_s < high
 
 
+def test_instants_are_named_once_above_the_panels_where_no_curve_runs() -> None:
+    _, *panels = draw_recording("mixed", Recording(synthetic_contact(), with_release())).axes
+    names = ["contact", "in the ego's view from here", "adversaries released", "conflict begins"]
+    assert [text.get_text() for text in panels[0].texts] == names
+    heights = [text.xyann[1] for text in panels[0].texts]
+    assert all(height > 0 for height in heights)
+    assert len(set(heights)) == len(heights)
+    assert not any(panel.texts for panel in panels[1:])
+
+
+def test_earlier_places_of_a_body_that_stands_are_labelled_together() -> None:
+    series = with_release()
+    still = series | {"x_m": np.where(np.arange(3) == 0, 300.0, series["x_m"])}
+    view, *_ = draw_recording("mixed", Recording(synthetic_contact(), still)).axes
+    labels = [text.get_text() for text in view.texts]
+    assert labels[-1] == "−0.5, −1, −2, −3 s"
+    moving, *_ = draw_recording("mixed", Recording(synthetic_contact(), series)).axes
+    assert [text.get_text() for text in moving.texts][-4:] == ["−0.5 s", "−1 s", "−2 s", "−3 s"]
+
+
+def test_the_ground_on_which_the_other_is_hidden_is_explained() -> None:
+    _, speeds, *_ = draw_recording("mixed", Recording(synthetic_contact(), synthetic_series())).axes
+    assert [text.get_text() for text in speeds.get_legend().get_texts()] == ["ego", "pedestrian", "hidden from the ego"]
+
+
+def test_a_scene_from_before_its_family_had_all_parameters_is_drawn_without_roads() -> None:
+    contact = synthetic_contact()
+    older = replace(contact, episode=contact.episode.model_copy(update={"scene": {"ego_speed_mps": 10.0}}))
+    roads = draw_recording("mixed", Recording(contact, synthetic_series())).axes[0].patches
+    none = draw_recording("mixed", Recording(older, synthetic_series())).axes[0].patches
+    assert len(none) < len(roads)
+
+
 def test_a_contact_that_nobody_judged_is_drawn_without_a_conflict() -> None:
     figure = draw_recording("mixed", Recording(synthetic_contact(None), synthetic_series()))
     view, *panels = figure.axes
     assert len(figure.get_suptitle().splitlines()) == 2
-    assert "conflict" not in [line.get_label() for line in view.lines]
-    assert [text.get_text() for text in panels[0].texts] == ["in view", "release"]
+    assert not [line for line in view.lines if line.get_marker() == "D"]
+    assert "conflict begins" not in [text.get_text() for text in panels[0].texts]
 
 
 def test_contact_and_first_sight_are_marked_in_every_panel() -> None:
@@ -63,7 +96,8 @@ def test_contact_and_first_sight_are_marked_in_every_panel() -> None:
 def test_both_bodies_and_both_paths_are_drawn() -> None:
     view, *_ = draw_recording("mixed", Recording(synthetic_contact(), synthetic_series())).axes
     labels = [text.get_text() for text in view.get_legend().get_texts()]
-    assert labels == ["pedestrian (adversary)", "ego", "contact", "conflict"]
+    drawn = ["pedestrian (adversary)", "ego", "touched here", "as the conflict began", "earlier", "others"]
+    assert sorted(labels) == sorted(drawn)
     paths = [line for line in view.lines if len(np.ravel(line.get_xdata())) == 21]
     assert len(paths) == 3
 

@@ -1,0 +1,124 @@
+"""`risk-sac campaigns failures list` and `show`: what a campaign found, one by one, without the server's folder."""
+
+import argparse
+import itertools
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+from rich.text import Text
+
+from risk_sac.cli.campaigns.output import at_least_one, print_answer
+from risk_sac.cli.console import OK, Commands, notes, or_dash
+from risk_sac.cli.text import in_words, printable
+from risk_sac.client import Client, Collision, Episode
+from risk_sac.errors import ConfigError
+from risk_sac.records import Grade
+
+LISTED = 20
+FILTERS = {
+    "run": "of this run",
+    "broke": "whose striker broke this, such as red_light",
+    "signature": "of this class, in the words of the list",
+}
+
+
+def add_list_failures(failures: Commands) -> None:
+    """Adds the command."""
+    parser = failures.add_parser("list", help="a campaign's failures, in the order they were found")
+    parser.set_defaults(command=_list)
+    parser.add_argument("id", metavar="ID", help="of the campaign")
+    parser.add_argument(
+        "--grade", choices=[grade.value for grade in Grade], help="only of this grade; careful: preventable"
+    )
+    for name, which in FILTERS.items():
+        parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only those {which}")
+    parser.add_argument("--raw", action="store_true", help="contacts too that a rule refused")
+    parser.add_argument("--limit", type=at_least_one, default=LISTED, metavar="N", help=f"at most (default: {LISTED})")
+
+
+def add_show_failure(failures: Commands) -> None:
+    """Adds the command."""
+    parser = failures.add_parser("show", help="one failure in words and as a picture")
+    parser.set_defaults(command=_show)
+    parser.add_argument("id", metavar="ID", help="of the campaign")
+    parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
+    parser.add_argument("--out", type=Path, metavar="FILE.png", help="the picture (default: FAILURE.png)")
+
+
+def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:
+    """What to type to look at a failure."""
+    return f"risk-sac campaigns failures show {campaign_id} {failure_id} --url {service_url}"
+
+
+def _list(options: argparse.Namespace) -> int:
+    filters = {name: getattr(options, name) for name in (*FILTERS, "grade")}
+    with Client.from_environment(options.url) as client:
+        found = client.failures(options.id, tier="raw" if options.raw else "valid", **filters)
+        failures = list(itertools.islice(found, options.limit + 1))
+    print_answer(options, failures[: options.limit], failures_table(failures[: options.limit]))
+    if len(failures) > options.limit:
+        notes.print(f"There are more: --limit is {options.limit}.")
+    return OK
+
+
+def _show(options: argparse.Namespace) -> int:
+    picture = options.out or Path(f"{options.failure}.png")
+    if picture.suffix != ".png":
+        raise ConfigError(f"got {str(picture)!r}; wanted a name that ends in .png", field="--out")
+    picture.parent.mkdir(parents=True, exist_ok=True)
+    with Client.from_environment(options.url) as client:
+        failure = client.failure(options.id, options.failure)
+        picture.write_bytes(client.picture(options.id, options.failure))
+    print_answer(options, failure, "\n".join(_lines(failure)))
+    notes.print(f"Drawn: {picture}", markup=False, soft_wrap=True)
+    return OK
+
+
+def failures_table(failures: Sequence[Episode]) -> Table:
+    """Two lines per failure; 80 columns hold it."""
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    table.add_column("id,\nwhat kind of failure it is")
+    table.add_column("outcome\ngrade", no_wrap=True)
+    table.add_column("ego's, other's\nm/s", no_wrap=True, justify="right")
+    table.add_column("failed rules,\nor what the other broke")
+    for failure in failures:
+        collision = failure.collision
+        judgement = collision and collision.judgement
+        table.add_row(
+            Text(printable(f"{failure.id}\n{judgement.signature if judgement else ''}")),
+            f"{failure.outcome}\n{(judgement and judgement.grade) or ''}",
+            _speeds(collision) if collision else "",
+            Text(printable(_wrong(failure))),
+        )
+    return table
+
+
+def _speeds(collision: Collision) -> str:
+    return f"{or_dash(collision.ego_speed_mps, '.1f')}, {or_dash(collision.other_speed_mps, '.1f')}"
+
+
+def _wrong(failure: Episode) -> str:
+    """Rules that the contact failed, or else what its striker broke."""
+    collision = failure.collision
+    if failure.reason or collision is None or collision.judgement is None:
+        return in_words([failure.reason])
+    return in_words(collision.judgement.broke)
+
+
+def _lines(failure: Episode) -> Iterator[str]:
+    """A failure in words."""
+    yield f"{failure.id}: {failure.outcome}{f' ({in_words([failure.reason])})' if failure.reason else ''}"
+    collision = failure.collision
+    if collision is None:
+        return
+    yield (
+        f"  contact    {or_dash(collision.time_s, '.1f')} s after the adversaries' release: the ego's "
+        f"{collision.ego_zone} at {or_dash(collision.ego_speed_mps, '.1f')} m/s, the {collision.other_zone} of "
+        f"{collision.other_role} {printable(collision.other_id)!r} at {or_dash(collision.other_speed_mps, '.1f')} m/s"
+    )
+    if (judgement := collision.judgement) is not None:
+        yield f"  kind       {printable(judgement.signature)}"
+        yield f"  grade      {judgement.grade or 'none: it is not valid'}"
+        yield f"  the other  broke {in_words(judgement.broke) or 'nothing'}"

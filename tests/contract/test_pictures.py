@@ -1,0 +1,221 @@
+"""The picture of a contact over REST, by the client and from a terminal: a real server with known campaigns."""
+
+import json
+import struct
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import contextmanager
+
+import httpx
+import pytest
+
+from risk_sac import cli
+from risk_sac.client import Client, Refused, Series
+from risk_sac.run_folder.results import FAILURES, series_name
+from service.settings import ServiceSettings
+from service.store.database import READERS
+from service.views import pictures
+from tests.contract.recorded_campaigns import ENDED_ID, Recorded, known_times_and_ids
+from tests.contract.serving import serving
+
+RUN = "low-risk-sac-3"
+FOLDER = f"/v1/campaigns/{ENDED_ID}/failures"
+
+
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory) -> ServiceSettings:
+    return ServiceSettings(data_dir=tmp_path_factory.mktemp("pictures"), max_workers=1)
+
+
+@contextmanager
+def recorded(settings: ServiceSettings) -> Iterator[httpx.Client]:
+    with known_times_and_ids() as clock:
+        Recorded(settings, clock).write()
+        with serving(settings) as url, httpx.Client(base_url=url, timeout=600) as client:
+            yield client
+
+
+@pytest.fixture(scope="module")
+def client(settings) -> Iterator[httpx.Client]:
+    with recorded(settings) as client:
+        yield client
+
+
+@pytest.fixture
+def fresh(tmp_path) -> Iterator[httpx.Client]:
+    """Of a service that has drawn nothing yet."""
+    with recorded(ServiceSettings(data_dir=tmp_path, max_workers=1)) as client:
+        yield client
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The pictures that are drawn, each as soon as its gate is open."""
+    draw, begun, gate = pictures.recording_bytes, [], threading.Event()
+
+    def drawing(family, recording, format_):
+        begun.append(recording.contact.id)
+        assert gate.wait(600)
+        return draw(family, recording, format_)
+
+    monkeypatch.setattr(pictures, "recording_bytes", drawing)
+    drawing.begun, drawing.gate = begun, gate
+    yield drawing
+    gate.set()
+
+
+def ids(client) -> list[str]:
+    """Of all contacts, valid or not."""
+    return [each["id"] for each in client.get(FOLDER, params={"tier": "raw"}).json()["items"]]
+
+
+def wait_for(begun: list[str]) -> None:
+    while not begun:
+        time.sleep(0.01)
+
+
+def test_every_contact_has_a_picture_that_need_not_be_sent_twice(client):
+    for failure in ids(client):
+        answer = client.get(f"{FOLDER}/{failure}/picture.png")
+        assert (answer.status_code, answer.headers["content-type"]) == (200, "image/png")
+        assert answer.headers["cache-control"] == "no-cache"
+        assert answer.content.startswith(b"\x89PNG")
+        assert min(struct.unpack(">II", answer.content[16:24])) >= 600
+        known = {"If-None-Match": answer.headers["etag"]}
+        assert client.get(f"{FOLDER}/{failure}/picture.png", headers=known).status_code == 304
+
+
+def test_pictures_of_two_contacts_have_two_tags(client):
+    tags = {client.get(f"{FOLDER}/{failure}/picture.png").headers["etag"] for failure in ids(client)[:2]}
+    assert len(tags) == 2
+
+
+def test_what_is_no_contact_has_no_picture(client):
+    for path in (f"{FOLDER}/{RUN}-train-0", f"{FOLDER}/x", f"/v1/campaigns/c0/failures/{RUN}-train-1"):
+        answer = client.get(f"{path}/picture.png")
+        assert (answer.status_code, answer.json()["reason"]) == (404, "unknown_id")
+
+
+def test_a_contact_whose_series_is_lost_or_damaged_has_no_picture_and_says_so(fresh, tmp_path):
+    file = tmp_path / "campaigns" / ENDED_ID / RUN / FAILURES / series_name(1)
+    content = file.read_bytes()
+    for breaking, why in ((lambda: file.write_bytes(content[:-1]), "is damaged"), (file.unlink, "is gone")):
+        breaking()
+        answer = fresh.get(f"{FOLDER}/{RUN}-train-1/picture.png")
+        assert (answer.status_code, answer.json()["reason"]) == (404, "series_lost")
+        assert why in answer.json()["detail"]
+        assert str(tmp_path) not in answer.text
+    file.write_bytes(content)
+    assert fresh.get(f"{FOLDER}/{RUN}-train-1/picture.png").status_code == 200
+
+
+def test_a_picture_is_drawn_once_for_all_who_ask_for_it_and_holds_up_nothing_else(fresh, drawn):
+    client = fresh
+    path = f"{FOLDER}/{ids(client)[0]}/picture.png"
+    with ThreadPoolExecutor(READERS + 5) as askers:
+        answers = [askers.submit(client.get, path) for _ in range(READERS + 5)]
+        wait_for(drawn.begun)
+        assert client.get("/healthz").status_code == 200
+        assert client.get(FOLDER).status_code == 200  # in one of the threads that read the database
+        assert not any(answer.done() for answer in answers)
+        drawn.gate.set()
+        assert len({answer.result().content for answer in answers}) == 1
+    assert len(drawn.begun) == 1
+    client.get(path)
+    assert len(drawn.begun) == 1
+
+
+def test_no_more_than_a_bounded_number_waits_and_others_are_told_when_to_come_back(fresh, drawn, monkeypatch):
+    client = fresh
+    monkeypatch.setattr(pictures, "MOST_WAITING", 1)
+    first, *others = (f"{FOLDER}/{failure}/picture.png" for failure in ids(client)[:3])
+    with ThreadPoolExecutor(3) as askers:
+        answers = [askers.submit(client.get, first)]
+        wait_for(drawn.begun)
+        answers += [askers.submit(client.get, path) for path in others]
+        refused = next(as_completed(answers)).result()
+        assert (refused.status_code, refused.headers["retry-after"]) == (503, "2")
+        assert refused.json()["reason"] == "pictures_busy"
+        drawn.gate.set()
+        assert sorted(answer.result().status_code for answer in answers) == [200, 200, 503]
+    assert client.get(refused.url.path).status_code == 200
+
+
+def test_the_client_has_the_picture_and_the_series_as_arrays_with_units(client):
+    with Client(str(client.base_url)) as remote:
+        failure = remote.failure(ENDED_ID, f"{RUN}-train-1")
+        assert isinstance(failure.series, Series)
+        assert failure.series.ids == ["ego", "lead"]
+        assert failure.series.x_m == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
+        assert failure.series.visible == [[None, True], [None, None], [None, False]]
+        assert failure.series.released_s is None
+        assert failure.model_dump(mode="json") == client.get(f"{FOLDER}/{RUN}-train-1").json()
+        assert remote.picture(ENDED_ID, failure.id) == client.get(f"{FOLDER}/{RUN}-train-1/picture.png").content
+        with pytest.raises(Refused) as refused:
+            remote.picture(ENDED_ID, f"{RUN}-train-0")
+        assert refused.value.reason == "unknown_id"
+
+
+@pytest.fixture
+def call(client, monkeypatch, capsys):
+    """What a command about failures prints, and its exit status."""
+    monkeypatch.setenv("RISK_SAC_URL", str(client.base_url))
+
+    def called(*arguments):
+        capsys.readouterr()
+        status = cli.main(["campaigns", "failures", *map(str, arguments)])
+        return status, capsys.readouterr()
+
+    return called
+
+
+def test_failures_are_listed_in_a_terminal_by_kind_and_grade(call, client):
+    status, printed = call("list", ENDED_ID)
+    assert status == 0
+    assert "…" not in printed.out
+    assert max(map(len, printed.out.splitlines())) <= 80
+    for word in (f"{RUN}-train-1", f"{RUN}-train-2", "careful", "ideal", "leader"):
+        assert word in printed.out
+    _, printed = call("list", ENDED_ID, "--json")
+    assert json.loads(printed.out) == client.get(FOLDER).json()["items"]
+
+
+def test_a_list_of_failures_is_filtered_and_says_that_there_are_more(call, client):
+    for flags, query in (
+        (["--grade", "ideal"], {"grade": "ideal"}),
+        (["--signature", "leader"], {"signature": "leader"}),
+        (["--broke", "speeding"], {"broke": "speeding"}),
+        (["--run", "low-random-3"], {"run": "low-random-3"}),
+        (["--raw"], {"tier": "raw"}),
+    ):
+        _, printed = call("list", ENDED_ID, *flags, "--json")
+        assert json.loads(printed.out) == client.get(FOLDER, params=query).json()["items"]
+        assert "more" not in printed.err
+    status, printed = call("list", ENDED_ID, "--limit", 1)
+    assert status == 0
+    assert "There are more" in printed.err
+
+
+def test_a_failure_is_shown_in_words_and_drawn_without_the_folder_of_the_server(call, client, tmp_path):
+    file = tmp_path / "new" / "a.png"
+    status, printed = call("show", ENDED_ID, f"{RUN}-train-2", "--out", file)
+    assert status == 0
+    assert file.read_bytes() == client.get(f"{FOLDER}/{RUN}-train-2/picture.png").content
+    words = (f"{RUN}-train-2: failure", "kind       leader", "grade      ideal", "the other  broke")
+    assert all(word in printed.out for word in words)
+    assert "of adversary 'lead'" in printed.out
+    assert str(file) in printed.err
+    _, printed = call("show", ENDED_ID, f"{RUN}-train-2", "--out", file, "--json")
+    assert json.loads(printed.out) == client.get(f"{FOLDER}/{RUN}-train-2").json()
+
+
+def test_a_failure_whose_picture_cannot_be_had_is_exit_status_2(call, tmp_path):
+    status, printed = call("show", ENDED_ID, "x", "--out", tmp_path / "a.png")
+    assert status == 2
+    assert "answered 404" in printed.err
+    status, printed = call("show", ENDED_ID, f"{RUN}-train-1", "--out", tmp_path / "a.svg")
+    assert status == 2
+    assert printed.err.startswith("--out: got ")
+    assert not (tmp_path / "a.png").exists()
