@@ -6,6 +6,8 @@ from typing import IO
 
 from service.errors import StorageError
 
+LOCK = ".lock"
+
 
 def try_lock(folder: Path) -> IO[bytes]:
     """Lock a folder; close the returned file to give it back.
@@ -23,4 +25,4 @@ def try_lock(folder: Path) -> IO[bytes]:
 
 
 def _open(folder: Path) -> IO[bytes]:
-    return (folder / ".lock").open("ab")
+    return (folder / LOCK).open("ab")

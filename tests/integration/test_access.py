@@ -287,11 +287,26 @@ def test_damaged_keys_let_nobody_in(world, content):
     assert ask(world, "GET", CAMPAIGN, "own").status == 200
 
 
-def test_without_keys_a_public_address_lets_nobody_in(world):
+@every_route
+def test_with_its_keys_missing_a_service_lets_nobody_in_and_says_what_to_do(world, method, path):
+    wanted, status = ROUTES[method, path]
     with keys(world, None):
         for key in (None, "own", "admin"):
-            assert_refused(ask(world, "GET", CAMPAIGN, key), 401, "unauthorized")
+            answer = ask(world, method, path, key)
+            if wanted == "nothing":
+                assert answer.status == status
+            else:
+                assert_refused(answer, 503, "keys_unavailable")
+                assert "begin anew with `risk-sac keys create --anew`" in answer.text
     assert ask(world, "GET", CAMPAIGN, "own").status == 200
+
+
+def test_an_address_that_others_reach_is_never_open(world, tmp_path):
+    file = KeyFile(tmp_path / "keys.json")
+    file.open_all()
+    with keys(world, file.path.read_bytes()):
+        for key in (None, "own", "admin"):
+            assert_refused(ask(world, "GET", CAMPAIGN, key), 401, "unauthorized")
 
 
 def test_with_all_keys_revoked_nobody_gets_in(world, tmp_path):
@@ -354,6 +369,9 @@ def test_on_loopback_nobody_needs_a_key_until_there_is_one(strict, calm):
     file.revoke(key.id)
     assert calm.get("/v1/campaigns").status_code == 401, "revoking the last key opens nothing"
     file.path.unlink()
+    refused = calm.get("/v1/campaigns")
+    assert (refused.status_code, refused.json()["reason"]) == (503, "keys_unavailable"), "nor does losing them"
+    file.open_all()
     assert calm.get("/v1/campaigns").status_code == 200
 
 
@@ -385,7 +403,7 @@ def test_keys_are_counted_apart_and_guesses_by_address(strict, calm):
         assert {calm.get("/v1/methods", headers=guess).status_code for _ in range(50)} == {401, 429}
         assert calm.get("/v1/methods", headers=idle).status_code == 200
     finally:
-        file.path.unlink()
+        file.open_all()
 
 
 def parts(size):
@@ -430,7 +448,7 @@ def test_server_refuses_to_start_where_it_could_not_keep_anybody_out(tmp_path):
     started = subprocess.run(
         [sys.executable, "-m", "service"], env=environment, capture_output=True, text=True, timeout=60
     )
-    assert started.returncode == 1
+    assert started.returncode == 2
     wanted = "wanted a loopback address, or API keys: create one with `risk-sac keys create`"
     assert started.stderr == f"host is '0.0.0.0'; {wanted}\n"
     assert list(tmp_path.iterdir()) == []

@@ -10,7 +10,6 @@ import threading
 import time
 
 import httpx
-import pytest
 
 LONG_S = 600
 
@@ -124,22 +123,6 @@ def test_an_id_that_was_never_given_is_refused(serve):
         assert response.status_code == 422, forged
         assert response.json()["reason"] == "invalid_field"
         assert [error["field"] for error in response.json()["errors"]] == ["Last-Event-ID"]
-
-
-def test_an_id_from_while_episodes_and_changes_were_numbered_apart_goes_on_or_is_refused(serve):
-    service = serve()
-    campaign_id = service.post(budget={"episodes": 2})
-    seen = list(events(service.client, campaign_id))
-    assert [event["event"] == "state" for event in seen] == [True, True, False, False, True, True]
-
-    def rest(episode, change):
-        return list(events(service.client, campaign_id, base64.b64encode(f"{episode}.{change}".encode()).decode()))
-
-    for told_before, numbers in enumerate([(0, 0), (0, 1), (0, 2), (1, 2), (2, 2), (2, 3), (2, 4)]):
-        assert rest(*numbers) == seen[told_before:]
-    for numbers in [(1, 1), (2, 0), (1, 4)]:  # told in an order that there is no more
-        with pytest.raises(AssertionError, match="assert 422 == 200"):
-            rest(*numbers)
 
 
 def test_a_stream_ends_when_its_campaign_is_deleted(serve):

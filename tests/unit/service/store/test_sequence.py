@@ -22,11 +22,6 @@ from service.store.writing import Ledger
 
 BEFORE_SEQUENCES = Path(__file__).with_name("before_sequences.sql")
 TABLES = ("campaigns", "runs", "episodes", "changes")
-# What somebody was told who followed the first campaign: numbers of the last episode and the last change, each time.
-FOLLOWED = (
-    *((0, 1), (0, 2), (0, 3), (1, 3), (2, 3), (4, 3), (6, 3), (6, 6), (7, 6), (7, 7), (8, 7), (8, 10), (9, 10)),
-    *((9, 11), (10, 11), (11, 11), (12, 11), (12, 12), (13, 12), (13, 13)),
-)
 
 
 @pytest.fixture
@@ -111,36 +106,6 @@ def test_a_row_that_was_damaged_before_is_not_sealed_anew(former_url, table):
     engine.dispose()
     with pytest.raises(StorageError, match=f"of the table '{table}' is damaged"):
         read_first(former_url)
-
-
-def test_a_former_position_is_taken_up_exactly_or_not_at_all(upgraded):
-    campaign_id = first_id(upgraded)
-    with upgraded.engine.connect() as connection:
-        events = {  # sequence: table and number
-            sequence: (table, number)
-            for table in ("episodes", "changes")
-            for sequence, number in connection.exec_driver_sql(
-                f"SELECT sequence, number FROM {table} WHERE campaign_number = 1"
-            )
-        }
-    known = [(table, number) for _, (table, number) in sorted(events.items())]
-    assert len(known) == 20
-    numbers = {kind: [0, *(number for table, number in known if table == kind)] for kind in ("episodes", "changes")}
-    for episode in numbers["episodes"]:
-        for change in numbers["changes"]:
-            limits = {"episodes": episode, "changes": change}
-            heard = {(table, number) for table, number in known if number <= limits[table]}
-            wanted = len(heard) if heard == set(known[: len(heard)]) else None
-            assert upgraded.former_position(campaign_id, episode, change) == wanted, limits
-    resumed = [each for each in FOLLOWED if upgraded.former_position(campaign_id, *each) is not None]
-    assert {(9, 11), (12, 12), (13, 13)} <= set(resumed)
-    assert len(resumed) > len(FOLLOWED) // 2
-    assert told(upgraded, campaign_id, after=upgraded.former_position(campaign_id, 13, 13)) == []
-
-
-@pytest.mark.parametrize("position", [(3, 1), (99, 13), (13, 99), (0, 4)])
-def test_a_former_position_of_another_campaign_is_none_of_this_one(upgraded, position):
-    assert upgraded.former_position(first_id(upgraded), *position) is None
 
 
 def test_a_page_of_events_ends_where_it_says(store, ledger, episode):
