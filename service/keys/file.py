@@ -110,10 +110,12 @@ class KeyFile:
             raise KeysError(f"id is {key_id!r}; wanted one that `risk-sac keys list` shows")
 
     def _whole(self) -> bool:
+        """Whether there is a file and it is not damaged; one that may not be read raises, since nobody can know."""
         try:
-            return self.load() is not None
-        except KeysError:
+            _parse(self.path.read_bytes(), self.path)
+        except (FileNotFoundError, KeysError):
             return False
+        return True
 
     @contextmanager
     def _changing(self) -> Iterator[list[Key]]:

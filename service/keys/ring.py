@@ -19,7 +19,7 @@ class KeyRing:
     """Finds keys; what a command changes in the file counts from the next request on.
 
     A request costs one look at the file's metadata. A file that cannot be read is never taken for one
-    without keys, nor one that is missing for one that never was: all raises until it is whole again.
+    without keys, nor one that is missing for one that never was: each look raises until it is whole again.
     """
 
     def __init__(self, path: Path, made: KeysMade) -> None:

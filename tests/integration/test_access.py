@@ -1,8 +1,10 @@
 """Who may do what, on real servers: every route against every way of not being allowed."""
 
+import base64
 import json
 import os
 import socket
+import sqlite3
 import subprocess
 import sys
 import time
@@ -241,6 +243,50 @@ def test_an_admin_sees_all_projects_and_others_their_own(world):
     assert "rival" in labels("other")
     assert "rival" not in labels("own")
     assert ask(world, "GET", CAMPAIGN, "admin").status == 200
+
+
+def test_an_admin_stops_and_removes_what_any_project_has_begun(world):
+    own = SimpleNamespace(**vars(world) | {"campaign": world.service.post(budget={"episodes": 100_000})})
+    own.network = upload(world.service)
+    for key, status in (("other", 404), ("reader", 403), ("admin", 202)):
+        assert ask(own, "POST", f"{CAMPAIGN}/cancel", key).status == status
+    world.service.wait(own.campaign)
+    for path in (CAMPAIGN, NETWORK):
+        for key, status in (("other", 404), ("reader", 403), ("admin", 204), ("own", 404)):
+            assert ask(own, "DELETE", path, key).status == status
+
+
+def test_what_an_admin_may_is_documented(world):
+    paths = json.loads(ask(world, "GET", "/openapi.json").text)["paths"]
+    for path, method in ((f"{CAMPAIGN}/cancel", "post"), (CAMPAIGN, "delete"), (NETWORK, "delete")):
+        assert "With an `admin` key any project's." in paths[path][method]["description"]
+
+
+def test_a_cursor_tells_nothing_of_other_projects_and_is_no_use_to_them(world):
+    headers = {name: {"authorization": f"Bearer {world.tokens[name]}"} for name in ("own", "other", "admin")}
+    for _ in range(2):
+        world.service.client.post("/v1/campaigns", json=SPEC, headers=headers["other"])
+        world.service.client.post("/v1/campaigns", json=SPEC | {"budget": {"episodes": 1}})
+    with sqlite3.connect(world.service.data_dir / "risk-sac.db") as database:
+        numbers = dict(database.execute("SELECT id, number FROM campaigns").fetchall())
+    database.close()
+    paths = {"/v1/campaigns": ("own", "other", "admin"), f"/v1/campaigns/{world.campaign}/episodes": ("own", "admin")}
+    for path, holders in paths.items():
+        for holder in holders:
+            page = world.nobody.get(path, params={"limit": 1}, headers=headers[holder]).json()
+            content = base64.urlsafe_b64decode(page["next"])
+            assert len(content) == 24
+            number = numbers.get(page["items"][0]["id"], 1)
+            assert str(number).encode() != content
+            assert number.to_bytes(8) not in content
+            for reader in headers:
+                answer = world.nobody.get(path, params={"limit": 1, "cursor": page["next"]}, headers=headers[reader])
+                known = reader in holders
+                assert answer.status_code == (200 if reader == holder else 422 if known else answer.status_code)
+                assert known or answer.status_code in (404, 422)
+            plain = base64.urlsafe_b64encode(str(number).encode()).decode()
+            forged = world.nobody.get(path, params={"cursor": plain}, headers=headers[holder])
+            assert (forged.status_code, forged.json()["reason"]) == (422, "invalid_field")
 
 
 def test_a_key_counts_from_its_creation_until_its_revocation(world):

@@ -76,6 +76,25 @@ def test_a_stream_taken_up_after_any_event_tells_exactly_the_rest(serve):
     assert (over.status_code, over.content) == (204, b"")
 
 
+def test_what_was_told_first_is_told_again_in_its_order_from_every_id(serve):
+    """Followed as it happens, through a server that stops amid it and through two runs that wait and go on."""
+    service = serve("striking_worker")
+    campaign_id = service.post(seeds=[0, 1], methods=["random", "sac"], budget={"episodes": 25})
+    first = []
+    while not (first and told(first[-1]) == ("state", None, "succeeded")):
+        for event in events(service.client, campaign_id, first[-1]["id"] if first else None):
+            first.append(event)
+            if len(first) == 20:
+                service.stop(signal.SIGKILL)
+                service.start()
+                break
+    assert ("state", "low-random-0", "queued") in map(told, first)
+    assert len(first) > 100
+    assert list(events(service.client, campaign_id)) == first
+    for index, event in enumerate(first):
+        assert list(events(service.client, campaign_id, event["id"])) == first[index + 1 :]
+
+
 def test_streams_through_killed_servers_tell_everything_once(serve):
     """Each client comes back with the last id it has; the server is killed under them again and again."""
     service = serve("striking_worker")
