@@ -37,13 +37,13 @@ def _check_secrets() -> None:
 
 
 def _line(error: ErrorDetails) -> str:
-    """What one setting is and what it should be; a list as a whole, though one of its items is to blame."""
-    name = str(error["loc"][0])
-    given = error["input"] if len(error["loc"]) == 1 else "a list with something else in it"
-    wanted = takes(ServiceSettings.model_json_schema()["properties"][name])
-    text = repr(given)
+    """What one setting is, or what is in its list, and what it should be."""
+    name, *item = error["loc"]
+    field = ServiceSettings.model_json_schema()["properties"][name]
+    text = repr(error["input"])
     shown = text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}…"
-    return f"{_variable(name)} is {shown}; wanted {wanted}"
+    verb, wanted = ("holds", takes(field["items"])) if item else ("is", takes(field))
+    return f"{_variable(str(name))} {verb} {shown}; wanted {wanted}"
 
 
 def _variable(name: str) -> str:

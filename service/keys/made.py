@@ -15,7 +15,7 @@ from service.errors import StorageError
 from service.host.data_folder import hold_data_folder
 from service.keys.file import KeyFile
 from service.settings import ServiceSettings
-from service.store.database import connect, held, sqlite_file, storage_errors
+from service.store.database import connected, held, sqlite_file
 from service.store.server import keys_were_made, noting_keys
 from service.store.steps import newest_step, present_step, step_forward
 
@@ -109,9 +109,5 @@ def _database(settings: ServiceSettings, *, make: bool = False) -> Iterator[Engi
             yield None
             return
         hold_data_folder(settings.data_dir).close()  # which makes it
-    engine = connect(settings.url)
-    try:
-        with storage_errors("opening the database"):
-            yield engine
-    finally:
-        engine.dispose()
+    with connected(settings.url, "opening the database") as engine:
+        yield engine

@@ -12,7 +12,7 @@ from service.host.data_folder import hold_data_folder
 from service.host.environment import MISUSED, read_settings
 from service.host.private import create_private
 from service.settings import ServiceSettings
-from service.store.database import connect, held, sqlite_file, storage_errors
+from service.store.database import connected, held, sqlite_file
 from service.store.steps import present_step, step_back
 
 
@@ -46,21 +46,21 @@ def _copy(settings: ServiceSettings, options: argparse.Namespace) -> str:
     if options.file.exists():
         raise StorageError(f"{str(options.file)!r} exists; wanted a file that there is not yet")
     create_private(options.file)
-    engine = connect(settings.url)
-    with storage_errors("copying the database"), closing(engine.raw_connection()) as connection:
-        connection.cursor().execute("VACUUM INTO ?", [str(options.file)])
-    engine.dispose()
+    doing = "copying the database"
+    with connected(settings.url, doing) as engine, closing(engine.raw_connection()) as connection:
+        connection.cursor().execute("VACUUM INTO ?", [str(options.file)])  # which refuses within a transaction
     return f"The database is copied to {options.file}."
 
 
 def _back(settings: ServiceSettings, options: argparse.Namespace) -> str:
     _existing(settings)
-    with hold_data_folder(settings.data_dir):
-        engine = connect(settings.url)
-        with storage_errors("taking a step back"), held(engine):
-            step_back(engine)
-            step = present_step(engine)
-        engine.dispose()
+    with (
+        hold_data_folder(settings.data_dir),
+        connected(settings.url, "taking a step back") as engine,
+        held(engine),
+    ):
+        step_back(engine)
+        step = present_step(engine)
     return f"The database is at step {step}. Start the version of the service before this one: this one steps forward."
 
 

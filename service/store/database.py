@@ -78,6 +78,17 @@ def connect(url: str) -> Engine:
     raise StorageError("database_url names another kind of database; wanted postgresql+psycopg://… or sqlite:///…")
 
 
+@contextmanager
+def connected(url: str, doing: str) -> Iterator[Engine]:
+    """The same for a while; what the driver raises meanwhile becomes a StorageError that says what was done."""
+    engine = connect(url)
+    try:
+        with storage_errors(doing):
+            yield engine
+    finally:
+        engine.dispose()
+
+
 def sqlite_file(url: str) -> Path | None:
     """The file of a SQLite database; None for any other."""
     named = make_url(url)

@@ -36,7 +36,7 @@ def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program: str, t
         "RISK_SAC_PORT is 'http'; wanted integer ≥ 1, ≤ 65535",
         "RISK_SAC_LOG_FORMAT is 'xml'; wanted `text` or `json`",
         "RISK_SAC_GRACE_S is 'nan'; wanted number > 0, ≤ 600",
-        "RISK_SAC_ALLOWED_HOSTS is a list with something else in it; wanted JSON list",
+        "RISK_SAC_ALLOWED_HOSTS holds 1; wanted text",
         "RISK_SAC_CORS_ORIGINS is '*'; wanted JSON list",
     ]
     assert list(tmp_path.iterdir()) == []
