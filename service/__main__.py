@@ -5,11 +5,11 @@ import sys
 
 import uvicorn
 
-from risk_sac.errors import RiskSacError
+from risk_sac.errors import ConfigError, RiskSacError
 from service.app import create_app
+from service.host.environment import MISUSED, read_settings
 from service.host.logs import set_up_logs
 from service.keys.exposure import check_exposure
-from service.settings import ServiceSettings
 
 ANSWERS_END_S = 2  # for answers and streams at work when the server is told to stop; workers are stopped after that
 SWITCH_S = 0.001  # for which a busy thread may hold up the event loop, and with it all answers; 5 ms by default
@@ -17,10 +17,13 @@ SWITCH_S = 0.001  # for which a busy thread may hold up the event loop, and with
 
 def main() -> None:
     """Serve until told to stop."""
-    settings = ServiceSettings()
-    set_up_logs(settings.log_format)
     try:
+        settings = read_settings()
+        set_up_logs(settings.log_format)
         check_exposure(settings)
+    except ConfigError as error:
+        print(error, file=sys.stderr)  # noqa: T201 - before there is a log
+        sys.exit(MISUSED)
     except RiskSacError as error:
         sys.exit(str(error))
     app = create_app(settings)

@@ -2,7 +2,6 @@
 
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, closing, contextmanager
-from typing import IO
 
 from anyio import to_thread
 from fastapi import FastAPI
@@ -12,6 +11,7 @@ from risk_sac import __version__
 from risk_sac.execution.executor import Executor
 from risk_sac.execution.executors import executor_named
 from service.api.answer_cache import AnswerCache
+from service.api.answers.pages import Cursors
 from service.api.answers.problems import add_problem_handlers
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
@@ -20,14 +20,16 @@ from service.api.routes import campaigns, catalogue, episodes, events, networks,
 from service.api.stream import Streams
 from service.api.telemetry.metrics import registry, request_latencies
 from service.api.telemetry.requests import Observe
-from service.errors import StorageError
-from service.host.locks import try_lock
+from service.host.data_folder import hold_data_folder
 from service.keys.exposure import check_exposure
+from service.keys.file import KeyFile
+from service.keys.made import KeysMade
 from service.networks.shelf import Shelf
 from service.runs.manager import Manager
 from service.settings import ServiceSettings
 from service.store.database import READERS, held
 from service.store.reading import Store
+from service.store.server import cursor_secret
 from service.views.pictures import Pictures
 from service.views.reports import Reports
 from service.workers.messages import Event
@@ -41,13 +43,13 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
       settings: the environment's settings.
       executor: where runs execute; by default as the settings say.
     """
-    latencies = request_latencies()
+    latencies, made = request_latencies(), KeysMade()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         to_thread.current_default_thread_limiter().total_tokens = READERS
         chosen = executor or executor_named(settings.executor)(program(settings))
-        with opened(settings, chosen, latencies) as context:
+        with opened(settings, chosen, latencies, made) as context:
             app.state.context = context
             yield
 
@@ -58,14 +60,16 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
         app.include_router(routes.router)
     add_problem_handlers(app)
     app.add_middleware(AnswerCache)
-    add_guards(app, settings)
+    add_guards(app, settings, made)
     app.add_middleware(Observe, latencies=latencies)
     app.openapi = lambda: openapi(app)  # type: ignore[method-assign]  # FastAPI's documented way
     return app
 
 
 @contextmanager
-def opened(settings: ServiceSettings, executor: Executor[Event], latencies: Histogram) -> Iterator[Context]:
+def opened(
+    settings: ServiceSettings, executor: Executor[Event], latencies: Histogram, made: KeysMade
+) -> Iterator[Context]:
     """The data folder, held exclusively, with its database open and its queue at work.
 
     Raises:
@@ -74,7 +78,12 @@ def opened(settings: ServiceSettings, executor: Executor[Event], latencies: Hist
       KeysError: the API keys cannot be read.
     """
     check_exposure(settings)
-    with _data_folder(settings), closing(Store(settings.url)) as store, held(store.engine):
+    with (
+        hold_data_folder(settings.data_dir),
+        closing(Store(settings.url)) as store,
+        held(store.engine),
+        made.kept(store.engine, KeyFile(settings.keys_file)),
+    ):
         manager = Manager(settings, store, executor)
         manager.start()
         try:
@@ -92,14 +101,6 @@ def _context(settings: ServiceSettings, store: Store, manager: Manager, latencie
         Pictures(settings),
         Shelf(settings.networks_dir),
         Streams(store),
+        Cursors(cursor_secret(store.engine)),
         registry(latencies, store, manager),
     )
-
-
-def _data_folder(settings: ServiceSettings) -> IO[bytes]:
-    try:
-        settings.data_dir.mkdir(parents=True, exist_ok=True)
-        return try_lock(settings.data_dir)
-    except OSError as error:
-        message = f"data_dir is {str(settings.data_dir)!r}; wanted a folder that can be written ({error.strerror})"
-        raise StorageError(message) from error

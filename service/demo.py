@@ -77,7 +77,7 @@ def _service(data_dir: Path, console: Console) -> Iterator[Client]:
     """A client of the service on a free loopback port, which is stopped at the end."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
-    data_dir.mkdir(parents=True, exist_ok=True)
+    data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)  # as the service wants it, which comes after the log
     log = data_dir / "service.log"
     environment = os.environ | {
         "RISK_SAC_HOST": "127.0.0.1",

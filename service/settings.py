@@ -4,12 +4,22 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic import BeforeValidator, Field
+from pydantic_core import from_json
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from risk_sac.execution.executors import ExecutorName
 
 SECRETS = os.environ.get("RISK_SAC_SECRETS_DIR")
+
+
+def _parsed(value: object) -> object:
+    """JSON as a variable holds it."""
+    return from_json(value) if isinstance(value, str) else value
+
+
+# Parsed by us: what is no JSON, pydantic-settings would tell before it had looked at any other setting.
+Names = Annotated[list[str], NoDecode, BeforeValidator(_parsed)]
 
 
 def _cores() -> int:
@@ -57,9 +67,9 @@ class ServiceSettings(BaseSettings):
     retention_days: Annotated[float, Field(gt=0)] | None = None
     """Campaigns that ended so many days ago are deleted with their files; by default none is."""
 
-    allowed_hosts: list[str] = ["localhost", "127.0.0.1", "[::1]"]
+    allowed_hosts: Names = ["localhost", "127.0.0.1", "[::1]"]
     """Host headers that are answered, a JSON list; `*` answers all. The address listened on is always one of them."""
-    cors_origins: list[str] = []
+    cors_origins: Names = []
     """Origins whose web pages may call the service, a JSON list."""
     max_body_bytes: Annotated[int, Field(ge=1024)] = 1 << 20
     """Largest body of a request, but for uploads, bytes."""

@@ -29,7 +29,7 @@ class Service:
         self.log = data_dir.with_name(f"{data_dir.name}.log")
         with socket.create_server(("127.0.0.1", 0)) as probe:
             self.port = probe.getsockname()[1]
-        self._environment = os.environ | {
+        self.environment = os.environ | {
             "PYTHONPATH": os.pathsep.join([str(ROOT), str(SCRIPTED), os.environ.get("PYTHONPATH", "")]),
             "RISK_SAC_DATA_DIR": str(data_dir),
             "RISK_SAC_PORT": str(self.port),
@@ -48,7 +48,7 @@ class Service:
         """Start it; False if it refuses."""
         with self.log.open("ab") as log:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "service"], cwd=ROOT, env=self._environment, stderr=log
+                [sys.executable, "-m", "service"], cwd=ROOT, env=self.environment, stderr=log
             )
         self.wait_until(lambda: self.process.poll() is not None or self._answers(), alive=False)
         return self.process.poll() is None

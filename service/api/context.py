@@ -6,6 +6,7 @@ from typing import Annotated, cast
 from fastapi import Depends, Request
 from prometheus_client import CollectorRegistry
 
+from service.api.answers.pages import Cursors
 from service.api.stream import Streams
 from service.networks.shelf import Shelf
 from service.runs.manager import Manager
@@ -26,6 +27,7 @@ class Context:
     pictures: Pictures
     networks: Shelf
     streams: Streams
+    cursors: Cursors
     metrics: CollectorRegistry
 
 

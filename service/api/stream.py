@@ -27,7 +27,6 @@ RETRY_MS = 1000  # after which a client whose connection broke comes back
 BATCH = 100  # events at most at once
 KEPT = 64  # batches
 _ID = re.compile(r"(\w+)-([1-9]\d{0,17})", re.ASCII)  # campaign; sequence of an event
-_FORMER_ID = re.compile(r"(\d{1,18})\.(\d{1,18})", re.ASCII)  # numbers of an episode and of a change
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,10 +98,7 @@ class Streams:
 
 
 def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None:
-    """The position that an id of this campaign's events was made of; None if it never was, or is none any more.
-
-    Ids from while episodes and changes were numbered apart hold where they were in each order. Their holders go on if
-    what they were told is the beginning of the one order that there is now.
+    """The position that an id of this campaign's events was made of; None if it never was.
 
     Raises:
       NotFoundError: there is no such campaign.
@@ -112,8 +108,6 @@ def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None
         text = base64.b64decode(event_id.encode("ascii"), altchars=b"-_", validate=True).decode("ascii")
     except (UnicodeError, binascii.Error):
         return None
-    if former := _FORMER_ID.fullmatch(text):
-        return store.former_position(campaign_id, int(former[1]), int(former[2]))
     match = _ID.fullmatch(text)
     if match is None or match[1] != campaign_id:
         return None

@@ -6,6 +6,8 @@ from typing import IO
 
 from service.errors import StorageError
 
+LOCK = ".lock"
+
 
 def try_lock(folder: Path) -> IO[bytes]:
     """Lock a folder; close the returned file to give it back.
@@ -13,7 +15,7 @@ def try_lock(folder: Path) -> IO[bytes]:
     Raises:
       StorageError: another process holds it.
     """
-    handle = (folder / ".lock").open("ab")
+    handle = (folder / LOCK).open("ab")
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:

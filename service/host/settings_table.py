@@ -17,7 +17,7 @@ def table() -> str:
     """The settings as a markdown table: variable, what it takes, its default, its meaning."""
     prefix = ServiceSettings.model_config["env_prefix"]
     rows = [
-        f"| `{prefix}{name.upper()}` | {_takes(field)} | {_default(field)} | {' '.join(field['description'].split())} |"
+        f"| `{prefix}{name.upper()}` | {takes(field)} | {_default(field)} | {' '.join(field['description'].split())} |"
         for name, field in ServiceSettings.model_json_schema()["properties"].items()
     ]
     return "\n".join(["| variable | takes | default | meaning |", "|---|---|---|---|", *rows])
@@ -32,9 +32,10 @@ def with_table(text: str) -> str:
     return f"{before}{begin}\n{table()}\n{end}{after}"
 
 
-def _takes(field: dict[str, Any]) -> str:
+def takes(field: dict[str, Any]) -> str:
+    """What a setting takes, by its JSON schema."""
     if "anyOf" in field:  # one of them is null, which is what no variable means
-        return next(_takes(each) for each in field["anyOf"] if each["type"] != "null")
+        return next(takes(each) for each in field["anyOf"] if each["type"] != "null")
     if "const" in field:
         return f"`{field['const']}`"
     if "enum" in field:

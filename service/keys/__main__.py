@@ -1,4 +1,4 @@
-"""`python -m service.keys`: create, list and revoke API keys; a running server heeds it at once."""
+"""`python -m service.keys`: create, list and revoke API keys, or do without; a running server heeds it at once."""
 
 import argparse
 import re
@@ -12,9 +12,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from risk_sac.errors import RiskSacError
-from service.keys.file import KeyFile
+from risk_sac.errors import ConfigError, RiskSacError
+from service.host.environment import MISUSED, read_settings
+from service.keys.file import KeyFile, missing
 from service.keys.key import PROJECT, Key, Scope
+from service.keys.made import ever_made, noting
 from service.settings import ServiceSettings
 
 console = Console(highlight=False, soft_wrap=True)
@@ -25,10 +27,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
     options = _parser().parse_args(arguments)
     try:
-        settings = ServiceSettings()
+        settings = read_settings()
         if options.data_dir is not None:
             settings = settings.model_copy(update={"data_dir": options.data_dir})
-        options.command(KeyFile(settings.keys_file), options)
+        options.command(settings, options)
+    except ConfigError as error:
+        errors.print(str(error), style="red", markup=False)
+        return MISUSED
     except RiskSacError as error:
         errors.print(str(error), style="red", markup=False)
         return 1
@@ -53,34 +58,63 @@ def _parser() -> argparse.ArgumentParser:
         type=Scope,
         default=Scope.RUN,
         metavar="read|run|admin",
-        help="look; also post, cancel and delete; also see all projects and the metrics (default: run)",
+        help="look; also post, cancel and delete; also all of that in every project, and the metrics (default: run)",
+    )
+    create.add_argument(
+        "--anew", action="store_true", help="in place of a lost or damaged file of keys, which are worthless then"
     )
     list_ = commands.add_parser("list", help="all keys, without their secrets", parents=[folder])
     list_.set_defaults(command=_list)
     revoke = commands.add_parser("revoke", help="make a key worthless", parents=[folder])
     revoke.set_defaults(command=_revoke)
     revoke.add_argument("id", help="as `list` shows it")
+    open_ = commands.add_parser(
+        "open", help="forget all keys; on a loopback address everybody may do everything then", parents=[folder]
+    )
+    open_.set_defaults(command=_open)
+    open_.add_argument("--yes", action="store_true", required=True, help="to say that this is meant")
     return parser
 
 
-def _create(file: KeyFile, options: argparse.Namespace) -> None:
-    key, token = file.create(options.project, options.name, options.scope)
+def _create(settings: ServiceSettings, options: argparse.Namespace) -> None:
+    file = KeyFile(settings.keys_file) if options.anew else _file(settings)
+    make = file.create_anew if options.anew else file.create
+    with noting(settings):
+        key, token = make(options.project, options.name, options.scope)
     console.print(token, markup=False)  # alone on standard output, for scripts
     errors.print(f"Key {key.id} may {key.scope} in project {key.project}. It is not stored: keep it now.", markup=False)
 
 
-def _list(file: KeyFile, options: argparse.Namespace) -> None:
+def _list(settings: ServiceSettings, options: argparse.Namespace) -> None:
     table = Table(box=SIMPLE_HEAD)
     for name in ("id", "project", "scope", "created", "revoked", "name"):
         table.add_column(name, no_wrap=True)
-    for key in file.read():
+    for key in _file(settings).read():
         table.add_row(key.id, key.project, key.scope, _date(key.created_at), _date(key.revoked_at), escape(key.name))
     console.print(table)
 
 
-def _revoke(file: KeyFile, options: argparse.Namespace) -> None:
-    key: Key = file.revoke(options.id)
+def _revoke(settings: ServiceSettings, options: argparse.Namespace) -> None:
+    key: Key = _file(settings).revoke(options.id)
     console.print(f"Key {key.id} of project {key.project} is revoked.", markup=False)
+
+
+def _open(settings: ServiceSettings, options: argparse.Namespace) -> None:
+    KeyFile(settings.keys_file).open_all()
+    console.print("All keys are forgotten. On a loopback address nobody needs one until the next is created.")
+
+
+def _file(settings: ServiceSettings) -> KeyFile:
+    """The file of keys.
+
+    Raises:
+      KeysError: it is missing although keys were made.
+      StorageError: that cannot be known.
+    """
+    file = KeyFile(settings.keys_file)
+    if not file.path.exists() and ever_made(settings):
+        raise missing(file.path)
+    return file
 
 
 def _project(text: str) -> str:

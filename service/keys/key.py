@@ -24,7 +24,7 @@ class Scope(StrEnum):
 
     READ = "read"  # look at its project's campaigns
     RUN = "run"  # post, cancel and delete them
-    ADMIN = "admin"  # see all projects, and the metrics
+    ADMIN = "admin"  # all of that in every project, since somebody has to stop a runaway campaign; and see the metrics
 
     def includes(self, other: "Scope") -> bool:
         """Whether whoever has this scope may do what `other` allows."""

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from service.errors import KeysError
-from service.keys.file import KeyFile
+from service.keys.file import Document, KeyFile, missing
 from service.keys.key import Key, split
+from service.keys.made import KeysMade
 
 logger = logging.getLogger(__name__)
 
@@ -18,34 +19,57 @@ class KeyRing:
     """Finds keys; what a command changes in the file counts from the next request on.
 
     A request costs one look at the file's metadata. A file that cannot be read is never taken for one
-    without keys: `keys` raises until it can.
+    without keys, nor one that is missing for one that never was: each look raises until it is whole again.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, made: KeysMade) -> None:
         self._path = path
+        self._made = made
         self._signature: _Signature | None = None
+        self._document: Document | None = None
         self._keys: Mapping[str, Key] = {}
         self._problem = ""
+
+    @property
+    def open(self) -> bool:
+        """Whether a process of this machine needs no key: none was ever made, or an administrator has said so.
+
+        Raises:
+          KeysError: the file cannot be read, is damaged, or is missing.
+        """
+        self.keys()
+        return self._document is None or self._document.open
 
     def keys(self) -> Mapping[str, Key]:
         """All keys by id, revoked ones too.
 
         Raises:
-          KeysError: the file cannot be read, or is damaged.
+          KeysError: the file cannot be read, is damaged, or is missing although keys were made.
         """
-        # Before it is read: a change that comes between shows as another signature the next time.
+        # Before the file is looked at, since it is there before anybody can know of its keys; and before it is read: a
+        # change that comes between shows as another signature the next time.
+        made = self._made.known
         signature = _signature(self._path)
-        if signature != self._signature:
-            self._signature = None  # and stays so if the file cannot be read: the next request tries again
-            self._keys = self._read()
-            self._signature = signature
+        try:
+            if signature != self._signature:
+                self._signature = None  # and stays so if the file cannot be read: the next request tries again
+                self._document = self._read()
+                self._signature = signature
+            if made and self._document is None:
+                raise missing(self._path)
+        except KeysError as error:
+            if str(error) != self._problem:  # once, not with every request
+                logger.error("%s; until then every request is refused", error)
+            self._problem = str(error)
+            raise
+        self._problem = ""
         return self._keys
 
     def find(self, token: str) -> Key | None:
         """The key that this is the token of; None if there is none that still counts.
 
         Raises:
-          KeysError: the file cannot be read, or is damaged.
+          KeysError: the file cannot be read, is damaged, or is missing although keys were made.
         """
         keys = self.keys()
         parts = split(token)
@@ -54,21 +78,20 @@ class KeyRing:
         key = keys.get(parts[0])
         return key if key is not None and key.opened_by(parts[1]) else None
 
-    def _read(self) -> Mapping[str, Key]:
-        try:
-            keys = {key.id: key for key in KeyFile(self._path).read()}
-        except KeysError as error:
-            if str(error) != self._problem:  # once, not with every request
-                logger.error("%s; until then every request is refused", error)
-            self._problem = str(error)
-            raise
-        self._problem = ""
-        revoked = sum(key.revoked_at is not None for key in keys.values())
-        if keys and revoked == len(keys):
+    def _read(self) -> Document | None:
+        document = KeyFile(self._path).load()
+        self._keys = {} if document is None else {key.id: key for key in document.keys}
+        if document is None:
+            return None
+        self._made.known = True
+        revoked = sum(key.revoked_at is not None for key in document.keys)
+        if document.open:
+            logger.warning("an administrator has let in every process of this machine without an API key")
+        elif revoked == len(document.keys):
             logger.warning("all %d API keys are revoked: every request is refused until one is created", revoked)
-        elif keys:
-            logger.info("%d API keys, %d of them revoked", len(keys), revoked)
-        return keys
+        else:
+            logger.info("%d API keys, %d of them revoked", len(document.keys), revoked)
+        return document
 
 
 def _signature(path: Path) -> _Signature:

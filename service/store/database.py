@@ -15,13 +15,12 @@ from itertools import takewhile
 from pathlib import Path
 from sqlite3 import Connection as SqliteConnection
 
-from alembic import command
-from alembic.config import Config
-from alembic.util import CommandError
 from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DatabaseError, IntegrityError, NoSuchModuleError, ProgrammingError
 
 from service.errors import StorageError
+from service.host.private import create_private, make_private
+from service.store.steps import step_forward
 
 logger = logging.getLogger(__name__)
 
@@ -34,6 +33,7 @@ LOG_FRAME = struct.Struct(">6I")  # page, size after a commit, two salts, two ch
 # Options of a connection that will write. On SQLite a transaction that first reads is refused once it writes, without a
 # wait, if another one has written meanwhile.
 WRITING = {"begin": "BEGIN IMMEDIATE"}
+SIDE_FILES = ("-wal", "-shm")  # which SQLite makes with the mode of the database
 PRAGMAS = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_timeout=5000")
 
 
@@ -43,18 +43,56 @@ def open_database(url: str) -> Engine:
     Raises:
       StorageError: it cannot be opened, is damaged, belongs to a newer version, or is another server's.
     """
-    engine = _engine(url)
+    engine = connect(url)
     logged = _logged_frames(Path(engine.url.database or "")) if engine.dialect.name == "sqlite" else 0
     try:
         with storage_errors("opening the database"):
             if logged and (dropped := logged - _taken_frames(engine)) > 0:
                 logger.warning("the last %d frames of the journal hold no whole commit; runs tell again", dropped)
             _check(engine)
-            _upgrade(engine)
+            step_forward(engine)
     except BaseException:
         engine.dispose()
         raise
     return engine
+
+
+def connect(url: str) -> Engine:
+    """A database as it is, neither checked nor brought up to date; SQLite's file is made where there is none.
+
+    Raises:
+      StorageError: the URL names no database that can be used, or others can read its file and that cannot be mended.
+    """
+    try:
+        kind = make_url(url).get_backend_name()
+        if kind == "sqlite":
+            _keep_to_ourselves(sqlite_file(url))
+            engine = create_engine(url, pool_size=READERS)
+            event.listen(engine, "connect", _set_up)
+            event.listen(engine, "begin", _begin)
+            return engine
+        if kind == "postgresql":
+            return create_engine(url, pool_size=READERS, pool_pre_ping=True)
+    except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
+        raise StorageError(f"database_url cannot be used: {error}") from error
+    raise StorageError("database_url names another kind of database; wanted postgresql+psycopg://… or sqlite:///…")
+
+
+@contextmanager
+def connected(url: str, doing: str) -> Iterator[Engine]:
+    """The same for a while; what the driver raises meanwhile becomes a StorageError that says what was done."""
+    engine = connect(url)
+    try:
+        with storage_errors(doing):
+            yield engine
+    finally:
+        engine.dispose()
+
+
+def sqlite_file(url: str) -> Path | None:
+    """The file of a SQLite database; None for any other."""
+    named = make_url(url)
+    return Path(named.database) if named.get_backend_name() == "sqlite" and named.database else None
 
 
 @contextmanager
@@ -91,18 +129,13 @@ def storage_errors(doing: str) -> Iterator[None]:
         raise StorageError(f"storage failed while {doing}: {str(error.orig).strip()}") from error
 
 
-def _engine(url: str) -> Engine:
-    try:
-        if make_url(url).get_backend_name() == "sqlite":
-            engine = create_engine(url, pool_size=READERS)
-            event.listen(engine, "connect", _set_up)
-            event.listen(engine, "begin", _begin)
-            return engine
-        if make_url(url).get_backend_name() == "postgresql":
-            return create_engine(url, pool_size=READERS, pool_pre_ping=True)
-    except (ArgumentError, NoSuchModuleError, ModuleNotFoundError) as error:
-        raise StorageError(f"database_url cannot be used: {error}") from error
-    raise StorageError("database_url names another kind of database; wanted postgresql+psycopg://… or sqlite:///…")
+def _keep_to_ourselves(file: Path | None) -> None:
+    """Let nobody else read a SQLite database, neither a new one nor one from before this was seen to."""
+    if file is None:
+        return
+    create_private(file)
+    for path in (file, *(file.with_name(f"{file.name}{end}") for end in SIDE_FILES)):
+        make_private(path)
 
 
 def _set_up(connection: SqliteConnection, _: object) -> None:
@@ -146,15 +179,3 @@ def _check(engine: Engine) -> None:
         raise StorageError(f"database {engine.url.database!r} is damaged ({found[0]}); restore a copy or move it away")
     if orphan is not None:
         raise StorageError(f"database {engine.url.database!r} is damaged ({orphan[0]!r} lacks its {orphan[2]!r} row)")
-
-
-def _upgrade(engine: Engine) -> None:
-    """All missing steps in one transaction, so that a server that dies in between leaves the old tables."""
-    config = Config()
-    config.set_main_option("script_location", "service.store:migrations")
-    with engine.begin() as connection:
-        config.attributes["connection"] = connection
-        try:
-            command.upgrade(config, "head")
-        except CommandError as error:
-            raise StorageError(f"database cannot be brought up to date: {error}; a newer version wrote it") from error

@@ -14,7 +14,7 @@ from service.store.counting import HOUR_S
 from service.store.database import open_database, storage_errors
 from service.store.finding import Judged, episode_page, find_campaign, find_run, split_failure_id, unknown_failure
 from service.store.revisions import Revisions
-from service.store.sequence import event_page, former_position
+from service.store.sequence import event_page
 from service.store.states import FINAL, State
 from service.store.stored import Page, StoredCampaign, StoredChange, StoredEpisode, StoredRun, Usage
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, UsageRow
@@ -121,15 +121,6 @@ class Store:
         """
         with self._reading() as session:
             return event_page(session, find_campaign(session, campaign_id), limit, after)
-
-    def former_position(self, campaign_id: str, episode: int, change: int) -> int | None:
-        """Where those go on who were told events while episodes and changes were numbered apart; None: nowhere.
-
-        Raises:
-          NotFoundError: there is no such campaign.
-        """
-        with self._reading() as session:
-            return former_position(session, find_campaign(session, campaign_id), episode, change)
 
     def episodes(
         self,

@@ -6,7 +6,7 @@ ends. So numbers become visible in their order and leave no gap: whoever has rea
 
 from operator import attrgetter
 
-from sqlalchemy import ColumnElement, func, select
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
 from service.errors import StorageError
@@ -51,23 +51,3 @@ def event_page(session: Session, campaign: CampaignRow, limit: int, after: int) 
         raise StorageError(f"events {after + 1} to {last} of campaign {campaign.id} are {len(found)}; restore a copy")
     items = tuple(sorted(found, key=attrgetter("sequence")))
     return Page(items=items, last=last if last < campaign.events else None)
-
-
-def former_position(session: Session, campaign: CampaignRow, episode: int, change: int) -> int | None:
-    """Where somebody goes on who was told all up to an episode and a change, each by its row's number; 0 for none.
-
-    None: there are no such rows, or what they were told is not the beginning of the order that there is now.
-    """
-    told = []
-    for table, number in ((EpisodeRow, episode), (ChangeRow, change)):
-        count, last, sequence = session.execute(
-            select(func.count(), func.max(table.number), func.max(table.sequence)).where(
-                table.campaign_number == campaign.number, table.number <= number
-            )
-        ).one()
-        if (last or 0) != number:
-            return None
-        told.append((count, sequence or 0))
-    counts, sequences = zip(*told, strict=True)
-    position: int = max(sequences)
-    return position if position == sum(counts) else None

@@ -1,4 +1,4 @@
-"""The database: campaigns, their runs, the runs' episodes, what changed when, and who used how much.
+"""The database: campaigns, their runs, the runs' episodes, what changed when, who used how much, and the server's own.
 
 Records of the method are stored as the JSON that the worker sent; what is filtered or counted has a
 column of its own. Numbers are primary keys in order of arrival, so that a page continues where the
@@ -176,6 +176,16 @@ class UsageRow(Checked, Base):
     project: Mapped[str] = mapped_column(primary_key=True)
     hour: Mapped[int] = mapped_column(primary_key=True)
     busy_s: Mapped[float]
+
+
+class ServerRow(Checked, Base):
+    """The one row that the server keeps of itself."""
+
+    __tablename__ = "server"
+
+    number: Mapped[int] = mapped_column(primary_key=True)
+    cursor_secret: Mapped[str]  # 32 bytes, hexadecimal
+    keys_made_at: Mapped[float | None]  # when the first API key was made, or seen; seconds since the epoch
 
 
 def checksum(row: Checked) -> int:

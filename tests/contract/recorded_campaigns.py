@@ -114,6 +114,7 @@ def known_times_and_ids() -> Iterator[Clock]:
     clock, ids = Clock(), iter((ENDED_ID, LIVE_ID, CANCELLED_ID, POSTED_ID))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(time, "time", clock)
+        patch.setattr("secrets.token_bytes", bytes)
         patch.setattr("secrets.token_hex", lambda _: next(ids).removeprefix("c"))
         yield clock
 

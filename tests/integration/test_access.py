@@ -1,8 +1,10 @@
 """Who may do what, on real servers: every route against every way of not being allowed."""
 
+import base64
 import json
 import os
 import socket
+import sqlite3
 import subprocess
 import sys
 import time
@@ -244,6 +246,50 @@ def test_an_admin_sees_all_projects_and_others_their_own(world):
     assert ask(world, "GET", CAMPAIGN, "admin").status == 200
 
 
+def test_an_admin_stops_and_removes_what_any_project_has_begun(world):
+    own = SimpleNamespace(**vars(world) | {"campaign": world.service.post(budget={"episodes": 100_000})})
+    own.network = upload(world.service)
+    for key, status in (("other", 404), ("reader", 403), ("admin", 202)):
+        assert ask(own, "POST", f"{CAMPAIGN}/cancel", key).status == status
+    world.service.wait(own.campaign)
+    for path in (CAMPAIGN, NETWORK):
+        for key, status in (("other", 404), ("reader", 403), ("admin", 204), ("own", 404)):
+            assert ask(own, "DELETE", path, key).status == status
+
+
+def test_what_an_admin_may_is_documented(world):
+    paths = json.loads(ask(world, "GET", "/openapi.json").text)["paths"]
+    for path, method in ((f"{CAMPAIGN}/cancel", "post"), (CAMPAIGN, "delete"), (NETWORK, "delete")):
+        assert "With an `admin` key any project's." in paths[path][method]["description"]
+
+
+def test_a_cursor_tells_nothing_of_other_projects_and_is_no_use_to_them(world):
+    headers = {name: {"authorization": f"Bearer {world.tokens[name]}"} for name in ("own", "other", "admin")}
+    for _ in range(2):
+        world.service.client.post("/v1/campaigns", json=SPEC, headers=headers["other"])
+        world.service.client.post("/v1/campaigns", json=SPEC | {"budget": {"episodes": 1}})
+    with sqlite3.connect(world.service.data_dir / "risk-sac.db") as database:
+        numbers = dict(database.execute("SELECT id, number FROM campaigns").fetchall())
+    database.close()
+    paths = {"/v1/campaigns": ("own", "other", "admin"), f"/v1/campaigns/{world.campaign}/episodes": ("own", "admin")}
+    for path, holders in paths.items():
+        for holder in holders:
+            page = world.nobody.get(path, params={"limit": 1}, headers=headers[holder]).json()
+            content = base64.urlsafe_b64decode(page["next"])
+            assert len(content) == 24
+            number = numbers.get(page["items"][0]["id"], 1)
+            assert str(number).encode() != content
+            assert number.to_bytes(8) not in content
+            for reader in headers:
+                answer = world.nobody.get(path, params={"limit": 1, "cursor": page["next"]}, headers=headers[reader])
+                known = reader in holders
+                assert answer.status_code == (200 if reader == holder else 422 if known else answer.status_code)
+                assert known or answer.status_code in (404, 422)
+            plain = base64.urlsafe_b64encode(str(number).encode()).decode()
+            forged = world.nobody.get(path, params={"cursor": plain}, headers=headers[holder])
+            assert (forged.status_code, forged.json()["reason"]) == (422, "invalid_field")
+
+
 def test_a_key_counts_from_its_creation_until_its_revocation(world):
     key, token = world.file.create("maps", "", Scope.READ)
     assert ask(world, "GET", CAMPAIGN, token).status == 200
@@ -288,11 +334,26 @@ def test_damaged_keys_let_nobody_in(world, content):
     assert ask(world, "GET", CAMPAIGN, "own").status == 200
 
 
-def test_without_keys_a_public_address_lets_nobody_in(world):
+@every_route
+def test_with_its_keys_missing_a_service_lets_nobody_in_and_says_what_to_do(world, method, path):
+    wanted, status = ROUTES[method, path]
     with keys(world, None):
         for key in (None, "own", "admin"):
-            assert_refused(ask(world, "GET", CAMPAIGN, key), 401, "unauthorized")
+            answer = ask(world, method, path, key)
+            if wanted == "nothing":
+                assert answer.status == status
+            else:
+                assert_refused(answer, 503, "keys_unavailable")
+                assert "begin anew with `risk-sac keys create --anew`" in answer.text
     assert ask(world, "GET", CAMPAIGN, "own").status == 200
+
+
+def test_an_address_that_others_reach_is_never_open(world, tmp_path):
+    file = KeyFile(tmp_path / "keys.json")
+    file.open_all()
+    with keys(world, file.path.read_bytes()):
+        for key in (None, "own", "admin"):
+            assert_refused(ask(world, "GET", CAMPAIGN, key), 401, "unauthorized")
 
 
 def test_with_all_keys_revoked_nobody_gets_in(world, tmp_path):
@@ -355,6 +416,9 @@ def test_on_loopback_nobody_needs_a_key_until_there_is_one(strict, calm):
     file.revoke(key.id)
     assert calm.get("/v1/campaigns").status_code == 401, "revoking the last key opens nothing"
     file.path.unlink()
+    refused = calm.get("/v1/campaigns")
+    assert (refused.status_code, refused.json()["reason"]) == (503, "keys_unavailable"), "nor does losing them"
+    file.open_all()
     assert calm.get("/v1/campaigns").status_code == 200
 
 
@@ -386,7 +450,7 @@ def test_keys_are_counted_apart_and_guesses_by_address(strict, calm):
         assert {calm.get("/v1/methods", headers=guess).status_code for _ in range(50)} == {401, 429}
         assert calm.get("/v1/methods", headers=idle).status_code == 200
     finally:
-        file.path.unlink()
+        file.open_all()
 
 
 def parts(size):
@@ -431,7 +495,7 @@ def test_server_refuses_to_start_where_it_could_not_keep_anybody_out(tmp_path):
     started = subprocess.run(
         [sys.executable, "-m", "service"], env=environment, capture_output=True, text=True, timeout=60
     )
-    assert started.returncode == 1
+    assert started.returncode == 2
     wanted = "wanted a loopback address, or API keys: create one with `risk-sac keys create`"
     assert started.stderr == f"host is '0.0.0.0'; {wanted}\n"
     assert list(tmp_path.iterdir()) == []

@@ -16,7 +16,11 @@ from typing import Any
 
 from risk_sac.config import METHODS
 from risk_sac.scenario.families import FAMILIES
-from service.api.answers.pages import encode_cursor
+from service.api.answers.pages import Cursors
+from service.api.routes.campaigns import LISTED
+from service.settings import ServiceSettings
+from service.store.database import connect
+from service.store.server import cursor_secret
 from service.store.states import FINAL
 from tests.load.population import LABELS, RARE_LABEL, Plan, populate
 from tests.load.resources import processor_s
@@ -83,6 +87,7 @@ class Asking:
 
     def __init__(self, service: Service, plans: Sequence[Plan]) -> None:
         self._port = service.port
+        self._cursors = Cursors(cursor_secret(connect(ServiceSettings(data_dir=service.data_dir).url)))
         self._server = service.process.pid
         self._plans = plans
         self._large = max(plans, key=lambda plan: len(plan.spec.runs()))
@@ -91,7 +96,9 @@ class Asking:
     async def all(self) -> dict[str, Answers]:
         """All questions, one after another."""
         connection = await Polling.open(self._port)
-        questions = _lists(self._plans) | _campaigns(self._plans, self._large, await self._contacts(connection))
+        contacts = await self._contacts(connection)
+        questions = _lists(self._plans, self._cursors)
+        questions |= _campaigns(self._plans, self._large, contacts, self._cursors)
         answers = {
             name: await self._time(lambda path=path: self._ask(connection, path(self._chance)))
             for name, path in questions.items()
@@ -143,15 +150,18 @@ class Asking:
         return took_ms
 
 
-def _lists(plans: Sequence[Plan]) -> dict[str, Question]:
+def _lists(plans: Sequence[Plan], cursors: Cursors) -> dict[str, Question]:
     """Pages of campaigns; the newest ones by a cursor that no request before had."""
     families, methods, states = list(FAMILIES), list(METHODS), sorted(FINAL)
 
+    def older(number: int) -> str:
+        return f"/v1/campaigns?cursor={cursors.encode(number, LISTED, None)}"
+
     def newest(chance: Random) -> str:
-        return f"/v1/campaigns?cursor={encode_cursor(NEWER + chance.getrandbits(30))}"
+        return older(NEWER + chance.getrandbits(30))
 
     def deep(chance: Random) -> str:
-        return f"/v1/campaigns?cursor={encode_cursor(chance.choice(plans).number)}"
+        return older(chance.choice(plans).number)
 
     def narrow(chance: Random) -> str:
         search = f"&family={chance.choice(families)}&method={chance.choice(methods)}"
@@ -170,7 +180,7 @@ def _lists(plans: Sequence[Plan]) -> dict[str, Question]:
     }
 
 
-def _campaigns(plans: Sequence[Plan], large: Plan, contacts: Sequence[str]) -> dict[str, Question]:
+def _campaigns(plans: Sequence[Plan], large: Plan, contacts: Sequence[str], cursors: Cursors) -> dict[str, Question]:
     """What is asked about one campaign: any of them, and the largest, which has many runs."""
     runs = [run.id for run in large.spec.runs()]
     episodes = f"/v1/campaigns/{large.id}/episodes"
@@ -181,7 +191,7 @@ def _campaigns(plans: Sequence[Plan], large: Plan, contacts: Sequence[str]) -> d
 
     def somewhere(path: str) -> Question:
         # Numbers of episodes lie between those of the campaigns and a few hundred times as much.
-        return lambda chance: f"{path}cursor={encode_cursor(chance.randrange(1, len(plans) * 100))}"
+        return lambda chance: f"{path}cursor={cursors.encode(chance.randrange(1, len(plans) * 100), large.id, None)}"
 
     return {
         "status": about(""),

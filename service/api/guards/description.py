@@ -8,7 +8,7 @@ _SECURITY = {
     "ApiKey": {
         "type": "http",
         "scheme": "bearer",
-        "description": "Made by `risk-sac keys create`. On a loopback address none is needed until there is one.",
+        "description": "Made by `risk-sac keys create`. On a loopback address none is needed until one was made.",
     }
 }
 _WAIT = {"Retry-After": {"description": "Seconds until asking again pays.", "schema": {"type": "integer"}}}
@@ -19,7 +19,7 @@ _COUNTED: _Answers = {"429": ("Too many requests, or too much for the project's 
 _GUARDED: _Answers = {
     "401": ("The API key is missing, wrong or revoked", _SCHEME),
     "403": ("The API key does not reach so far, or the request comes from a foreign page", {}),
-    "503": ("The API keys cannot be read", {}),
+    "503": ("The API keys are lost or damaged; `detail` says what whoever runs the service can do", {}),
 }
 
 

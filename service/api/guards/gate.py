@@ -16,7 +16,9 @@ from service.api.guards.rate import RateLimit
 from service.api.guards.refusal import refuse
 from service.errors import KeysError
 from service.keys.exposure import is_loopback
+from service.keys.file import REMEDY
 from service.keys.key import Scope as KeyScope
+from service.keys.made import KeysMade
 from service.keys.ring import KeyRing
 from service.schemas.problems import Reason
 from service.settings import ServiceSettings
@@ -30,12 +32,12 @@ RequestHeaders = Mapping[bytes, bytes]
 class Gate:
     """ASGI middleware: host, origin, key, rate and scope, in this order."""
 
-    def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
+    def __init__(self, app: ASGIApp, settings: ServiceSettings, made: KeysMade) -> None:
         self._app = app
         self._hosts = Hosts([*settings.allowed_hosts, settings.host])
         self._origins = Origins(settings.cors_origins)
         self._rate = RateLimit(settings.rate_limit)
-        self._keys = KeyRing(settings.keys_file)
+        self._keys = KeyRing(settings.keys_file, made)
         self._keyless = is_loopback(settings.host)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -101,12 +103,12 @@ class Gate:
           ProblemError: 401, or 503 where that cannot be known.
         """
         try:
-            if not self._keys.keys() and self._keyless:
+            if self._keys.open and self._keyless:
                 return LOCAL
             scheme, _, token = headers.get(b"authorization", b"").decode("latin-1").partition(" ")
             key = self._keys.find(token.strip()) if scheme.lower() == "bearer" else None
         except KeysError as error:
-            detail = "the API keys cannot be read, so nobody is let in; the service's log says why"
+            detail = f"the API keys are lost or damaged, so nobody is let in; whoever runs the service: {REMEDY}"
             raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.KEYS_UNAVAILABLE, detail) from error
         if key is None:
             given = "not one that counts" if scheme else "missing"

@@ -10,7 +10,7 @@ from risk_sac import __version__
 from risk_sac.config import FamilyName, MethodName
 from service.api.access import Caller, CurrentCaller
 from service.api.answer_cache import keep
-from service.api.answers.pages import Cursor, Limit, decode_cursor, encode_cursor
+from service.api.answers.pages import Cursor, Limit
 from service.api.answers.representations import Representation, caching, entity_tag
 from service.api.answers.responses import (
     ACCEPTED,
@@ -35,6 +35,7 @@ from service.views.bodies import campaign_body, summary_body
 from service.views.progress import retry_after_s
 from service.views.totals import results
 
+LISTED = "campaigns"
 POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON
 IdempotencyKey = Annotated[
     str | None,
@@ -78,7 +79,7 @@ def list_campaigns(
     revision = service.store.revision_of_all()
     page = service.store.campaigns(
         limit,
-        decode_cursor(cursor),
+        service.cursors.decode(cursor, LISTED, caller.sees),
         project=caller.sees,
         state=state,
         family=family,
@@ -86,7 +87,8 @@ def list_campaigns(
         label=label,
     )
     items = [summary_body(campaign, service.settings) for campaign in page.items]
-    body = CampaignPage(items=items, next=encode_cursor(page.last)).model_dump_json().encode()
+    cursor = service.cursors.encode(page.last, LISTED, caller.sees)
+    body = CampaignPage(items=items, next=cursor).model_dump_json().encode()
     tag = entity_tag(blake2b(body, digest_size=8).hexdigest())
     representation = Representation(body, tag, caching(tag))
     keep(request, representation, revision)
@@ -95,14 +97,14 @@ def list_campaigns(
 
 @router.post("/{campaign_id}/cancel", status_code=202, response_model=Campaign, responses=UNKNOWN | ACCEPTED)
 def cancel_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> Response:
-    """Stop a campaign and keep what it found; changes nothing once it has ended."""
+    """Stop a campaign and keep what it found; changes nothing once it has ended. With an `admin` key any project's."""
     campaign = service.manager.cancel(campaign_id, caller.sees)
     return _accepted(campaign, service)
 
 
 @router.delete("/{campaign_id}", status_code=204, responses=UNKNOWN | NOT_ENDED)
 def delete_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> None:
-    """Remove a campaign that has ended, with all that it found and its files."""
+    """Remove a campaign that has ended, with all that it found and its files. With an `admin` key any project's."""
     service.manager.delete(campaign_id, caller.sees)
 
 

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query
 
 from risk_sac.records import Grade, Outcome
 from service.api.access import CurrentCaller
-from service.api.answers.pages import Cursor, Limit, decode_cursor, encode_cursor
+from service.api.answers.pages import Cursor, Limit
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN
 from service.api.context import Service
 from service.schemas.episodes import EpisodePage
@@ -34,12 +34,12 @@ def list_episodes(
     page = service.store.episodes(
         campaign_id,
         limit=limit,
-        after=decode_cursor(cursor),
+        after=service.cursors.decode(cursor, campaign_id, caller.sees),
         run_id=run,
         outcomes=() if outcome is None else (outcome,),
         project=caller.sees,
     )
-    return _episode_page(page)
+    return _episode_page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
 
 
 @router.get("/failures")
@@ -63,13 +63,13 @@ def list_failures(
     page = service.store.episodes(
         campaign_id,
         limit=limit,
-        after=decode_cursor(cursor),
+        after=service.cursors.decode(cursor, campaign_id, caller.sees),
         run_id=run,
         outcomes=TIERS[tier],
         judged=Judged(grade=grade, broke=broke, signature=signature),
         project=caller.sees,
     )
-    return _episode_page(page)
+    return _episode_page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
 
 
 @router.get("/failures/{failure_id}")
@@ -79,5 +79,5 @@ def get_failure(campaign_id: str, failure_id: str, service: Service, caller: Cur
     return failure_body(campaign_id, episode, service.settings)
 
 
-def _episode_page(page: Page[StoredEpisode]) -> EpisodePage:
-    return EpisodePage(items=[episode_body(episode) for episode in page.items], next=encode_cursor(page.last))
+def _episode_page(page: Page[StoredEpisode], cursor: str | None) -> EpisodePage:
+    return EpisodePage(items=[episode_body(episode) for episode in page.items], next=cursor)

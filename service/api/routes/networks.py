@@ -9,7 +9,7 @@ from fastapi.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
 from service.api.access import CurrentCaller
-from service.api.answers.pages import Cursor, Limit, decode_cursor, encode_cursor
+from service.api.answers.pages import Cursor, Limit
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, header, problem
 from service.api.context import Service
@@ -19,6 +19,7 @@ from service.networks.packaging import MEDIA_TYPES, Packaging
 from service.networks.schemas import Network, NetworkPage
 from service.schemas.problems import Reason
 
+LISTED = "networks"
 RECEIVE_S = 60  # a sender that is slower would keep others out
 CREATED: Responses = {201: {"headers": {"Location": header("Where it is.")}}}
 REFUSALS: Responses = (
@@ -94,8 +95,8 @@ async def post_network(
 @router.get("")
 def list_networks(service: Service, caller: CurrentCaller, limit: Limit = 50, cursor: Cursor = None) -> NetworkPage:
     """Uploaded networks, newest first."""
-    page = service.networks.list(limit, decode_cursor(cursor), caller.sees)
-    return NetworkPage(items=list(page.items), next=encode_cursor(page.last))
+    page = service.networks.list(limit, service.cursors.decode(cursor, LISTED, caller.sees), caller.sees)
+    return NetworkPage(items=list(page.items), next=service.cursors.encode(page.last, LISTED, caller.sees))
 
 
 @router.get("/{network_id}", responses=UNKNOWN)
@@ -106,5 +107,5 @@ def get_network(network_id: str, service: Service, caller: CurrentCaller) -> Net
 
 @router.delete("/{network_id}", status_code=204, responses=UNKNOWN)
 def delete_network(network_id: str, service: Service, caller: CurrentCaller) -> None:
-    """Remove a network and its files."""
+    """Remove a network and its files. With an `admin` key any project's."""
     service.networks.delete(network_id, caller.sees)

@@ -7,6 +7,7 @@ waits.
 
 from contextlib import closing
 from pathlib import Path
+from random import Random
 
 import pytest
 from alembic import command
@@ -22,11 +23,6 @@ from service.store.writing import Ledger
 
 BEFORE_SEQUENCES = Path(__file__).with_name("before_sequences.sql")
 TABLES = ("campaigns", "runs", "episodes", "changes")
-# What somebody was told who followed the first campaign: numbers of the last episode and the last change, each time.
-FOLLOWED = (
-    *((0, 1), (0, 2), (0, 3), (1, 3), (2, 3), (4, 3), (6, 3), (6, 6), (7, 6), (7, 7), (8, 7), (8, 10), (9, 10)),
-    *((9, 11), (10, 11), (11, 11), (12, 11), (12, 12), (13, 12), (13, 13)),
-)
 
 
 @pytest.fixture
@@ -113,36 +109,6 @@ def test_a_row_that_was_damaged_before_is_not_sealed_anew(former_url, table):
         read_first(former_url)
 
 
-def test_a_former_position_is_taken_up_exactly_or_not_at_all(upgraded):
-    campaign_id = first_id(upgraded)
-    with upgraded.engine.connect() as connection:
-        events = {  # sequence: table and number
-            sequence: (table, number)
-            for table in ("episodes", "changes")
-            for sequence, number in connection.exec_driver_sql(
-                f"SELECT sequence, number FROM {table} WHERE campaign_number = 1"
-            )
-        }
-    known = [(table, number) for _, (table, number) in sorted(events.items())]
-    assert len(known) == 20
-    numbers = {kind: [0, *(number for table, number in known if table == kind)] for kind in ("episodes", "changes")}
-    for episode in numbers["episodes"]:
-        for change in numbers["changes"]:
-            limits = {"episodes": episode, "changes": change}
-            heard = {(table, number) for table, number in known if number <= limits[table]}
-            wanted = len(heard) if heard == set(known[: len(heard)]) else None
-            assert upgraded.former_position(campaign_id, episode, change) == wanted, limits
-    resumed = [each for each in FOLLOWED if upgraded.former_position(campaign_id, *each) is not None]
-    assert {(9, 11), (12, 12), (13, 13)} <= set(resumed)
-    assert len(resumed) > len(FOLLOWED) // 2
-    assert told(upgraded, campaign_id, after=upgraded.former_position(campaign_id, 13, 13)) == []
-
-
-@pytest.mark.parametrize("position", [(3, 1), (99, 13), (13, 99), (0, 4)])
-def test_a_former_position_of_another_campaign_is_none_of_this_one(upgraded, position):
-    assert upgraded.former_position(first_id(upgraded), *position) is None
-
-
 def test_a_page_of_events_ends_where_it_says(store, ledger, episode):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
     ledger.start_run(campaign.runs[0].number)
@@ -153,6 +119,42 @@ def test_a_page_of_events_ends_where_it_says(store, ledger, episode):
     assert len(store.events(campaign.id, limit=4, after=3).items) == 2
     for after in (5, 6, 1 << 62):
         assert store.events(campaign.id, limit=4, after=after).items == ()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_was_told_as_it_was_written_is_told_again_from_every_position(store, ledger, episode, seed):
+    """Three runs that start, report, repeat, wait, pause and end in turns that chance chooses."""
+    chance = Random(seed)
+    spec = CampaignSpec(families=("low",), methods=("random",), seeds=(0, 1, 2))
+    campaign = ledger.create(spec)
+    other = ledger.create(spec)  # whose rows come between
+    told_first = []
+
+    def hear():
+        told_first.extend(store.events(campaign.id, limit=500, after=len(told_first)).items)
+
+    waiting, at_work = [run.number for run in campaign.runs], []
+    ledger.start_run(other.runs[0].number)
+    for index in range(60):
+        ledger.add_episode(other.runs[0].number, episode(index))
+        if waiting and (not at_work or chance.random() < 0.4):
+            at_work.append(waiting.pop(chance.randrange(len(waiting))))
+            ledger.start_run(at_work[-1])
+        elif chance.random() < 0.8:
+            ledger.add_episode(chance.choice(at_work), episode(chance.randrange(30)))
+        else:
+            waiting.append(at_work.pop(chance.randrange(len(at_work))))
+            ledger.requeue_run(waiting[-1], "its worker died")
+        hear()
+    ledger.pause(at_work, "the disk is full")
+    hear()
+    ledger.resume()
+    hear()
+    ledger.cancel(campaign.id)
+    hear()
+    assert told_first[-1].state is State.CANCELLED
+    for position in range(len(told_first) + 1):
+        assert list(store.events(campaign.id, limit=500, after=position).items) == told_first[position:]
 
 
 @pytest.mark.parametrize("damage", ["DELETE FROM changes", "UPDATE changes SET sequence = 9"])

@@ -1,0 +1,30 @@
+"""What the server itself has to remember: the secret of its cursors, and whether an API key was ever made."""
+
+import secrets
+import zlib
+
+import sqlalchemy as sa
+from alembic import op
+from pydantic_core import to_json
+
+revision = "0005"
+down_revision = "0004"
+
+
+def upgrade() -> None:
+    """Creates the one row there is. Keys that there are already, the next server notes when it sees their file."""
+    server = op.create_table(
+        "server",
+        sa.Column("number", sa.Integer, primary_key=True),
+        sa.Column("cursor_secret", sa.String, nullable=False),
+        sa.Column("keys_made_at", sa.Float),
+        sa.Column("checksum", sa.BigInteger),
+    )
+    secret = secrets.token_bytes(32).hex()
+    checksum = zlib.crc32(to_json((secret, None)))
+    op.bulk_insert(server, [{"number": 1, "cursor_secret": secret, "keys_made_at": None, "checksum": checksum}])
+
+
+def downgrade() -> None:
+    """The version before has no use for it: its cursors are plain numbers, and it trusts the file of keys alone."""
+    op.drop_table("server")

@@ -1,0 +1,75 @@
+"""A service whose file of keys is lost: whatever is restarted, nobody gets in until an administrator says otherwise."""
+
+import subprocess
+import sys
+
+import httpx
+import pytest
+
+RISK_SAC = [sys.executable, "-c", "import sys; from risk_sac.cli import main; sys.exit(main())"]
+NEEDS_KEY = (
+    ("GET", "/v1/campaigns"),
+    ("GET", "/metrics"),
+    ("GET", "/v1/families"),
+    ("GET", "/v1/networks"),
+    ("POST", "/v1/campaigns"),
+)
+
+
+def keys(service, *arguments):
+    command = [*RISK_SAC, "keys", *arguments]
+    return subprocess.run(command, env=service.environment, capture_output=True, text=True, timeout=600, check=False)
+
+
+def create(service, *arguments):
+    """A client with a new key."""
+    made = keys(service, "create", "--project", "maps", *arguments)
+    assert made.returncode == 0, made.stderr
+    headers = {"authorization": f"Bearer {made.stdout.strip()}"}
+    return httpx.Client(base_url=service.client.base_url, headers=headers, timeout=120)
+
+
+def statuses(client, campaign):
+    asked = (*NEEDS_KEY, ("DELETE", f"/v1/campaigns/{campaign}"))
+    answers = [client.request(method, path) for method, path in asked]
+    assert all(answer.json()["reason"] == "keys_unavailable" for answer in answers if answer.status_code == 503)
+    return {answer.status_code for answer in answers}
+
+
+@pytest.mark.parametrize("serve", ["sqlite", "postgresql"], indirect=True)
+def test_lost_keys_open_nothing(serve):
+    service = serve()
+    campaign = service.wait(service.post(budget={"episodes": 1}))["id"]
+    with create(service) as holder:
+        assert holder.get("/v1/campaigns").status_code == 200
+        (service.data_dir / "keys.json").unlink()
+        for restarted in (False, True):
+            if restarted:
+                service.stop()
+                for path in service.data_dir.glob("keys.*"):
+                    path.unlink()
+                service.start()
+            for client in (service.client, holder):
+                assert statuses(client, campaign) == {503}
+            assert service.client.get("/healthz").status_code == 200
+            assert service.client.get("/openapi.json").status_code == 200
+        assert "is missing, although keys were made; restore their file from a copy" in service.log.read_text()
+        assert keys(service, "create", "--project", "maps").returncode == 1
+        with create(service, "--anew") as new:
+            assert new.get("/v1/campaigns").status_code == 200
+            assert holder.get("/v1/campaigns").status_code == 401
+            assert service.client.get("/v1/campaigns").status_code == 401
+    assert keys(service, "open").returncode == 2
+    assert service.client.get("/v1/campaigns").status_code == 401
+    assert keys(service, "open", "--yes").returncode == 0
+    assert [each["id"] for each in service.client.get("/v1/campaigns").json()["items"]] == [campaign]
+    (service.data_dir / "keys.json").unlink()
+    assert statuses(service.client, campaign) == {503}
+
+
+def test_keys_that_are_lost_before_the_first_start_open_nothing_either(serve):
+    service = serve(started=False)
+    create(service).close()
+    (service.data_dir / "keys.json").unlink()
+    service.start()
+    assert service.client.get("/v1/campaigns").status_code == 503

@@ -1,0 +1,92 @@
+import os
+import sqlite3
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from service.errors import StorageError
+from service.host.data_folder import hold_data_folder
+from service.host.private import make_private
+from service.store.reading import Store
+
+
+@pytest.fixture(autouse=True)
+def _generous() -> Iterator[None]:
+    """What is made is for everybody, unless its maker says otherwise."""
+    before = os.umask(0)
+    yield
+    os.umask(before)
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+def test_a_new_data_folder_is_nobody_elses(tmp_path: Path) -> None:
+    hold_data_folder(tmp_path / "new" / "data").close()
+    assert mode(tmp_path / "new" / "data") == 0o700
+
+
+@pytest.mark.parametrize("known_by", [(), (".lock", "campaigns"), ("keys.lock", "keys.json"), ("lost+found",)])
+def test_a_data_folder_from_before_is_mended(tmp_path: Path, known_by: tuple[str, ...]) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir(mode=0o755)
+    for name in known_by:
+        (folder / name).touch()
+    hold_data_folder(folder).close()
+    assert mode(folder) == 0o700
+
+
+def test_a_folder_that_others_need_is_refused_and_stays_as_it_is(tmp_path: Path) -> None:
+    folder = tmp_path / "lib"
+    (folder / "of-another-program").mkdir(parents=True, mode=0o755)
+    folder.chmod(0o755)
+    with pytest.raises(StorageError, match=r"others may look into \(mode 0755\).* wanted a folder of its own"):
+        hold_data_folder(folder)
+    assert mode(folder) == 0o755
+    folder.chmod(0o700)
+    hold_data_folder(folder).close()
+
+
+def test_what_is_not_ours_to_change_is_refused_where_everybody_may_look(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path, mode: int) -> None:
+        raise PermissionError(1, "Operation not permitted", str(path))
+
+    monkeypatch.setattr(Path, "chmod", refuse)
+    folder, file = tmp_path / "data", tmp_path / "file"
+    folder.mkdir(mode=0o775)
+    os.close(os.open(file, os.O_CREAT, 0o644))
+    with pytest.raises(StorageError, match=r"data' has mode 0775, .*\(Operation not permitted\); wanted 0700"):
+        make_private(folder)
+    with pytest.raises(StorageError, match=r"file' has mode 0644, .*; wanted 0600"):
+        make_private(file)
+    os.chmod(folder, 0o770)  # a volume that its owner lends to a group
+    make_private(folder)
+    assert mode(folder) == 0o770
+
+
+def test_only_the_owner_may_read_the_database_and_its_journal(tmp_path: Path) -> None:
+    store = Store(f"sqlite:///{tmp_path}/risk-sac.db")
+    store.campaigns(limit=1)
+    files = sorted(tmp_path.glob("risk-sac.db*"))
+    assert [path.name for path in files] == ["risk-sac.db", "risk-sac.db-shm", "risk-sac.db-wal"]
+    assert {path.name: mode(path) for path in files} == {path.name: 0o600 for path in files}
+    store.close()
+
+
+def test_a_database_from_before_is_mended_with_what_a_killed_server_left(tmp_path: Path) -> None:
+    Store(f"sqlite:///{tmp_path}/risk-sac.db").close()
+    other = sqlite3.connect(tmp_path / "risk-sac.db")
+    other.execute("SELECT count(*) FROM campaigns").fetchall()
+    files = sorted(tmp_path.glob("risk-sac.db*"))
+    assert len(files) == 3
+    for path in files:
+        path.chmod(0o644)
+    store = Store(f"sqlite:///{tmp_path}/risk-sac.db")
+    assert {mode(path) for path in files} == {0o600}
+    store.close()
+    other.close()

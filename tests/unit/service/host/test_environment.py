@@ -1,0 +1,82 @@
+"""Wrong settings, as whoever starts one of the service's programs sees them."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from risk_sac.errors import ConfigError
+from service.host.environment import read_settings
+
+RISK_SAC = [sys.executable, "-c", "import sys; from risk_sac.cli import main; sys.exit(main())"]
+PROGRAMS = {
+    "service": [sys.executable, "-m", "service"],
+    "serve": [*RISK_SAC, "serve"],
+    "keys": [*RISK_SAC, "keys", "list"],
+    "database": [sys.executable, "-m", "service.store", "back"],
+}
+each_program = pytest.mark.parametrize("program", PROGRAMS)
+
+
+def start(program: str, folder: Path, **settings: str) -> subprocess.CompletedProcess[str]:
+    given = {f"RISK_SAC_{name.upper()}": value for name, value in ({"data_dir": str(folder)} | settings).items()}
+    return subprocess.run(
+        PROGRAMS[program], env=os.environ | given, capture_output=True, text=True, timeout=600, check=False
+    )
+
+
+@each_program
+def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program: str, tmp_path: Path) -> None:
+    wrong = {"port": "http", "grace_s": "nan", "log_format": "xml", "cors_origins": "*", "allowed_hosts": "[1]"}
+    ended = start(program, tmp_path, **wrong)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert ended.stderr.splitlines() == [
+        "RISK_SAC_PORT is 'http'; wanted integer ≥ 1, ≤ 65535",
+        "RISK_SAC_LOG_FORMAT is 'xml'; wanted `text` or `json`",
+        "RISK_SAC_GRACE_S is 'nan'; wanted number > 0, ≤ 600",
+        "RISK_SAC_ALLOWED_HOSTS holds 1; wanted text",
+        "RISK_SAC_CORS_ORIGINS is '*'; wanted JSON list",
+    ]
+    assert list(tmp_path.iterdir()) == []
+
+
+@each_program
+def test_a_missing_folder_of_secrets_ends_the_start_in_one_line(program: str, tmp_path: Path) -> None:
+    ended = start(program, tmp_path, secrets_dir="/run/no-such-secrets")
+    assert (ended.returncode, ended.stdout) == (2, "")
+    wanted = "which is missing; wanted a folder that has settings as files"
+    assert ended.stderr == f"RISK_SAC_SECRETS_DIR is '/run/no-such-secrets', {wanted}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_in_place_of_the_folder_of_secrets_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "secrets").write_text("")
+    ended = start("keys", tmp_path / "data", secrets_dir=str(tmp_path / "secrets"))
+    assert (ended.returncode, ended.stderr.count("\n")) == (2, 1)
+    assert "which is no folder" in ended.stderr
+
+
+def test_secrets_are_read_and_wrong_ones_named(tmp_path: Path) -> None:
+    (tmp_path / "risk_sac_port").write_text("70000\n")
+    ended = start("keys", tmp_path, secrets_dir=str(tmp_path))
+    assert (ended.returncode, ended.stderr) == (2, "RISK_SAC_PORT is '70000'; wanted integer ≥ 1, ≤ 65535\n")
+
+
+def test_lists_are_json(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RISK_SAC_ALLOWED_HOSTS", '["a.example", "b.example"]')
+    assert read_settings().allowed_hosts == ["a.example", "b.example"]
+
+
+@pytest.mark.parametrize("value", ["a.example", "{}", '"a"', "", "7"])
+def test_what_is_no_list_is_named(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    monkeypatch.setenv("RISK_SAC_ALLOWED_HOSTS", value)
+    with pytest.raises(ConfigError, match=r"^RISK_SAC_ALLOWED_HOSTS is .*; wanted JSON list$"):
+        read_settings()
+
+
+def test_a_long_value_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RISK_SAC_MAX_WORKERS", "9" * 5000)
+    with pytest.raises(ConfigError, match=r"^RISK_SAC_MAX_WORKERS is '9{79}…; wanted integer"):
+        read_settings()

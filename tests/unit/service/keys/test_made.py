@@ -1,0 +1,207 @@
+"""Keys that were made once, and whose file is lost."""
+
+import sqlite3
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from service.errors import KeysError, StorageError
+from service.host.data_folder import hold_data_folder
+from service.keys.__main__ import main
+from service.keys.file import Document, KeyFile
+from service.keys.key import Scope
+from service.keys.made import KeysMade, ever_made, noting
+from service.keys.ring import KeyRing
+from service.settings import ServiceSettings
+from service.store.reading import Store
+from service.store.server import keys_were_made, noting_keys
+
+CREATE = ["create", "--project", "maps"]
+
+
+@pytest.fixture
+def settings(tmp_path: Path, database_url: str, monkeypatch: pytest.MonkeyPatch) -> ServiceSettings:
+    """Of a service that has not started yet, with each kind of database."""
+    monkeypatch.setenv("RISK_SAC_DATA_DIR", str(tmp_path / "data"))
+    monkeypatch.setenv("RISK_SAC_DATABASE_URL", database_url)
+    return ServiceSettings()
+
+
+@pytest.fixture
+def file(settings: ServiceSettings) -> KeyFile:
+    return KeyFile(settings.keys_file)
+
+
+@pytest.fixture
+def store(settings: ServiceSettings) -> Iterator[Store]:
+    store = Store(settings.url)
+    yield store
+    store.close()
+
+
+def test_the_command_notes_in_the_database_that_there_are_keys(settings: ServiceSettings, file: KeyFile) -> None:
+    assert not ever_made(settings)
+    assert main(CREATE) == 0
+    assert ever_made(settings)
+    file.path.unlink()
+    assert ever_made(settings)
+    store = Store(settings.url)  # which is the server's, and is as the server would have made it
+    assert keys_were_made(store.engine)
+    store.close()
+
+
+def test_the_command_works_beside_a_server(settings: ServiceSettings, file: KeyFile, store: Store) -> None:
+    assert main(CREATE) == 0
+    assert keys_were_made(store.engine)
+    assert len(file.read()) == 1
+
+
+def test_a_key_that_cannot_be_noted_is_not_made(
+    file: KeyFile, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("RISK_SAC_DATABASE_URL", "postgresql+psycopg://nobody@127.0.0.1:1/nothing")
+    assert main(CREATE) == 1
+    assert "storage failed while opening the database" in capsys.readouterr().err
+    assert not file.path.exists()
+
+
+def test_keys_that_cannot_be_written_are_not_noted(settings: ServiceSettings, store: Store) -> None:
+    with pytest.raises(KeysError), noting(settings):
+        raise KeysError("the disk is full")
+    assert not keys_were_made(store.engine)
+
+
+def test_the_command_takes_lost_keys_for_lost(
+    settings: ServiceSettings, file: KeyFile, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["list"]) == 0
+    assert main(CREATE) == 0
+    (old,) = file.read()
+    for damage in (file.path.unlink, lambda: file.path.write_text("{}")):
+        damage()
+        capsys.readouterr()
+        for command in (["list"], CREATE, ["revoke", old.id]):
+            assert main(command) == 1
+            assert "begin anew with `risk-sac keys create --anew`" in capsys.readouterr().err
+        assert main([*CREATE, "--anew"]) == 0
+        (new,) = file.read()
+        assert new.id != old.id
+    assert main([*CREATE, "--anew"]) == 1
+    assert "is whole" in capsys.readouterr().err
+    assert file.read() == (new,)
+
+
+def test_the_command_opens_only_when_told_that_it_is_meant(file: KeyFile) -> None:
+    assert main(CREATE) == 0
+    with pytest.raises(SystemExit, match="2"):
+        main(["open"])
+    assert len(file.read()) == 1
+    assert main(["open", "--yes"]) == 0
+    assert file.load() == Document.of((), open_=True)
+    assert main(CREATE) == 0
+    assert len(file.read()) == 1
+    document = file.load()
+    assert document is not None
+    assert not document.open
+
+
+def test_a_server_notes_keys_that_it_sees_and_heeds_what_is_noted(
+    file: KeyFile, store: Store, caplog: pytest.LogCaptureFixture
+) -> None:
+    _, token = file.create("maps", "", Scope.RUN)
+    with KeysMade().kept(store.engine, file):
+        assert keys_were_made(store.engine)
+    file.path.unlink()
+    made = KeysMade()
+    with made.kept(store.engine, file):
+        ring = KeyRing(file.path, made)
+        for _ in range(3):
+            with pytest.raises(KeysError, match=r"is missing, although keys were made; restore .* create --anew`"):
+                ring.find(token)
+            with pytest.raises(KeysError, match="missing"):
+                _ = ring.open
+        _, new = file.create_anew("maps", "", Scope.RUN)
+        assert ring.find(new) is not None
+        assert ring.find(token) is None
+        assert not ring.open
+    assert caplog.text.count("missing, although") == 1, "said once"
+
+
+def test_a_server_notes_keys_that_are_made_while_nobody_asks(file: KeyFile, store: Store) -> None:
+    made, pause = KeysMade(), threading.Event()
+    with made.kept(store.engine, file):
+        assert not made.known
+        assert KeyRing(file.path, made).open
+        with noting_keys(store.engine):
+            pass
+        while not made.known:
+            pause.wait(0.05)
+        with pytest.raises(KeysError, match="missing"):
+            _ = KeyRing(file.path, made).open
+
+
+def test_keys_that_a_request_saw_are_known_of_at_once(file: KeyFile) -> None:
+    made = KeysMade()
+    ring = KeyRing(file.path, made)
+    assert ring.open
+    file.create("maps", "", Scope.RUN)
+    assert not ring.open
+    file.path.unlink()
+    with pytest.raises(KeysError, match="missing"):
+        ring.keys()
+
+
+def test_open_is_what_an_administrator_has_said(file: KeyFile) -> None:
+    ring = KeyRing(file.path, KeysMade())
+    _, token = file.create("maps", "", Scope.RUN)
+    file.open_all()
+    assert ring.open
+    assert ring.find(token) is None
+    content = file.path.read_bytes()
+    file.path.write_bytes(content.replace(b"true", b"false"))
+    with pytest.raises(KeysError, match="damaged"):
+        _ = ring.open
+    file.path.write_bytes(content)
+    file.create("maps", "", Scope.RUN)
+    assert not ring.open
+
+
+def test_a_file_that_is_replaced_is_never_missing_nor_open(file: KeyFile) -> None:
+    made = KeysMade()
+    ring = KeyRing(file.path, made)
+    _, token = file.create("maps", "", Scope.RUN)
+    with ThreadPoolExecutor(2) as pool:
+        changes = [pool.submit(file.create, "maps", "", Scope.READ) for _ in range(100)]
+        while not all(change.done() for change in changes):
+            assert ring.find(token) is not None
+            assert not ring.open
+        for change in changes:
+            change.result()
+
+
+def test_the_first_key_is_never_missing(settings: ServiceSettings, file: KeyFile, store: Store) -> None:
+    made = KeysMade()
+    with made.kept(store.engine, file), ThreadPoolExecutor(1) as pool:
+        ring = KeyRing(file.path, made)
+        change = pool.submit(main, CREATE)
+        seen = [ring.open]
+        while not (change.done() and made.known):
+            seen.append(ring.open)  # raises where it takes the file for missing
+        assert change.result() == 0
+    assert sorted(seen, reverse=True) == seen, "open until there is a key, and never again"
+    assert not ring.open
+
+
+def test_a_database_of_an_older_version_is_brought_up_to_date_only_while_no_server_uses_it(tmp_path: Path) -> None:
+    settings = ServiceSettings(data_dir=tmp_path)
+    old = sqlite3.connect(tmp_path / "risk-sac.db")
+    old.close()
+    with hold_data_folder(tmp_path), pytest.raises(StorageError, match="in use by another process"), noting(settings):
+        pass
+    assert not ever_made(settings)
+    with noting(settings):
+        pass
+    assert ever_made(settings)

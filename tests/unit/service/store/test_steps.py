@@ -1,0 +1,116 @@
+"""Going back to the version before, as service/README.md says it."""
+
+import sqlite3
+from pathlib import Path
+
+import pytest
+from alembic import command
+from alembic.config import Config
+from sqlalchemy import create_engine, inspect
+
+from risk_sac.config import CampaignSpec
+from risk_sac.records import Outcome
+from service.errors import StorageError
+from service.host.data_folder import hold_data_folder
+from service.settings import ServiceSettings
+from service.store.__main__ import main
+from service.store.database import held
+from service.store.reading import Store
+from service.store.steps import newest_step, present_step, step_back
+from service.store.writing import Ledger
+
+BEFORE = "0004"
+
+
+@pytest.fixture
+def settings(tmp_path: Path, database_url: str, monkeypatch: pytest.MonkeyPatch) -> ServiceSettings:
+    monkeypatch.setenv("RISK_SAC_DATA_DIR", str(tmp_path / "data"))
+    monkeypatch.setenv("RISK_SAC_DATABASE_URL", database_url)
+    return ServiceSettings()
+
+
+def tables(url: str) -> dict[str, object]:
+    """All tables with their columns and indexes, and the step."""
+    engine = create_engine(url)
+    found = inspect(engine)
+    tables = {
+        name: (
+            sorted((column["name"], str(column["type"]), column["nullable"]) for column in found.get_columns(name)),
+            sorted((index["name"] or "", index["column_names"], index["unique"]) for index in found.get_indexes(name)),
+        )
+        for name in found.get_table_names()
+    }
+    step = present_step(engine)
+    engine.dispose()
+    return {"step": step, **tables}
+
+
+def test_one_step_back_leaves_what_the_version_before_wrote_and_all_rows(settings, episode, capsys):
+    engine, config = create_engine(settings.url), Config()
+    config.set_main_option("script_location", "service.store:migrations")
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, BEFORE)
+    engine.dispose()
+    before = tables(settings.url)
+    store = Store(settings.url)
+    ledger = Ledger(store)
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
+    ledger.start_run(campaign.runs[0].number)
+    ledger.add_episode(campaign.runs[0].number, episode(0, Outcome.FAILURE))
+    told = repr(store.events(campaign.id, limit=9))  # in which a NaN is what it is
+    store.close()
+    assert tables(settings.url)["step"] == newest_step()
+    assert main(["back"]) == 0
+    assert f"is at step {BEFORE}" in capsys.readouterr().out
+    assert tables(settings.url) == before
+    assert main(["back"]) == 1, "no further"
+    assert f"database is at step {BEFORE}; wanted {newest_step()}" in capsys.readouterr().err
+    store = Store(settings.url)  # which steps forward again
+    assert repr(store.events(campaign.id, limit=9)) == told
+    store.close()
+
+
+def test_no_step_is_taken_beneath_a_server(settings, capsys):
+    store = Store(settings.url)
+    with hold_data_folder(settings.data_dir):
+        assert main(["back"]) == 1
+    assert "is in use by another process" in capsys.readouterr().err
+    if store.engine.dialect.name == "postgresql":
+        with held(store.engine):
+            assert main(["back"]) == 1
+        assert "is in use by another server" in capsys.readouterr().err
+    assert present_step(store.engine) == newest_step()
+    store.close()
+
+
+def test_a_database_of_a_newer_version_is_not_taken_back(settings):
+    store = Store(settings.url)
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = '9999'")
+    with pytest.raises(StorageError, match="database is at step 9999"):
+        step_back(store.engine)
+    store.close()
+
+
+def test_a_copy_is_whole_though_the_server_writes(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("RISK_SAC_DATA_DIR", str(tmp_path))
+    copy = tmp_path / "copy.db"
+    assert main(["copy", str(copy)]) == 1
+    assert "is missing" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+    store = Store(ServiceSettings().url)
+    spec = CampaignSpec(families=("low",), methods=("random",))
+    campaign = Ledger(store).create(spec)
+    assert main(["copy", str(copy)]) == 0
+    assert copy.stat().st_mode & 0o077 == 0
+    Ledger(store).create(spec)
+    store.close()
+    assert main(["copy", str(copy)]) == 1
+    assert "exists" in capsys.readouterr().err
+    with sqlite3.connect(copy) as database:
+        assert database.execute("SELECT id FROM campaigns").fetchall() == [(campaign.id,)]
+    database.close()
+    copied = Store(f"sqlite:///{copy}")
+    assert [each.id for each in copied.campaigns(limit=9).items] == [campaign.id]
+    copied.close()
