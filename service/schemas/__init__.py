@@ -6,6 +6,7 @@ from service.schemas.campaign_results import Results, RunResult, Total
 from service.schemas.campaigns import Campaign, CampaignPage, CampaignSummary, Metrics, Progress, Run
 from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter
 from service.schemas.changes import StateChange
+from service.schemas.entrance import Entrance
 from service.schemas.episodes import Collision, Episode, EpisodePage, Judgement, ReferenceOutcome
 from service.schemas.failures import Failure, Series
 from service.schemas.health import Health, Ready
@@ -17,6 +18,7 @@ __all__ = [
     "CampaignPage",
     "CampaignSummary",
     "Collision",
+    "Entrance",
     "Episode",
     "EpisodePage",
     "Failure",

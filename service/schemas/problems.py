@@ -20,7 +20,6 @@ class Reason(StrEnum):
     IDEMPOTENCY_KEY_REUSED = "idempotency_key_reused"
     NOT_ENDED = "not_ended"
     TOO_LARGE = "too_large"
-    UPLOAD_INCOMPLETE = "upload_incomplete"
     UPLOAD_TOO_SLOW = "upload_too_slow"
     UPLOAD_REFUSED = "upload_refused"
     UPLOADS_BUSY = "uploads_busy"

@@ -5,10 +5,11 @@ import math
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.routing import compile_path
 
 from risk_sac.errors import ConfigError
@@ -18,6 +19,7 @@ from service.schemas import FieldProblem, Problem, Reason
 
 logger = logging.getLogger(__name__)
 
+CLIENT_LEFT = 499  # in the middle of its request; nobody gets this answer, but the log and the metrics tell of it
 _REASONS = {
     HTTPStatus.NOT_FOUND: Reason.UNKNOWN_ROUTE,
     HTTPStatus.METHOD_NOT_ALLOWED: Reason.METHOD_NOT_ALLOWED,
@@ -62,6 +64,7 @@ def add_problem_handlers(app: FastAPI) -> None:
     app.add_exception_handler(ConflictError, _conflict)
     app.add_exception_handler(QuotaError, _over_quota)
     app.add_exception_handler(StorageError, _storage_failed)
+    app.add_exception_handler(ClientDisconnect, _left)
     app.add_exception_handler(Exception, _bug)
 
 
@@ -113,7 +116,7 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
         detail = f"nothing is at {request.url.path}; /docs lists all routes"
     headers = dict(error.headers or {})
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
-        headers["Allow"] = allowed = ", ".join(sorted(_methods(request))) or headers["Allow"]
+        headers["Allow"] = allowed = ", ".join(sorted(_methods(request, headers["Allow"])))
         detail = f"{request.url.path} does not answer {request.method}; it answers {allowed}"
     return problem_response(request.url.path, status, _REASONS[status], detail, headers=headers)
 
@@ -162,6 +165,10 @@ async def _storage_failed(request: Request, error: Exception) -> JSONResponse:
     return problem_response(request.url.path, status, Reason.STORAGE_UNAVAILABLE, str(error))
 
 
+async def _left(request: Request, error: Exception) -> Response:
+    return Response(status_code=CLIENT_LEFT)
+
+
 async def _bug(request: Request, error: Exception) -> JSONResponse:
     detail = f"the service has a bug ({type(error).__name__}); its log has the traceback"
     return problem_response(request.url.path, HTTPStatus.INTERNAL_SERVER_ERROR, Reason.INTERNAL_ERROR, detail)
@@ -172,8 +179,9 @@ def _invalid(request: Request, detail: str, *errors: FieldProblem) -> JSONRespon
     return problem_response(request.url.path, status, Reason.INVALID_FIELD, detail, *errors)
 
 
-def _methods(request: Request) -> set[str]:
+def _methods(request: Request, of_first: str) -> set[str]:
     """Methods that some route answers at this path; Starlette names only those of the first."""
     paths: dict[str, dict[str, Any]] = request.app.openapi()["paths"]
     matching = (methods for path, methods in paths.items() if compile_path(path)[0].match(request.url.path))
-    return {method.upper() for methods in matching for method in methods}
+    found = {method.upper() for methods in matching for method in methods} | set(of_first.split(", "))
+    return found | {"HEAD"} if "GET" in found else found
