@@ -6,6 +6,7 @@ import sys
 import uvicorn
 
 from risk_sac.errors import RiskSacError
+from service.api.guards.connections import accepted_at_once, protocol
 from service.app import create_app
 from service.host.logs import set_up_logs
 from service.keys.exposure import check_exposure
@@ -36,6 +37,8 @@ def main() -> None:
         access_log=False,
         server_header=False,
         ws="none",
+        http=protocol(settings),
+        backlog=accepted_at_once(),
         timeout_graceful_shutdown=ANSWERS_END_S,
     )
 

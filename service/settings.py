@@ -61,6 +61,10 @@ class ServiceSettings(BaseSettings):
     """Host headers that are answered, a JSON list; `*` answers all. The address listened on is always one of them."""
     cors_origins: list[str] = []
     """Origins whose web pages may call the service, a JSON list."""
+    max_connections: Annotated[int, Field(ge=1)] | None = None
+    """Connections open at the same time; by default, and at most, what the limit of open files leaves room for."""
+    head_timeout_s: Annotated[float, Field(gt=0, le=600)] = 10.0
+    """How long a connection may take for the head of its next request, s."""
     max_body_bytes: Annotated[int, Field(ge=1024)] = 1 << 20
     """Largest body of a request, but for uploads, bytes."""
     max_upload_bytes: Annotated[int, Field(ge=1024)] = 32 << 20

@@ -30,6 +30,7 @@ class Reason(StrEnum):
     RATE_LIMITED = "rate_limited"
     INTERNAL_ERROR = "internal_error"
     KEYS_UNAVAILABLE = "keys_unavailable"
+    CONNECTIONS_BUSY = "connections_busy"
     STORAGE_UNAVAILABLE = "storage_unavailable"
     MANAGER_STOPPED = "manager_stopped"
 

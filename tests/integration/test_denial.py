@@ -1,0 +1,106 @@
+"""Clients that keep connections, bodies and answers waiting keep nobody else out."""
+
+import contextlib
+import json
+import resource
+import socket
+
+import httpx
+import pytest
+
+from tests.hostile_networks import NET
+from tests.server import LONG_S
+
+FILES = 160  # that a server may have open
+
+
+@pytest.fixture
+def few_files():
+    """Whatever is started meanwhile may have few files open."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (FILES, limits[1]))
+    yield lambda: resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+    resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+@pytest.fixture
+def connect():
+    """Connections that are closed at the end."""
+    with contextlib.ExitStack() as opened:
+
+        def connect(service, *sent):
+            connection = opened.enter_context(socket.create_connection(("127.0.0.1", service.port), timeout=LONG_S))
+            for data in sent:
+                connection.sendall(data)
+            return connection
+
+        yield connect
+
+
+def ended(connection):
+    """Whether the server closes a connection on which something arrives now and then."""
+    connection.settimeout(0.1)
+    while True:
+        try:
+            connection.sendall(b"x")
+            if not connection.recv(1000):
+                return True
+        except TimeoutError:
+            pass
+        except ConnectionError:
+            return True
+
+
+@pytest.mark.parametrize("sent", [b"", b"GET /healthz HTTP/1.1\r\nHost: loc"])
+def test_half_open_connections_keep_nobody_out(serve, few_files, connect, sent):
+    service = serve()
+    few_files()
+    campaign = service.post(budget={"episodes": 100_000})
+    for _ in range(FILES + 40):
+        connect(service, sent)
+    for _ in range(20):
+        with httpx.Client(base_url=service.client.base_url, timeout=LONG_S) as newcomer:
+            assert newcomer.get("/healthz").status_code == 200
+    done = service.get(campaign)["progress"]["episodes_done"]
+    service.wait_for(campaign, lambda seen: seen["progress"]["episodes_done"] > done + 3)
+    assert service.get(campaign)["state"] == "running", "not paused for want of a descriptor"
+    service.wait_for(service.post(budget={"episodes": 1}), lambda seen: seen["state"] == "succeeded")
+    service.stop()
+    log = service.log.read_text()
+    assert "Traceback" not in log
+    assert log.count("connections are as many as may be") == 1
+
+
+def test_a_head_has_to_come_in_time_on_a_new_connection_and_on_an_old_one(serve, connect):
+    service = serve(head_timeout_s=0.5)
+    assert ended(connect(service, b"GET /healthz HTTP/1.1\r\nX: "))
+    used = connect(service, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+    assert used.recv(1000).startswith(b"HTTP/1.1 200")
+    used.sendall(b"GET /healthz HTTP/1.1\r\nX: ")
+    assert ended(used)
+    assert "Traceback" not in service.log.read_text()
+
+
+def test_an_answer_that_goes_on_is_no_late_head(serve):
+    service = serve(head_timeout_s=0.1)
+    campaign = service.post(budget={"episodes": 60})
+    with service.client.stream("GET", f"/v1/campaigns/{campaign}/events") as response:
+        told = response.read().decode()
+    assert told.count("event: episode") == 60
+
+
+def test_with_all_connections_at_work_one_more_is_refused(serve):
+    service = serve(max_connections=3)
+    campaign = service.post(budget={"episodes": 100_000})
+    with contextlib.ExitStack() as streams:
+        for _ in range(3):
+            client = streams.enter_context(httpx.Client(base_url=service.client.base_url, timeout=LONG_S))
+            streams.enter_context(client.stream("GET", f"/v1/campaigns/{campaign}/events"))
+        with socket.create_connection(("127.0.0.1", service.port), timeout=LONG_S) as connection:
+            head, _, body = connection.recv(10_000).partition(b"\r\n\r\n")
+        assert head.startswith(b"HTTP/1.1 503 Service Unavailable\r\n")
+        assert b"retry-after: 1" in head
+        assert json.loads(body)["reason"] == "connections_busy"
+    service.wait_until(lambda: service.get(campaign)["state"] == "running")
+
+
