@@ -69,6 +69,10 @@ class ServiceSettings(BaseSettings):
     """Largest body of a request, but for uploads, bytes."""
     max_upload_bytes: Annotated[int, Field(ge=1024)] = 32 << 20
     """Largest upload, bytes."""
+    min_body_rate: Annotated[int, Field(ge=1)] = 1024
+    """Bytes per second at which a body has to come, on average."""
+    body_patience_s: Annotated[float, Field(gt=0, le=600)] = 5.0
+    """How long a body may come more slowly than that, s."""
     rate_limit: Annotated[int, Field(ge=1)] = 500
     """Requests per second that one key, or one address without a key, may make."""
     quota_queued_runs: Annotated[int, Field(ge=1)] = 10_000

@@ -8,7 +8,6 @@ import socket
 import httpx
 import pytest
 
-from tests.hostile_networks import NET
 from tests.server import LONG_S
 
 FILES = 160  # that a server may have open
@@ -102,5 +101,3 @@ def test_with_all_connections_at_work_one_more_is_refused(serve):
         assert b"retry-after: 1" in head
         assert json.loads(body)["reason"] == "connections_busy"
     service.wait_until(lambda: service.get(campaign)["state"] == "running")
-
-

@@ -16,6 +16,7 @@ _SCHEME = {"WWW-Authenticate": {"description": "`Bearer`", "schema": {"type": "s
 _Answers = dict[str, tuple[str, dict[str, Any]]]
 _FULL = "too many connections are open"
 _ALL: _Answers = {
+    "408": ("The body comes too slowly", {}),
     "413": ("The body is too large", {}),
     "421": ("The Host header names no address of this service", {}),
     "503": (_FULL.capitalize(), _WAIT),

@@ -22,7 +22,7 @@ from service.schemas import Reason
 RECEIVE_S = 60  # a sender that is slower would keep others out
 CREATED: Responses = {201: {"headers": {"Location": header("Where it is.")}}}
 REFUSALS: Responses = (
-    problem(408, f"The body took longer than {RECEIVE_S} s")
+    problem(408, f"The body comes too slowly, or took longer than {RECEIVE_S} s")
     | problem(409, "The project has as many networks as it may")
     | problem(415, "The body is declared as something else, or carries a Content-Encoding")
     | problem(422, "The upload is refused, and `detail` says why; or a query parameter is wrong")
@@ -61,7 +61,7 @@ async def post_network(
 ) -> Network:
     """Receive an upload, have it checked, and keep it."""
     try:
-        with service.networks.receive() as incoming:
+        with service.networks.receive(caller.key_id) as incoming:
             async with asyncio.timeout(RECEIVE_S):
                 async for chunk in request.stream():
                     incoming.write(chunk)
