@@ -1,12 +1,11 @@
 """`python -m service`: serve in the foreground."""
 
+import contextlib
 import gc
 import sys
 
-import uvicorn
-
 from risk_sac.errors import RiskSacError
-from service.api.guards.connections import accepted_at_once, protocol
+from service.api.guards.connections import Server
 from service.app import create_app
 from service.host.logs import set_up_logs
 from service.keys.exposure import check_exposure
@@ -29,18 +28,19 @@ def main() -> None:
     gc.collect()
     gc.freeze()
     sys.setswitchinterval(SWITCH_S)
-    uvicorn.run(
+    server = Server(
         app,
+        settings,
         host=settings.host,
         port=settings.port,
         log_config=None,
         access_log=False,
         server_header=False,
         ws="none",
-        http=protocol(settings),
-        backlog=accepted_at_once(),
         timeout_graceful_shutdown=ANSWERS_END_S,
     )
+    with contextlib.suppress(KeyboardInterrupt):
+        server.run()
 
 
 if __name__ == "__main__":

@@ -43,6 +43,8 @@ class ServiceSettings(BaseSettings):
     """Module that executes one run, started as `python -m`."""
     worker_niceness: Annotated[int, Field(ge=0, le=19)] = 5
     """Added to the niceness of workers."""
+    worker_memory_bytes: Annotated[int, Field(ge=1 << 28)] = 4 << 30
+    """Memory that a worker may take, bytes; a run that needs more fails."""
     grace_s: Annotated[float, Field(gt=0, le=600)] = 30.0
     """How long a worker whose run is cancelled may finish its episode before it is killed, s."""
     stop_s: Annotated[float, Field(gt=0, le=600)] = 15.0

@@ -2,13 +2,16 @@
 
 import contextlib
 import json
+import os
 import resource
 import socket
+import sys
+from pathlib import Path
 
 import httpx
 import pytest
 
-from tests.server import LONG_S
+from tests.server import LONG_S, ROOT
 
 FILES = 160  # that a server may have open
 
@@ -101,3 +104,23 @@ def test_with_all_connections_at_work_one_more_is_refused(serve):
         assert b"retry-after: 1" in head
         assert json.loads(body)["reason"] == "connections_busy"
     service.wait_until(lambda: service.get(campaign)["state"] == "running")
+
+
+def test_a_run_that_needs_too_much_memory_takes_one_attempt(serve):
+    service = serve("service.worker", worker_memory_bytes=1 << 28)  # not even enough for the imports
+    (run,) = service.wait(service.post(budget={"episodes": 1}))["runs"]
+    assert (run["state"], run["attempts"]) == ("failed", 1)
+    assert run["reason"].startswith("the run needs more than the 0.25 GiB of memory that a worker may take")
+
+
+@pytest.mark.parametrize("relative", [True, False])
+def test_a_reason_does_not_say_where_on_the_machine_files_lie(serve, scripted, tmp_path, relative):
+    data = tmp_path / "data"
+    service = serve(data_dir=Path(os.path.relpath(data, ROOT)) if relative else data, attempts=2)
+    campaign = service.wait(service.post(seeds=[scripted.RAISES], budget={"episodes": 9}))
+    (run,) = campaign["runs"]
+    assert run["state"] == "failed"
+    assert "FileNotFoundError: [Errno 2] No such file or directory: 'nothing'" in run["reason"]
+    told = service.client.get(f"/v1/campaigns/{campaign['id']}").text
+    for folder in (tmp_path, ROOT, sys.prefix, data.parent.name):
+        assert str(folder) not in told

@@ -7,12 +7,16 @@ goes, which is none that has just come to send one.
 
 import asyncio
 import logging
+import os
 import resource
+import socket
 import time
 from functools import partial
 from http import HTTPStatus
 from typing import Any, cast
 
+import uvicorn
+from starlette.types import ASGIApp
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from service.api.answers.problems import problem_response
@@ -22,20 +26,32 @@ from service.settings import ServiceSettings
 OWN_FILES = 64  # that the server may have open without any connection: database, log, keys, reports, uploads
 WORKER_FILES = 4  # for each worker
 FEWEST = 8
+WAITING = 2048  # connections that the kernel keeps until they are accepted
 UNREAD_S = 60.0  # for which a client may take nothing of its answer
 CALM_S = 60.0  # after which a full room is worth another line in the log
 
 logger = logging.getLogger(__name__)
 
 
-def accepted_at_once() -> int:
-    """Connections that wait to be accepted; the event loop takes so many before it looks how many there are."""
-    return max(4, min(2048, _descriptors() // 32))
+class Server(uvicorn.Server):
+    """Uvicorn's, with room for so many connections and no more."""
+
+    def __init__(self, app: ASGIApp, settings: ServiceSettings, **options: Any) -> None:
+        http = cast(type[asyncio.Protocol], partial(Connection, room=Room(settings)))
+        super().__init__(uvicorn.Config(app, http=http, backlog=_accepted_at_once(), **options))
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Starts to listen."""
+        await super().startup(sockets)
+        # The backlog is two things: what the event loop accepts before it looks up, and what waits to be accepted.
+        # The second may be large: else, in a rush, newcomers would be passed over and try again only seconds later.
+        for listening in (each for server in self.servers for each in server.sockets):
+            with socket.socket(fileno=os.dup(listening.fileno())) as same:
+                same.listen(WAITING)
 
 
-def protocol(settings: ServiceSettings) -> type[asyncio.Protocol]:
-    """What uvicorn is to make of each connection of a server."""
-    return cast(type[asyncio.Protocol], partial(Connection, room=Room(settings)))
+def _accepted_at_once() -> int:
+    return max(4, min(WAITING, _descriptors() // 32))
 
 
 def _descriptors() -> int:
@@ -48,7 +64,7 @@ class Room:
     def __init__(self, settings: ServiceSettings) -> None:
         self.head_s = settings.head_timeout_s
         # Of those that go, some still have their descriptor when the next ones are accepted.
-        others = OWN_FILES + WORKER_FILES * settings.max_workers + 4 * accepted_at_once()
+        others = OWN_FILES + WORKER_FILES * settings.max_workers + 4 * _accepted_at_once()
         possible = max(FEWEST, _descriptors() - others)
         self._most = min(possible, settings.max_connections or possible)
         self._open: set[Connection] = set()
