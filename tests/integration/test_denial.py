@@ -6,11 +6,17 @@ import os
 import resource
 import socket
 import sys
+import time
 from pathlib import Path
 
 import httpx
+import psutil
 import pytest
 
+from service.api.guards import connections
+from service.api.routes import docs
+from service.settings import ServiceSettings
+from tests.contract.serving import serving
 from tests.server import LONG_S, ROOT
 
 FILES = 160  # that a server may have open
@@ -53,14 +59,13 @@ def ended(connection):
             return True
 
 
-@pytest.mark.parametrize("sent", [b"", b"GET /healthz HTTP/1.1\r\nHost: loc"])
-def test_half_open_connections_keep_nobody_out(serve, few_files, connect, sent):
+def test_half_open_connections_keep_nobody_out(serve, few_files, connect):
     service = serve()
     few_files()
     campaign = service.post(budget={"episodes": 100_000})
-    for _ in range(FILES + 40):
-        connect(service, sent)
-    for _ in range(20):
+    for number in range(FILES + 40):
+        connect(service, b"GET /healthz HTTP/1.1\r\nHost: loc" if number % 2 else b"")
+    for _ in range(5):
         with httpx.Client(base_url=service.client.base_url, timeout=LONG_S) as newcomer:
             assert newcomer.get("/healthz").status_code == 200
     done = service.get(campaign)["progress"]["episodes_done"]
@@ -104,6 +109,26 @@ def test_with_all_connections_at_work_one_more_is_refused(serve):
         assert b"retry-after: 1" in head
         assert json.loads(body)["reason"] == "connections_busy"
     service.wait_until(lambda: service.get(campaign)["state"] == "running")
+
+
+def test_who_reads_nothing_of_an_answer_is_not_waited_for_for_ever(tmp_path, monkeypatch):
+    monkeypatch.setattr(connections, "UNREAD_S", 0.2)
+    most = 20 * (docs.ASSETS / docs.SCRIPT).stat().st_size
+    with serving(ServiceSettings(data_dir=tmp_path / "data")) as url, socket.socket() as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.settimeout(LONG_S)
+        client.connect(("127.0.0.1", httpx.URL(url).port))
+        client.sendall(b"GET /docs/%s HTTP/1.1\r\nHost: localhost\r\n\r\n" % docs.SCRIPT.encode() * 20)
+        assert client.recv(1) == b"H"
+        while established(client):
+            time.sleep(0.05)
+        assert sum(iter(lambda: len(client.recv(1 << 20)), 0)) < most
+
+
+def established(client):
+    """Whether the server, in this process, still has its end of a connection."""
+    ends = psutil.Process().net_connections("tcp")
+    return any(end.raddr == client.getsockname() and end.status == psutil.CONN_ESTABLISHED for end in ends)
 
 
 def test_a_run_that_needs_too_much_memory_takes_one_attempt(serve):
