@@ -54,14 +54,16 @@ def exited(status: int, log: WorkerLog, *, done: bool, given_up: Exited | None) 
     return Exited(reason or "worker left without a word", cause, status)
 
 
-def without_folders(text: str, own: Path) -> str:
+def without_folders(text: str, own: Path | None = None) -> str:
     """A text that anybody may read: of each file it has the name, but not where on this machine it lies.
 
     Args:
       text: as it was meant for the log.
       own: the folder that it is about, which may be a relative path.
     """
-    return _FOLDERS.sub("", text.replace(f"{own}/", "").replace(str(own), own.name))
+    if own is not None:
+        text = text.replace(f"{own}/", "").replace(str(own), own.name)
+    return _FOLDERS.sub("", text)
 
 
 def signal_name(number: int) -> str:

@@ -21,6 +21,7 @@ from alembic.util import CommandError
 from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DatabaseError, IntegrityError, NoSuchModuleError, ProgrammingError
 
+from risk_sac.execution.postmortem import without_folders
 from service.errors import StorageError
 
 logger = logging.getLogger(__name__)
@@ -88,7 +89,7 @@ def storage_errors(doing: str) -> Iterator[None]:
     except (IntegrityError, ProgrammingError):
         raise
     except DatabaseError as error:
-        raise StorageError(f"storage failed while {doing}: {str(error.orig).strip()}") from error
+        raise StorageError(f"storage failed while {doing}: {without_folders(str(error.orig).strip())}") from error
 
 
 def _engine(url: str) -> Engine:
