@@ -1,11 +1,11 @@
 """`python -m service`: serve in the foreground."""
 
+import contextlib
 import gc
 import sys
 
-import uvicorn
-
 from risk_sac.errors import ConfigError, RiskSacError
+from service.api.guards.connections import Server
 from service.app import create_app
 from service.host.environment import MISUSED, read_settings
 from service.host.logs import set_up_logs
@@ -31,8 +31,9 @@ def main() -> None:
     gc.collect()
     gc.freeze()
     sys.setswitchinterval(SWITCH_S)
-    uvicorn.run(
+    server = Server(
         app,
+        settings,
         host=settings.host,
         port=settings.port,
         log_config=None,
@@ -41,6 +42,8 @@ def main() -> None:
         ws="none",
         timeout_graceful_shutdown=ANSWERS_END_S,
     )
+    with contextlib.suppress(KeyboardInterrupt):
+        server.run()
 
 
 if __name__ == "__main__":

@@ -16,7 +16,8 @@ from service.api.answers.problems import add_problem_handlers
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
 from service.api.guards import add_guards
-from service.api.routes import campaigns, catalogue, episodes, events, networks, operations, pictures, reports
+from service.api.head import Head
+from service.api.routes import campaigns, catalogue, docs, episodes, events, networks, operations, pictures, reports
 from service.api.stream import Streams
 from service.api.telemetry.metrics import registry, request_latencies
 from service.api.telemetry.requests import Observe
@@ -54,13 +55,20 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
             yield
 
     app = FastAPI(
-        title="RISK-SAC", description=DESCRIPTION, version=__version__, lifespan=lifespan, redirect_slashes=False
+        title="RISK-SAC",
+        description=DESCRIPTION,
+        version=__version__,
+        lifespan=lifespan,
+        redirect_slashes=False,
+        docs_url=None,  # the routes have pages that need no network
+        redoc_url=None,
     )
-    for routes in (campaigns, episodes, pictures, events, reports, networks, catalogue, operations):
+    for routes in (campaigns, episodes, pictures, events, reports, networks, catalogue, operations, docs):
         app.include_router(routes.router)
     add_problem_handlers(app)
     app.add_middleware(AnswerCache)
     add_guards(app, settings, made)
+    app.add_middleware(Head)
     app.add_middleware(Observe, latencies=latencies)
     app.openapi = lambda: openapi(app)  # type: ignore[method-assign]  # FastAPI's documented way
     return app

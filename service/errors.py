@@ -4,7 +4,7 @@ RiskSacError
 └── ServiceError
     ├── NotFoundError      no such campaign, run or failure
     ├── ConflictError      what is asked for does not fit what there is
-    ├── QuotaError         a project has used up its share
+    ├── QuotaError         a project, or a key, has used up its share
     ├── KeysError          the API keys cannot be read, or have no such key
     ├── StorageError       the database or the data folder refused
     └── TransitionError    a change of state that the table of transitions does not allow
@@ -35,7 +35,7 @@ class ConflictError(ServiceError):
 
 
 class QuotaError(ServiceError):
-    """A project has used up its share; asking again pays after `retry_after_s` seconds."""
+    """A project, or a key, has used up its share; asking again pays after `retry_after_s` seconds."""
 
     def __init__(self, message: str, retry_after_s: float) -> None:
         super().__init__(message)

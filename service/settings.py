@@ -53,6 +53,8 @@ class ServiceSettings(BaseSettings):
     """Module that executes one run, started as `python -m`."""
     worker_niceness: Annotated[int, Field(ge=0, le=19)] = 5
     """Added to the niceness of workers."""
+    worker_memory_bytes: Annotated[int, Field(ge=1 << 28)] = 4 << 30
+    """Memory that a worker may take, bytes; a run that needs more fails."""
     grace_s: Annotated[float, Field(gt=0, le=600)] = 30.0
     """How long a worker whose run is cancelled may finish its episode before it is killed, s."""
     stop_s: Annotated[float, Field(gt=0, le=600)] = 15.0
@@ -71,10 +73,18 @@ class ServiceSettings(BaseSettings):
     """Host headers that are answered, a JSON list; `*` answers all. The address listened on is always one of them."""
     cors_origins: Names = []
     """Origins whose web pages may call the service, a JSON list."""
+    max_connections: Annotated[int, Field(ge=1)] | None = None
+    """Connections open at the same time; by default, and at most, what the limit of open files leaves room for."""
+    head_timeout_s: Annotated[float, Field(gt=0, le=600)] = 10.0
+    """How long a connection may take for the head of its next request, s."""
     max_body_bytes: Annotated[int, Field(ge=1024)] = 1 << 20
     """Largest body of a request, but for uploads, bytes."""
     max_upload_bytes: Annotated[int, Field(ge=1024)] = 32 << 20
     """Largest upload, bytes."""
+    min_body_rate: Annotated[int, Field(ge=1)] = 1024
+    """Bytes per second at which a body has to come, on average."""
+    body_patience_s: Annotated[float, Field(gt=0, le=600)] = 5.0
+    """How long a body may come more slowly than that, s."""
     rate_limit: Annotated[int, Field(ge=1)] = 500
     """Requests per second that one key, or one address without a key, may make."""
     quota_queued_runs: Annotated[int, Field(ge=1)] = 10_000

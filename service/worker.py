@@ -1,4 +1,4 @@
-"""`python -m service.worker FOLDER NICENESS`: execute one run in a process of its own.
+"""`python -m service.worker FOLDER NICENESS MEMORY_BYTES`: execute one run in a process of its own.
 
 The run is one line of JSON on stdin, events are lines of JSON on stdout, everything else a library
 prints goes to stderr. SIGTERM stops the run at the next episode boundary, with a checkpoint; before the first
@@ -22,7 +22,9 @@ from typing import TYPE_CHECKING
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
+from risk_sac.execution.postmortem import without_folders
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
+from service.workers.memory import limit_memory, out_of_memory
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
 from service.workers.takeover import take_over
 
@@ -107,29 +109,35 @@ class LossyLog(io.FileIO):
 
 def main() -> int:
     """Execute the run; returns the exit status."""
-    folder, niceness = Path(sys.argv[1]), int(sys.argv[2])
+    folder, niceness, memory_bytes = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
     os.nice(niceness)
+    limit_memory(memory_bytes)
     reporter = Reporter(_take_stdout())
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     spec = RunSpec.model_validate_json(sys.stdin.buffer.readline())
     threading.Thread(target=_leave_with_server, daemon=True).start()
     reporter.send(Started(pid=os.getpid()))
     with reporter.beating():
-        last = _run(spec, folder, reporter)
+        last = _run(spec, folder, reporter, memory_bytes)
     reporter.send(last)
     return 1 if isinstance(last, Failed) else 0
 
 
-def _run(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished | Failed:
+def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int) -> Finished | Failed:
     try:
         with take_over(folder):
             return _execute(spec, folder, reporter)
-    except OSError as error:
-        logger.exception("the disk refused")
-        return Failed(reason=_refused(error), storage=True)
-    except RiskSacError as error:
-        logger.exception("the run cannot go on")
-        return Failed(reason=str(error))
+    except Exception as error:
+        if out_of_memory(error):  # as it would be for the next worker
+            logger.exception("the run needs more memory than there is")
+            return Failed(reason=_too_much(memory_bytes))
+        if isinstance(error, OSError):
+            logger.exception("the disk refused")
+            return Failed(reason=_refused(error), storage=True)
+        if isinstance(error, RiskSacError):
+            logger.exception("the run cannot go on")
+            return Failed(reason=without_folders(str(error), folder))
+        raise
 
 
 def _execute(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished:
@@ -170,8 +178,15 @@ def _leave_with_server() -> None:
 
 
 def _refused(error: OSError) -> str:
-    where = f" ({error.filename!r})" if error.filename else ""
+    where = f" ({Path(error.filename).name!r})" if error.filename else ""
     return f"storage failed: {error.strerror or error}{where}"
+
+
+def _too_much(memory_bytes: int) -> str:
+    return (
+        f"the run needs more than the {memory_bytes / 2**30:.3g} GiB of memory that a worker may take; wanted smaller "
+        "networks, batches or replay, or a larger RISK_SAC_WORKER_MEMORY_BYTES"
+    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Why a worker is gone, told from its exit status, its last word and its log."""
 
 import os
+import re
 import signal
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from risk_sac.execution.executor import Cause, Exited
 TAIL_BYTES = 2000  # of a log, at most
 TAIL_LINES = 5
 
+_FOLDERS = re.compile(r"""(?<![\w./:])/(?:[^\s/'"|]+/)*(?=[\w.])""")  # of an absolute path; URLs stay
 _SIGNAL_NAMES = {item.value: item.name for item in signal.Signals}  # real-time signals have none
 _OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
 
@@ -30,7 +32,8 @@ class WorkerLog:
                 lines = stream.read().decode(errors="replace").splitlines()
         except OSError as error:
             return f"its log cannot be read ({error.strerror})"
-        return " | ".join(line.strip() for line in lines[-TAIL_LINES:] if line.strip()) or "it left no message"
+        said = " | ".join(line.strip() for line in lines[-TAIL_LINES:] if line.strip())
+        return without_folders(said, self.path.parent) or "it left no message"
 
 
 def exited(status: int, log: WorkerLog, *, done: bool, given_up: Exited | None) -> Exited:
@@ -49,6 +52,18 @@ def exited(status: int, log: WorkerLog, *, done: bool, given_up: Exited | None) 
         return replace(given_up, status=status)
     cause = Cause.KILLED if -status in _OUTSIDE else Cause.CRASHED
     return Exited(reason or "worker left without a word", cause, status)
+
+
+def without_folders(text: str, own: Path | None = None) -> str:
+    """A text that anybody may read: of each file it has the name, but not where on this machine it lies.
+
+    Args:
+      text: as it was meant for the log.
+      own: the folder that it is about, which may be a relative path.
+    """
+    if own is not None:
+        text = text.replace(f"{own}/", "").replace(str(own), own.name)
+    return _FOLDERS.sub("", text)
 
 
 def signal_name(number: int) -> str:

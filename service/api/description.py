@@ -13,7 +13,7 @@ from service.schemas.changes import StateChange
 DESCRIPTION = """Finds scenarios in which an automated driving system fails.
 
 Post a campaign, follow it, read what it found. All errors are problem details (RFC 9457) that name the field, with a
-`reason` that does not change when messages do."""
+`reason` that does not change when messages do. Whatever answers GET answers HEAD, too."""
 
 
 def openapi(app: FastAPI) -> dict[str, Any]:

@@ -4,12 +4,13 @@ import json
 from http import HTTPStatus
 from typing import Annotated, Any
 
-from fastapi import Depends, HTTPException, Request
+from fastapi import Depends, Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import ValidationError
 
 from risk_sac.config import CampaignSpec
 from service.api.answers.problems import ProblemError, invalid_field
+from service.api.media_types import media_type
 from service.schemas.problems import Reason
 
 MOST_MISTAKES = 50  # that a refusal names one by one
@@ -33,8 +34,7 @@ def body_schemas() -> dict[str, Any]:
 
 async def _posted(request: Request) -> CampaignSpec:
     # Not a body parameter: FastAPI validates the parsed JSON, where strictness would refuse arrays for tuples.
-    if request.headers.get("content-type", "").partition(";")[0].strip().lower() != "application/json":
-        raise HTTPException(415, f"content-type is {request.headers.get('content-type')!r}; wanted application/json")
+    media_type(request, ["application/json"])
     content = await request.body()
     try:
         spec = CampaignSpec.model_validate_json(content, strict=True)

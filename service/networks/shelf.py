@@ -11,6 +11,7 @@ import shutil
 import tempfile
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -22,7 +23,7 @@ from pydantic import ValidationError
 from risk_sac.errors import DamagedError
 from risk_sac.run_folder.durable import sync_folder
 from risk_sac.run_folder.seal import seal, unseal
-from service.errors import ConflictError, NotFoundError, StorageError
+from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
 from service.networks.errors import BusyError
 from service.networks.incoming import Incoming
 from service.networks.packaging import Packaging
@@ -34,6 +35,7 @@ from service.store.stored import Page
 logger = logging.getLogger(__name__)
 
 UPLOADS_AT_ONCE = 4  # being received or checked
+UPLOADS_OF_ONE = 2  # of them, from the holder of one key
 MOST = 200  # networks of one project
 RETRY_AFTER_S = 5
 INCOMING = ".incoming"  # no project's name starts with a dot
@@ -65,22 +67,26 @@ class Shelf:
         self._most = most
         self._checker = checker
         self._at_once = at_once
-        self._slots = threading.BoundedSemaphore(at_once)
+        self._at_work = Counter[str | None]()  # uploads, by key
+        self._counting = threading.Lock()
         self._adding = threading.Lock()
         shutil.rmtree(folder / INCOMING, ignore_errors=True)
 
     @contextmanager
-    def receive(self) -> Iterator[Incoming]:
+    def receive(self, key_id: str | None = None) -> Iterator[Incoming]:
         """A place for one upload, which is removed again unless `add` made a network of it.
 
+        Args:
+          key_id: of the key that it was sent with; None: no key is needed.
+
         Raises:
+          QuotaError: there are too many at once of this key.
           BusyError: there are too many at once.
           StorageError: the disk refuses.
         """
-        if not self._slots.acquire(blocking=False):
-            raise BusyError(
-                f"{self._at_once} uploads are at work; wanted fewer: try again in {RETRY_AFTER_S} s", RETRY_AFTER_S
-            )
+        with self._counting:
+            self._check_share(key_id)
+            self._at_work[key_id] += 1
         try:
             with _refusals("an upload cannot be received"):
                 (self._folder / INCOMING).mkdir(parents=True, exist_ok=True)
@@ -90,7 +96,15 @@ class Shelf:
             finally:
                 incoming.discard()
         finally:
-            self._slots.release()
+            with self._counting:
+                self._at_work[key_id] -= 1
+
+    def _check_share(self, key_id: str | None) -> None:
+        again = f"wanted fewer: try again in {RETRY_AFTER_S} s"
+        if self._at_work[key_id] >= UPLOADS_OF_ONE:
+            raise QuotaError(f"{UPLOADS_OF_ONE} uploads of this key are at work; {again}", RETRY_AFTER_S)
+        if self._at_work.total() >= self._at_once:
+            raise BusyError(f"{self._at_once} uploads are at work; {again}", RETRY_AFTER_S)
 
     def add(self, incoming: Incoming, packaging: Packaging, project: str, label: str) -> Network:
         """Check an upload that has arrived, and keep it.

@@ -62,8 +62,8 @@ class StoragePause:
 
 
 def refused(doing: str, folder: Path, error: OSError) -> str:
-    """What the disk said, in a line."""
-    return f"storage failed while {doing}: {error.strerror} ({str(error.filename or folder)!r})"
+    """What the disk said, in a line that anybody may read: the log has where the data lies."""
+    return f"storage failed while {doing}: {error.strerror} ({Path(error.filename or folder).name!r})"
 
 
 def _probe(folder: Path) -> None:

@@ -20,7 +20,6 @@ class Reason(StrEnum):
     IDEMPOTENCY_KEY_REUSED = "idempotency_key_reused"
     NOT_ENDED = "not_ended"
     TOO_LARGE = "too_large"
-    UPLOAD_INCOMPLETE = "upload_incomplete"
     UPLOAD_TOO_SLOW = "upload_too_slow"
     UPLOAD_REFUSED = "upload_refused"
     UPLOADS_BUSY = "uploads_busy"
@@ -33,6 +32,7 @@ class Reason(StrEnum):
     RATE_LIMITED = "rate_limited"
     INTERNAL_ERROR = "internal_error"
     KEYS_UNAVAILABLE = "keys_unavailable"
+    CONNECTIONS_BUSY = "connections_busy"
     STORAGE_UNAVAILABLE = "storage_unavailable"
     MANAGER_STOPPED = "manager_stopped"
 

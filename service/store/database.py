@@ -18,6 +18,7 @@ from sqlite3 import Connection as SqliteConnection
 from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
 from sqlalchemy.exc import ArgumentError, DatabaseError, IntegrityError, NoSuchModuleError, ProgrammingError
 
+from risk_sac.execution.postmortem import without_folders
 from service.errors import StorageError
 from service.host.private import create_private, make_private
 from service.store.steps import step_forward
@@ -126,7 +127,7 @@ def storage_errors(doing: str) -> Iterator[None]:
     except (IntegrityError, ProgrammingError):
         raise
     except DatabaseError as error:
-        raise StorageError(f"storage failed while {doing}: {str(error.orig).strip()}") from error
+        raise StorageError(f"storage failed while {doing}: {without_folders(str(error.orig).strip())}") from error
 
 
 def _keep_to_ourselves(file: Path | None) -> None:

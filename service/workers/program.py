@@ -15,7 +15,8 @@ def program(settings: ServiceSettings) -> Program[Event]:
     """The worker that the settings name."""
 
     def arguments(spec: RunSpec, folder: Path) -> Sequence[str]:
-        return ["-m", settings.worker_module, str(folder), str(settings.worker_niceness)]
+        limits = settings.worker_niceness, settings.worker_memory_bytes
+        return ["-m", settings.worker_module, str(folder), *map(str, limits)]
 
     return Program(
         arguments=arguments,

@@ -36,14 +36,15 @@ Do = Callable[[psutil.Process], None]
 class Launcher:
     """Executes one worker after the other on the same run."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, spec: RunSpec = SPEC, settings: ServiceSettings | None = None) -> None:
         self.folder = folder
-        self.executor = LocalExecutor(program(ServiceSettings()))
+        self.spec = spec
+        self.executor = LocalExecutor(program(settings or ServiceSettings()))
         self.attempts = 0
 
     def submit(self) -> None:
         self.attempts += 1
-        self.executor.submit(1, self.attempts, SPEC, self.folder)
+        self.executor.submit(1, self.attempts, self.spec, self.folder)
 
     def work(self, until: int | None = None, then: Do | None = None) -> tuple[list[Event], Exited, float]:
         """What one worker says, why it is gone, and how long that took after something was done to it.
@@ -134,3 +135,14 @@ def test_a_disk_that_is_full_is_told_and_leaves_a_run_that_goes_on(
     assert said[-1].reason.startswith("storage failed: File too large")
     assert exited.cause is Cause.ENDED
     assert digest(launcher) == undisturbed
+
+
+def test_a_run_that_needs_too_much_memory_says_so_and_nothing_else(tmp_path: Path) -> None:
+    learner = SPEC.learner.model_copy(update={"agent": AgentConfig(hidden_sizes=(2048, 2048))})
+    settings = ServiceSettings(worker_memory_bytes=1 << 29)
+    said, exited, _ = Launcher(tmp_path / "run", SPEC.model_copy(update={"learner": learner}), settings).work()
+    assert exited.cause is Cause.ENDED, "it would be no better with another worker"
+    assert isinstance(said[-1], Failed)
+    assert not said[-1].storage
+    assert said[-1].reason.startswith("the run needs more than the 0.5 GiB of memory that a worker may take; wanted")
+    assert "RISK_SAC_WORKER_MEMORY_BYTES" in said[-1].reason

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import uvicorn
-
 from risk_sac.config import RunSpec
 from risk_sac.execution.executor import Exited
+from service.api.guards.connections import Server
 from service.app import create_app
 from service.settings import ServiceSettings
 from service.workers.messages import Event
@@ -43,7 +42,7 @@ class IdleExecutor:
 @contextmanager
 def serving(settings: ServiceSettings) -> Iterator[str]:
     """Where the app answers."""
-    server = uvicorn.Server(uvicorn.Config(create_app(settings, IdleExecutor()), log_level="warning"))
+    server = Server(create_app(settings, IdleExecutor()), settings, log_level="warning")
     listener = socket.create_server(("127.0.0.1", 0))
     thread = threading.Thread(target=server.run, args=([listener],))
     thread.start()

@@ -28,6 +28,7 @@ RECORD = os.environ.get("RISK_SAC_RECORD") == "1"
 HEADERS = ("allow", "cache-control", "content-type", "etag", "location", "retry-after", "vary")
 ENDED, LIVE, CANCELLED = (f"/v1/campaigns/{each}" for each in (ENDED_ID, LIVE_ID, CANCELLED_ID))
 ASKED = {
+    "entrance": ("GET", "/"),
     "health": ("GET", "/healthz"),
     "readiness": ("GET", "/readyz"),
     "metrics": ("GET", "/metrics"),

@@ -35,7 +35,7 @@ def test_every_error_is_declared_as_a_problem():
                 assert types == [problem] if int(status) >= 400 else problem not in types, (method, path, status)
 
 
-@pytest.mark.parametrize("path", ["/", "/v1", "/v1/campaigns/", "/v1/campaigns/x/y/z", "/v1/families/low"])
+@pytest.mark.parametrize("path", ["/v1", "/v1/campaigns/", "/v1/campaigns/x/y/z", "/v1/families/low"])
 def test_unknown_route_is_a_problem(base_url, path):
     response = httpx.get(base_url + path)
     assert response.status_code == 404
@@ -47,7 +47,7 @@ def test_wrong_method_is_a_problem_that_names_the_right_ones(base_url):
     response = httpx.delete(f"{base_url}/v1/campaigns")
     assert response.status_code == 405
     assert response.headers["content-type"] == "application/problem+json"
-    assert response.headers["allow"] == "GET, POST"
+    assert response.headers["allow"] == "GET, HEAD, POST"
 
 
 @pytest.mark.parametrize("part", ["", "/results", "/episodes", "/failures", "/table", "/figures", "/spec"])

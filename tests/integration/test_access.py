@@ -30,11 +30,13 @@ CAMPAIGN, NETWORK = "/v1/campaigns/{campaign_id}", "/v1/networks/{network_id}"
 
 # What each route wants, and what it answers the project's own key.
 ROUTES = {
+    ("GET", "/"): ("nothing", 200),
     ("GET", "/healthz"): ("nothing", 200),
     ("GET", "/readyz"): ("nothing", 200),
     ("GET", "/docs"): ("nothing", 200),
-    ("GET", "/docs/oauth2-redirect"): ("nothing", 200),
-    ("GET", "/redoc"): ("nothing", 200),
+    ("GET", "/docs/swagger-ui-bundle.js"): ("nothing", 200),
+    ("GET", "/docs/swagger-ui.css"): ("nothing", 200),
+    ("GET", "/docs/favicon.png"): ("nothing", 200),
     ("GET", "/openapi.json"): ("nothing", 200),
     ("GET", "/metrics"): ("admin", 200),
     ("GET", "/v1/families"): ("read", 200),

@@ -1,5 +1,6 @@
 """Uploading road networks to a real server."""
 
+import contextlib
 import gzip
 import json
 import os
@@ -13,6 +14,8 @@ from pathlib import Path
 import httpx
 import pytest
 
+from service.keys.file import KeyFile
+from service.keys.key import Scope
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
 from tests.server import Service
 
@@ -117,20 +120,45 @@ def test_an_upload_that_is_packed_for_the_way_is_refused(client: httpx.Client) -
     assert "content-encoding is 'gzip'; wanted none" in response.json()["detail"]
 
 
-def test_slow_senders_keep_each_other_out_and_nobody_else(serve: Callable[..., Service]) -> None:
-    service = serve()
+def test_slow_senders_of_one_key_keep_out_that_key_and_nobody_else(serve: Callable[..., Service]) -> None:
+    service = serve(body_patience_s=600)
+    keys = KeyFile(service.data_dir / "keys.json")
+    slow, other = (keys.create("maps", name, Scope.RUN)[1] for name in ("slow", "other"))
     senders = [socket.create_connection(("127.0.0.1", service.port)) for _ in range(4)]
     for sender in senders:
-        sender.sendall(HALF)
+        sender.sendall(HALF.replace(b"\r\n\r\n", f"\r\nAuthorization: Bearer {slow}\r\n\r\n".encode()))
     incoming = service.data_dir / "networks" / ".incoming"
-    service.wait_until(lambda: incoming.exists() and len(list(incoming.iterdir())) == 4)
-    busy = post(service.client)
-    assert (busy.status_code, busy.json()["reason"], busy.headers["retry-after"]) == (503, "uploads_busy", "5")
+    service.wait_until(lambda: incoming.exists() and len(list(incoming.iterdir())) == 2)
+    service.client.headers["authorization"] = f"Bearer {slow}"
+    more = post(service.client)
+    assert (more.status_code, more.json()["reason"], more.headers["retry-after"]) == (429, "quota_exceeded", "5")
     assert service.client.get("/v1/networks").status_code == 200
+    service.client.headers["authorization"] = f"Bearer {other}"
+    assert post(service.client).status_code == 201
     for sender in senders:
         sender.close()
     service.wait_until(lambda: not list(incoming.iterdir()))
+    service.client.headers["authorization"] = f"Bearer {slow}"
     assert post(service.client).status_code == 201
+
+
+@pytest.mark.parametrize("path", ["/v1/networks", "/v1/campaigns"])
+def test_who_sends_too_slowly_is_told_so_and_hung_up_on(serve: Callable[..., Service], path: str) -> None:
+    service = serve(body_patience_s=0.5)
+    kind = b"xml" if path == "/v1/networks" else b"json"
+    with socket.create_connection(("127.0.0.1", service.port), timeout=0.1) as sender:
+        sender.sendall(HALF.replace(b"/v1/networks", path.encode()).replace(b"xml", kind))
+        answer = b""
+        while not answer.endswith(b"}"):
+            with contextlib.suppress(TimeoutError, BrokenPipeError):
+                sender.sendall(b" ")
+            with contextlib.suppress(TimeoutError):
+                answer += sender.recv(10_000)
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 408 ")
+    assert b"connection: close" in head
+    assert json.loads(body)["reason"] == "upload_too_slow"
+    assert not list(service.data_dir.glob("networks/.incoming/*"))
 
 
 def test_a_server_that_is_killed_while_it_receives_leaves_nothing_behind(serve: Callable[..., Service]) -> None:

@@ -5,10 +5,11 @@ import math
 from http import HTTPStatus
 from typing import Any
 
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.routing import compile_path
 
 from risk_sac.errors import ConfigError
@@ -18,6 +19,7 @@ from service.schemas.problems import FieldProblem, Problem, Reason
 
 logger = logging.getLogger(__name__)
 
+CLIENT_LEFT = 499  # in the middle of its request; nobody gets this answer, but the log and the metrics tell of it
 _REASONS = {
     HTTPStatus.NOT_FOUND: Reason.UNKNOWN_ROUTE,
     HTTPStatus.METHOD_NOT_ALLOWED: Reason.METHOD_NOT_ALLOWED,
@@ -68,6 +70,7 @@ def add_problem_handlers(app: FastAPI) -> None:
     """Make every error response of the app a problem."""
     for kind in (*_OF_REQUESTS, *_OF_THE_SERVICE, Exception):
         app.add_exception_handler(kind, _answer)
+    app.add_exception_handler(ClientDisconnect, _left)
 
 
 def problem_response(path: str, problem: ProblemError) -> JSONResponse:
@@ -132,7 +135,7 @@ def _http_error(request: Request, error: HTTPException) -> ProblemError:
         detail = f"nothing is at {request.url.path}; /docs lists all routes"
     headers = dict(error.headers or {})
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
-        headers["Allow"] = allowed = ", ".join(sorted(_methods(request))) or headers["Allow"]
+        headers["Allow"] = allowed = ", ".join(sorted(_methods(request, headers["Allow"])))
         detail = f"{request.url.path} does not answer {request.method}; it answers {allowed}"
     return ProblemError(status, _REASONS[status], detail, headers=headers)
 
@@ -142,8 +145,13 @@ def invalid(detail: str, *errors: FieldProblem) -> ProblemError:
     return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail, *errors)
 
 
-def _methods(request: Request) -> set[str]:
+async def _left(request: Request, error: Exception) -> Response:
+    return Response(status_code=CLIENT_LEFT)
+
+
+def _methods(request: Request, of_first: str) -> set[str]:
     """Methods that some route answers at this path; Starlette names only those of the first."""
     paths: dict[str, dict[str, Any]] = request.app.openapi()["paths"]
     matching = (methods for path, methods in paths.items() if compile_path(path)[0].match(request.url.path))
-    return {method.upper() for methods in matching for method in methods}
+    found = {method.upper() for methods in matching for method in methods} | set(of_first.split(", "))
+    return found | {"HEAD"} if "GET" in found else found

@@ -14,12 +14,18 @@ _SECURITY = {
 _WAIT = {"Retry-After": {"description": "Seconds until asking again pays.", "schema": {"type": "integer"}}}
 _SCHEME = {"WWW-Authenticate": {"description": "`Bearer`", "schema": {"type": "string"}}}
 _Answers = dict[str, tuple[str, dict[str, Any]]]
-_ALL: _Answers = {"413": ("The body is too large", {}), "421": ("The Host header names no address of this service", {})}
+_FULL = "too many connections are open"
+_ALL: _Answers = {
+    "408": ("The body comes too slowly", {}),
+    "413": ("The body is too large", {}),
+    "421": ("The Host header names no address of this service", {}),
+    "503": (_FULL.capitalize(), _WAIT),
+}
 _COUNTED: _Answers = {"429": ("Too many requests, or too much for the project's quota", _WAIT)}
 _GUARDED: _Answers = {
     "401": ("The API key is missing, wrong or revoked", _SCHEME),
     "403": ("The API key does not reach so far, or the request comes from a foreign page", {}),
-    "503": ("The API keys are lost or damaged; `detail` says what whoever runs the service can do", {}),
+    "503": (f"The API keys are lost or damaged, as `detail` says, or {_FULL}", _WAIT),
 }
 
 

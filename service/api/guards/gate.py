@@ -24,7 +24,8 @@ from service.schemas.problems import Reason
 from service.settings import ServiceSettings
 
 HEALTH = frozenset({"/healthz", "/readyz"})
-PUBLIC = HEALTH | {"/docs", "/docs/oauth2-redirect", "/redoc", "/openapi.json"}
+_PAGE = {"/docs", "/docs/swagger-ui-bundle.js", "/docs/swagger-ui.css", "/docs/favicon.png"}
+PUBLIC = HEALTH | _PAGE | {"/", "/openapi.json"}
 
 RequestHeaders = Mapping[bytes, bytes]
 

@@ -6,13 +6,13 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from starlette.requests import ClientDisconnect
 
 from service.api.access import CurrentCaller
 from service.api.answers.pages import Cursor, Limit
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, header, problem
 from service.api.context import Service
+from service.api.media_types import media_type
 from service.networks.errors import BusyError, UploadError
 from service.networks.limits import MAX_EDGES, MAX_EXPANDED_BYTES, MAX_FILES, WALL_S
 from service.networks.packaging import MEDIA_TYPES, Packaging
@@ -23,8 +23,7 @@ LISTED = "networks"
 RECEIVE_S = 60  # a sender that is slower would keep others out
 CREATED: Responses = {201: {"headers": {"Location": header("Where it is.")}}}
 REFUSALS: Responses = (
-    problem(400, "The body ended early")
-    | problem(408, f"The body took longer than {RECEIVE_S} s")
+    problem(408, f"The body comes too slowly, or took longer than {RECEIVE_S} s")
     | problem(409, "The project has as many networks as it may")
     | problem(415, "The body is declared as something else, or carries a Content-Encoding")
     | problem(422, "The upload is refused, and `detail` says why; or a query parameter is wrong")
@@ -49,17 +48,7 @@ router = APIRouter(prefix="/v1/networks", tags=["networks"], responses=STORAGE |
 
 
 def _packaging(request: Request) -> Packaging:
-    declared = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if declared not in MEDIA_TYPES:
-        raise _unsupported(f"content-type is {declared[:100]!r}; wanted one of {', '.join(MEDIA_TYPES)}")
-    encoding = request.headers.get("content-encoding", "identity")
-    if encoding.lower() != "identity":
-        raise _unsupported(f"content-encoding is {encoding[:100]!r}; wanted none: send the file as it is")
-    return MEDIA_TYPES[declared]
-
-
-def _unsupported(detail: str) -> ProblemError:
-    return ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, Reason.UNSUPPORTED_MEDIA_TYPE, detail)
+    return MEDIA_TYPES[media_type(request, MEDIA_TYPES)]
 
 
 @router.post("", status_code=201, responses=CREATED | REFUSALS, description=DESCRIPTION, openapi_extra=DOCUMENTED_BODY)
@@ -73,7 +62,7 @@ async def post_network(
 ) -> Network:
     """Receive an upload, have it checked, and keep it."""
     try:
-        with service.networks.receive() as incoming:
+        with service.networks.receive(caller.key_id) as incoming:
             async with asyncio.timeout(RECEIVE_S):
                 async for chunk in request.stream():
                     incoming.write(chunk)
@@ -86,8 +75,6 @@ async def post_network(
     except TimeoutError as error:
         detail = f"the body took longer than {RECEIVE_S} s; wanted it faster"
         raise ProblemError(HTTPStatus.REQUEST_TIMEOUT, Reason.UPLOAD_TOO_SLOW, detail) from error
-    except ClientDisconnect as error:
-        raise ProblemError(HTTPStatus.BAD_REQUEST, Reason.UPLOAD_INCOMPLETE, "the body ended early") from error
     response.headers["Location"] = f"/v1/networks/{network.id}"
     return network
 

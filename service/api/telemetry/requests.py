@@ -46,7 +46,7 @@ class Observe:
         try:
             await self._app(scope, receive, note)
         finally:
-            if not status:  # an exception on its way to the handler of last resort, or a client that left
+            if not status:  # an exception on its way to the handler of last resort
                 status = 500
                 self._observe(scope, status, time.perf_counter() - began)
             _log(scope, status, time.perf_counter() - began, request_id.decode())

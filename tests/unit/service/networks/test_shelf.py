@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from service.errors import ConflictError, NotFoundError, StorageError
+from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
 from service.networks.errors import BusyError, UploadError
 from service.networks.packaging import Packaging
 from service.networks.schemas import Network
@@ -104,6 +104,17 @@ def test_more_uploads_than_may_be_at_once_are_told_to_come_again(folder: Path) -
     with pytest.raises(UploadError):
         add(shelf, content="<evil/>")
     add(shelf)
+
+
+def test_one_key_has_a_part_of_the_places_only(folder: Path) -> None:
+    shelf = Shelf(folder)
+    with shelf.receive("mine"), shelf.receive("mine"):
+        with pytest.raises(QuotaError, match="2 uploads of this key are at work; wanted fewer"), shelf.receive("mine"):
+            pass
+        with shelf.receive("theirs"), shelf.receive("theirs"), pytest.raises(BusyError), shelf.receive("third"):
+            pass
+    with shelf.receive("mine"):
+        pass
 
 
 def test_what_an_earlier_server_left_unfinished_is_removed(shelf: Shelf, folder: Path) -> None:

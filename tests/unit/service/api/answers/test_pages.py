@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.api.answers.pages import Cursors
-from service.errors import CursorError
+from service.api.answers.problems import ProblemError
 
 CURSORS = Cursors(bytes(range(32)))
 numbers = st.integers(0, 2**64 - 1)
@@ -37,7 +37,7 @@ def test_a_cursor_holds_for_one_list_one_reader_and_one_service() -> None:
         (CURSORS, "campaigns", None),
         (Cursors(bytes(32)), "campaigns", "maps"),
     ):
-        with pytest.raises(CursorError):
+        with pytest.raises(ProblemError):
             cursors.decode(cursor, listed, project)
 
 
@@ -45,7 +45,7 @@ def test_a_cursor_holds_for_one_list_one_reader_and_one_service() -> None:
     st.one_of(st.text(max_size=100), st.binary(max_size=60).map(lambda some: base64.urlsafe_b64encode(some).decode()))
 )
 def test_what_is_made_up_is_refused(cursor: str) -> None:
-    with pytest.raises(CursorError):
+    with pytest.raises(ProblemError):
         CURSORS.decode(cursor, "campaigns", None)
 
 
@@ -53,5 +53,5 @@ def test_what_is_made_up_is_refused(cursor: str) -> None:
 def test_a_flipped_bit_is_noticed(bit: int) -> None:
     content = bytearray(base64.urlsafe_b64decode(CURSORS.encode(7, "campaigns", None) or ""))
     content[bit // 8] ^= 1 << bit % 8
-    with pytest.raises(CursorError):
+    with pytest.raises(ProblemError):
         CURSORS.decode(base64.urlsafe_b64encode(content).decode(), "campaigns", None)

@@ -1,0 +1,151 @@
+"""Clients that keep connections, bodies and answers waiting keep nobody else out."""
+
+import contextlib
+import json
+import os
+import resource
+import socket
+import sys
+import time
+from pathlib import Path
+
+import httpx
+import psutil
+import pytest
+
+from service.api.guards import connections
+from service.api.routes import docs
+from service.settings import ServiceSettings
+from tests.contract.serving import serving
+from tests.server import LONG_S, ROOT
+
+FILES = 160  # that a server may have open
+
+
+@pytest.fixture
+def few_files():
+    """Whatever is started meanwhile may have few files open."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (FILES, limits[1]))
+    yield lambda: resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+    resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+
+
+@pytest.fixture
+def connect():
+    """Connections that are closed at the end."""
+    with contextlib.ExitStack() as opened:
+
+        def connect(service, *sent):
+            connection = opened.enter_context(socket.create_connection(("127.0.0.1", service.port), timeout=LONG_S))
+            for data in sent:
+                connection.sendall(data)
+            return connection
+
+        yield connect
+
+
+def ended(connection):
+    """Whether the server closes a connection on which something arrives now and then."""
+    connection.settimeout(0.1)
+    while True:
+        try:
+            connection.sendall(b"x")
+            if not connection.recv(1000):
+                return True
+        except TimeoutError:
+            pass
+        except ConnectionError:
+            return True
+
+
+def test_half_open_connections_keep_nobody_out(serve, few_files, connect):
+    service = serve()
+    few_files()
+    campaign = service.post(budget={"episodes": 100_000})
+    for number in range(FILES + 40):
+        connect(service, b"GET /healthz HTTP/1.1\r\nHost: loc" if number % 2 else b"")
+    for _ in range(5):
+        with httpx.Client(base_url=service.client.base_url, timeout=LONG_S) as newcomer:
+            assert newcomer.get("/healthz").status_code == 200
+    done = service.get(campaign)["progress"]["episodes_done"]
+    service.wait_for(campaign, lambda seen: seen["progress"]["episodes_done"] > done + 3)
+    assert service.get(campaign)["state"] == "running", "not paused for want of a descriptor"
+    service.wait_for(service.post(budget={"episodes": 1}), lambda seen: seen["state"] == "succeeded")
+    service.stop()
+    log = service.log.read_text()
+    assert "Traceback" not in log
+    assert log.count("connections are as many as may be") == 1
+
+
+def test_a_head_has_to_come_in_time_on_a_new_connection_and_on_an_old_one(serve, connect):
+    service = serve(head_timeout_s=0.5)
+    assert ended(connect(service, b"GET /healthz HTTP/1.1\r\nX: "))
+    used = connect(service, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
+    assert used.recv(1000).startswith(b"HTTP/1.1 200")
+    used.sendall(b"GET /healthz HTTP/1.1\r\nX: ")
+    assert ended(used)
+    assert "Traceback" not in service.log.read_text()
+
+
+def test_an_answer_that_goes_on_is_no_late_head(serve):
+    service = serve(head_timeout_s=0.1)
+    campaign = service.post(budget={"episodes": 60})
+    with service.client.stream("GET", f"/v1/campaigns/{campaign}/events") as response:
+        told = response.read().decode()
+    assert told.count("event: episode") == 60
+
+
+def test_with_all_connections_at_work_one_more_is_refused(serve):
+    service = serve(max_connections=3)
+    campaign = service.post(budget={"episodes": 100_000})
+    with contextlib.ExitStack() as streams:
+        for _ in range(3):
+            client = streams.enter_context(httpx.Client(base_url=service.client.base_url, timeout=LONG_S))
+            streams.enter_context(client.stream("GET", f"/v1/campaigns/{campaign}/events"))
+        with socket.create_connection(("127.0.0.1", service.port), timeout=LONG_S) as connection:
+            head, _, body = connection.recv(10_000).partition(b"\r\n\r\n")
+        assert head.startswith(b"HTTP/1.1 503 Service Unavailable\r\n")
+        assert b"retry-after: 1" in head
+        assert json.loads(body)["reason"] == "connections_busy"
+    service.wait_until(lambda: service.get(campaign)["state"] == "running")
+
+
+def test_who_reads_nothing_of_an_answer_is_not_waited_for_for_ever(tmp_path, monkeypatch):
+    monkeypatch.setattr(connections, "UNREAD_S", 0.2)
+    most = 20 * (docs.ASSETS / docs.SCRIPT).stat().st_size
+    with serving(ServiceSettings(data_dir=tmp_path / "data")) as url, socket.socket() as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.settimeout(LONG_S)
+        client.connect(("127.0.0.1", httpx.URL(url).port))
+        client.sendall(b"GET /docs/%s HTTP/1.1\r\nHost: localhost\r\n\r\n" % docs.SCRIPT.encode() * 20)
+        assert client.recv(1) == b"H"
+        while established(client):
+            time.sleep(0.05)
+        assert sum(iter(lambda: len(client.recv(1 << 20)), 0)) < most
+
+
+def established(client):
+    """Whether the server, in this process, still has its end of a connection."""
+    ends = psutil.Process().net_connections("tcp")
+    return any(end.raddr == client.getsockname() and end.status == psutil.CONN_ESTABLISHED for end in ends)
+
+
+def test_a_run_that_needs_too_much_memory_takes_one_attempt(serve):
+    service = serve("service.worker", worker_memory_bytes=1 << 28)  # not even enough for the imports
+    (run,) = service.wait(service.post(budget={"episodes": 1}))["runs"]
+    assert (run["state"], run["attempts"]) == ("failed", 1)
+    assert run["reason"].startswith("the run needs more than the 0.25 GiB of memory that a worker may take")
+
+
+@pytest.mark.parametrize("relative", [True, False])
+def test_a_reason_does_not_say_where_on_the_machine_files_lie(serve, scripted, tmp_path, relative):
+    data = tmp_path / "data"
+    service = serve(data_dir=Path(os.path.relpath(data, ROOT)) if relative else data, attempts=2)
+    campaign = service.wait(service.post(seeds=[scripted.RAISES], budget={"episodes": 9}))
+    (run,) = campaign["runs"]
+    assert run["state"] == "failed"
+    assert "FileNotFoundError: [Errno 2] No such file or directory: 'nothing'" in run["reason"]
+    told = service.client.get(f"/v1/campaigns/{campaign['id']}").text
+    for folder in (tmp_path, ROOT, sys.prefix, data.parent.name):
+        assert str(folder) not in told

@@ -1,0 +1,123 @@
+"""How the server speaks HTTP to browsers, curl, and those who leave."""
+
+import gzip
+import json
+import re
+import socket
+from html.parser import HTMLParser
+
+import httpx
+import pytest
+
+from tests.server import LONG_S
+
+SPEC = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 1}}
+POST = b"POST %s HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/%s\r\nContent-Length: 99\r\n\r\n%s"
+
+
+@pytest.fixture(scope="module")
+def campaign(serve_shared, client):
+    campaign_id = client.post("/v1/campaigns", json=SPEC).raise_for_status().json()["id"]
+    while client.get(f"/v1/campaigns/{campaign_id}").json()["state"] != "succeeded":
+        pass
+    return campaign_id
+
+
+def test_head_answers_as_get_does_without_the_body(client, campaign):
+    paths = [path for path, methods in client.get("/openapi.json").json()["paths"].items() if "get" in methods]
+    assert len(paths) > 15
+    for path in [*paths, "/docs", "/docs/swagger-ui.css", "/nothing"]:
+        url = path.format(campaign_id=campaign, failure_id="x", network_id="x", name="ecr_low", format="png")
+        with client.stream("GET", url) as got:
+            pass
+        head = client.head(url)
+        assert head.content == b""
+        assert head.status_code == got.status_code, url
+        assert head.headers.keys() == got.headers.keys() - {"transfer-encoding"}, url
+        for name in head.headers.keys() - {"date", "x-request-id", "content-length"}:
+            assert head.headers[name] == got.headers[name], (url, name)
+
+
+def test_a_connection_goes_on_after_a_head_of_a_stream(client, campaign):
+    limits = httpx.Limits(max_connections=1)
+    with httpx.Client(base_url=client.base_url, limits=limits, timeout=LONG_S) as one:
+        for _ in range(3):
+            assert one.head(f"/v1/campaigns/{campaign}/events").status_code == 200
+            assert one.get("/healthz").json() == {"status": "ok"}
+
+
+def test_a_wrong_method_hears_that_head_is_answered(client):
+    for path, allowed in {"/docs": "GET, HEAD", "/healthz": "GET, HEAD", "/v1/campaigns": "GET, HEAD, POST"}.items():
+        response = client.delete(path)
+        assert (response.status_code, response.headers["allow"]) == (405, allowed)
+
+
+def test_the_entrance_says_where_what_is(client):
+    links = client.get("/").raise_for_status().json()
+    assert links["name"] == "RISK-SAC"
+    for name in ("docs", "openapi", "health", "campaigns"):
+        assert client.get(links[name]).status_code == 200, name
+
+
+@pytest.mark.parametrize("path", ["/v1/campaigns", "/v1/networks"])
+def test_what_curl_sends_by_itself_is_refused_with_what_to_send(client, path):
+    form = client.post(path, files={"file": ("x.json", b"{}")})
+    data = client.post(path, data={"a": "b"})
+    for response in (form, data):
+        assert (response.status_code, response.json()["reason"]) == (415, "unsupported_media_type")
+        assert "--data-binary @FILE" in response.json()["detail"]
+    remedy = re.search(r"content-type: ([\w/]+)'", form.json()["detail"])[1]
+    assert client.post(path, content=b"", headers={"content-type": remedy}).status_code in (400, 422)
+
+
+def test_a_campaign_that_is_packed_for_the_way_is_refused(client):
+    def post(content, encoding):
+        headers = {"content-type": "application/json", "content-encoding": encoding}
+        return client.post("/v1/campaigns", content=content, headers=headers)
+
+    packed = post(gzip.compress(json.dumps(SPEC).encode()), "gzip")
+    assert packed.status_code == 415
+    assert "content-encoding is 'gzip'; wanted none" in packed.json()["detail"]
+    assert post(json.dumps(SPEC).encode(), "identity").status_code == 202
+
+
+class Links(HTMLParser):
+    """What a page makes a browser load."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.found = []
+        self.feed(page)
+
+    def handle_starttag(self, tag, attributes):
+        self.found += [value for name, value in attributes if name in ("src", "href")]
+
+
+def test_the_docs_need_no_network(client):
+    page = client.get("/docs").raise_for_status()
+    links = Links(page.text).found
+    assert len(links) == 3
+    for link in links:
+        asset = client.get(page.url.join(link))
+        assert asset.url.host == page.url.host, link
+        assert asset.status_code == 200
+        assert asset.headers["content-type"].partition(";")[0] in ("text/javascript", "text/css", "image/png")
+        assert asset.headers["x-content-type-options"] == "nosniff", "which makes a browser insist on the type"
+    assert "http" not in page.text.partition("<body>")[2], "nothing from elsewhere"
+    assert page.headers["content-security-policy"].startswith("default-src 'self';"), "nor from within the scripts"
+    description = re.search(r'"?url"?: ["\'](.*?)["\']', page.text)[1]
+    assert client.get(page.url.join(description)).json()["openapi"]
+
+
+@pytest.mark.parametrize(("path", "kind"), [(b"/v1/campaigns", b"json"), (b"/v1/networks", b"xml")])
+def test_who_leaves_in_the_middle_of_a_body_is_counted_as_such(serve, path, kind):
+    service = serve()
+    for _ in range(3):
+        with socket.create_connection(("127.0.0.1", service.port)) as connection:
+            connection.sendall(POST % (path, kind, b"{"))
+    labels = f'method="POST",route="{path.decode()}",status="499"'
+    counted = f"risk_sac_request_seconds_count{{{labels}}} 3.0"
+    service.wait_until(lambda: counted in service.client.get("/metrics").text)
+    assert 'status="500"' not in service.client.get("/metrics").text
+    service.stop()
+    assert "Traceback" not in service.log.read_text()
