@@ -4,7 +4,7 @@ from risk_sac.metrics import Funnel
 from service.schemas.base import Body, Real
 from service.schemas.campaign_results import Results, RunResult, Total
 from service.schemas.campaigns import Campaign, CampaignPage, CampaignSummary, Metrics, Progress, Run
-from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter
+from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter, Signal
 from service.schemas.changes import StateChange
 from service.schemas.episodes import Collision, Episode, EpisodePage, Judgement, ReferenceOutcome
 from service.schemas.failures import Failure, Series
@@ -40,6 +40,7 @@ __all__ = [
     "RunResult",
     "SceneParameter",
     "Series",
+    "Signal",
     "StateChange",
     "Total",
 ]

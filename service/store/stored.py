@@ -131,7 +131,7 @@ class StoredEpisode:
     @property
     def id(self) -> str:
         """Unique within the campaign, and the same whenever the same campaign is run again."""
-        return f"{self.run_id}-{self.record.phase}-{self.record.index}"
+        return self.record.id_in(self.run_id)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

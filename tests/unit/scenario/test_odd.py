@@ -86,12 +86,12 @@ def test_intersection_is_the_set_of_common_values(bounds: list[float]) -> None:
         (
             Odd(dynamic=DynamicElements(vehicle_accel_mps2=interval(1, 3))),
             "odd.dynamic.vehicle_accel_mps2",
-            "low < 0 < high",
+            "low <= -0.1 and high >= 0.1",
         ),
         (
             Odd(dynamic=DynamicElements(pedestrian_accel_mps2=interval(-2, 0))),
             "odd.dynamic.pedestrian_accel_mps2",
-            "low < 0 < high",
+            "low <= -0.1 and high >= 0.1",
         ),
     ],
 )
