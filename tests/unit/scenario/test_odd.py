@@ -185,7 +185,7 @@ def test_a_user_may_widen_what_is_only_usual_up_to_the_extreme() -> None:
     [
         (DynamicElements(vehicle_lateral_speed_mps=interval(0, 1.9)), r"bounds within \[0, 1.8\]"),
         (DynamicElements(vehicle_lateral_speed_mps=interval(-1, 1)), r"bounds within \[0, 1.8\]"),
-        (DynamicElements(vehicle_lateral_accel_mps2=interval(0, 0)), "a high above 0"),
+        (DynamicElements(vehicle_lateral_accel_mps2=interval(0, 0)), "a high of at least 0.1"),
     ],
 )
 def test_a_senseless_lateral_limit_is_refused(dynamic: DynamicElements, wanted: str) -> None:
