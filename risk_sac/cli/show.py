@@ -43,7 +43,7 @@ def _contacts(results: Results) -> Table:
     Fits 80 columns; only the last one wraps.
     """
     run = results.spec.id
-    table = Table(title=run, caption=f"in full, as the service says it: {run}-…", box=SIMPLE_HEAD, padding=0)
+    table = Table(title=run, caption=f"in full, as the service says it: {run}-ID", box=SIMPLE_HEAD, padding=0)
     speeds, zones = "ego's\nother's\nm/s", "ego's\nother's\nzone"
     for name in ("id", "outcome\ngrade", "other", speeds, zones, "conflict\nbegan at s,\nx y m"):
         table.add_column(name, no_wrap=True)
