@@ -23,8 +23,8 @@ from risk_sac.train import episode
 
 SMALL = {  # what costs time or memory, and is bounded for that
     "seeds": [5],
-    "budget.episodes": 4,
-    "budget.evaluation_episodes": 1,
+    "budget.episodes": 3,
+    "budget.evaluation_episodes": 0,
     "learner.agent.hidden_sizes": [8, 8],
     "learner.agent.batch_size": 8,
     "learner.agent.updates_per_step": 1,
@@ -69,7 +69,8 @@ def schema() -> dict[str, Any]:
 OF_ODD = {f"odd.{path}.{end}" for path in SENSIBLE for end in ("low", "high")}  # bounded there, one by one
 BOUNDED = [number for number in numbers(schema()) if number.path not in OF_ODD]
 FLOATS = [number for number in BOUNDED if number.type == "number"]
-EXTREMES = [(number.path, value) for number in FLOATS for value in (number.low, number.high)]
+CORNERS = 12
+LEARNING = [name for name, method in METHODS.items() if method.learns]
 
 
 def test_every_number_of_a_campaign_has_bounds() -> None:
@@ -137,19 +138,15 @@ def assert_finite(state: Any) -> None:
         assert np.isfinite(state)
 
 
-@pytest.mark.parametrize(("path", "value"), EXTREMES)
-def test_one_float_at_its_bound_leaves_a_run_finite(path: str, value: float, tmp_path: Path) -> None:
-    method = "ddpg-lag" if ".ddpg." in path else "risk-sac"
-    play(campaign({path: value}, method=method).runs()[0], tmp_path / "run")
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_all_floats_at_bounds_leave_a_run_finite(seed: int, tmp_path: Path) -> None:
-    generator = np.random.default_rng(seed)
-    ends = {number.path: float(generator.choice((number.low, number.high))) for number in FLOATS}
-    ends["ego.reaction_time_s"] = round(ends["ego.reaction_time_s"], 1)
-    learning = [name for name, method in METHODS.items() if method.agent in ("sac", "ddpg")]
-    family, method = ("low", "mixed", "dense")[seed % 3], learning[seed % len(learning)]
+@pytest.mark.parametrize("corner", range(CORNERS))
+def test_a_run_with_floats_at_their_bounds_stays_finite(corner: int, tmp_path: Path) -> None:
+    """Over all corners each float is at its low end, at its high end and at its default equally often."""
+    ends = {}
+    for number in FLOATS:
+        place = np.random.default_rng(list(number.path.encode())).permutation(CORNERS)[corner] % 3
+        if place < 2:
+            ends[number.path] = float((number.low, number.high)[place])
+    family, method = ("low", "mixed", "dense")[corner % 3], LEARNING[corner % len(LEARNING)]
     play(campaign(ends, family, method).runs()[0], tmp_path / "run")
 
 
@@ -165,8 +162,8 @@ def test_an_odd_at_the_ends_of_what_is_sensible_is_refused_or_leaves_a_run_finit
     for number, (path, low, high) in enumerate(dict.fromkeys(odds())):
         branch, name = path.split(".")
         odd = Odd.model_validate({branch: {name: {"low": low, "high": high}}})
-        for family in ("low", "mixed", "dense"):
-            spec = campaign({"budget.episodes": 1}, family).runs()[0].model_copy(update={"odd": odd})
+        for family in ("low", "mixed"):
+            spec = campaign({"budget.episodes": 1}, family, "random").runs()[0].model_copy(update={"odd": odd})
             try:
                 Problem.from_spec(spec)
             except OddError:
