@@ -83,7 +83,6 @@ def campaign(methods: list[str], **learner: object) -> CampaignSpec:
     [
         ("learner.agent.hidden_sizes", {"agent": {"hidden_sizes": [4096, 4096]}}),
         ("learner.replay.capacity", {"replay": {"capacity": 2_000_000}}),
-        ("learner.agent.batch_size", {"agent": {"hidden_sizes": [1500] * 4, "batch_size": 4096}}),
     ],
 )
 def test_what_would_take_too_much_memory_is_refused_by_the_field_that_takes_most(field: str, learner: object) -> None:
