@@ -1,7 +1,7 @@
 """The FastAPI application."""
 
 from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager, closing, contextmanager
 from typing import IO
 
 from anyio import to_thread
@@ -73,18 +73,13 @@ def opened(settings: ServiceSettings, executor: Executor[Event], latencies: Hist
       KeysError: the API keys cannot be read.
     """
     check_exposure(settings)
-    with _data_folder(settings):
-        store = Store(settings.url)
+    with _data_folder(settings), closing(Store(settings.url)) as store, held(store.engine):
+        manager = Manager(settings, store, executor)
+        manager.start()
         try:
-            with held(store.engine):
-                manager = Manager(settings, store, executor)
-                manager.start()
-                try:
-                    yield _context(settings, store, manager, latencies)
-                finally:
-                    manager.stop()
+            yield _context(settings, store, manager, latencies)
         finally:
-            store.close()
+            manager.stop()
 
 
 def _context(settings: ServiceSettings, store: Store, manager: Manager, latencies: Histogram) -> Context:

@@ -3,7 +3,6 @@
 RiskSacError
 └── ServiceError
     ├── NotFoundError      no such campaign, run or failure
-    ├── CursorError        a page cursor that this service did not issue
     ├── ConflictError      what is asked for does not fit what there is
     ├── QuotaError         a project has used up its share
     ├── KeysError          the API keys cannot be read, or have no such key
@@ -25,14 +24,6 @@ class NotFoundError(ServiceError):
     def __init__(self, message: str, *, field: str, got: str) -> None:
         super().__init__(message)
         self.field = field
-        self.got = got
-
-
-class CursorError(ServiceError):
-    """A page cursor that was not issued by this service."""
-
-    def __init__(self, got: str) -> None:
-        super().__init__(f"cursor is {got!r}; wanted the `next` of an earlier page, unchanged")
         self.got = got
 
 

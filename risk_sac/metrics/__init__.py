@@ -12,7 +12,7 @@ from risk_sac.metrics.features import FEATURES, outcome_features
 from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, wilson_interval
 from risk_sac.metrics.metric import Kept, Metric, Ratio
 from risk_sac.metrics.pooling import Estimate, estimate, mean_over_runs, pooled_bins, pooled_signatures
-from risk_sac.metrics.rows import METRICS, RATIOS
+from risk_sac.metrics.rows import METRICS, RATIOS, MetricName
 from risk_sac.metrics.tally import WINDOW, Tally, preventable
 
 __all__ = [
@@ -27,6 +27,7 @@ __all__ = [
     "Funnel",
     "Kept",
     "Metric",
+    "MetricName",
     "MetricsAccumulator",
     "Ratio",
     "Tally",

@@ -15,10 +15,15 @@ from risk_sac.records import RunMetrics
 class Estimate:
     """A mean over seeds."""
 
-    mean: float | None  # None where no run has a value
-    low: float | None  # 95 % interval; None where it takes more runs to have one
+    mean: float | None
+    """Null where no run has a value."""
+    low: float | None
+    """95 % interval: bootstrap over seeds, Wilson for the rate of one run; null where it takes more runs."""
     high: float | None
-    runs: int  # over how many the mean was taken
+    runs: int
+    """Over how many the mean was taken."""
+
+    __pydantic_config__ = {"use_attribute_docstrings": True}  # noqa: RUF012 - a body of the service shows it
 
 
 def estimate(metric: Metric, metrics: Sequence[RunMetrics]) -> Estimate:

@@ -4,6 +4,9 @@ Source: RISK-SAC, Sec. IV; what the paper leaves open is marked as a choice.
 """
 
 import math
+from typing import Annotated
+
+from pydantic import Field
 
 from risk_sac.metrics.counts import Counts
 from risk_sac.metrics.features import FEATURES
@@ -156,6 +159,14 @@ METRICS = (
         tabled=False,  # its reciprocal is
     ),
 )
+
+MetricName = Annotated[
+    str,
+    Field(
+        description=f"{' | '.join(metric.name for metric in METRICS)}; the markdown table defines them.",
+        examples=[METRICS[0].name],
+    ),
+]
 
 RATIOS = (
     Ratio(

@@ -10,6 +10,7 @@ from risk_sac.metrics import (
     RATIOS,
     Estimate,
     Metric,
+    MetricName,
     estimate,
     pooled_bins,
     pooled_counts,
@@ -26,35 +27,53 @@ def metrics_of(phase: Phase) -> tuple[Metric, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
-    """What a method achieved in a family and phase."""
+    """What a method achieved in a family and phase, over all its finished runs."""
 
     family: FamilyName
     method: MethodName
     phase: Phase
-    seeds: tuple[int, ...]  # of the runs that are counted
-    # `metrics.Counts`, each summed over the runs; what two of them found alike counts twice.
+    seeds: tuple[int, ...]
+    """Of the runs that are counted."""
     episodes: int
     rejected: int
+    """Infeasible scenes."""
     raw_collisions: int
+    """Episodes in which the ego touched something."""
     failures: int
+    """Valid collisions."""
     distinct_failures: int
+    """Sum over the runs; what two runs found alike counts twice."""
     preventable: int
+    """Valid collisions that the careful driver would have prevented, repetitions included."""
     distinct_preventable: int
+    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
     artefacts: int
     unresponsive: int
     environment_steps: int
-    estimates: Mapping[str, Estimate]  # by `Metric.name`
-    # `metrics.RATIOS` of the summed counts, and what a distinct failure costs in processor time.
+    estimates: Mapping[MetricName, Estimate]
+    """By the name of the metric."""
     steps_per_distinct_failure: float | None
-    cpu_s_per_distinct_failure: float | None  # of the search only; the whole run's processor time
-    raw_rate: float  # contacts / episodes
+    cpu_s_per_distinct_failure: float | None
+    """Processor seconds of the whole runs; of the search only."""
+    raw_rate: float
+    """Contacts / episodes."""
     artefact_rate: float
+    """Contacts that the simulator or the control made / episodes."""
     degenerate_rate: float
+    """Contacts that are no valid failure / episodes."""
     rejected_rate: float
-    unresponsive_share: float | None  # of the valid failures; None without one
-    signatures: Mapping[str, int]  # signature -> valid failures
-    conflicts_by_second: tuple[int, ...]  # valid failures by the second after the release in which they began
-    contacts_by_second: tuple[int, ...]  # the same by the second of the contact
+    """Infeasible scenes / episodes."""
+    unresponsive_share: float | None
+    """Share of the valid collisions with a visible collision course of 1.5 s or more during which the ego never braked;
+    null without one."""
+    signatures: Mapping[str, int]
+    """Signature → valid collisions."""
+    conflicts_by_second: tuple[int, ...]
+    """Valid collisions by the second after the adversaries' release in which the conflict began."""
+    contacts_by_second: tuple[int, ...]
+    """The same by the second of the contact."""
+
+    __pydantic_config__ = {"use_attribute_docstrings": True}  # noqa: RUF012 - a body of the service shows it
 
 
 def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:

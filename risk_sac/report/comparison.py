@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunSpec
-from risk_sac.metrics import RESAMPLING_SEED, Metric, bootstrap_interval
+from risk_sac.metrics import RESAMPLING_SEED, Metric, MetricName, bootstrap_interval
 from risk_sac.records import RECORDED, Phase
 from risk_sac.report.cells import Cell, cell_of, metrics_of
 from risk_sac.report.runs import FinishedRun
@@ -17,20 +17,28 @@ LEVEL = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairedTest:
-    """The reference method against another one in one metric, runs paired by seed."""
+    """The reference against another method in one metric, runs paired by seed."""
 
     family: FamilyName
     phase: Phase
-    metric: str
+    metric: MetricName
     reference: MethodName
     method: MethodName
-    pairs: int  # seeds for which both have a value
-    difference: float | None  # mean of reference - method; None without a pair
-    low: float | None  # its 95 % interval, bootstrapped over the pairs; None with fewer than two
+    pairs: int
+    """Seeds for which both have a value."""
+    difference: float | None
+    """Mean of reference - method; null without a pair."""
+    low: float | None
+    """95 % interval of the difference, bootstrapped over the pairs; null with fewer than two."""
     high: float | None
-    p: float | None  # Wilcoxon, two-sided; None with fewer than two pairs
-    p_holm: float | None  # corrected over all tests of the same family and phase
-    a12: float | None  # chance that the reference's value is the larger one
+    p: float | None
+    """Wilcoxon signed-rank, exact, two-sided; null with fewer than two pairs."""
+    p_holm: float | None
+    """Corrected over all tests of the same family and phase."""
+    a12: float | None
+    """Vargha-Delaney: chance that the reference's value is the larger one."""
+
+    __pydantic_config__ = {"use_attribute_docstrings": True}  # noqa: RUF012 - a body of the service shows it
 
     @property
     def significant(self) -> bool:

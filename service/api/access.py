@@ -1,6 +1,5 @@
 """Who calls, and what they may know of: routes take a caller and hand its project to the manager and the store."""
 
-from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Annotated, cast
@@ -9,7 +8,7 @@ from fastapi import Depends, Request
 
 from service.api.answers.problems import ProblemError
 from service.keys.key import Scope
-from service.schemas import Reason
+from service.schemas.problems import Reason
 
 CALLER = "risk_sac.caller"  # in the ASGI scope, where the gate puts it
 
@@ -50,10 +49,6 @@ async def _caller(request: Request) -> Caller:
 CurrentCaller = Annotated[Caller, Depends(_caller)]
 
 
-def require(scope: Scope) -> Callable[[Caller], Awaitable[None]]:
+async def require_admin(caller: CurrentCaller) -> None:
     """A dependency for routes that want more than the gate does, which is `read` to look and `run` to change."""
-
-    async def check(caller: CurrentCaller) -> None:
-        check_scope(caller, scope)
-
-    return check
+    check_scope(caller, Scope.ADMIN)

@@ -8,7 +8,7 @@ from pydantic import TypeAdapter
 
 from service.api.guards.description import describe_guards
 from service.api.posted_campaign import body_schemas
-from service.schemas import StateChange
+from service.schemas.changes import StateChange
 
 DESCRIPTION = """Finds scenarios in which an automated driving system fails.
 

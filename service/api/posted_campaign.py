@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from risk_sac.config import CampaignSpec
 from service.api.answers.problems import ProblemError, invalid_field
-from service.schemas import Reason
+from service.schemas.problems import Reason
 
 MOST_MISTAKES = 50  # that a refusal names one by one
 

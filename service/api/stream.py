@@ -15,15 +15,16 @@ from starlette.concurrency import run_in_threadpool
 
 from risk_sac.records import Outcome
 from service.errors import NotFoundError, StorageError
+from service.schemas.changes import StateChange
 from service.store.reading import Store
-from service.store.stored import StoredEpisode
-from service.views.bodies import change_body, episode_body
-from service.views.happenings import Happening, read_batch
+from service.store.stored import StoredChange, StoredEpisode
+from service.views.bodies import episode_body
 
 logger = logging.getLogger(__name__)
 
 TICK_S = 1.0  # between two looks at a campaign's revision
 RETRY_MS = 1000  # after which a client whose connection broke comes back
+BATCH = 100  # events at most at once
 KEPT = 64  # batches
 _ID = re.compile(r"(\w+)-([1-9]\d{0,17})", re.ASCII)  # campaign; sequence of an event
 _FORMER_ID = re.compile(r"(\d{1,18})\.(\d{1,18})", re.ASCII)  # numbers of an episode and of a change
@@ -31,12 +32,12 @@ _FORMER_ID = re.compile(r"(\d{1,18})\.(\d{1,18})", re.ASCII)  # numbers of an ep
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """A batch of happenings as it is sent."""
+    """What happened next, as it is sent."""
 
     data: bytes
-    position: int
-    more: bool
-    ended: bool
+    position: int  # sequence of the last event that has been told then; 0: none
+    more: bool  # whether more has happened since
+    ended: bool  # whether it ends with the campaign's final state
 
 
 class Streams:
@@ -90,9 +91,11 @@ class Streams:
         return await run_in_threadpool(self._render, campaign_id, position)
 
     def _render(self, campaign_id: str, position: int) -> Chunk:
-        batch = read_batch(self._store, campaign_id, position)
-        data = b"".join(_event(campaign_id, happening) for happening in batch.happenings)
-        return Chunk(data, batch.position, batch.more, batch.ended)
+        page = self._store.events(campaign_id, after=position, limit=BATCH)
+        data = b"".join(_event(campaign_id, event) for event in page.items)
+        last = page.items[-1] if page.items else None
+        ended = isinstance(last, StoredChange) and last.ends_campaign
+        return Chunk(data, position if last is None else last.sequence, page.last is not None, ended)
 
 
 def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None:
@@ -118,11 +121,11 @@ def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None
     return position if store.events(campaign_id, after=position - 1, limit=1).items else None
 
 
-def _event(campaign_id: str, happening: Happening) -> bytes:
-    if isinstance(happening, StoredEpisode):
-        name = "failure" if happening.record.outcome is Outcome.FAILURE else "episode"
-        data = episode_body(happening).model_dump_json()
+def _event(campaign_id: str, event: StoredEpisode | StoredChange) -> bytes:
+    if isinstance(event, StoredEpisode):
+        name = "failure" if event.record.outcome is Outcome.FAILURE else "episode"
+        data = episode_body(event).model_dump_json()
     else:
-        name, data = "state", change_body(happening).model_dump_json()
-    event_id = base64.urlsafe_b64encode(f"{campaign_id}-{happening.sequence}".encode()).decode()  # opaque to clients
+        name, data = "state", StateChange.model_validate(event).model_dump_json()
+    event_id = base64.urlsafe_b64encode(f"{campaign_id}-{event.sequence}".encode()).decode()  # opaque to clients
     return ServerSentEvent(data, event=name, id=event_id, sep="\n").encode()

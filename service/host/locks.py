@@ -13,14 +13,10 @@ def try_lock(folder: Path) -> IO[bytes]:
     Raises:
       StorageError: another process holds it.
     """
-    handle = _open(folder)
+    handle = (folder / ".lock").open("ab")
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
         handle.close()
         raise StorageError(f"folder {str(folder)!r} is in use by another process; stop it or use another") from error
     return handle
-
-
-def _open(folder: Path) -> IO[bytes]:
-    return (folder / ".lock").open("ab")

@@ -11,6 +11,7 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import to_json
 
+from risk_sac.run_folder.durable import sync_folder
 from service.errors import KeysError
 from service.keys.key import Key, Scope, mint
 
@@ -94,11 +95,7 @@ class KeyFile:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(self.path)
-        folder = os.open(self.path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+        sync_folder(self.path.parent)
 
 
 def _parse(content: bytes, path: Path) -> tuple[Key, ...]:

@@ -1,4 +1,7 @@
-"""What the checker says on its stdout, for the server to read."""
+"""What the checker says on its stdout, for the server to read; parts of it are parts of response bodies, too.
+
+No models of pydantic: to import that would take the checker more time and memory than most uploads.
+"""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,14 +16,18 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class CheckedFile:
-    """A document that was found harmless, as it was written anew."""
+class NetworkFile:
+    """One of the files of a network, as the service has written it anew."""
 
     name: str
+    """Given by the service; the names in an archive are not kept."""
     kind: Kind
+    """Told by its root element."""
     bytes: int
     elements: int
     sha256: str
+
+    __pydantic_config__ = {"use_attribute_docstrings": True}  # noqa: RUF012 - pydantic's name
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,5 +47,5 @@ class CheckReport:
 
     refused: str | None = None
     summary: Summary | None = None
-    files: tuple[CheckedFile, ...] = ()
+    files: tuple[NetworkFile, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -4,20 +4,8 @@ from datetime import datetime
 
 from pydantic import BaseModel, ConfigDict
 
-from service.networks.report import Kind
-from service.schemas import Body
-
-
-class NetworkFile(Body):
-    """One of the files of a network, as the service has written it anew."""
-
-    name: str
-    """Given by the service; the names in an archive are not kept."""
-    kind: Kind
-    """Told by its root element."""
-    bytes: int
-    elements: int
-    sha256: str
+from service.networks.report import NetworkFile
+from service.schemas.base import Body
 
 
 class BoundingBox(Body):

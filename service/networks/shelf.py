@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from service.networks.incoming import Incoming
 from service.networks.packaging import Packaging
 from service.networks.report import CheckReport
 from service.networks.sandbox import CHECKER, inspect
-from service.networks.schemas import BoundingBox, Network, NetworkFile, Record
+from service.networks.schemas import BoundingBox, Network, Record
 from service.store.stored import Page
 
 logger = logging.getLogger(__name__)
@@ -184,22 +185,11 @@ class Shelf:
 def _network(report: CheckReport, label: str, sha256: str, size: int) -> Network:
     now = time.time()
     number = int(now * 1000) << _RANDOM_BITS | secrets.randbits(_RANDOM_BITS)
-    summary = report.summary
-    assert summary is not None
-    return Network(
-        id=f"n{number:016x}",
-        label=label,
-        created_at=datetime.fromtimestamp(now, UTC),
-        sha256=sha256,
-        bytes=size,
-        files=[NetworkFile.model_validate(file) for file in report.files],
-        edges=summary.edges,
-        junctions=summary.junctions,
-        lanes=summary.lanes,
-        length_m=summary.length_m,
-        bounding_box=BoundingBox(**dict(zip(BoundingBox.model_fields, summary.bounding_box, strict=True))),
-        warnings=list(report.warnings),
-    )
+    assert report.summary is not None
+    sent = {"label": label, "created_at": datetime.fromtimestamp(now, UTC), "sha256": sha256, "bytes": size}
+    box = dict(zip(BoundingBox.model_fields, report.summary.bounding_box, strict=True))
+    found = asdict(report.summary) | {"files": report.files, "warnings": report.warnings, "bounding_box": box}
+    return Network.model_validate({"id": f"n{number:016x}"} | sent | found)
 
 
 def _number(path: Path) -> int:

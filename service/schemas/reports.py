@@ -6,17 +6,11 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
-from risk_sac.metrics import METRICS
 from risk_sac.records import Phase
-from service.schemas import Body, Metrics, Real
-
-MetricName = Annotated[
-    str,
-    Field(
-        description=f"{' | '.join(metric.name for metric in METRICS)}; the markdown table defines them.",
-        examples=[METRICS[0].name],
-    ),
-]
+from risk_sac.report import PairedTest
+from risk_sac.report.cells import Cell
+from service.schemas.base import Body
+from service.schemas.campaigns import Metrics
 
 
 class MissingRun(Body):
@@ -27,89 +21,6 @@ class MissingRun(Body):
     seed: int
     reason: Annotated[str, Field(examples=["queued", "failed: worker was killed by SIGKILL"])]
     """Its state, and why it failed."""
-
-
-class Estimate(Body):
-    """A mean over seeds."""
-
-    mean: Real
-    """Null where no run has a value."""
-    low: Real
-    """95 % interval: bootstrap over seeds, Wilson for the rate of one run; null where it takes more runs."""
-    high: Real
-    runs: int
-    """Over how many the mean was taken."""
-
-
-class Cell(Body):
-    """What a method achieved in a family and phase, over all its finished runs."""
-
-    family: FamilyName
-    method: MethodName
-    phase: Phase
-    seeds: list[int]
-    """Of the runs that are counted."""
-    episodes: int
-    rejected: int
-    """Infeasible scenes."""
-    raw_collisions: int
-    """Episodes in which the ego touched something."""
-    failures: int
-    """Valid collisions."""
-    distinct_failures: int
-    """Sum over the runs; what two runs found alike counts twice."""
-    preventable: int
-    """Valid collisions that the careful driver would have prevented, repetitions included."""
-    distinct_preventable: int
-    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
-    artefacts: int
-    unresponsive: int
-    environment_steps: int
-    estimates: Mapping[MetricName, Estimate]
-    """By the name of the metric."""
-    steps_per_distinct_failure: Real
-    cpu_s_per_distinct_failure: Real
-    """Processor seconds of the whole runs; of the search only."""
-    raw_rate: float
-    """Contacts / episodes."""
-    artefact_rate: float
-    """Contacts that the simulator or the control made / episodes."""
-    degenerate_rate: float
-    """Contacts that are no valid failure / episodes."""
-    rejected_rate: float
-    """Infeasible scenes / episodes."""
-    unresponsive_share: Real
-    """Share of the valid collisions with a visible collision course of 1.5 s or more during which the ego never braked;
-    null without one."""
-    signatures: Mapping[str, int]
-    """Signature → valid collisions."""
-    conflicts_by_second: list[int]
-    """Valid collisions by the second after the adversaries' release in which the conflict began."""
-    contacts_by_second: list[int]
-    """The same by the second of the contact."""
-
-
-class PairedTest(Body):
-    """The reference against another method in one metric, runs paired by seed."""
-
-    family: FamilyName
-    phase: Phase
-    metric: MetricName
-    reference: MethodName
-    method: MethodName
-    pairs: int
-    """Seeds for which both have a value."""
-    difference: Real
-    """Mean of reference - method; null without a pair."""
-    low: Real
-    """95 % interval of the difference, bootstrapped over the pairs; null with fewer than two."""
-    high: Real
-    p: Real
-    """Wilcoxon signed-rank, exact, two-sided; null with fewer than two pairs."""
-    p_holm: Real
-    """Corrected over all tests of the same family and phase."""
-    a12: Real
-    """Vargha-Delaney: chance that the reference's value is the larger one."""
 
 
 class ReportedRun(Body):

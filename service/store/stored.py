@@ -160,6 +160,11 @@ class StoredChange:
         """The snapshot of a change."""
         return cls(**_columns(cls, row) | {"state": State(row.state)})
 
+    @property
+    def ends_campaign(self) -> bool:
+        """Whether this is the end of the campaign, which nothing follows."""
+        return self.run_id is None and self.state.final
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Usage:

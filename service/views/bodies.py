@@ -2,12 +2,13 @@
 
 from typing import Any
 
-from risk_sac.records import Outcome
 from risk_sac.run_folder.results import FAILURES
 from service.errors import StorageError
-from service.schemas import Campaign, CampaignSummary, Episode, Failure, Run, StateChange
+from service.schemas.campaigns import Campaign, CampaignSummary, Run
+from service.schemas.episodes import Episode
+from service.schemas.failures import Failure
 from service.settings import ServiceSettings
-from service.store.stored import StoredCampaign, StoredChange, StoredEpisode
+from service.store.stored import StoredCampaign, StoredEpisode
 from service.views.progress import progress
 from service.views.series import load_series
 
@@ -23,18 +24,8 @@ def campaign_body(campaign: StoredCampaign, settings: ServiceSettings) -> Campai
 
 def summary_body(campaign: StoredCampaign, settings: ServiceSettings) -> CampaignSummary:
     """A campaign in a list."""
-    return CampaignSummary.model_validate(
-        {
-            "id": campaign.id,
-            "label": campaign.label,
-            "state": campaign.state,
-            "reason": campaign.reason,
-            "created_at": campaign.created_at,
-            "started_at": campaign.started_at,
-            "finished_at": campaign.finished_at,
-            "progress": progress(campaign, settings.max_workers),
-        }
-    )
+    stored = {name: getattr(campaign, name) for name in CampaignSummary.model_fields.keys() - {"progress"}}
+    return CampaignSummary.model_validate(stored | {"progress": progress(campaign, settings.max_workers)})
 
 
 def episode_body(episode: StoredEpisode) -> Episode:
@@ -53,16 +44,6 @@ def failure_body(campaign_id: str, episode: StoredEpisode, settings: ServiceSett
     except StorageError as error:
         body |= {"series": None, "series_problem": str(error)}
     return Failure.model_validate(body)
-
-
-def change_body(change: StoredChange) -> StateChange:
-    """A change of state in a stream of events."""
-    return StateChange.model_validate(change)
-
-
-def tier_outcomes(tier: str) -> tuple[Outcome, ...]:
-    """Outcomes that a tier of failures admits: `valid`, or `raw` for all contacts."""
-    return (Outcome.FAILURE,) if tier == "valid" else (Outcome.FAILURE, Outcome.DEGENERATE)
 
 
 def _fields(episode: StoredEpisode) -> dict[str, Any]:

@@ -5,10 +5,13 @@ from collections.abc import Sequence
 
 from risk_sac.config import METHODS
 from risk_sac.records import RunMetrics
-from service.schemas import Progress
+from service.schemas.campaigns import Progress
 from service.store.states import State
 from service.store.stored import StoredCampaign, StoredRun
+from service.store.tables import TALLIED
 
+SUMMED = ("episodes_total", "rejected", *TALLIED)
+AVERAGED = ("window_ecr", "window_pcr", "dual_variable", "temperature")
 LOOKS = 20  # that somebody who follows a campaign takes from now to its end
 SOONEST_S, LATEST_S = 1, 30
 LEARNING = {name for name, method in METHODS.items() if method.learns}
@@ -21,23 +24,11 @@ def progress(campaign: StoredCampaign, workers: int) -> Progress:
       campaign: the campaign.
       workers: runs the server executes at once.
     """
-    runs = campaign.runs
-    present = _present(runs)
-    return Progress(
-        episodes_done=sum(run.episodes_done for run in runs),
-        episodes_total=sum(run.episodes_total for run in runs),
-        failures=sum(run.failures for run in runs),
-        raw_collisions=sum(run.raw_collisions for run in runs),
-        rejected=sum(run.rejected for run in runs),
-        distinct_failures=sum(run.distinct_failures for run in runs),
-        preventable=sum(run.preventable for run in runs),
-        distinct_preventable=sum(run.distinct_preventable for run in runs),
-        window_ecr=_mean([metrics.window_ecr for metrics in present]),
-        window_pcr=_mean([metrics.window_pcr for metrics in present]),
-        dual_variable=_mean([metrics.dual_variable for metrics in present]),
-        temperature=_mean([metrics.temperature for metrics in present]),
-        eta_s=0.0 if campaign.state.final else eta_s(runs, workers),
-    )
+    runs, present = campaign.runs, _present(campaign.runs)
+    sums = {name: sum(getattr(run, name) for run in runs) for name in SUMMED}
+    means = {name: _mean([getattr(metrics, name) for metrics in present]) for name in AVERAGED}
+    eta = 0.0 if campaign.state.final else eta_s(runs, workers)
+    return Progress.model_validate(sums | means | {"eta_s": eta})
 
 
 def retry_after_s(campaign: StoredCampaign, workers: int) -> int | None:

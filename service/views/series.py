@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from risk_sac.types import Kind, Role, Signal
 from service.errors import StorageError
-from service.schemas import Series
+from service.schemas.failures import Series
 
 _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 

@@ -18,7 +18,7 @@ from risk_sac.metrics import (
     pooled_signatures,
 )
 from risk_sac.records import RunMetrics
-from service.schemas import Results, RunResult, Total
+from service.schemas.campaign_results import Results, RunResult, Total
 from service.store.stored import StoredCampaign, StoredRun
 
 

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 from risk_sac.config import CampaignSpec
-from service.schemas import FieldProblem
+from service.schemas.problems import FieldProblem
 
 LONGEST_VALUE = 200
 # How this project words an error: "reaction_time_s is 0.55; wanted a multiple of 0.1", or where the

@@ -13,8 +13,8 @@ from starlette.routing import compile_path
 
 from risk_sac.errors import ConfigError
 from service.api.answers.fields import field_problems, parse, shown
-from service.errors import ConflictError, CursorError, NotFoundError, QuotaError, StorageError
-from service.schemas import FieldProblem, Problem, Reason
+from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
+from service.schemas.problems import FieldProblem, Problem, Reason
 
 logger = logging.getLogger(__name__)
 
@@ -37,6 +37,15 @@ class ProblemError(Exception):
         *errors: FieldProblem,
         headers: dict[str, str] | None = None,
     ) -> None:
+        """A problem.
+
+        Args:
+          status: of the response; the problem's type is stable for each.
+          reason: stable for each cause.
+          detail: what was got, what was wanted, and the remedy.
+          errors: the fields to blame.
+          headers: of the response.
+        """
         super().__init__(detail)
         self.status = status
         self.reason = reason
@@ -47,66 +56,76 @@ class ProblemError(Exception):
 def invalid_field(field: str, got: object, wanted: str) -> ProblemError:
     """The answer to a value that no schema could have told to be wrong."""
     detail = f"{field} is {shown(got)}; wanted {wanted}"
-    item = FieldProblem(field=field, message=detail, got=shown(got), wanted=wanted)
-    return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail, item)
+    return invalid(detail, FieldProblem(field=field, message=detail, got=shown(got), wanted=wanted))
+
+
+# Errors that say what is wrong; any other is a bug of the service.
+_OF_REQUESTS = (RequestValidationError, HTTPException, ProblemError, ConfigError)
+_OF_THE_SERVICE = (NotFoundError, ConflictError, QuotaError, StorageError)
 
 
 def add_problem_handlers(app: FastAPI) -> None:
     """Make every error response of the app a problem."""
-    app.add_exception_handler(RequestValidationError, _invalid_request)
-    app.add_exception_handler(HTTPException, _http_error)
-    app.add_exception_handler(ProblemError, _problem_error)
-    app.add_exception_handler(ConfigError, _bad_config)
-    app.add_exception_handler(CursorError, _bad_cursor)
-    app.add_exception_handler(NotFoundError, _not_found)
-    app.add_exception_handler(ConflictError, _conflict)
-    app.add_exception_handler(QuotaError, _over_quota)
-    app.add_exception_handler(StorageError, _storage_failed)
-    app.add_exception_handler(Exception, _bug)
+    for kind in (*_OF_REQUESTS, *_OF_THE_SERVICE, Exception):
+        app.add_exception_handler(kind, _answer)
 
 
-def problem_response(
-    path: str,
-    status: HTTPStatus,
-    reason: Reason,
-    detail: str,
-    *errors: FieldProblem,
-    headers: dict[str, str] | None = None,
-) -> JSONResponse:
-    """A problem as a response, which is an ASGI application: middleware has no more than a path to say.
-
-    Args:
-      path: of the request.
-      status: of the response; the problem's type is stable for each.
-      reason: stable for each cause.
-      detail: what was got, what was wanted, and the remedy.
-      errors: the fields to blame.
-      headers: of the response.
-    """
+def problem_response(path: str, problem: ProblemError) -> JSONResponse:
+    """A problem as a response, which is an ASGI application: middleware has no more than a path to say."""
     body = Problem(
-        type=f"urn:risk-sac:problem:{status.name.lower().replace('_', '-')}",
-        title=status.phrase,
-        status=status,
-        reason=reason,
-        detail=detail,
+        type=f"urn:risk-sac:problem:{problem.status.name.lower().replace('_', '-')}",
+        title=problem.status.phrase,
+        status=problem.status,
+        reason=problem.reason,
+        detail=str(problem),
         instance=path,
-        errors=list(errors),
+        errors=list(problem.errors),
     )
-    return JSONResponse(body.model_dump(mode="json"), status, headers=headers, media_type="application/problem+json")
+    content, headers = body.model_dump(mode="json"), problem.headers
+    return JSONResponse(content, problem.status, headers=headers, media_type="application/problem+json")
 
 
-async def _invalid_request(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, RequestValidationError)
+async def _answer(request: Request, error: Exception) -> JSONResponse:
+    problem = error if isinstance(error, ProblemError) else _problem(request, error)
+    return problem_response(request.url.path, problem)
+
+
+def _problem(request: Request, error: Exception) -> ProblemError:
+    """What the client is told of an error."""
+    said = str(error)
+    match error:
+        case RequestValidationError():
+            return _invalid_request(error)
+        case HTTPException():
+            return _http_error(request, error)
+        case ConfigError():
+            _, got, wanted = parse(said)
+            return invalid(said, FieldProblem(field=error.field, message=said, got=got, wanted=wanted))
+        case NotFoundError():
+            item = FieldProblem(field=error.field, message=said, got=shown(error.got), wanted="an existing id")
+            return ProblemError(HTTPStatus.NOT_FOUND, Reason.UNKNOWN_ID, said, item)
+        case ConflictError():
+            return ProblemError(HTTPStatus.CONFLICT, Reason(error.reason), said)
+        case QuotaError():
+            headers = {"Retry-After": str(math.ceil(error.retry_after_s))}
+            return ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.QUOTA_EXCEEDED, said, headers=headers)
+        case StorageError():
+            logger.error("%s %s: %s", request.method, request.url.path, said)
+            return ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.STORAGE_UNAVAILABLE, said)
+    detail = f"the service has a bug ({type(error).__name__}); its log has the traceback"
+    return ProblemError(HTTPStatus.INTERNAL_SERVER_ERROR, Reason.INTERNAL_ERROR, detail)
+
+
+def _invalid_request(error: RequestValidationError) -> ProblemError:
     found = error.errors()
     if any(item["type"] == "json_invalid" for item in found):
         detail = f"the body is no JSON: {found[0]['ctx']['error']}"
-        return problem_response(request.url.path, HTTPStatus.BAD_REQUEST, Reason.MALFORMED_JSON, detail)
+        return ProblemError(HTTPStatus.BAD_REQUEST, Reason.MALFORMED_JSON, detail)
     errors = field_problems(found)
-    return _invalid(request, "; ".join(f"{item.field}: {item.message}".removeprefix(": ") for item in errors), *errors)
+    return invalid("; ".join(f"{item.field}: {item.message}".removeprefix(": ") for item in errors), *errors)
 
 
-async def _http_error(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, HTTPException)
+def _http_error(request: Request, error: HTTPException) -> ProblemError:
     status = HTTPStatus(error.status_code)
     detail = str(error.detail)
     if status is HTTPStatus.NOT_FOUND:
@@ -115,61 +134,12 @@ async def _http_error(request: Request, error: Exception) -> JSONResponse:
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
         headers["Allow"] = allowed = ", ".join(sorted(_methods(request))) or headers["Allow"]
         detail = f"{request.url.path} does not answer {request.method}; it answers {allowed}"
-    return problem_response(request.url.path, status, _REASONS[status], detail, headers=headers)
+    return ProblemError(status, _REASONS[status], detail, headers=headers)
 
 
-async def _problem_error(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, ProblemError)
-    path, headers = request.url.path, error.headers
-    return problem_response(path, error.status, error.reason, str(error), *error.errors, headers=headers)
-
-
-async def _bad_config(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, ConfigError)
-    _, got, wanted = parse(str(error))
-    item = FieldProblem(field=error.field, message=str(error), got=got, wanted=wanted)
-    return _invalid(request, str(error), item)
-
-
-async def _bad_cursor(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, CursorError)
-    item = FieldProblem(
-        field="cursor", message=str(error), got=shown(error.got), wanted="the `next` of an earlier page, unchanged"
-    )
-    return _invalid(request, str(error), item)
-
-
-async def _not_found(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, NotFoundError)
-    item = FieldProblem(field=error.field, message=str(error), got=shown(error.got), wanted="an existing id")
-    return problem_response(request.url.path, HTTPStatus.NOT_FOUND, Reason.UNKNOWN_ID, str(error), item)
-
-
-async def _conflict(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, ConflictError)
-    return problem_response(request.url.path, HTTPStatus.CONFLICT, Reason(error.reason), str(error))
-
-
-async def _over_quota(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, QuotaError)
-    status, headers = HTTPStatus.TOO_MANY_REQUESTS, {"Retry-After": str(math.ceil(error.retry_after_s))}
-    return problem_response(request.url.path, status, Reason.QUOTA_EXCEEDED, str(error), headers=headers)
-
-
-async def _storage_failed(request: Request, error: Exception) -> JSONResponse:
-    logger.error("%s %s: %s", request.method, request.url.path, error)
-    status = HTTPStatus.SERVICE_UNAVAILABLE
-    return problem_response(request.url.path, status, Reason.STORAGE_UNAVAILABLE, str(error))
-
-
-async def _bug(request: Request, error: Exception) -> JSONResponse:
-    detail = f"the service has a bug ({type(error).__name__}); its log has the traceback"
-    return problem_response(request.url.path, HTTPStatus.INTERNAL_SERVER_ERROR, Reason.INTERNAL_ERROR, detail)
-
-
-def _invalid(request: Request, detail: str, *errors: FieldProblem) -> JSONResponse:
-    status = HTTPStatus.UNPROCESSABLE_ENTITY
-    return problem_response(request.url.path, status, Reason.INVALID_FIELD, detail, *errors)
+def invalid(detail: str, *errors: FieldProblem) -> ProblemError:
+    """The answer to a request that holds something wrong."""
+    return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail, *errors)
 
 
 def _methods(request: Request) -> set[str]:

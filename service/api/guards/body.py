@@ -6,7 +6,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.answers.problems import ProblemError
 from service.api.guards.refusal import refuse
-from service.schemas import Reason
+from service.schemas.problems import Reason
 from service.settings import ServiceSettings
 
 UPLOADS = "/v1/networks"

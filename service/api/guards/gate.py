@@ -18,7 +18,7 @@ from service.errors import KeysError
 from service.keys.exposure import is_loopback
 from service.keys.key import Scope as KeyScope
 from service.keys.ring import KeyRing
-from service.schemas import Reason
+from service.schemas.problems import Reason
 from service.settings import ServiceSettings
 
 HEALTH = frozenset({"/healthz", "/readyz"})

@@ -7,7 +7,7 @@ from http import HTTPStatus
 from starlette.types import Scope
 
 from service.api.answers.problems import ProblemError
-from service.schemas import Reason
+from service.schemas.problems import Reason
 
 _HOST = re.compile(r"(?:\[(?P<address>[0-9a-f:.]+)\]|(?P<name>[^:\[\]]*))(?::\d*)?")
 

@@ -6,7 +6,7 @@ from http import HTTPStatus
 from starlette.types import Scope
 
 from service.api.answers.problems import ProblemError
-from service.schemas import Reason
+from service.schemas.problems import Reason
 
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # methods that change nothing
 

@@ -5,7 +5,7 @@ from collections import Counter
 from http import HTTPStatus
 
 from service.api.answers.problems import ProblemError
-from service.schemas import Reason
+from service.schemas.problems import Reason
 
 
 class RateLimit:

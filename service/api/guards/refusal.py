@@ -7,5 +7,4 @@ from service.api.answers.problems import ProblemError, problem_response
 
 async def refuse(error: ProblemError, scope: Scope, receive: Receive, send: Send) -> None:
     """Answers a request in place of the app: what middleware raises, no handler of the app would see."""
-    response = problem_response(scope["path"], error.status, error.reason, str(error), headers=error.headers)
-    await response(scope, receive, send)
+    await problem_response(scope["path"], error)(scope, receive, send)

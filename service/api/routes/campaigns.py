@@ -26,7 +26,9 @@ from service.api.answers.responses import (
 )
 from service.api.context import Context, Service
 from service.api.posted_campaign import DOCUMENTED_BODY, PostedCampaign
-from service.schemas import Body, Campaign, CampaignPage, Results
+from service.schemas.base import Body
+from service.schemas.campaign_results import Results
+from service.schemas.campaigns import Campaign, CampaignPage
 from service.store.states import State
 from service.store.stored import StoredCampaign
 from service.views.bodies import campaign_body, summary_body

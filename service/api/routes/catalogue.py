@@ -8,7 +8,7 @@ from risk_sac.config import METHODS, EgoConfig
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import requirements_from_odd
-from service.schemas import Families, Family, Methods, NamedMethod, SceneParameter, Signal
+from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter, Signal
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 

@@ -9,10 +9,13 @@ from service.api.access import CurrentCaller
 from service.api.answers.pages import Cursor, Limit, decode_cursor, encode_cursor
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN
 from service.api.context import Service
-from service.schemas import EpisodePage, Failure
+from service.schemas.episodes import EpisodePage
+from service.schemas.failures import Failure
 from service.store.finding import Judged
 from service.store.stored import Page, StoredEpisode
-from service.views.bodies import episode_body, failure_body, tier_outcomes
+from service.views.bodies import episode_body, failure_body
+
+TIERS = {"valid": (Outcome.FAILURE,), "raw": (Outcome.FAILURE, Outcome.DEGENERATE)}
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
 
@@ -62,7 +65,7 @@ def list_failures(
         limit=limit,
         after=decode_cursor(cursor),
         run_id=run,
-        outcomes=tier_outcomes(tier),
+        outcomes=TIERS[tier],
         judged=Judged(grade=grade, broke=broke, signature=signature),
         project=caller.sees,
     )

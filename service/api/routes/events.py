@@ -13,7 +13,6 @@ from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses
 from service.api.context import Service
 from service.api.stream import decode_position
 from service.store.reading import Store
-from service.views.happenings import read_batch
 
 HEARTBEAT_S = 15.0
 GRACE_S = 1.0  # for streams to end by themselves when the server stops
@@ -83,5 +82,5 @@ def _start(store: Store, campaign_id: str, project: str | None, event_id: str | 
             "Last-Event-ID", event_id, "the id of an event of this campaign, unchanged; else leave it out"
         )
     ended = campaign.state.final
-    told = ended and not read_batch(store, campaign_id, position, limit=1).happenings
+    told = ended and not store.events(campaign_id, after=position, limit=1).items
     return None if told else position, ended

@@ -17,7 +17,7 @@ from service.networks.errors import BusyError, UploadError
 from service.networks.limits import MAX_EDGES, MAX_EXPANDED_BYTES, MAX_FILES, WALL_S
 from service.networks.packaging import MEDIA_TYPES, Packaging
 from service.networks.schemas import Network, NetworkPage
-from service.schemas import Reason
+from service.schemas.problems import Reason
 
 RECEIVE_S = 60  # a sender that is slower would keep others out
 CREATED: Responses = {201: {"headers": {"Location": header("Where it is.")}}}

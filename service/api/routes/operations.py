@@ -5,12 +5,12 @@ from http import HTTPStatus
 from fastapi import APIRouter, Depends, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
-from service.api.access import require
+from service.api.access import require_admin
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import STOPPED, UNREADY, Responses
 from service.api.context import Service
-from service.keys.key import Scope
-from service.schemas import Health, Ready, Reason
+from service.schemas.health import Health, Ready
+from service.schemas.problems import Reason
 from service.store.statistics import check_readable
 
 EXAMPLE = 'risk_sac_episodes_total{family="low",method="risk-sac"} 4711.0\n…'
@@ -39,7 +39,7 @@ def get_readiness(service: Service) -> Ready:
 
 
 # A key that may see all campaigns: the runs at work are among the metrics.
-@router.get("/metrics", response_class=Response, responses=METRICS, dependencies=[Depends(require(Scope.ADMIN))])
+@router.get("/metrics", response_class=Response, responses=METRICS, dependencies=[Depends(require_admin)])
 def get_metrics(service: Service) -> Response:
     """Metrics in the text format of Prometheus."""
     return Response(generate_latest(service.metrics), media_type=CONTENT_TYPE_LATEST)

@@ -17,9 +17,10 @@ from risk_sac.report.figures import FORMATS, Format
 from service.api.access import CurrentCaller
 from service.api.answers.representations import accepted, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses
-from service.api.context import Service
+from service.api.context import Context, Service
 from service.schemas.reports import Figure, FigureFile, Figures, Table
-from service.views.reports import edition
+from service.store.stored import StoredCampaign
+from service.views.reports import CampaignReport, edition
 
 TableFormat = Literal["json", "md", "csv"]
 SpecFormat = Literal["json", "yaml"]
@@ -82,28 +83,24 @@ def get_table(
     """The methods compared over seeds by the runs that have finished, with the others named; empty before the first."""
     campaign = service.store.campaign(campaign_id, caller.sees)
     name = format_ or _accepted(request, TABLES)
-    tag = entity_tag(edition(campaign), name)
-    if has(request, tag):
-        return not_modified(tag, vary="Accept")
-    report = service.reports.report(campaign)
     command, spec_command = _commands(request, campaign_id)
-    text = TABLES[name](replace(report.comparison, command=command, spec_command=spec_command))
-    headers = caching(tag if report.lasting else None, vary="Accept")
-    return Response(text, headers=headers, media_type=MEDIA_TYPES[name])
+
+    def table(report: CampaignReport) -> str:
+        return TABLES[name](replace(report.comparison, command=command, spec_command=spec_command))
+
+    return _shown(request, service, campaign, (name,), table, MEDIA_TYPES[name], vary="Accept")
 
 
 @router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)
 def list_figures(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """The figures that the finished runs allow: how the methods search, what they reach, λ and α."""
     campaign = service.store.campaign(campaign_id, caller.sees)
-    tag = entity_tag(edition(campaign), "figures")
-    if has(request, tag):
-        return not_modified(tag)
-    report = service.reports.report(campaign)
-    items = [Figure(name=name, files=_files(campaign_id, name)) for name in report.figures]
-    body = Figures(complete=not report.comparison.missing, items=items)
-    headers = caching(tag if report.lasting else None)
-    return Response(body.model_dump_json(), headers=headers, media_type="application/json")
+
+    def figures(report: CampaignReport) -> str:
+        items = [Figure(name=name, files=_files(campaign_id, name)) for name in report.figures]
+        return Figures(complete=not report.comparison.missing, items=items).model_dump_json()
+
+    return _shown(request, service, campaign, ("figures",), figures, MEDIA_TYPES["json"])
 
 
 @router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED)
@@ -117,12 +114,9 @@ def get_figure(
 ) -> Response:
     """One figure; drawn when it is first asked for, and again once more runs have finished."""
     campaign = service.store.campaign(campaign_id, caller.sees)
-    tag = entity_tag(edition(campaign), name, format)
-    if has(request, tag):
-        return not_modified(tag)
-    report = service.reports.report(campaign)
-    content = report.figure(name, format)
-    return Response(content, headers=caching(tag if report.lasting else None), media_type=IMAGE_TYPES[format])
+    return _shown(
+        request, service, campaign, (name, format), lambda report: report.figure(name, format), IMAGE_TYPES[format]
+    )
 
 
 @router.get("/spec", response_model=CampaignSpec, responses=SPEC | UNACCEPTABLE)
@@ -139,6 +133,23 @@ def get_spec(
     spec = service.store.campaign(campaign_id, caller.sees).spec
     name = format_ or _accepted(request, SPECS)
     return Response(SPECS[name](spec), headers={"Vary": "Accept"}, media_type=MEDIA_TYPES[name])
+
+
+def _shown(
+    request: Request,
+    service: Context,
+    campaign: StoredCampaign,
+    parts: tuple[str, ...],
+    show: Callable[[CampaignReport], str | bytes],
+    media_type: str,
+    vary: str = "",
+) -> Response:
+    """What the report says in one representation, which `parts` name, unless the client has it."""
+    tag = entity_tag(edition(campaign), *parts)
+    if has(request, tag):
+        return not_modified(tag, vary)
+    report = service.reports.report(campaign)
+    return Response(show(report), headers=caching(tag if report.lasting else None, vary), media_type=media_type)
 
 
 def _accepted(request: Request, formats: dict[str, Any]) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from prometheus_client import CollectorRegistry, Histogram, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
+from pydantic_core import from_json
 
 from service.errors import StorageError
 from service.runs.manager import Manager
@@ -31,6 +32,7 @@ COUNTERS = {
         "The distinct ones of the preventable failures.",
     ),
 }
+RATES = {"ecr": "Valid failures", "pcr": "Preventable failures"}
 
 
 def request_latencies() -> Histogram:
@@ -80,17 +82,18 @@ class CampaignMetrics(Collector):
         for counted, (name, meaning) in COUNTERS.items():
             sums = Counts[tuple[str, str]]()
             for tally in statistics.tallies:
-                sums[tally.family, tally.method] += tally.counts[counted]
+                sums[tally.family, tally.method] += getattr(tally, counted)
             yield self._counters[counted].family(name, meaning, sums)
-        labels = ["campaign", "run", *SEARCH]
-        ecr = GaugeMetricFamily("risk_sac_run_ecr", "Valid failures per episode of a run at work.", labels=labels)
-        pcr = GaugeMetricFamily("risk_sac_run_pcr", "Preventable failures per episode of a run at work.", labels=labels)
-        for run in statistics.at_work:
-            for gauge, rate in ((ecr, run.ecr), (pcr, run.pcr)):
-                if rate is not None:
-                    gauge.add_metric([run.campaign_id, run.id, run.family, run.method], rate)
-        yield ecr
-        yield pcr
+        for name, rate in RATES.items():
+            labels = ["campaign", "run", *SEARCH]
+            gauge = GaugeMetricFamily(f"risk_sac_run_{name}", f"{rate} per episode of a run at work.", labels=labels)
+            for run in statistics.at_work:
+                metrics = {} if run.metrics is None else from_json(run.metrics)
+                if (
+                    metrics.get(name) is not None
+                ):  # not before the first episode; the PCR not in what is older than judgements
+                    gauge.add_metric([run.campaign_id, run.id, run.family, run.method], metrics[name])
+            yield gauge
 
 
 class _Monotone:
@@ -113,11 +116,8 @@ class _Monotone:
 
 def _states(statistics: Statistics) -> Iterator[Metric]:
     """How many campaigns and runs are in each state; the queue are the runs that are queued."""
-    runs = Counts[State]()
-    for tally in statistics.tallies:
-        runs[tally.state] += tally.runs
-    for name, counts in (("campaigns", statistics.campaigns), ("runs", runs)):
+    for name, rows in (("campaigns", statistics.campaigns), ("runs", statistics.tallies)):
         family = GaugeMetricFamily(f"risk_sac_{name}", f"Stored {name} by state.", labels=["state"])
         for state in State:
-            family.add_metric([state], counts.get(state, 0))
+            family.add_metric([state], sum(getattr(row, name) for row in rows if row.state == state))
         yield family

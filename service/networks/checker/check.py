@@ -8,11 +8,11 @@ from pathlib import Path
 from service.networks.checker import simulator
 from service.networks.checker.archive import documents
 from service.networks.checker.bounds import bind_simulator
-from service.networks.checker.document import Count, Observer, read, root_of
+from service.networks.checker.document import Observer, read, root_of
 from service.networks.checker.roads import Demand, Net
 from service.networks.errors import UploadError
 from service.networks.packaging import Packaging
-from service.networks.report import CheckedFile, CheckReport, Kind, Summary
+from service.networks.report import CheckReport, Kind, NetworkFile, Summary
 
 
 def check(upload: Path, packaging: Packaging) -> CheckReport:
@@ -28,7 +28,7 @@ def check(upload: Path, packaging: Packaging) -> CheckReport:
     return CheckReport(summary=summary, files=tuple(files), warnings=tuple(warnings))
 
 
-def rewrite(found: Sequence[bytes]) -> tuple[list[CheckedFile], Summary]:
+def rewrite(found: Sequence[bytes]) -> tuple[list[NetworkFile], Summary]:
     """Write each document anew in the current folder, under a name of ours; the net is the first.
 
     Raises:
@@ -37,14 +37,14 @@ def rewrite(found: Sequence[bytes]) -> tuple[list[CheckedFile], Summary]:
     kinds = [_kind(number, data) for number, data in enumerate(found)]
     if kinds.count(Kind.NET) != 1:
         raise UploadError(f"there are {kinds.count(Kind.NET)} nets in the upload; wanted one")
-    elements, net = Count(), Net()
+    net = Net()
     first = kinds.index(Kind.NET)
-    files = [_rewrite_one(first, Kind.NET, found[first], elements, net)]
+    files = [_rewrite_one(first, Kind.NET, found[first], net)]
     summary = net.finish()
     demand = Demand(net)
     for number, (kind, data) in enumerate(zip(kinds, found, strict=True)):
         if number != first:
-            files.append(_rewrite_one(number, kind, data, elements, demand))
+            files.append(_rewrite_one(number, kind, data, demand, sum(file.elements for file in files)))
     return files, summary
 
 
@@ -56,13 +56,13 @@ def _kind(number: int, data: bytes) -> Kind:
         return Kind(root)
 
 
-def _rewrite_one(number: int, kind: Kind, data: bytes, elements: Count, observer: Observer) -> CheckedFile:
+def _rewrite_one(number: int, kind: Kind, data: bytes, observer: Observer, before: int = 0) -> NetworkFile:
     with _naming(number, kind):
-        document = read(data, kind, elements, observer)
+        document = read(data, kind, observer, before)
     text = document.text.encode()
     name = f"{kind}.xml" if kind is Kind.NET else f"{kind}-{number}.xml"
     Path(name).write_bytes(text)
-    return CheckedFile(name, kind, len(text), document.elements, hashlib.sha256(text).hexdigest())
+    return NetworkFile(name, kind, len(text), document.elements, hashlib.sha256(text).hexdigest())
 
 
 @contextmanager

@@ -35,30 +35,13 @@ class Observer(Protocol):
         """
 
 
-class Count:
-    """Elements of all documents of an upload together."""
-
-    def __init__(self) -> None:
-        self.elements = 0
-
-    def add(self) -> None:
-        """One more.
-
-        Raises:
-          UploadError: that is too many.
-        """
-        self.elements += 1
-        if self.elements > MAX_ELEMENTS:
-            raise UploadError(f"there are more than {MAX_ELEMENTS} elements; wanted at most that")
-
-
 class Document:
     """The target that the parser tells what it finds."""
 
-    def __init__(self, kind: str, count: Count, observer: Observer) -> None:
+    def __init__(self, kind: str, observer: Observer, before: int) -> None:
         self.elements = 0
         self._vocabulary = VOCABULARIES[kind]
-        self._count = count
+        self._before = before
         self._observer = observer
         self._path = [DOCUMENT]
         self._parts: list[str] = ['<?xml version="1.0" encoding="UTF-8"?>\n']
@@ -70,8 +53,9 @@ class Document:
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         """An element begins."""
-        self._count.add()
         self.elements += 1
+        if self._before + self.elements > MAX_ELEMENTS:
+            raise UploadError(f"there are more than {MAX_ELEMENTS} elements; wanted at most that")
         parent = self._path[-1]
         if len(self._path) > MAX_DEPTH:
             raise UploadError(f"elements are nested more than {MAX_DEPTH} deep; wanted at most that")
@@ -131,19 +115,19 @@ def root_of(data: bytes) -> str:
     raise UploadError("there is no element; wanted a network")
 
 
-def read(data: bytes, kind: str, count: Count, observer: Observer) -> Document:
+def read(data: bytes, kind: str, observer: Observer, before: int = 0) -> Document:
     """Read a document.
 
     Args:
       data: its bytes, UTF-8.
       kind: name of its root element.
-      count: of the elements so far.
       observer: told about each element.
+      before: elements of the documents read before it, which count for the limit.
 
     Raises:
       UploadError: it breaks a rule; the message has the line.
     """
-    document = Document(kind, count, observer)
+    document = Document(kind, observer, before)
     _parse(data, document)
     return document
 

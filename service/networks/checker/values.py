@@ -28,7 +28,6 @@ _WHOLE = re.compile(r"-?\d{1,10}", re.ASCII)
 _WORD = re.compile(r"[\w.:%+-]{1,100}", re.ASCII)
 _NOT_IN_IDENTIFIERS = re.compile(r"[\s|\\'\";,<>&$]")  # SUMO's own rule, and $
 _COORDINATE = r"-?\d{1,8}(?:\.\d{0,16})?"
-MAX_LANE_INDEX = MAX_LANES - 1
 _SPECIAL_WORDS = ("nan", "inf", "infinity")  # that SUMO reads as numbers, with a sign too
 
 
@@ -92,6 +91,12 @@ NON_NEGATIVE = number(0, MAX_NUMBER)
 PROBABILITY = number(0, 1)
 SPEED = number(0, 500)  # m/s
 LENGTH = number(0, 1e6)  # m
+PER_HOUR = number(0, 1e5)
+LANE_INDEX = whole(0, MAX_LANES - 1)
+INDEX = whole(-1, 10_000)
+REQUEST = whole(0, 4000)  # of a junction
+TRAVELLERS = whole(0, 1_000_000)
+CAPACITY = whole(0, 10_000)
 COORDINATE = number(-MAX_COORDINATE, MAX_COORDINATE)
 SHAPE = Type(
     "points x,y or x,y,z of at most 8 digits before the dot and no exponent, separated by blanks",

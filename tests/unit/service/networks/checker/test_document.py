@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from service.networks.checker import document
-from service.networks.checker.document import Attributes, Count, read, root_of
+from service.networks.checker.check import rewrite
+from service.networks.checker.document import Attributes, read, root_of
 from service.networks.checker.roads import Demand, Net
 from service.networks.errors import UploadError
 from tests.hostile_networks import EAST, NET, ROAD
@@ -24,7 +25,7 @@ class Nobody:
 
 
 def rewritten(data: bytes, kind: str = "net") -> str:
-    return read(data, kind, Count(), Nobody()).text
+    return read(data, kind, Nobody()).text
 
 
 def listed(text: bytes) -> list[tuple[str, dict[str, str]]]:
@@ -68,14 +69,22 @@ def test_the_root_is_told_without_reading_on() -> None:
 
 def test_elements_are_counted_over_all_documents(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(document, "MAX_ELEMENTS", 9)
-    count = Count()
-    assert read(NET.encode(), "net", count, Nobody()).elements == count.elements == 5
+    assert read(NET.encode(), "net", Nobody(), 4).elements == 5
     with pytest.raises(UploadError, match="more than 9 elements"):
-        read(NET.encode(), "net", count, Nobody())
+        read(NET.encode(), "net", Nobody(), 5)
+
+
+def test_an_upload_may_have_no_more_elements_than_one_document(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    routes = b"<routes><person id='p' depart='0'/></routes>"
+    monkeypatch.setattr(document, "MAX_ELEMENTS", 7)
+    assert [file.elements for file in rewrite([NET.encode(), routes])[0]] == [5, 2]
+    with pytest.raises(UploadError, match="more than 7 elements"):
+        rewrite([NET.encode(), routes, routes])
 
 
 def watched(text: str, kind: str, observer: document.Observer) -> None:
-    read(text.encode(), kind, Count(), observer)
+    read(text.encode(), kind, observer)
 
 
 def test_a_summary_counts_roads_and_not_what_lies_inside_junctions() -> None:

@@ -8,8 +8,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.records import Outcome
 from service.errors import NotFoundError
 from service.store.states import State
-from service.store.stored import StoredEpisode
-from service.views.happenings import read_batch
+from service.store.stored import StoredChange, StoredEpisode
 from service.workers.messages import Finished
 
 
@@ -37,24 +36,28 @@ def campaign(ledger, episode, done):
 
 
 def story(store, campaign, position=0, limit=100):
-    """All that is told from a position on, in as many batches as it takes, and the positions."""
+    """All that is told from a position on, in as many pages as it takes, and the positions."""
     told, positions = [], []
     while True:
-        batch = read_batch(store, campaign.id, position, limit)
-        assert batch.happenings, "a batch that ends nothing must tell something"
-        assert len(batch.happenings) <= limit
-        told += map(short, batch.happenings)
-        positions += [happening.sequence for happening in batch.happenings]
-        position = batch.position
-        if batch.ended:
-            assert not batch.more
+        page = store.events(campaign.id, after=position, limit=limit)
+        assert page.items, "a page that ends nothing must tell something"
+        assert len(page.items) <= limit
+        told += map(short, page.items)
+        positions += [event.sequence for event in page.items]
+        position = positions[-1]
+        if ends(page.items[-1]):
+            assert page.last is None
             return told, positions
 
 
-def short(happening):
-    if isinstance(happening, StoredEpisode):
-        return happening.id
-    return f"{happening.run_id or 'campaign'} {happening.state}"
+def ends(event):
+    return isinstance(event, StoredChange) and event.ends_campaign
+
+
+def short(event):
+    if isinstance(event, StoredEpisode):
+        return event.id
+    return f"{event.run_id or 'campaign'} {event.state}"
 
 
 def test_all_is_told_in_the_order_in_which_it_was_written(store, campaign):
@@ -93,9 +96,9 @@ def test_many_writers_and_readers_agree_on_one_order(store, ledger, episode, don
         """What somebody is told who always wants to know what is new."""
         told, position, ended = [], 0, False
         while not ended and not failed.is_set():
-            batch = read_batch(store, campaign.id, position, limit)
-            told += batch.happenings
-            position, ended = batch.position, batch.ended
+            told += store.events(campaign.id, after=position, limit=limit).items
+            if told:
+                position, ended = told[-1].sequence, ends(told[-1])
         return told
 
     with ThreadPoolExecutor(7) as pool:
@@ -119,13 +122,12 @@ def test_many_writers_and_readers_agree_on_one_order(store, ledger, episode, don
 
 def test_what_goes_on_has_not_ended(store, ledger, episode):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
-    assert read_batch(store, campaign.id, 0).happenings == ()
+    assert store.events(campaign.id, limit=100).items == ()
     ledger.start_run(campaign.runs[0].number)
     ledger.add_episode(campaign.runs[0].number, episode(0))
-    batch = read_batch(store, campaign.id, 0)
-    assert [short(each) for each in batch.happenings][-1] == "low-random-0-train-0"
-    assert not batch.ended
-    assert not batch.more
+    page = store.events(campaign.id, limit=100)
+    assert short(page.items[-1]) == "low-random-0-train-0"
+    assert page.last is None
 
 
 def test_an_episode_that_comes_out_otherwise_keeps_its_place(store, ledger, episode):
@@ -134,14 +136,14 @@ def test_an_episode_that_comes_out_otherwise_keeps_its_place(store, ledger, epis
     ledger.start_run(number)
     for index in range(2):
         ledger.add_episode(number, episode(index))
-    before = read_batch(store, campaign.id, 0).happenings
+    before = store.events(campaign.id, limit=100).items
     ledger.add_episode(number, episode(0, Outcome.FAILURE))
     ledger.add_episode(number, episode(2))
-    after = read_batch(store, campaign.id, 0).happenings
+    after = store.events(campaign.id, limit=100).items
     assert [short(each) for each in after] == [*map(short, before), "low-random-0-train-2"]
     assert [each.sequence for each in after] == [1, 2, 3, 4, 5]
 
 
 def test_a_campaign_that_is_gone_has_no_feed(store):
     with pytest.raises(NotFoundError):
-        read_batch(store, "none", 0)
+        store.events("none", limit=100)
