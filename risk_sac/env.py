@@ -1,6 +1,7 @@
 """The closed loop as a Gymnasium environment: adversaries act, SUMO and its ego answer.
 
-Registered as RiskSAC/Low-v0, RiskSAC/Mixed-v0 and RiskSAC/Dense-v0. The reward is R_risk alone; the
+Importing this module registers RiskSAC/Low-v0, RiskSAC/Mixed-v0 and RiskSAC/Dense-v0, and
+`gymnasium.make("risk_sac.env:RiskSAC/Low-v0")` imports it first. The reward is R_risk alone; the
 realism cost and the robustness come in `info`, because λ and the shaping belong to the learner.
 
 Source: RISK-SAC, Alg. 1, l. 5 and 8.
@@ -23,6 +24,7 @@ from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import adversaries_cost, broken_hard_rule
 from risk_sac.risk.reward import risk_reward
 from risk_sac.run_folder.series import Trace
+from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import LEAD_IN_S
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import limits_from_odd
@@ -273,9 +275,7 @@ def make_default(family: FamilyName) -> RiskSacEnv:
     return RiskSacEnv(Problem.from_spec(spec), spec.learner.reward)
 
 
-def register_envs() -> None:
-    """Registers the three families; Gymnasium calls it through the package's entry point."""
-    for family in ("low", "mixed", "dense"):
-        id_ = f"RiskSAC/{family.capitalize()}-v0"
-        if id_ not in gym.registry:
-            gym.register(id_, entry_point="risk_sac.env:make_default", kwargs={"family": family})
+for _family in FAMILIES:
+    gym.register(
+        f"RiskSAC/{_family.capitalize()}-v0", entry_point="risk_sac.env:make_default", kwargs={"family": _family}
+    )

@@ -21,12 +21,17 @@ LIMIT = 5.0  # of every entry
 X_M, Y_M, SPEED_MPS, LATERAL_MPS, ACCEL_MPS2, GAP_M = 40.0, 8.0, 15.0, 4.0, 8.0, 20.0  # scales
 
 
+def observation_size(adversaries: int, scene_size: int, requirements: int) -> int:
+    """Entries of an observation."""
+    return PER_ADVERSARY * adversaries + PER_EGO + scene_size + requirements + 1
+
+
 class Encoder:
     """Builds observations of a fixed size for one family."""
 
     def __init__(self, family: Family, scene_size: int, requirements: int) -> None:
         self._adversaries = family.adversaries
-        self.size = PER_ADVERSARY * len(family.adversaries) + PER_EGO + scene_size + requirements + 1
+        self.size = observation_size(len(family.adversaries), scene_size, requirements)
         self._ids: tuple[str, ...] = ()
 
     def encode(

@@ -6,7 +6,9 @@ Everything a campaign can get wrong beyond its types is found here, without load
 from dataclasses import dataclass
 
 from risk_sac.config import CampaignSpec, EgoConfig, Odd, Requirement, RunSpec
+from risk_sac.config.demand import check_demand
 from risk_sac.errors import ConfigError, OddError
+from risk_sac.observation import observation_size
 from risk_sac.risk.rss import RssParameters
 from risk_sac.risk.stl import check_requirements
 from risk_sac.scenario.families import FAMILIES
@@ -38,7 +40,7 @@ class Problem:
         Raises:
           OddError: the ODD contradicts itself or leaves no scene.
           FormulaError: a user's requirement cannot be monitored online.
-          ConfigError: a user's requirement takes the name of a shipped one.
+          ConfigError: a user's requirement takes the name of a shipped one, or the run takes too much memory.
         """
         family = FAMILIES[spec.family]
         odd = intersect(family.odd, spec.odd)
@@ -58,7 +60,7 @@ class Problem:
                     f"{sorted(taken)}",
                     field=f"requirements[{index}].name",
                 )
-        return cls(
+        problem = cls(
             family=family,
             odd=odd,
             space=narrow(family.space, odd),
@@ -66,6 +68,18 @@ class Problem:
             requirements=(*shipped, *spec.requirements),
             rss=_rss_parameters(odd),
         )
+        problem.check_demand(spec)
+        return problem
+
+    def check_demand(self, spec: RunSpec) -> None:
+        """Refuses a run of this problem that would take too much memory.
+
+        Raises:
+          ConfigError: naming the field that takes most of it.
+        """
+        adversaries = len(self.family.adversaries)
+        observed = observation_size(adversaries, self.space.dimension, len(self.requirements))
+        check_demand(spec, observed, 2 * adversaries, self.family.horizon_steps)
 
     @property
     def visibility_m(self) -> float:
@@ -99,6 +113,9 @@ def _rss_parameters(odd: Odd) -> RssParameters:
 
 def check_campaign(spec: CampaignSpec) -> None:
     """Refuses a campaign that could not run; see `Problem.from_spec` for the errors."""
+    alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()
     for family in spec.families:
-        run = next(run for run in spec.runs() if run.family == family)
-        Problem.from_spec(run)
+        first, *others = (run for run in alike if run.family == family)
+        problem = Problem.from_spec(first)
+        for run in others:
+            problem.check_demand(run)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
+from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
 
 class Outcome(StrEnum):
@@ -56,7 +56,9 @@ class Record(BaseModel):
     "-Infinity" or "NaN", so that it reads back. Only the public bodies, which derive from these records, say null.
     """
 
-    model_config = ConfigDict(frozen=True, ser_json_inf_nan="strings", use_attribute_docstrings=True)
+    model_config = ConfigDict(
+        frozen=True, ser_json_inf_nan="strings", serialize_by_alias=True, use_attribute_docstrings=True
+    )
 
 
 def _nothing_was_least(value: Any) -> Any:
@@ -66,6 +68,11 @@ def _nothing_was_least(value: Any) -> Any:
 Real = Annotated[float, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "null"}]})]
 Least = Annotated[Real, BeforeValidator(_nothing_was_least)]
 """The least of some values, infinite without any; folders from before infinities were strings have null for it."""
+
+
+def _early(name: str) -> Any:
+    """A minimum that ends 1 s before the contact is called so; under its plain name in what was stored before."""
+    return Field(validation_alias=AliasChoices(f"early_{name}", name), serialization_alias=f"early_{name}")
 
 
 class ReferenceOutcome(Record):
@@ -134,13 +141,13 @@ class Collision(Record):
     relative_speed_mps: Real
     lateral_offset_m: Real
     """The other's centre across the ego's axis at contact."""
-    min_ttc_s: Least
-    """Until 1 s before the contact, at which it is 0 for every collision alike."""
+    min_ttc_s: Least = _early("min_ttc_s")
+    """Until 1 s before the contact, at which it is 0 for every collision alike, as the episode's own minimum is."""
     min_rss_margin_m: Least
     visible_for_s: Real
     """How long the ego had known of the other without a break before contact, its memory included; 0 if unseen."""
     ego_peak_braking_mps2: Real
-    min_robustness: Least
+    min_robustness: Least = _early("min_robustness")
     """Soft minimum of the requirements, until 1 s before the contact too."""
     simulator_agrees: bool | None
     """Whether SUMO lists the collision within 0.3 s; null for pedestrians, whom it does not know."""
@@ -189,8 +196,9 @@ class EpisodeRecord(Record):
     mean_cost: Real
     """Mean C_soft over the executed steps."""
     min_ttc_s: Least
-    """Null when nothing was ever on a collision course."""
+    """Over the whole episode, the contact included, and so 0 if there is one; null in a record without any."""
     min_robustness: Least
+    """Soft minimum of the requirements, over the whole episode too."""
     objective: float | None
     """f_e; null until the scene optimiser was told."""
     dual_variable: Real
@@ -200,6 +208,10 @@ class EpisodeRecord(Record):
     environment_steps: int
     """Of the run, up to and including this episode."""
     collision: Collision | None = None
+
+    def id_in(self, run_id: str) -> str:
+        """How the episode is called wherever it is spoken of, unique within a campaign."""
+        return f"{run_id}-{self.phase}-{self.index}"
 
     @property
     def searching(self) -> bool:

@@ -196,7 +196,7 @@ def _invite(found: Json, data_dir: Path, console: Console) -> None:
     program, here = Path(sys.executable).with_name("risk-sac"), Path.cwd()
     program = program.relative_to(here) if program.is_relative_to(here) else program
     folder = _run_folder(data_dir, campaign, first["run_id"])
-    command = [program, "show", folder, Path(series_name(first["index"])).stem, "--out", "failure.png"]
+    command = [program, "show", folder, first["id"], "--out", "failure.png"]
     console.print(f"draw one: {shlex.join(map(str, command))}", soft_wrap=True, markup=False, highlight=False)
 
 

@@ -7,6 +7,7 @@ RiskSacError
     ├── QuotaError         a project, or a key, has used up its share
     ├── KeysError          the API keys cannot be read, or have no such key
     ├── StorageError       the database or the data folder refused
+    │   └── OutdatedError  what a stored campaign asks for is refused by now
     └── TransitionError    a change of state that the table of transitions does not allow
 """
 
@@ -48,6 +49,10 @@ class KeysError(ServiceError):
 
 class StorageError(ServiceError):
     """The database or the data folder refused a read or a write; the message is the reason."""
+
+
+class OutdatedError(StorageError):
+    """What a stored campaign asks for is refused by now; it can be listed and deleted, and its runs fail."""
 
 
 class TransitionError(ServiceError):

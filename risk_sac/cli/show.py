@@ -17,7 +17,9 @@ def add_show(commands: Commands) -> None:
     show = commands.add_parser("show", help="list a run's contacts, or draw one")
     show.set_defaults(command=_show)
     show.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
-    show.add_argument("failure", nargs="?", metavar="FAILURE", help="id of a contact; without it they are listed")
+    show.add_argument(
+        "failure", nargs="?", metavar="FAILURE", help="id of a contact, or its number; default: list them"
+    )
     show.add_argument("--out", type=Path, metavar="FILE.png", help="(default: failures/FAILURE.png beside RESULTS)")
 
 
@@ -37,8 +39,12 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _contacts(results: Results) -> Table:
-    """Two lines per contact. Fits 80 columns; only the last one wraps."""
-    table = Table(box=SIMPLE_HEAD, padding=0)
+    """Two lines per contact, under the id of the run, with which their own ids begin.
+
+    Fits 80 columns; only the last one wraps.
+    """
+    run = results.spec.id
+    table = Table(title=run, caption=f"in full, as the service says it: {run}-ID", box=SIMPLE_HEAD, padding=0)
     speeds, zones = "ego's\nother's\nm/s", "ego's\nother's\nzone"
     for name in ("id", "outcome\ngrade", "other", speeds, zones, "conflict\nbegan at s,\nx y m"):
         table.add_column(name, no_wrap=True)
@@ -49,7 +55,7 @@ def _contacts(results: Results) -> Table:
             continue
         judgement = collision.judgement
         table.add_row(
-            contact.id,
+            contact.id.removeprefix(f"{run}-"),
             f"{contact.episode.outcome}\n{(judgement and judgement.grade) or ''}",
             collision.other_id,
             f"{collision.ego_speed_mps:.1f}\n{collision.other_speed_mps:.1f}",

@@ -6,7 +6,11 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 
 class Settings(BaseModel):
-    """Frozen, closed to unknown fields, and finite."""
+    """Frozen, closed to unknown fields, and finite.
+
+    Every number has bounds, far beyond what is of use and short of where arithmetic ends: between them, a run's figures
+    stay finite.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
 
@@ -27,6 +31,5 @@ class Interval(Settings):
         return self.low <= value <= self.high
 
 
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+Weight = Annotated[float, Field(ge=0, le=1000)]

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from risk_sac.config.base import Positive, Settings
+from risk_sac.config.base import Settings
 from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import MethodName
@@ -16,6 +16,7 @@ from risk_sac.config.odd import Odd
 
 FamilyName = Literal["low", "mixed", "dense"]
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
+MOST_EPISODES = 2_000_000  # of a campaign; the database takes about 1.2 KB for each
 Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 
 
@@ -24,7 +25,7 @@ class Requirement(Settings):
 
     name: Identifier
     formula: Annotated[str, Field(min_length=1, max_length=500)]
-    scale: Positive
+    scale: Annotated[float, Field(ge=1e-3, le=1e6)]
     """Physical size of a clear margin, in the formula's unit; robustness is divided by it."""
     shapes: bool = True
     """Whether it counts in the soft minimum and so in the reward's shaping; if not, it is only monitored."""
@@ -79,6 +80,16 @@ class CampaignSpec(Settings):
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
+
+    @model_validator(mode="after")
+    def _within_reason(self) -> Self:
+        runs = len(self.families) * len(self.methods) * len(self.seeds)
+        if runs * self.budget.total_episodes > MOST_EPISODES:
+            raise ValueError(
+                f"budget is {self.budget.total_episodes} episodes for each of {runs} runs; wanted at most "
+                f"{MOST_EPISODES} in all"
+            )
+        return self
 
     @model_validator(mode="after")
     def _no_repeats(self) -> Self:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from risk_sac.config.base import NonNegative, Positive, Settings
+from risk_sac.config.base import Settings
 
 CarFollowing = Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"]
 
@@ -13,13 +13,13 @@ CarFollowing = Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"]
 class SensorConfig(Settings):
     """Line-of-sight sensor, mounted at the middle of the ego's roof."""
 
-    range_m: Positive = 80.0
+    range_m: Annotated[float, Field(ge=1, le=100_000)] = 80.0
     """Farthest distance at which a body is seen, m."""
-    field_of_view_rad: Annotated[float, Field(gt=0, le=math.tau)] = math.tau
+    field_of_view_rad: Annotated[float, Field(ge=0.01, le=math.tau)] = math.tau
     """Opening angle centred on the ego's heading, rad."""
     occlusion: bool = True
     """Whether vehicles hide what stands behind them."""
-    memory_s: NonNegative = 3.0
+    memory_s: Annotated[float, Field(ge=0, le=60)] = 3.0
     """How long an actor that went out of sight is still reckoned with, s; it is expected to go on as it did then."""
 
 

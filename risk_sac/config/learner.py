@@ -7,24 +7,25 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from risk_sac.config.base import Fraction, NonNegative, Positive, Settings
+from risk_sac.config.base import Fraction, Settings, Weight
 
-Count = Annotated[int, Field(ge=1)]
+Width = Annotated[int, Field(ge=1, le=4096)]
+LearningRate = Annotated[float, Field(ge=1e-7, le=0.01)]
 
 
 class AgentConfig(Settings):
     """What all agents share: networks, optimisers and the pace of learning."""
 
-    hidden_sizes: Annotated[tuple[Count, ...], Field(min_length=1, max_length=4)] = (64, 64)
+    hidden_sizes: Annotated[tuple[Width, ...], Field(min_length=1, max_length=4)] = (64, 64)
     """Units of each hidden layer, actor and critics alike."""
     batch_size: Annotated[int, Field(ge=1, le=4096)] = 256
-    discount: Annotated[float, Field(gt=0, lt=1)] = 0.99
+    discount: Annotated[float, Field(ge=0.01, le=0.9999)] = 0.99
     """γ; 0.99 at 0.1 s looks about 10 s ahead."""
-    actor_learning_rate: Positive = 3e-4
-    critic_learning_rate: Positive = 1e-3
-    target_rate: Annotated[float, Field(gt=0, le=1)] = 0.005
+    actor_learning_rate: LearningRate = 3e-4
+    critic_learning_rate: LearningRate = 1e-3
+    target_rate: Annotated[float, Field(ge=1e-5, le=1)] = 0.005
     """τ of the target networks' moving average."""
-    warmup_steps: Annotated[int, Field(ge=0)] = 1000
+    warmup_steps: Annotated[int, Field(ge=0, le=10_000_000)] = 1000
     """Environment steps with uniformly random actions and no update."""
     updates_per_step: Annotated[int, Field(ge=0, le=20)] = 1
     device: Literal["auto", "cpu", "cuda"] = "auto"
@@ -35,17 +36,17 @@ class AgentConfig(Settings):
 class SacConfig(Settings):
     """Soft Actor-Critic (Haarnoja et al. 2018), Eq. 4."""
 
-    temperature_learning_rate: Positive = 3e-4
-    initial_temperature: Positive = 0.02
+    temperature_learning_rate: LearningRate = 3e-4
+    initial_temperature: Annotated[float, Field(ge=1e-6, le=100)] = 0.02
     """α at the start."""
-    target_entropy_per_action: float = -1.0
-    """Target entropy divided by the action dimension, nats."""
+    target_entropy_per_action: Annotated[float, Field(ge=-10, le=0.5)] = -1.0
+    """Target entropy divided by the action dimension, nats; uniform actions have log 2."""
 
 
 class DdpgConfig(Settings):
     """Deep deterministic policy gradient (Lillicrap et al. 2016)."""
 
-    exploration_deviation: NonNegative = 0.2
+    exploration_deviation: Annotated[float, Field(ge=0, le=10)] = 0.2
     """Standard deviation of the Gaussian noise added to actions in [-1, 1]."""
 
 
@@ -53,13 +54,13 @@ class ReplayConfig(Settings):
     """Replay memory and its risk-guided priorities, Eq. 9-10."""
 
     capacity: Annotated[int, Field(ge=1000, le=2_000_000)] = 100_000
-    td_weight: NonNegative = 1.0
+    td_weight: Weight = 1.0
     """w1, on the normalised TD error."""
-    return_weight: NonNegative = 0.5
+    return_weight: Weight = 0.5
     """w2, on the normalised accumulated reward of the episode."""
-    robustness_weight: NonNegative = 0.5
+    robustness_weight: Weight = 0.5
     """w3, on the normalised negative robustness."""
-    priority_floor: Positive = 0.05
+    priority_floor: Annotated[float, Field(ge=1e-6, le=1000)] = 0.05
     """ε > 0: smallest priority, so nothing is forgotten."""
     correction: Fraction = 0.6
     """η, exponent of the importance weights."""
@@ -68,28 +69,28 @@ class ReplayConfig(Settings):
 class LagrangianConfig(Settings):
     """The dual variable λ, Eq. 1-2 and Alg. 1, l. 16."""
 
-    initial: NonNegative = 0.0
-    learning_rate: Positive = 5e-4
+    initial: Weight = 0.0
+    learning_rate: Annotated[float, Field(ge=1e-9, le=1)] = 5e-4
     """η_λ."""
-    cost_limit: NonNegative = 0.2
-    """d, on the mean realism cost per step."""
-    maximum: Positive = 0.5
+    cost_limit: Fraction = 0.2
+    """d, on the mean realism cost per step, which is in [0, 1]."""
+    maximum: Annotated[float, Field(ge=1e-6, le=1000)] = 0.5
     """Cap on λ, so that a burst of cost cannot drown the risk reward for good."""
 
 
 class RewardConfig(Settings):
     """R_risk (terms of Eq. 1) and the shaping potential (Eq. 6-8)."""
 
-    valid_collision: NonNegative = 20.0
+    valid_collision: Weight = 20.0
     """Bonus for a valid collision."""
-    degenerate_collision: NonNegative = 4.0
+    degenerate_collision: Weight = 4.0
     """Penalty for contact that a validity rule refuses."""
-    ttc_weight: NonNegative = 0.2
+    ttc_weight: Weight = 0.2
     """Weight of exp(-TTC / ttc_scale_s)."""
-    ttc_scale_s: Positive = 1.0
-    rss_weight: NonNegative = 0.1
+    ttc_scale_s: Annotated[float, Field(ge=0.01, le=1000)] = 1.0
+    rss_weight: Weight = 0.1
     """Reward per step in which both RSS margins are violated."""
-    softmin_sharpness: Positive = 20.0
+    softmin_sharpness: Annotated[float, Field(ge=0.1, le=1000)] = 20.0
     """β of Eq. 7; robustness is in units of each requirement's scale."""
     zero_terminal_potential: bool = True
     """φ = 0 at terminal states, which policy invariance needs; False is Eq. 8 to the letter."""
@@ -103,13 +104,13 @@ class SceneOptimizerConfig(Settings):
     window: Annotated[int, Field(ge=8, le=1000)] = 150
     """Newest observations the model is fitted to: the policy changes, so old scores go stale. An ask and a tell
     take about 5 ms on average at 150 and 10 ms at 300."""
-    refit_every: Annotated[int, Field(ge=1)] = 10
+    refit_every: Annotated[int, Field(ge=1, le=1000)] = 10
     """Fewest observations between two fits of the kernel's hyper-parameters; a fifth of those kept if that is more."""
     candidates: Annotated[int, Field(ge=16, le=8192)] = 256
     """Sobol points at which the acquisition is scored before local refinement."""
     exploration: Fraction = 0.1
     """Share of scenes drawn at random, so that no region is given up."""
-    running_maximum_rate: Annotated[float, Field(gt=0, le=1)] = 0.1
+    running_maximum_rate: Annotated[float, Field(ge=1e-3, le=1)] = 0.1
     """Share of the way that M̄_e moves towards the largest mean return so far, in every episode."""
 
 
@@ -123,5 +124,5 @@ class LearnerConfig(Settings):
     lagrangian: LagrangianConfig = LagrangianConfig()
     reward: RewardConfig = RewardConfig()
     scenes: SceneOptimizerConfig = SceneOptimizerConfig()
-    checkpoint_every: Annotated[int, Field(ge=1)] = 20
+    checkpoint_every: Annotated[int, Field(ge=1, le=100_000)] = 20
     """Episodes between two checkpoints."""

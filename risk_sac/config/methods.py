@@ -32,6 +32,11 @@ class Method(Settings):
     scenes: Literal["botorch", "sobol"] = "sobol"
     summary: str
 
+    @property
+    def learns(self) -> bool:
+        """Whether its adversaries do; the others are controls."""
+        return self.agent in ("sac", "ddpg")
+
 
 # Choice: all learners search scenes with BoTorch, so that their rows differ in the learner alone.
 METHODS: dict[MethodName, Method] = {

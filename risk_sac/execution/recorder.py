@@ -56,7 +56,7 @@ class Recorder:
         self._episodes.write(record.model_dump_json().encode() + b"\n")
         self._episodes.flush()
         if record.collision is not None:
-            self._contacts.append(Contact.of(record))
+            self._contacts.append(Contact.of(self.results.spec.id, record))
         told = self.results.metrics.episodes if self.results.metrics else 0
         due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes > told
         if due and record.searching:

@@ -4,8 +4,10 @@ Choice: RSS gives two distances along a lane; here they are taken along the ego'
 heading. What is along one body's axis is across the other's, so that braking and acceleration are blended by
 the angle between them: cross traffic stops by its brakes and not by its steering.
 
+Deviation: of the lateral distance, the paper's words are taken and not its formula; see `lateral`.
+
 Source: Shalev-Shwartz, Shammah, Shashua 2017, "On a Formal Model of Safe and Scalable Self-driving
-Cars", Definitions 1 (same direction), 2 (opposite directions) and 6 (lateral).
+Cars", arXiv 1708.06374, Definitions 1 (same direction), 2 (opposite directions) and 6 (lateral).
 """
 
 from typing import NamedTuple
@@ -87,6 +89,10 @@ def opposite_direction(ego_mps: float, other_mps: float, parameters: RssParamete
 @compiled
 def lateral(closing_ego_mps: float, closing_other_mps: float, parameters: RssParameters) -> float:
     """d_min = μ + [Σ_i (v_i + v_i,ρ) ρ/2 + v_i,ρ |v_i,ρ| / (2 b_lat)]_+ , m  (Def. 6).
+
+    Deviation: the paper's formula has v_i,ρ² for v_i,ρ |v_i,ρ|. The two are the same for who closes in once ρ is over.
+    Who moves away even then goes on doing so while braking to a standstill, as Def. 6 says in words; v² would count
+    that way as closing in, so that the faster somebody leaves, the more room would have to be left.
 
     Args:
       closing_ego_mps: the ego's lateral speed towards the other; negative when it moves away.

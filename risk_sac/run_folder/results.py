@@ -33,15 +33,14 @@ def series_name(index: int) -> str:
 class Contact:
     """An episode in which the ego touched something."""
 
-    id: str  # the episode's index, six digits
+    id: str  # the episode's, as the service says it too; in older folders its index in six digits
     series: str  # file of its time series, relative to results.json
     episode: EpisodeRecord
 
     @classmethod
-    def of(cls, episode: EpisodeRecord) -> "Contact":
+    def of(cls, run_id: str, episode: EpisodeRecord) -> "Contact":
         """The contact of an episode, its file named as the run names it."""
-        name = series_name(episode.index)
-        return cls(id=name.removesuffix(".npz"), series=f"{FAILURES}/{name}", episode=episode)
+        return cls(id=episode.id_in(run_id), series=f"{FAILURES}/{series_name(episode.index)}", episode=episode)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,16 +62,18 @@ class Results:
     contacts: tuple[Contact, ...] = ()  # in the order of the episodes
 
     def contact(self, id_: str) -> Contact:
-        """The contact with this id, with or without leading zeros.
+        """The contact with this id, with or without the run's before it, or with this number of an episode.
 
         Raises:
           ConfigError: there is none.
         """
         for contact in self.contacts:
-            if id_.isdecimal() and int(id_) == contact.episode.index:
+            episode = contact.episode
+            known = (contact.id, episode.id_in(self.spec.id), f"{episode.phase}-{episode.index}")
+            if id_ in known or (id_.isdecimal() and int(id_) == episode.index):
                 return contact
-        known = ", ".join(contact.id for contact in self.contacts) or "none: the ego touched nothing"
-        raise ConfigError(f"got {id_!r}; wanted one of the contacts ({known})", field="FAILURE")
+        every = ", ".join(contact.id for contact in self.contacts) or "none: the ego touched nothing"
+        raise ConfigError(f"got {id_!r}; wanted one of the contacts ({every})", field="FAILURE")
 
 
 _RESULTS = TypeAdapter(Results)

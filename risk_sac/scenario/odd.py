@@ -21,6 +21,8 @@ STANDING_M = 10.0  # which is worth as much as this gap
 EMERGENCY_BRAKING_MPS2 = 9.0  # of SUMO's default passenger car, on dry asphalt
 RED_LIGHT_SCALE = 0.8  # of the grip, and so 1.25 for who need not brake and about 0.5 for who brakes at leisure
 RED_LIGHT_HOLD_S = 1.0
+TINY = 1e-6  # in any unit; SUMO refuses a speed of 1e-320
+LEAST_ACCEL_MPS2 = 0.1  # of who can accelerate at all: what is stopped by less is stopped for good
 BRAKING_HOLD_S = 0.5  # braking shorter than that is a correction, not an emergency stop
 
 # What every value of a field must lie in; an ODD outside it describes no road on Earth.
@@ -76,15 +78,17 @@ def check(odd: Odd) -> None:
         interval = field(odd, path)
         if interval is not None and not (interval.low in sensible and interval.high in sensible):
             raise _error(path, interval, f"bounds within {_text(sensible)}")
+        if interval is not None and any(0 < abs(bound) < TINY for bound in (interval.low, interval.high)):
+            raise _error(path, interval, f"bounds that are 0 or at least {TINY:g} in size")
     for path in ("dynamic.vehicle_accel_mps2", "dynamic.pedestrian_accel_mps2"):
         interval = field(odd, path)
-        if interval is not None and not interval.low < 0 < interval.high:
-            raise _error(path, interval, "low < 0 < high, so that actors can both brake and accelerate")
+        if interval is not None and not (interval.low <= -LEAST_ACCEL_MPS2 and interval.high >= LEAST_ACCEL_MPS2):
+            wanted = f"low <= -{LEAST_ACCEL_MPS2:g} and high >= {LEAST_ACCEL_MPS2:g}"
+            raise _error(path, interval, f"{wanted}, so that actors can both brake and accelerate")
     lateral = odd.dynamic.vehicle_lateral_accel_mps2
-    if lateral is not None and lateral.high == 0:
-        raise _error(
-            "dynamic.vehicle_lateral_accel_mps2", lateral, "a high above 0; a lateral speed of 0 forbids moving"
-        )
+    if lateral is not None and lateral.high < LEAST_ACCEL_MPS2:
+        wanted = f"a high of at least {LEAST_ACCEL_MPS2:g}; a lateral speed of 0 forbids moving"
+        raise _error("dynamic.vehicle_lateral_accel_mps2", lateral, wanted)
     for path in ("scenery.signal_types", "scenery.crossing_types", "dynamic.actor_kinds"):
         if field(odd, path) == ():
             raise _error(path, (), "at least one kind, or the field left out")

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.executor import Cause, Executor, Exited
 from risk_sac.problem import check_campaign
-from service.errors import ConflictError, StorageError
+from service.errors import ConflictError, OutdatedError, StorageError
 from service.runs.disposal import dispose, settle
 from service.runs.quota import check_quota, exhausted
 from service.runs.retention import Retention
@@ -255,6 +255,9 @@ class Manager:
         self._active[run.number] = active = _Active(run, campaign.project)
         try:
             self._executor.submit(run.number, run.attempts + 1, campaign.run_spec(run), folder)
+        except OutdatedError as error:
+            del self._active[run.number]
+            self._ledger.end_run(run.number, State.FAILED, str(error))
         except OSError as error:
             del self._active[run.number]
             self._pause(refused("starting a run", folder, error), active)

@@ -55,7 +55,8 @@ class Progress(Body):
     distinct_preventable: int
     """The distinct ones among them; sum over the runs."""
     window_ecr: Real
-    """ECR over each run's newest 100 episodes: mean over the runs at work, or over all once none is."""
+    """ECR over each run's newest 100 episodes: mean over the runs at work, or over all once none is. Controls, which do
+    not learn, are left out of it, unless the campaign has nothing else; its results have each method by itself."""
     window_pcr: Real
     """PCR, averaged the same way."""
     dual_variable: Real

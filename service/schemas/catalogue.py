@@ -1,6 +1,6 @@
 """What can be posted."""
 
-from risk_sac.config import FamilyName, Method, MethodName, Odd
+from risk_sac.config import FamilyName, Method, MethodName, Odd, Requirement
 from service.schemas.base import Body
 
 
@@ -25,12 +25,26 @@ class Family(Body):
     adversaries: list[str]
     odd: Odd
     """Default operational design domain; a campaign's own narrows it."""
+    requirements: list[Requirement]
+    """What the default ego has to meet in the default ODD. A campaign's own ODD and ego change their thresholds; the
+    campaign's own requirements come on top, under other names."""
+
+
+class Signal(Body):
+    """What the formula of a requirement may speak of, with a value in every step."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    meaning: str
 
 
 class Families(Body):
-    """All scenario families."""
+    """All scenario families, and what requirements may speak of in each."""
 
     items: list[Family]
+    signals: list[Signal]
 
 
 class NamedMethod(Method):

@@ -5,11 +5,13 @@ from dataclasses import dataclass, fields, replace
 from functools import cache, lru_cache
 from typing import Any, Generic, Self, TypeVar
 
+from pydantic import ValidationError
 from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, FamilyName, RunSpec
 from risk_sac.metrics import Funnel
 from risk_sac.records import EpisodeRecord, RunMetrics
+from service.errors import OutdatedError
 from service.store.states import State
 from service.store.tables import Base, CampaignRow, ChangeRow, EpisodeRow, RunRow
 
@@ -83,8 +85,17 @@ class StoredCampaign:
 
     @property
     def spec(self) -> CampaignSpec:
-        """What was posted; read only when somebody asks, which a list does not."""
-        return _read_spec(self.spec_json)
+        """What was posted; read only when somebody asks, which a list does not.
+
+        Raises:
+          OutdatedError: an earlier version took what this one refuses.
+        """
+        try:
+            return _read_spec(self.spec_json)
+        except ValidationError as error:
+            first = error.errors()[0]
+            field = ".".join(map(str, first["loc"]))
+            raise OutdatedError(f"an earlier version took {field}, which this one refuses: {first['msg']}") from error
 
     def run_spec(self, run: StoredRun) -> RunSpec:
         """What a worker needs to know to execute one of the runs."""
@@ -131,7 +142,7 @@ class StoredEpisode:
     @property
     def id(self) -> str:
         """Unique within the campaign, and the same whenever the same campaign is run again."""
-        return f"{self.run_id}-{self.record.phase}-{self.record.index}"
+        return self.record.id_in(self.run_id)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from risk_sac.config import METHODS
 from risk_sac.records import RunMetrics
 from service.schemas.campaigns import Progress
 from service.store.states import State
@@ -13,6 +14,7 @@ SUMMED = ("episodes_total", "rejected", *TALLIED)
 AVERAGED = ("window_ecr", "window_pcr", "dual_variable", "temperature")
 LOOKS = 20  # that somebody who follows a campaign takes from now to its end
 SOONEST_S, LATEST_S = 1, 30
+LEARNING = {name for name, method in METHODS.items() if method.learns}
 
 
 def progress(campaign: StoredCampaign, workers: int) -> Progress:
@@ -63,8 +65,9 @@ def _left(run: StoredRun, mean_pace_s: float) -> float:
 
 
 def _present(runs: Sequence[StoredRun]) -> list[RunMetrics]:
-    at_work = [run for run in runs if run.state in (State.RUNNING, State.CANCELLING)]
-    return [run.metrics for run in at_work or runs if run.metrics is not None]
+    searching = [run for run in runs if run.method in LEARNING] or runs
+    at_work = [run for run in searching if run.state in (State.RUNNING, State.CANCELLING)]
+    return [run.metrics for run in at_work or searching if run.metrics is not None]
 
 
 def _mean(values: Sequence[float]) -> float | None:

@@ -202,7 +202,7 @@ class Recorded:
                 device="cpu",
                 wall_s=result.wall_s,
                 cpu_s=result.cpu_s,
-                contacts=tuple(Contact.of(each) for each in done if each.collision is not None),
+                contacts=tuple(Contact.of(spec.id, each) for each in done if each.collision is not None),
             ),
         )
         (folder / EPISODES).write_text("".join(records_to_json([each])[1:-1].strip() + "\n" for each in done))

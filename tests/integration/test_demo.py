@@ -63,10 +63,11 @@ def test_its_last_line_counts_what_is_worth_a_persons_time_and_no_repeats(capsys
 def test_it_offers_to_draw_a_preventable_failure_where_there_is_one(capsys):
     def failure(index, grade):
         judgement = None if grade is None else {"grade": grade}
-        return {"run_id": "low-random-0", "index": index, "collision": {"judgement": judgement}}
+        id_ = f"low-random-0-train-{index}"
+        return {"id": id_, "run_id": "low-random-0", "index": index, "collision": {"judgement": judgement}}
 
     campaign = {"id": "c", "runs": [{"id": "low-random-0"}]}
     failures = [failure(3, None), failure(5, "ideal"), failure(8, "careful")]
-    for known, drawn in ((failures, "000008"), (failures[:2], "000003")):
+    for known, drawn in ((failures, "low-random-0-train-8"), (failures[:2], "low-random-0-train-3")):
         demo._invite({"campaign": campaign, "failures": known}, Path(), demo.Console())
         assert f" {drawn} --out failure.png" in capsys.readouterr().out

@@ -1,8 +1,12 @@
 import math
+import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
@@ -13,7 +17,7 @@ from shapely import box as shapely_box
 from shapely.affinity import rotate, translate
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
-from risk_sac.env import RiskSacEnv, make_default, register_envs
+from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.errors import InfeasibleScene, SceneError
 from risk_sac.problem import Problem
 from risk_sac.records import Collision
@@ -23,6 +27,7 @@ from risk_sac.types import Frame, Kind, Scene
 
 NAMES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
 LEAD_IN_STEPS = 15
+README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 each_family = pytest.mark.parametrize("family", NAMES)
 Outcome = tuple[np.ndarray, float, bool, bool, dict[str, object]]
 
@@ -58,15 +63,28 @@ def same(one: list[Outcome], other: list[Outcome]) -> bool:
 
 @each_family
 def test_gymnasiums_checker_accepts_the_registered_environment(family: str) -> None:
-    register_envs()
     with closing(gym.make(f"RiskSAC/{family.capitalize()}-v0")) as env:
         check_env(env.unwrapped, skip_render_check=True)
 
 
-def test_registering_twice_is_harmless() -> None:
-    register_envs()
-    register_envs()
-    assert "RiskSAC/Low-v0" in gym.registry
+@pytest.mark.parametrize("line", re.findall(r'gymnasium\.make\("[^"]+"\)', README) or ["none in README"])
+def test_readme_makes_the_environment_in_a_fresh_interpreter(line: str) -> None:
+    program = f"import gymnasium\nenv = {line}\nenv.reset(seed=0)\nprint(len(env.step(env.action_space.sample())))"
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert said.stdout == "5\n"
+
+
+def test_readme_names_every_environment() -> None:
+    assert {name for name in gym.registry if name.startswith("RiskSAC/")} == {
+        f"RiskSAC/{family.capitalize()}-v0" for family in FAMILIES
+    }
+    assert all(f"{family.capitalize()}-v0" in README for family in FAMILIES)
+
+
+def test_the_package_alone_is_cheap_to_import() -> None:
+    program = "import sys, risk_sac\nprint(sorted({'gymnasium', 'numpy', 'torch', 'pydantic'} & set(sys.modules)))"
+    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert said.stdout == "[]\n"
 
 
 @each_family

@@ -1,17 +1,21 @@
 """What can be posted."""
 
+from dataclasses import asdict
+
 from fastapi import APIRouter
 
-from risk_sac.config import METHODS
+from risk_sac.config import METHODS, EgoConfig
+from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
-from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter
+from risk_sac.scenario.odd import requirements_from_odd
+from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter, Signal
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 
 
 @router.get("/families")
 def list_families() -> Families:
-    """Scenario families with their scene spaces and default operational design domains."""
+    """Scenario families with scene space, default ODD and requirements, and the signals that formulas speak of."""
     items = [
         Family(
             name=family.name,
@@ -20,10 +24,12 @@ def list_families() -> Families:
             parameters=[SceneParameter.model_validate(parameter) for parameter in family.space.parameters],
             adversaries=list(family.adversaries),
             odd=family.odd,
+            requirements=list(requirements_from_odd(family.odd, EgoConfig().reaction_time_s)),
         )
         for family in FAMILIES.values()
     ]
-    return Families(items=items)
+    signals = [Signal(name=name, **asdict(signal)) for name, signal in SIGNALS.items()]
+    return Families(items=items, signals=signals)
 
 
 @router.get("/methods")

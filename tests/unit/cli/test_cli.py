@@ -45,7 +45,7 @@ def test_results_hold_spec_metrics_versions_and_contacts(folder: Path) -> None:
     assert stored["wall_s"] > 0
     assert "libsumo" in stored["versions"]
     contact = stored["contacts"][0]
-    assert contact["id"] == f"{contact['episode']['index']:06d}"
+    assert contact["id"] == f"{SPEC.family}-{SPEC.method}-{stored['spec']['seed']}-train-{contact['episode']['index']}"
     assert contact["episode"]["collision"]["verdicts"]
     assert (folder / contact["series"]).exists()
 
@@ -58,7 +58,9 @@ def test_episodes_are_one_line_each(folder: Path) -> None:
 def test_show_lists_the_contacts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["show", str(folder)]) == 0
     printed = capsys.readouterr().out
-    assert all(contact.id in printed for contact in read_results(folder).contacts)
+    results = read_results(folder)
+    assert results.spec.id in printed
+    assert all(f"train-{contact.episode.index} " in printed for contact in results.contacts)
 
 
 @pytest.mark.parametrize("grade", [*Grade, None])
@@ -74,7 +76,7 @@ def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(
         conflict_y_m=-1202.5,
     )
     episode = synthetic_contact(judged).episode
-    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(Contact.of(episode),))
+    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(Contact.of(SPEC.id, episode),))
     Console(width=80).print(_contacts(results))
     printed = capsys.readouterr().out
     assert "…" not in printed
@@ -103,11 +105,12 @@ def test_the_list_shows_what_nobody_judged(capsys: pytest.CaptureFixture[str]) -
     assert "None" not in printed
 
 
-@pytest.mark.parametrize("strip", [False, True])
-def test_show_draws_by_id_with_or_without_leading_zeros(folder: Path, tmp_path: Path, strip: bool) -> None:
-    id_ = read_results(folder).contacts[0].id
+@pytest.mark.parametrize("form", ["{run}-train-{index}", "train-{index}", "{index:06d}", "{index}"])
+def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder: Path, tmp_path: Path, form: str) -> None:
+    results = read_results(folder)
+    index = results.contacts[0].episode.index
     picture = tmp_path / "contact.png"
-    wanted = str(int(id_)) if strip else id_
+    wanted = form.format(run=results.spec.id, index=index)
     assert cli.main(["show", str(folder / "results.json"), wanted, "--out", str(picture)]) == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
 

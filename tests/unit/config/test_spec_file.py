@@ -60,7 +60,7 @@ def test_flags_pick_one_run_of_a_campaign(tmp_path: Path) -> None:
         (
             "family: low\nmethod: sac\nseed: 0\nrequirements: [{name: a, formula: x, scale: -1}]",
             "requirements[0].scale",
-            "greater than 0",
+            "greater than or equal to 0.001",
         ),
         ("families: [low, low]", "", "wanted each value once"),
         ("[1, 2]", "spec", "holds a list"),

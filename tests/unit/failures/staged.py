@@ -47,7 +47,7 @@ def synthetic_contact(judged: Judgement | None = JUDGED) -> Contact:
         min_ttc_s=0.1,
         collision=hit,
     )
-    return Contact.of(episode)
+    return Contact.of("low-random-0", episode)
 
 
 def synthetic_series() -> dict[str, NDArray[np.generic]]:

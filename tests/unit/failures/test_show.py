@@ -121,7 +121,7 @@ class UntilContact:
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         if record.collision is not None:
-            self.contact = Contact.of(record)
+            self.contact = Contact.of("low-random-0", record)
             assert series is not None
             assert self.contact.series == f"failures/{series.name}"
 

@@ -213,7 +213,7 @@ def test_a_run_from_before_contacts_were_judged_can_still_be_read(runs, tmp_path
         finished=True,
         metrics=run.metrics["search"],
         digest=results_digest(records),
-        contacts=tuple(Contact.of(record) for record in records if record.collision is not None),
+        contacts=tuple(Contact.of(run.spec.id, record) for record in records if record.collision is not None),
     )
     write_results(tmp_path, results)
     stored = json.loads(unseal((tmp_path / RESULTS).read_bytes()))
@@ -245,7 +245,7 @@ def test_a_run_in_which_nothing_was_ever_close_can_be_read(runs, tmp_path, writt
         spec_digest=runs[0].spec.digest,
         finished=True,
         digest=results_digest(records),
-        contacts=tuple(Contact.of(record) for record in records if record.collision is not None),
+        contacts=tuple(Contact.of(runs[0].spec.id, record) for record in records if record.collision is not None),
     )
     write_results(tmp_path, results)
     stored = unseal((tmp_path / RESULTS).read_bytes()).decode()

@@ -110,6 +110,41 @@ def test_the_same_direction_distance_is_what_the_worst_case_uses_up(rear_mps: fl
         assert stopping_gap(rear_mps, front_mps, P) == pytest.approx(expected, abs=0.05)
 
 
+def lateral_approach(ego_mps: float, other_mps: float, p: RssParameters) -> float:
+    """Def. 6 in its words: ρ of lateral acceleration towards each other, then braking to lateral standstill; m."""
+    dt, approach = 1e-4, 0.0
+    for speed_mps in (ego_mps, other_mps):
+        for _ in range(round(p.response_s / dt)):
+            approach += (speed_mps + p.lateral_accel_mps2 * dt / 2) * dt
+            speed_mps += p.lateral_accel_mps2 * dt
+        while speed_mps != 0.0:
+            less = min(abs(speed_mps), p.lateral_brake_mps2 * dt)
+            slower = speed_mps - math.copysign(less, speed_mps)
+            approach += (speed_mps + slower) / 2 * dt
+            speed_mps = slower
+    return approach
+
+
+@pytest.mark.parametrize(
+    ("ego", "other"), [(0.5, 0.5), (1.0, -0.2), (1.5, -1.2), (-1.5, 1.9), (0.0, 0.0), (-2.0, -1.0)]
+)
+def test_the_lateral_distance_is_what_def_6_says_in_words_for_who_moves_away_too(ego: float, other: float) -> None:
+    expected = P.fluctuation_m + max(lateral_approach(ego, other, P), 0.0)
+    assert lateral(ego, other, P) == pytest.approx(expected, abs=1e-3)
+
+
+def test_the_papers_own_formula_would_ask_for_more_room_the_faster_the_other_leaves() -> None:
+    def by_the_formula(*closing_mps: float) -> float:
+        way = 0.0
+        for speed_mps in closing_mps:
+            after = speed_mps + P.response_s * P.lateral_accel_mps2
+            way += (speed_mps + after) * P.response_s / 2 + after**2 / (2 * P.lateral_brake_mps2)
+        return P.fluctuation_m + max(way, 0.0)
+
+    assert by_the_formula(0.5, 0.3) == pytest.approx(lateral(0.5, 0.3, P))
+    assert by_the_formula(0.0, -6.0) > by_the_formula(0.0, -3.0) > lateral(0.0, -3.0, P)
+
+
 @settings(deadline=None)  # the first call compiles
 @given(speed, speed, speed)
 def test_more_speed_of_the_rear_vehicle_never_shrinks_the_distance(a: float, b: float, front: float) -> None:

@@ -5,6 +5,7 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.executor import Cause, Exited
+from service.errors import OutdatedError
 from service.runs.manager import Manager
 from service.settings import ServiceSettings
 from service.workers.messages import Failed, Finished
@@ -71,3 +72,15 @@ def test_a_worker_that_stops_although_nobody_asked_was_told_to_by_somebody_else(
     run, _, manager = execute([stopped, Exited(None, Cause.ENDED, 0)], [Failed(reason="no"), Exited(None)])
     assert (run.state, run.reason, run.attempts) == ("failed", "no", 2)
     assert manager.restarts == {Cause.KILLED: 1}
+
+
+def test_what_was_queued_before_it_was_refused_fails_and_holds_nobody_up(store, ledger, execute, metrics):
+    learner = SPEC.learner.model_copy(update={"checkpoint_every": 10**9})
+    before = ledger.create(SPEC.model_copy(update={"learner": learner}))
+    finished = Finished(finished=True, metrics=metrics, evaluation=None, digest="d", versions={}, wall_s=1.0)
+    run, _, _ = execute([finished, Exited(None, Cause.ENDED, 0)])
+    assert run.state == "succeeded"
+    (outdated,) = store.campaign(before.id).runs
+    assert (outdated.state, "learner.checkpoint_every" in outdated.reason) == ("failed", True)
+    with pytest.raises(OutdatedError, match=r"learner\.checkpoint_every, which this one refuses"):
+        store.campaign(before.id).spec  # noqa: B018

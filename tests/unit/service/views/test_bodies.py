@@ -34,6 +34,13 @@ def test_a_contact_from_before_there_were_judgements_has_none(episode):
 def test_numbers_that_are_not_finite_are_null(episode):
     body = json.loads(shown(episode(3, Outcome.FAILURE).record).model_dump_json())
     assert body["min_ttc_s"] is None
-    assert body["collision"]["min_ttc_s"] is None
-    assert body["collision"]["min_robustness"] is None
+    assert body["collision"]["early_min_ttc_s"] is None
+    assert body["collision"]["early_min_robustness"] is None
     assert body["collision"]["ego_speed_mps"] == 9.0
+
+
+def test_an_episodes_minima_and_those_of_its_collision_are_called_differently(episode):
+    body = json.loads(shown(episode(3, Outcome.FAILURE).record).model_dump_json())
+    assert {"min_ttc_s", "min_robustness"} <= body.keys()
+    assert {"early_min_ttc_s", "early_min_robustness"} <= body["collision"].keys()
+    assert not body.keys() & body["collision"].keys()

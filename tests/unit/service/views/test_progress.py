@@ -82,6 +82,20 @@ def test_progress_counts_all_runs_and_shows_those_at_work(ledger, metrics):
     assert (final.dual_variable, final.eta_s) == (0.3, 0.0)
 
 
+def test_rates_are_those_of_the_methods_that_learn_where_there_are_any(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random")))
+    learning = replace(RUN, metrics=metrics.model_copy(update={"window_ecr": 0.4, "dual_variable": 0.5}))
+    control = replace(
+        RUN, method="random", metrics=metrics.model_copy(update={"window_ecr": 0.0, "dual_variable": 0.0})
+    )
+    for state in (State.RUNNING, State.SUCCEEDED):
+        runs = (replace(learning, state=state), control)
+        shown = progress(replace(campaign, state=State.RUNNING, runs=runs), workers=1)
+        assert (shown.window_ecr, shown.dual_variable) == (0.4, 0.5)
+    alone = progress(replace(campaign, state=State.RUNNING, runs=(control,)), workers=1)
+    assert (alone.window_ecr, alone.dual_variable) == (0.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("done", "busy_s", "wanted"),
     [(0, 0.0, 1), (50, 1.0, 1), (50, 100.0, 5), (50, 101.0, 6), (50, 10_000.0, 30)],  # as long again as it took

@@ -1,0 +1,41 @@
+import json
+
+import pytest
+from pydantic import ValidationError
+
+from risk_sac.metrics import results_digest
+from risk_sac.records import EpisodeRecord
+from risk_sac.run_folder.episode_json import records_from_json, records_from_lines, records_to_json
+from tests.builders import collision, episode_record
+
+RECORD = episode_record(4, collision=collision(min_ttc_s=0.7), min_ttc_s=0.0)
+
+
+def test_the_minima_of_a_collision_have_names_of_their_own_wherever_it_is_written() -> None:
+    for text in (RECORD.model_dump_json(), records_to_json([RECORD])[1:-1], json.dumps(RECORD.model_dump())):
+        written = json.loads(text)
+        assert written["min_ttc_s"] == 0.0
+        assert written["collision"]["early_min_ttc_s"] == 0.7
+        assert "min_ttc_s" not in written["collision"]
+
+
+def test_records_read_back_as_they_were_by_either_name() -> None:
+    text = records_to_json([RECORD])
+    before = text.replace("early_min_", "min_")
+    assert before != text
+    for stored in (text, before):
+        (read,) = records_from_json(stored)
+        assert read == RECORD
+        assert results_digest([read]) == results_digest([RECORD])
+        assert records_from_lines(stored[1:-1].encode()) == [RECORD]
+
+
+def test_a_collision_without_its_minimum_is_no_record() -> None:
+    stored = RECORD.model_dump()
+    del stored["collision"]["early_min_ttc_s"]
+    with pytest.raises(ValidationError, match="early_min_ttc_s"):
+        EpisodeRecord.model_validate(stored)
+
+
+def test_an_episode_is_called_by_its_run_phase_and_index() -> None:
+    assert RECORD.id_in("mixed-risk-sac-0") == "mixed-risk-sac-0-train-4"
