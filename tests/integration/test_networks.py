@@ -117,30 +117,28 @@ def test_an_upload_that_is_packed_for_the_way_is_refused(client: httpx.Client) -
     assert "content-encoding is 'gzip'; wanted none" in response.json()["detail"]
 
 
-def test_slow_senders_keep_each_other_out_and_nobody_else(serve: Callable[..., Service]) -> None:
-    service = serve()
-    senders = [socket.create_connection(("127.0.0.1", service.port)) for _ in range(4)]
+def test_slow_senders_keep_each_other_out_and_nobody_else(shared: Service) -> None:
+    senders = [socket.create_connection(("127.0.0.1", shared.port)) for _ in range(4)]
     for sender in senders:
         sender.sendall(HALF)
-    incoming = service.data_dir / "networks" / ".incoming"
-    service.wait_until(lambda: incoming.exists() and len(list(incoming.iterdir())) == 4)
-    busy = post(service.client)
+    incoming = shared.data_dir / "networks" / ".incoming"
+    shared.wait_until(lambda: incoming.exists() and len(list(incoming.iterdir())) == 4)
+    busy = post(shared.client)
     assert (busy.status_code, busy.json()["reason"], busy.headers["retry-after"]) == (503, "uploads_busy", "5")
-    assert service.client.get("/v1/networks").status_code == 200
+    assert shared.client.get("/v1/networks").status_code == 200
     for sender in senders:
         sender.close()
-    service.wait_until(lambda: not list(incoming.iterdir()))
-    assert post(service.client).status_code == 201
+    shared.wait_until(lambda: not list(incoming.iterdir()))
+    assert post(shared.client).status_code == 201
 
 
-def test_a_server_that_is_killed_while_it_receives_leaves_nothing_behind(serve: Callable[..., Service]) -> None:
-    service = serve()
-    incoming = service.data_dir / "networks" / ".incoming"
-    with socket.create_connection(("127.0.0.1", service.port)) as sender:
+def test_a_server_that_is_killed_while_it_receives_leaves_nothing_behind(shared: Service) -> None:
+    incoming = shared.data_dir / "networks" / ".incoming"
+    with socket.create_connection(("127.0.0.1", shared.port)) as sender:
         sender.sendall(HALF)
-        service.wait_until(lambda: list(incoming.glob("*/upload")))
-        service.stop(signal.SIGKILL)
-    service.start()
+        shared.wait_until(lambda: list(incoming.glob("*/upload")))
+        shared.stop(signal.SIGKILL)
+    shared.start()
     assert not incoming.exists()
 
 
