@@ -8,6 +8,8 @@ import time
 
 import pytest
 
+from tests.server import LONG_S
+
 DATABASES = ["sqlite", "postgresql"]
 EACH_DATABASE = pytest.mark.parametrize("serve", DATABASES, indirect=True)
 EACH_DATABASE_SHARED = pytest.mark.parametrize("serve_shared", DATABASES, indirect=True)
@@ -106,7 +108,8 @@ def test_a_worker_that_ignores_the_cancel_is_killed_after_its_grace(serve, scrip
     started = time.monotonic()
     assert service.client.post(f"/v1/campaigns/{campaign_id}/cancel").json()["state"] == "cancelling"
     assert service.wait(campaign_id)["state"] == "cancelled"
-    assert 0.4 < time.monotonic() - started < 5
+    # By its grace: its lease would have ended it after 60 s, and its last episode after 50 s.
+    assert 0.4 < time.monotonic() - started < 30
     assert service.workers() == []
 
 
@@ -117,10 +120,7 @@ def test_a_restarted_server_goes_on_without_losing_or_repeating_an_episode(serve
     campaign_id = service.post(seeds=[0, 1, 2], budget={"episodes": 20})
     service.wait_for(campaign_id, lambda seen: seen["progress"]["episodes_done"] >= 10)
     service.stop(number)
-    deadline = time.monotonic() + 5
-    while service.workers():
-        assert time.monotonic() < deadline, "a worker outlived its server"
-        time.sleep(0.05)
+    service.wait_until(lambda: service.workers() == [], alive=False)
     service.start()
     assert service.get(campaign_id)["progress"]["episodes_done"] >= 10
     campaign = service.wait(campaign_id)
@@ -138,7 +138,7 @@ def test_two_servers_never_share_a_data_folder(serve):
         env=os.environ | {"RISK_SAC_DATA_DIR": str(service.data_dir), "RISK_SAC_PORT": "8999"},
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=LONG_S,
         check=False,
     )
     assert second.returncode != 0

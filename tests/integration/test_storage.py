@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from tests.postgresql import binaries, running
-from tests.server import servers
+from tests.server import LONG_S, servers
 
 DATABASES = ["sqlite", "postgresql"]
 EACH_DATABASE = pytest.mark.parametrize("serve", DATABASES, indirect=True)
@@ -97,7 +97,7 @@ def test_a_server_without_a_usable_data_folder_says_so(tmp_path):
         env=os.environ | {"RISK_SAC_DATA_DIR": str(tmp_path / "file" / "data"), "RISK_SAC_PORT": "8999"},
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=LONG_S,
         check=False,
     )
     assert server.returncode != 0

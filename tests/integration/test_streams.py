@@ -12,7 +12,7 @@ import time
 import httpx
 import pytest
 
-LONG_S = 600
+from tests.server import LONG_S
 
 
 @pytest.fixture(scope="module")
