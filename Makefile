@@ -39,7 +39,7 @@ bench: $(STAMP) ## measure speed as ratios
 # What is marked `torture`, and what the suite does in part.
 torture: $(STAMP) ## kill, fill, damage and fuzz the service in earnest, about two hours
 	RISK_SAC_TORTURE=full RISK_SAC_SCHEMATHESIS_CASES=20000 $(PYTHON) -m pytest -m "not bench" --timeout 7200 \
-		tests/torture tests/contract/test_fuzzing.py tests/acceptance/test_pendulum.py
+		tests/torture tests/contract/test_fuzzing.py tests/acceptance/test_pendulum.py tests/integration/test_streams.py
 
 load: $(STAMP) ## poll and follow the service while it searches, and fill its database; half an hour on a quiet machine
 	$(PYTHON) -m tests.load.run

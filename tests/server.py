@@ -98,12 +98,13 @@ class Service:
                 return ids
             cursor = {"cursor": page["next"]}
 
-    def workers(self) -> list[int]:
-        """Processes that execute runs of this server's data folder."""
+    def workers(self, campaign_id: str = "") -> list[int]:
+        """Processes that execute runs of this server's data folder, or of one campaign in it."""
+        folder = f"{self.data_dir}/campaigns/{campaign_id}".encode()
         found = []
         for entry in Path("/proc").iterdir():
             with contextlib.suppress(OSError):
-                if entry.name.isdigit() and f"{self.data_dir}/campaigns/".encode() in (entry / "cmdline").read_bytes():
+                if entry.name.isdigit() and folder in (entry / "cmdline").read_bytes():
                     found.append(int(entry.name))
         return found
 

@@ -1,103 +1,25 @@
-"""The comparison as pictures: how the methods search (the paper's Fig. 4a), what they reach (Fig. 4b-d), λ and α."""
+"""The figures of a comparison: how the methods search (the paper's Fig. 4a), what they reach (Fig. 4b-d), λ and α.
+
+Loads matplotlib once a figure is drawn, which takes a second: a server lists many and draws few.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from risk_sac.canvas import canvas, picture
 from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
-from risk_sac.metrics import METRICS, RESAMPLING_SEED, WINDOW, Metric, preventable
+from risk_sac.metrics import METRICS, WINDOW, Metric, preventable
 from risk_sac.records import Outcome, Phase
-from risk_sac.report.comparison import REFERENCE, Comparison
+from risk_sac.report.comparison import Comparison
 from risk_sac.report.runs import FinishedRun
 from risk_sac.types import Floats
 
 Format = Literal["png", "svg"]
 FORMATS: tuple[Format, ...] = get_args(Format)
-RESAMPLES = 2000  # per curve; a band needs less than a table
 SETTLED = 10  # episodes before which a windowed rate is mostly noise
-CURVE_IN, BARS_IN, TIMES_IN, DPI = (6.4, 3.4), (7.2, 3.2), (7.2, 3.0), 200
-STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "0.9",
-    "grid.linewidth": 0.6,
-    "legend.frameon": False,
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Look:
-    """How a method is drawn in every figure."""
-
-    colour: str
-    dashes: str
-    width: float = 1.3
-
-
-# Paul Tol's "muted" scheme, safe for the colour-blind; line styles tell apart what a grey print does not.
-_MUTED = ("#CC6677", "#332288", "#117733", "#882255", "#88CCEE", "#44AA99", "#DDCC77", "#AA4499", "#999933")
-_DASHES = ("-", "--", "-.")
-_OWN = {
-    REFERENCE: Look("#000000", "-", 2.0),
-    "random": Look("#777777", ":"),
-    "no-adversary": Look("#BBBBBB", ":"),
-}
-
-
-def _looks() -> dict[MethodName, Look]:
-    """By the table of methods, so that a method looks the same whichever others are compared."""
-    others = [method for method in METHODS if method not in _OWN]
-    drawn = {
-        method: Look(_MUTED[place % len(_MUTED)], _DASHES[place % len(_DASHES)]) for place, method in enumerate(others)
-    }
-    return {method: _OWN.get(method) or drawn[method] for method in METHODS}
-
-
-LOOKS = _looks()
-
-
-def figure_names(comparison: Comparison) -> tuple[str, ...]:
-    """What there is to draw."""
-    return tuple(_figures(comparison))
-
-
-def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
-    """One figure as a file; the same comparison gives the same bytes.
-
-    Raises:
-        ConfigError: there is no such figure.
-    """
-    figures = _figures(comparison)
-    if name not in figures:
-        raise ConfigError(f"got {name!r}; wanted one of {', '.join(figures) or 'none: no run has finished'}")
-    return picture(figures[name], format_, DPI, STYLE)
-
-
-def _figures(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
-    """Name -> what draws it."""
-    figures: dict[str, Callable[[], Figure]] = {}
-    for family in (family for family in comparison.spec.families if comparison.group(family, "search")):
-        for curve in CURVES:
-            if any(_drawn(comparison, family, curve)):
-                figures[f"{curve.name}_{family}"] = partial(_curves, comparison, family, curve)
-    for phase in comparison.phases:
-        suffix = "" if phase == "search" else f"_{phase}"
-        for family in comparison.spec.families:
-            if any(sum(cell.contacts_by_second) for cell in comparison.group(family, phase)):
-                figures[f"times_{family}{suffix}"] = partial(_times, comparison, family, phase)
-        for metric in (metric for metric in METRICS if not metric.search_only):
-            figures[f"bars_{metric.name}{suffix}"] = partial(_bars, comparison, metric, phase)
-    return figures
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,7 +86,50 @@ CURVES = (
 )
 
 
-def _drawn(comparison: Comparison, family: FamilyName, curve: Curve) -> Iterator[tuple[MethodName, Floats]]:
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """A curve of each method of a family."""
+
+    family: FamilyName
+    curve: Curve
+
+
+@dataclass(frozen=True, slots=True)
+class Times:
+    """How long after the release a family's conflicts and contacts came."""
+
+    family: FamilyName
+    phase: Phase
+
+
+@dataclass(frozen=True, slots=True)
+class Bars:
+    """A metric of each method and family."""
+
+    metric: Metric
+    phase: Phase
+
+
+def figure_names(comparison: Comparison) -> tuple[str, ...]:
+    """What there is to draw."""
+    return tuple(_figures(comparison))
+
+
+def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
+    """One figure as a file; the same comparison gives the same bytes.
+
+    Raises:
+        ConfigError: there is no such figure.
+    """
+    from risk_sac.report.drawing import draw  # here, because it loads matplotlib
+
+    figures = _figures(comparison)
+    if name not in figures:
+        raise ConfigError(f"got {name!r}; wanted one of {', '.join(figures) or 'none: no run has finished'}")
+    return draw(comparison, figures[name], format_)
+
+
+def curve_values(comparison: Comparison, family: FamilyName, curve: Curve) -> Iterator[tuple[MethodName, Floats]]:
     """The methods of a figure with their runs' values, `runs x episodes`."""
     for method in comparison.methods:
         runs = comparison.of_cell(family, method)
@@ -172,111 +137,17 @@ def _drawn(comparison: Comparison, family: FamilyName, curve: Curve) -> Iterator
             yield method, np.array([curve.values(run) for run in runs])
 
 
-def _curves(comparison: Comparison, family: FamilyName, curve: Curve) -> Figure:
-    figure, axes = _canvas(CURVE_IN)
-    counts = []
-    for rank, (method, values) in enumerate(_drawn(comparison, family, curve)):
-        counts.append(len(values))
-        look = LOOKS[method]
-        front = 100 - rank  # the reference lies on top
-        episodes = np.arange(1, values.shape[1] + 1)
-        first = min(curve.first, len(episodes)) - 1
-        episodes, values = episodes[first:], values[:, first:]
-        axes.plot(
-            episodes,
-            values.mean(axis=0),
-            color=look.colour,
-            linestyle=look.dashes,
-            linewidth=look.width,
-            label=method,
-            zorder=front,
-        )
-        if len(values) > 1:
-            axes.fill_between(episodes, *_band(values), color=look.colour, alpha=0.13, linewidth=0, zorder=1)
-    axes.set_xlabel("search episode")
-    axes.set_ylabel(curve.label)
-    axes.margins(x=0)
-    if curve.log:
-        axes.set_yscale("log")
-    else:
-        axes.set_ylim(0, curve.top)
-    band = "; band: 95 % bootstrap interval" if max(counts) > 1 else ""
-    axes.set_title(f"{family}: mean over {_seeds(counts)}{band}", fontsize=9, loc="left")
-    _legend(figure, axes)
-    return figure
-
-
-def _band(values: Floats) -> tuple[Floats, Floats]:
-    """Pointwise bootstrap over the runs, all points by the same draws."""
-    runs = len(values)
-    drawn = np.random.default_rng(RESAMPLING_SEED).multinomial(runs, [1 / runs] * runs, size=RESAMPLES)
-    low, high = np.quantile(drawn / runs @ values, (0.025, 0.975), axis=0)
-    return low, high
-
-
-def _bars(comparison: Comparison, metric: Metric, phase: Phase) -> Figure:
-    figure, axes = _canvas(BARS_IN)
-    families = [family for family in comparison.spec.families if comparison.group(family, phase)]
-    methods = [method for method in comparison.methods if any(cell.method == method for cell in comparison.cells)]
-    width = 0.84 / len(methods)
-    counts = []
-    for place, method in enumerate(methods):
-        label: str | None = method
-        for middle, family in enumerate(families):
-            cells = [cell for cell in comparison.group(family, phase) if cell.method == method]
-            estimate = cells[0].estimates[metric.name] if cells else None
-            x = middle + (place - (len(methods) - 1) / 2) * width
-            counts += [estimate.runs] if estimate and estimate.runs else []
-            mean = estimate.mean if estimate else None
-            if not mean:  # a bar that nobody sees
-                axes.text(x, 0, "–" if mean is None else "0", ha="center", va="bottom", color="0.4", fontsize=7)
-            axes.bar(x, mean or 0.0, 0.9 * width, color=LOOKS[method].colour, label=label)
-            label = None
-            if estimate and mean is not None and estimate.low is not None and estimate.high is not None:
-                error = [[mean - estimate.low], [estimate.high - mean]]
-                axes.errorbar(x, mean, error, color="0.35", linewidth=0.9, capsize=1.5 if len(methods) > 5 else 3)
-    axes.set_xticks(range(len(families)), families)
-    axes.tick_params(axis="x", length=0)
-    axes.grid(visible=False, axis="x")
-    axes.set_ylabel(f"{metric.heading} ({phase})")
-    axes.set_ylim(bottom=0)
-    interval = "; lines: 95 % bootstrap interval" if max(counts, default=0) > 1 else ""
-    axes.set_title(f"mean over {_seeds(counts)}{interval}; –: no value", fontsize=9, loc="left")
-    _legend(figure, axes)
-    return figure
-
-
-def _times(comparison: Comparison, family: FamilyName, phase: Phase) -> Figure:
-    """Histograms of the time from the adversaries' release to the conflict and to the contact."""
-    figure = canvas(TIMES_IN)
-    conflict, contact = figure.subplots(1, 2, sharex=True, sharey=True)
-    counts = []
-    for cell in (cell for cell in comparison.group(family, phase) if any(cell.contacts_by_second)):
-        counts.append(len(cell.seeds))
-        look = LOOKS[cell.method]
-        for axes, bins in ((conflict, cell.conflicts_by_second), (contact, cell.contacts_by_second)):
-            axes.stairs(bins, color=look.colour, linestyle=look.dashes, linewidth=look.width, label=cell.method)
-    conflict.set(xlabel="release to conflict, s", ylabel=f"valid failures ({phase})", ylim=(0, None))
-    contact.set_xlabel("release to contact, s")
-    conflict.margins(x=0)
-    conflict.set_title(f"{family}: sum over {_seeds(counts)}", fontsize=9, loc="left")
-    _legend(figure, conflict)
-    return figure
-
-
-def _canvas(size: tuple[float, float]) -> tuple[Figure, Axes]:
-    figure = canvas(size)
-    return figure, figure.add_subplot()
-
-
-def _seeds(counts: Sequence[int]) -> str:
-    """Over how many runs the means were taken, in words."""
-    most = max(counts, default=0)
-    return ("" if len(set(counts)) < 2 else "up to ") + ("1 seed" if most == 1 else f"{most} seeds")
-
-
-def _legend(figure: Figure, axes: Axes) -> None:
-    """Beside the axes, where ten methods hide nothing."""
-    handles: Sequence[object]
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right upper", fontsize=8, handlelength=2.4)
+def _figures(comparison: Comparison) -> dict[str, Curves | Times | Bars]:
+    figures: dict[str, Curves | Times | Bars] = {}
+    for family in (family for family in comparison.spec.families if comparison.group(family, "search")):
+        for curve in CURVES:
+            if any(curve_values(comparison, family, curve)):
+                figures[f"{curve.name}_{family}"] = Curves(family, curve)
+    for phase in comparison.phases:
+        suffix = "" if phase == "search" else f"_{phase}"
+        for family in comparison.spec.families:
+            if any(sum(cell.contacts_by_second) for cell in comparison.group(family, phase)):
+                figures[f"times_{family}{suffix}"] = Times(family, phase)
+        for metric in (metric for metric in METRICS if not metric.search_only):
+            figures[f"bars_{metric.name}{suffix}"] = Bars(metric, phase)
+    return figures

@@ -1,15 +1,19 @@
 """Bayesian optimisation of scenes with BoTorch."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import torch
 from torch import Tensor
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.scene_optimizer import surrogate
 from risk_sac.scene_optimizer.base import State, check_identity, check_told
 from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
 from risk_sac.scene_optimizer.sobol import SobolSequence
 from risk_sac.types import Floats
+
+if TYPE_CHECKING:
+    from risk_sac.scene_optimizer.surrogate import Hyperparameters
 
 NEIGHBOURS = 64  # candidates around the best scenes; Sobol points alone are sparse in 12 dimensions
 PARENTS = 4
@@ -41,7 +45,7 @@ class BotorchOptimizer:
         self._asked = 0
         self._told = 0
         self._fitted_at = 0  # value of _told at the last refit
-        self._hyperparameters: surrogate.Hyperparameters | None = None
+        self._hyperparameters: Hyperparameters | None = None
 
     def ask(self) -> Floats:  # Alg. 1, l. 4
         """See `SceneOptimizer.ask`."""
@@ -85,6 +89,8 @@ class BotorchOptimizer:
         return -self.scores()  # f_e is minimised; this is the only change of its sign
 
     def _propose(self, values: Floats, random: np.random.Generator) -> Floats:
+        from risk_sac.scene_optimizer import surrogate  # here, because BoTorch is slow to load, and many runs need none
+
         points, targets = torch.from_numpy(self._points), torch.from_numpy(values)
         if self._hyperparameters is None or self._told - self._fitted_at >= self._refit_after():
             self._hyperparameters = surrogate.fit(points, targets, self._hyperparameters)

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
@@ -22,14 +22,13 @@ learner: {agent: {hidden_sizes: [32, 32], batch_size: 32, warmup_steps: 100}}
 """
 
 
-@pytest.fixture(autouse=True)
-def spec_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "spec.yaml").write_text(SPEC)
-    monkeypatch.chdir(tmp_path)
+EPISODES = 5
 
 
-def command(folder: Path, episodes: int) -> list[str]:
-    return [*RUN, "--spec", "spec.yaml", "--episodes", str(episodes), "--out", str(folder)]
+def command(folder: Path) -> list[str]:
+    spec = folder.with_suffix(".yaml")
+    spec.write_text(SPEC)
+    return [*RUN, "--spec", str(spec), "--episodes", str(EPISODES), "--out", str(folder)]
 
 
 def results(folder: Path) -> dict[str, Any]:
@@ -37,25 +36,36 @@ def results(folder: Path) -> dict[str, Any]:
     return stored
 
 
-def risk_sac_run(folder: Path, episodes: int) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command(folder, episodes), capture_output=True, text=True)
+def risk_sac_run(folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command(folder), capture_output=True, text=True)
 
 
-def test_three_episodes_from_start_to_summary(tmp_path: Path) -> None:
-    done = risk_sac_run(tmp_path, 3)
-    assert done.returncode == 0, done.stderr
-    assert re.search(r"ECR \(95 %\)", done.stdout)
-    stored = results(tmp_path)
+class Whole(NamedTuple):
+    """A run that was never interrupted."""
+
+    folder: Path
+    done: subprocess.CompletedProcess[str]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Whole:
+    folder = tmp_path_factory.mktemp("cli") / "whole"
+    return Whole(folder, risk_sac_run(folder))
+
+
+def test_a_few_episodes_from_start_to_summary(whole: Whole) -> None:
+    assert whole.done.returncode == 0, whole.done.stderr
+    assert re.search(r"ECR \(95 %\)", whole.done.stdout)
+    stored = results(whole.folder)
     assert stored["finished"] is True
-    assert stored["metrics"]["episodes"] == 3
+    assert stored["metrics"]["episodes"] == EPISODES
     assert stored["evaluation"]["episodes"] == 1
 
 
-def test_interrupted_and_resumed_run_equals_an_uninterrupted_one(tmp_path: Path) -> None:
-    whole, parts = tmp_path / "whole", tmp_path / "parts"
-    assert risk_sac_run(whole, 5).returncode == 0
+def test_interrupted_and_resumed_run_equals_an_uninterrupted_one(whole: Whole, tmp_path: Path) -> None:
+    parts = tmp_path / "parts"
     process = subprocess.Popen(
-        command(parts, 5),
+        command(parts),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -70,7 +80,7 @@ def test_interrupted_and_resumed_run_equals_an_uninterrupted_one(tmp_path: Path)
     assert re.search(r"Stopped after [2-5] of 6 episodes\. The same command again goes on", printed)
     assert results(parts)["finished"] is False
 
-    resumed = risk_sac_run(parts, 5)
+    resumed = risk_sac_run(parts)
     assert resumed.returncode == 0, resumed.stderr
-    assert results(parts)["digest"] == results(whole)["digest"]
-    assert episodes.read_bytes() == (whole / "episodes.jsonl").read_bytes()
+    assert results(parts)["digest"] == results(whole.folder)["digest"]
+    assert episodes.read_bytes() == (whole.folder / "episodes.jsonl").read_bytes()

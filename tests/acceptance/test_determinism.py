@@ -1,6 +1,7 @@
 """Same spec, same seed, same results; and a run stopped half-way ends as one that never was."""
 
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -119,12 +120,20 @@ def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
     assert resumed.evaluation == expected.evaluation
 
 
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that was stopped after four episodes."""
+    folder = tmp_path_factory.mktemp("stopped")
+    run(folder, limit=4)
+    return folder
+
+
 @pytest.mark.parametrize("damaged", ["newest", "both"])
 def test_a_run_with_damaged_checkpoints_equals_one_never_interrupted(
-    uninterrupted: tuple[RunSummary, Listener], tmp_path: Path, damaged: str
+    uninterrupted: tuple[RunSummary, Listener], stopped: Path, tmp_path: Path, damaged: str
 ) -> None:
     expected, whole = uninterrupted
-    run(tmp_path, limit=4)
+    shutil.copytree(stopped, tmp_path, dirs_exist_ok=True)
     files = [tmp_path / CHECKPOINT, previous(tmp_path / CHECKPOINT)]
     for file in files[:1] if damaged == "newest" else files:
         content = bytearray(file.read_bytes())

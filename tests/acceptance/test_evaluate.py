@@ -4,6 +4,7 @@ import fcntl
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -106,11 +107,13 @@ def test_folder_of_another_comparison_is_refused_and_kept(
 
 
 def test_an_interrupted_comparison_goes_on_and_equals_one_that_never_was(whole: Path, tmp_path: Path) -> None:
-    (tmp_path / "spec.yaml").write_text(SPEC)
+    shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
+    runs = tmp_path / "out" / "runs"
+    for folder in (*runs.glob("*-random-*"), *runs.glob("*-sac-*")):  # some are found finished, the others played again
+        shutil.rmtree(folder)
     process = subprocess.Popen(
         [*RISK_SAC, "evaluate", *FLAGS], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
     )
-    runs = tmp_path / "out" / "runs"
     wait_for(process, lambda: any(path.stat().st_size for path in runs.glob("*-sac-*/episodes.jsonl")))
     os.kill(process.pid, signal.SIGINT)
     printed, complaint = process.communicate()

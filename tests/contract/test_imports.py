@@ -1,14 +1,29 @@
+"""What the server process loads."""
+
 import json
 import subprocess
 import sys
 
+import pytest
 
-def test_the_server_process_loads_neither_torch_nor_libsumo():
+
+@pytest.fixture(scope="module")
+def loaded() -> set[str]:
+    """Names of its modules."""
     code = (
         "import json, sys; from service.app import create_app; from service.settings import ServiceSettings;"
         "create_app(ServiceSettings()).openapi(); print(json.dumps(sorted(sys.modules)))"
     )
-    loaded = json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout)
+    return set(json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout))
+
+
+def test_the_server_process_loads_neither_torch_nor_libsumo_and_matplotlib_only_once_it_draws(loaded: set[str]) -> None:
     assert "service.runs.manager" in loaded
     assert "risk_sac.report" in loaded
-    assert not {"torch", "libsumo", "botorch", "gpytorch", "matplotlib.pyplot", "service.worker"} & set(loaded)
+    assert not {"torch", "libsumo", "botorch", "gpytorch", "matplotlib", "service.worker"} & loaded
+
+
+def test_the_server_reads_no_upload_itself(loaded: set[str]) -> None:
+    assert "service.networks.sandbox" in loaded
+    assert "defusedxml" not in loaded
+    assert not [name for name in loaded if name.startswith("service.networks.checker")]

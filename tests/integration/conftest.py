@@ -23,23 +23,35 @@ def scripted() -> ModuleType:
 
 
 @pytest.fixture(scope="module")
-def client(serve_shared: Callable[..., Service]) -> httpx.Client:
-    """A client of one server for all tests of a module that leave no trace."""
-    return serve_shared().client
+def shared(serve_shared: Callable[..., Service]) -> Service:
+    """One server for all tests of a module that look at nothing but what they posted themselves."""
+    return serve_shared()
+
+
+@pytest.fixture(scope="module")
+def client(shared: Service) -> httpx.Client:
+    """A client of it."""
+    return shared.client
 
 
 @pytest.fixture
 def serve(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[..., Service]]:
     """Starts servers and stops them at the end of the test; on PostgreSQL where the parameter says so."""
-    common = {}
-    if getattr(request, "param", "sqlite") == "postgresql":
-        common["database_url"] = request.getfixturevalue("postgresql").new_database()
-    with servers(tmp_path, **common) as start:
+    with servers(tmp_path, **database(request)) as start:
         yield start
 
 
 @pytest.fixture(scope="module")
-def serve_shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[..., Service]]:
-    """Starts servers and stops them at the end of the module."""
-    with servers(tmp_path_factory.mktemp("shared")) as start:
+def serve_shared(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[..., Service]]:
+    """The same, at the end of the module."""
+    with servers(tmp_path_factory.mktemp("shared"), **database(request)) as start:
         yield start
+
+
+def database(request: pytest.FixtureRequest) -> dict[str, str]:
+    """The setting of a new database of the kind that the parameter names."""
+    if getattr(request, "param", "sqlite") == "postgresql":
+        return {"database_url": request.getfixturevalue("postgresql").new_database()}
+    return {}

@@ -40,17 +40,16 @@ def test_what_a_client_does_shows_at_once(serve):
     assert listed(service.client) == seen[1:]
 
 
-def test_episodes_show_as_they_come(serve):
-    service = serve()
-    campaign = service.post(budget={"episodes": 80})
+def test_episodes_show_as_they_come(shared):
+    campaign = shared.post(budget={"episodes": 80})
     counts, before = set(), 0
     while before < 80:
-        now = service.get(campaign)["progress"]["episodes_done"]
+        now = shared.get(campaign)["progress"]["episodes_done"]
         assert now >= before
         time.sleep(0.01)  # there is a limit to the rate of requests
         counts.add(now)
         before = now
-    assert service.wait(campaign)["state"] == "succeeded"
+    assert shared.wait(campaign)["state"] == "succeeded"
     assert counts - {0, 80}, "all of them showed at once"
 
 
@@ -90,14 +89,13 @@ def test_an_answer_is_given_again_only_to_those_who_see_the_same(serve, tmp_path
         assert service.client.get(path, headers={"Authorization": "Bearer nobody"}).status_code == 401
 
 
-def test_each_answer_is_counted_but_only_the_first_of_several_equal_ones_is_logged(serve):
-    service = serve()
-    campaign = service.wait(service.post(budget={"episodes": 2}))["id"]
+def test_each_answer_is_counted_but_only_the_first_of_several_equal_ones_is_logged(shared):
+    campaign = shared.wait(shared.post(budget={"episodes": 2}))["id"]
     path, route = f"/v1/campaigns/{campaign}/results", "/v1/campaigns/{campaign_id}/results"
     for expected in (1, 2):
-        poll(service.client, f"{path}?{expected}")
-        logged = [line for line in service.log.read_text().splitlines() if f"GET {route} 200" in line]
+        poll(shared.client, f"{path}?{expected}")
+        logged = [line for line in shared.log.read_text().splitlines() if f"GET {route} 200" in line]
         assert [f"[campaign {campaign}]" in line for line in logged] == [True] * expected
-    metrics = service.client.get("/metrics").text.splitlines()
+    metrics = shared.client.get("/metrics").text.splitlines()
     counter = f'risk_sac_request_seconds_count{{method="GET",route="{route}",status="200"}}'
     assert next(float(line.split()[-1]) for line in metrics if line.startswith(counter)) == 2 * POLLS

@@ -46,15 +46,14 @@ def test_duplicates_at_once_make_one_campaign_for_each_key(serve, posts, keys):
     assert len(listed) == keys
 
 
-def test_a_key_stands_for_one_body_even_after_a_restart(serve):
-    service = serve()
+def test_a_key_stands_for_one_body_even_after_a_restart(shared):
     header = {"Idempotency-Key": "nightly-2026-11-21"}
-    first = service.client.post("/v1/campaigns", json=SPEC, headers=header)
-    service.stop()
-    service.start()
-    again = service.client.post("/v1/campaigns", json=SPEC | {"seeds": [0]}, headers=header)  # the default, spelt out
+    first = shared.client.post("/v1/campaigns", json=SPEC, headers=header)
+    shared.stop()
+    shared.start()
+    again = shared.client.post("/v1/campaigns", json=SPEC | {"seeds": [0]}, headers=header)  # the default, spelt out
     assert (again.status_code, again.headers["location"]) == (202, first.headers["location"])
-    other = service.client.post("/v1/campaigns", json=SPEC | {"seeds": [1]}, headers=header)
+    other = shared.client.post("/v1/campaigns", json=SPEC | {"seeds": [1]}, headers=header)
     assert other.status_code == 409
     assert other.json()["reason"] == "idempotency_key_reused"
     assert first.json()["id"] in other.json()["detail"]
@@ -108,13 +107,12 @@ def test_pages_neither_repeat_nor_miss_what_was_there_while_more_is_posted(serve
 
 
 @pytest.mark.parametrize("part", ["", "/results"])
-def test_a_tag_changes_exactly_when_the_body_does(serve, part):
-    service = serve()
-    path = f"/v1/campaigns/{service.post(budget={'episodes': 20})}{part}"
+def test_a_tag_changes_exactly_when_the_body_does(shared, part):
+    path = f"/v1/campaigns/{shared.post(budget={'episodes': 20})}{part}"
     bodies: dict[str, set[bytes]] = {}
     states = []
     while states[-1:] != ["succeeded"]:
-        response = service.client.get(path)
+        response = shared.client.get(path)
         bodies.setdefault(response.headers["etag"], set()).add(response.content)
         states.append(response.json()["state"])
         assert ("retry-after" in response.headers) is (states[-1] != "succeeded")
@@ -123,24 +121,23 @@ def test_a_tag_changes_exactly_when_the_body_does(serve, part):
     assert all(len(same) == 1 for same in bodies.values())
     final = response.headers["etag"]
     for sent, status in ((final, 304), (f'"x", {final}', 304), ("*", 304), (next(iter(bodies)), 200)):
-        answer = service.client.get(path, headers={"If-None-Match": sent})
+        answer = shared.client.get(path, headers={"If-None-Match": sent})
         assert answer.status_code == status, sent
         assert answer.headers["etag"] == final
         assert answer.content == (b"" if status == 304 else response.content)
-    service.stop()
-    service.start()
-    after = service.client.get(path, headers={"If-None-Match": final})
+    shared.stop()
+    shared.start()
+    after = shared.client.get(path, headers={"If-None-Match": final})
     assert after.status_code == 304
 
 
-def test_retry_after_is_a_twentieth_of_the_eta_within_limits(serve):
-    service = serve()
-    long = service.post(budget={"episodes": 10_000})
-    service.wait_for(long, lambda seen: seen["progress"]["eta_s"] is not None)
-    response = service.client.get(f"/v1/campaigns/{long}")
+def test_retry_after_is_a_twentieth_of_the_eta_within_limits(shared):
+    long = shared.post(budget={"episodes": 10_000})
+    shared.wait_for(long, lambda seen: seen["progress"]["eta_s"] is not None)
+    response = shared.client.get(f"/v1/campaigns/{long}")
     wanted = min(max(response.json()["progress"]["eta_s"] / 20, 1), 30)
     assert wanted <= int(response.headers["retry-after"]) < wanted + 1
-    assert service.client.post(f"/v1/campaigns/{long}/cancel").headers["location"] == f"/v1/campaigns/{long}"
+    assert shared.client.post(f"/v1/campaigns/{long}/cancel").headers["location"] == f"/v1/campaigns/{long}"
 
 
 def test_only_what_has_ended_can_be_deleted_and_then_it_is_gone(serve):
@@ -190,8 +187,7 @@ def test_a_refusal_says_why_in_a_word_that_stays(client, method, path, headers, 
     assert response.headers["content-type"] == "application/problem+json"
 
 
-def test_nothing_acceptable_is_a_reason_too(serve):
-    service = serve()
-    campaign_id = service.post(budget={"episodes": 1})
-    response = service.client.get(f"/v1/campaigns/{campaign_id}/table", headers={"Accept": "image/png"})
+def test_nothing_acceptable_is_a_reason_too(shared):
+    campaign_id = shared.post(budget={"episodes": 1})
+    response = shared.client.get(f"/v1/campaigns/{campaign_id}/table", headers={"Accept": "image/png"})
     assert (response.status_code, response.json()["reason"]) == (406, "not_acceptable")

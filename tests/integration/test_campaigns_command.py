@@ -21,7 +21,7 @@ import pytest
 from risk_sac import cli
 from risk_sac.client import Client
 from risk_sac.records import Grade
-from tests.server import Service
+from tests.server import LONG_S, Service
 
 SUBMIT = ["submit", "--families", "low", "--methods", "random", "--seeds", "2", "--episodes", "6"]
 LONG = ["submit", "--families", "low", "--methods", "random", "--episodes", "5000"]
@@ -329,7 +329,7 @@ def test_a_terminal_shows_a_bar_for_each_run_at_work(service: Service) -> None:
                 shown += piece
         except OSError:  # how Linux ends a terminal whose other side is closed
             pass
-    assert process.wait(60) == 0
+    assert process.wait(LONG_S) == 0
     for name in ("all runs", "low-random-0", "low-random-1"):
         assert name.encode() in shown
 

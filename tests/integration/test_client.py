@@ -9,9 +9,8 @@ import pytest
 
 from risk_sac.client import Campaign, Client, Refused
 from risk_sac.config import Budget, CampaignSpec
-from tests.server import Service
+from tests.server import LONG_S, Service
 
-LONG_S = 600.0
 SPEC = CampaignSpec(label="a", families=("low",), methods=("random",), seeds=(0, 1), budget=Budget(episodes=6))
 
 

@@ -10,9 +10,11 @@ import sys
 import pytest
 
 from tests.postgresql import binaries, running
-from tests.server import servers
+from tests.server import LONG_S, servers
 
-EACH_DATABASE = pytest.mark.parametrize("serve", ["sqlite", "postgresql"], indirect=True)
+DATABASES = ["sqlite", "postgresql"]
+EACH_DATABASE = pytest.mark.parametrize("serve", DATABASES, indirect=True)
+EACH_DATABASE_SHARED = pytest.mark.parametrize("serve_shared", DATABASES, indirect=True)
 
 
 def test_a_database_that_cannot_grow_pauses_the_campaign_until_it_can(serve):
@@ -43,25 +45,23 @@ def test_a_database_that_cannot_grow_pauses_the_campaign_until_it_can(serve):
     assert service.client.get("/readyz").status_code == 200
 
 
-@EACH_DATABASE
-def test_a_disk_that_is_full_for_a_worker_pauses_its_campaign_until_there_is_room(serve, scripted):
-    service = serve()
-    campaign_id = service.post(seeds=[scripted.DISK_FULL, scripted.WELL_BEHAVED], budget={"episodes": 40})
-    campaign = service.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
+@EACH_DATABASE_SHARED
+def test_a_disk_that_is_full_for_a_worker_pauses_its_campaign_until_there_is_room(shared, scripted):
+    campaign_id = shared.post(seeds=[scripted.DISK_FULL, scripted.WELL_BEHAVED], budget={"episodes": 40})
+    campaign = shared.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
     assert campaign["reason"].endswith("storage failed: No space left on device")
-    assert service.get(campaign["id"], "/episodes")["items"]
-    (service.data_dir / "campaigns" / campaign_id / "room").touch()
-    campaign = service.wait(campaign_id)
+    assert shared.get(campaign["id"], "/episodes")["items"]
+    (shared.data_dir / "campaigns" / campaign_id / "room").touch()
+    campaign = shared.wait(campaign_id)
     assert (campaign["state"], campaign["progress"]["episodes_done"]) == ("succeeded", 80)
 
 
-@EACH_DATABASE
-def test_a_paused_campaign_can_be_cancelled(serve, scripted):
-    service = serve()
-    campaign_id = service.post(seeds=[scripted.DISK_FULL], budget={"episodes": 40})
-    service.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
-    service.client.post(f"/v1/campaigns/{campaign_id}/cancel")
-    campaign = service.wait(campaign_id)
+@EACH_DATABASE_SHARED
+def test_a_paused_campaign_can_be_cancelled(shared, scripted):
+    campaign_id = shared.post(seeds=[scripted.DISK_FULL], budget={"episodes": 40})
+    shared.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
+    shared.client.post(f"/v1/campaigns/{campaign_id}/cancel")
+    campaign = shared.wait(campaign_id)
     assert (campaign["state"], campaign["progress"]["episodes_done"]) == ("cancelled", 2)
 
 
@@ -98,7 +98,7 @@ def test_a_server_without_a_usable_data_folder_says_so(tmp_path):
         env=os.environ | {"RISK_SAC_DATA_DIR": str(tmp_path / "file" / "data"), "RISK_SAC_PORT": "8999"},
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=LONG_S,
         check=False,
     )
     assert server.returncode != 0

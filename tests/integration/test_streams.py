@@ -10,8 +10,15 @@ import threading
 import time
 
 import httpx
+import pytest
 
-LONG_S = 600
+from tests.server import LONG_S
+
+
+@pytest.fixture(scope="module")
+def shared(serve_shared):
+    """See `shared` of the conftest; here with failures."""
+    return serve_shared("striking_worker")
 
 
 def events(client, campaign_id, after=None):
@@ -40,15 +47,14 @@ def told(event):
     return (event["event"], data["run_id"], data.get("id") or data["state"])
 
 
-def test_a_stream_tells_all_in_order_and_ends_with_the_campaign(serve):
-    service = serve("striking_worker")
-    campaign_id = service.post(seeds=[0, 1], budget={"episodes": 12})
-    seen = list(events(service.client, campaign_id))
+def test_a_stream_tells_all_in_order_and_ends_with_the_campaign(shared):
+    campaign_id = shared.post(seeds=[0, 1], budget={"episodes": 12})
+    seen = list(events(shared.client, campaign_id))
     episodes = [event["data"] for event in seen if event["event"] != "state"]
-    listed = service.get(campaign_id, "/episodes", limit=500)["items"]
+    listed = shared.get(campaign_id, "/episodes", limit=500)["items"]
     assert episodes == listed
     failures = [event["data"]["id"] for event in seen if event["event"] == "failure"]
-    assert failures == [item["id"] for item in service.get(campaign_id, "/failures", limit=500)["items"]]
+    assert failures == [item["id"] for item in shared.get(campaign_id, "/failures", limit=500)["items"]]
     assert len(failures) == 12
     own = [
         event["data"]["funnel"] for event in seen if event["data"]["run_id"] == "low-random-0" and "id" in event["data"]
@@ -65,14 +71,13 @@ def test_a_stream_tells_all_in_order_and_ends_with_the_campaign(serve):
     assert len({event["id"] for event in seen}) == len(seen)
 
 
-def test_a_stream_taken_up_after_any_event_tells_exactly_the_rest(serve):
-    service = serve("striking_worker")
-    campaign_id = service.post(seeds=[0, 1, 2], budget={"episodes": 5})
-    seen = list(events(service.client, campaign_id))
+def test_a_stream_taken_up_after_any_event_tells_exactly_the_rest(shared):
+    campaign_id = shared.post(seeds=[0, 1, 2], budget={"episodes": 5})
+    seen = list(events(shared.client, campaign_id))
     for index, event in enumerate(seen):
-        assert list(events(service.client, campaign_id, event["id"])) == seen[index + 1 :]
+        assert list(events(shared.client, campaign_id, event["id"])) == seen[index + 1 :]
     path = f"/v1/campaigns/{campaign_id}/events"
-    over = service.client.get(path, headers={"Last-Event-ID": seen[-1]["id"]})
+    over = shared.client.get(path, headers={"Last-Event-ID": seen[-1]["id"]})
     assert (over.status_code, over.content) == (204, b"")
 
 
@@ -95,7 +100,8 @@ def test_what_was_told_first_is_told_again_in_its_order_from_every_id(serve):
         assert list(events(service.client, campaign_id, event["id"])) == first[index + 1 :]
 
 
-def test_streams_through_killed_servers_tell_everything_once(serve):
+@pytest.mark.parametrize("kills", [2, pytest.param(5, marks=pytest.mark.torture)])
+def test_streams_through_killed_servers_tell_everything_once(serve, kills):
     """Each client comes back with the last id it has; the server is killed under them again and again."""
     service = serve("striking_worker")
     campaign_id = service.post(seeds=[0, 1], budget={"episodes": 120})
@@ -113,7 +119,7 @@ def test_streams_through_killed_servers_tell_everything_once(serve):
     for follower in followers:
         follower.start()
     chance = random.Random(5)
-    for _ in range(5):
+    for _ in range(kills):
         time.sleep(chance.uniform(0.5, 2.0))
         service.stop(signal.SIGKILL)
         service.start()
@@ -130,30 +136,28 @@ def test_streams_through_killed_servers_tell_everything_once(serve):
         assert ("state", "low-random-0", "queued") in map(told, mine)  # a server that died put it back
 
 
-def test_an_id_that_was_never_given_is_refused(serve):
-    service = serve()
-    mine, other = (service.post(budget={"episodes": 2}) for _ in range(2))
-    theirs = list(events(service.client, other))[3]["id"]
-    service.wait(mine)
+def test_an_id_that_was_never_given_is_refused(shared):
+    mine, other = (shared.post(budget={"episodes": 2}) for _ in range(2))
+    theirs = list(events(shared.client, other))[3]["id"]
+    shared.wait(mine)
     wrong = ["1", "-1.-1", "999999.1", "1.999999", "99999999999999999999.1", "\u0661.\u0661", "1.1.1", "1.1\n"]
     wrong += [f"{mine}-{number}" for number in ("0", "-1", "7", "999999", "99999999999999999999", "\u0661", "1\n", "")]
     for forged in ["0", "x" * 101, "caf%C3%A9", theirs, *(base64.b64encode(text.encode()).decode() for text in wrong)]:
-        response = service.client.get(f"/v1/campaigns/{mine}/events", headers={"Last-Event-ID": forged})
+        response = shared.client.get(f"/v1/campaigns/{mine}/events", headers={"Last-Event-ID": forged})
         assert response.status_code == 422, forged
         assert response.json()["reason"] == "invalid_field"
         assert [error["field"] for error in response.json()["errors"]] == ["Last-Event-ID"]
 
 
-def test_a_stream_ends_when_its_campaign_is_deleted(serve):
-    service = serve()
-    campaign_id = service.post(budget={"episodes": 10_000})
-    stream = events(service.client, campaign_id)
+def test_a_stream_ends_when_its_campaign_is_deleted(shared):
+    campaign_id = shared.post(budget={"episodes": 10_000})
+    stream = events(shared.client, campaign_id)
     next(stream)
-    with httpx.Client(base_url=service.client.base_url) as other:
+    with httpx.Client(base_url=shared.client.base_url) as other:
         other.post(f"/v1/campaigns/{campaign_id}/cancel")
         assert told(list(stream)[-1]) == ("state", None, "cancelled")
-        service.wait_until(lambda: other.delete(f"/v1/campaigns/{campaign_id}").status_code == 204)
-    assert service.client.get(f"/v1/campaigns/{campaign_id}/events").status_code == 404
+        shared.wait_until(lambda: other.delete(f"/v1/campaigns/{campaign_id}").status_code == 204)
+    assert shared.client.get(f"/v1/campaigns/{campaign_id}/events").status_code == 404
 
 
 def test_a_server_with_open_streams_stops_in_time(serve):

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.server import LONG_S
+
 # Holds the folder in its argument until its stdin ends.
 HOLDER = """
 import sys
@@ -42,7 +44,7 @@ def test_a_worker_waits_for_the_one_before_it_to_leave(start, tmp_path):
     second = start(tmp_path / "run")
     first.terminate()
     assert second.stdout.readline() == b"holds\n"
-    assert first.wait(20) == -signal.SIGTERM
+    assert first.wait(LONG_S) == -signal.SIGTERM
 
 
 def test_a_worker_that_was_stopped_when_its_server_died_is_killed_and_no_other(start, tmp_path):
@@ -51,5 +53,5 @@ def test_a_worker_that_was_stopped_when_its_server_died_is_killed_and_no_other(s
         assert process.stdout.readline() == b"holds\n"
         process.send_signal(signal.SIGSTOP)
     assert start(tmp_path / "run").stdout.readline() == b"holds\n"
-    assert stopped.wait(20) == -signal.SIGKILL
+    assert stopped.wait(LONG_S) == -signal.SIGKILL
     assert other.poll() is None
