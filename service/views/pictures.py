@@ -10,7 +10,6 @@ from async_lru import alru_cache
 from risk_sac import __version__
 from risk_sac.config import FamilyName
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.show import recording_bytes
 from risk_sac.run_folder.results import Contact
 from service.errors import ServiceError
 from service.settings import ServiceSettings
@@ -73,6 +72,8 @@ class Pictures:
             self._begun -= 1
 
     def _draw_now(self, subject: Subject) -> bytes:
+        from risk_sac.failures.show import recording_bytes  # here, because it loads matplotlib
+
         episode = subject.episode
         path, sha256 = series_file(subject.campaign_id, episode, self._settings)
         arrays = load_arrays(path, sha256)

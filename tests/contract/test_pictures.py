@@ -13,6 +13,7 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.client import Client, Refused, Series
+from risk_sac.failures import show
 from risk_sac.run_folder.results import FAILURES, series_name
 from service.settings import ServiceSettings
 from service.store.database import READERS
@@ -53,14 +54,14 @@ def fresh(tmp_path) -> Iterator[httpx.Client]:
 @pytest.fixture
 def drawn(monkeypatch):
     """The pictures that are drawn, each as soon as its gate is open."""
-    draw, begun, gate = pictures.recording_bytes, [], threading.Event()
+    draw, begun, gate = show.recording_bytes, [], threading.Event()
 
     def drawing(family, recording, format_):
         begun.append(recording.contact.id)
         assert gate.wait(600)
         return draw(family, recording, format_)
 
-    monkeypatch.setattr(pictures, "recording_bytes", drawing)
+    monkeypatch.setattr(show, "recording_bytes", drawing)
     drawing.begun, drawing.gate = begun, gate
     yield drawing
     gate.set()
