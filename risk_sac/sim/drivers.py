@@ -1,11 +1,10 @@
 """The drivers of an episode's vehicles, and what each is told before a step."""
 
 import libsumo
-import numpy as np
 
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
-from risk_sac.sim.ego import MOTION, Belief
+from risk_sac.sim.ego import Belief
 from risk_sac.sim.placing import emergency_decel_mps2
 from risk_sac.sim.reading import Reading
 from risk_sac.sim.roads import Roads
@@ -49,7 +48,7 @@ class Drivers:
         look, ego = reading.lookout, self._ego
         speed, accel = reading.speed_and_accel[0]
         if ego.due:
-            ego.wanted_mps2 = self._decide(ego, 0, reading, _as_believed(reading.frame.state, belief), belief.known)
+            ego.wanted_mps2 = self._decide(ego, 0, reading, belief.state, belief.known)
         ego.tell(speed, accel)
         if braking_mps2:
             ego.brake(speed, accel, braking_mps2)
@@ -85,13 +84,3 @@ class Drivers:
     def _decide(self, driver: Driver, row: int, reading: Reading, state: Floats, candidates: Bools) -> float | None:
         along = self._roads.along(reading.vehicles[row])
         return driver.decide(row, reading.speed_and_accel[row][0], along, state, reading.lookout.vehicle, candidates)
-
-
-def _as_believed(state: Floats, belief: Belief) -> Floats:
-    """The state with all actors where the ego expects them, for of whom it does not see it knows no better."""
-    remembered = np.isfinite(belief.expected[0])
-    if not remembered.any():
-        return state
-    believed = state.copy()
-    believed[np.ix_(MOTION, remembered)] = belief.expected[:, remembered]
-    return believed
