@@ -10,7 +10,6 @@ fast as it may: so one that has stopped for a pedestrian does not start before t
 """
 
 import math
-from functools import cached_property
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from risk_sac.sim.paths import LIMIT, STATION
 from risk_sac.sim.paths import SIN as PATH_SIN
 from risk_sac.sim.paths import X as PATH_X
 from risk_sac.sim.paths import Y as PATH_Y
-from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, Frame, Kind, X, Y
+from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
 
 LOOK_S = 4.0  # how far ahead a collision course counts
 CUT_IN_LOOK_S = 2.0  # the same for whoever drives in the vehicle's own direction, whose sideways motion is soon over
@@ -33,33 +32,9 @@ MOVING_MPS = 0.5
 NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 
 
-class Lookout:
-    """A frame as drivers look at it; what it takes is worked out when the first of them looks."""
-
-    def __init__(self, frame: Frame) -> None:
-        """Looks at nothing yet."""
-        self._frame = frame
-
-    @cached_property
-    def vehicle(self) -> Bools:
-        """Who is a vehicle; the rest are pedestrians."""
-        vehicle: Bools = self._frame.kind == int(Kind.VEHICLE)
-        return vehicle
-
-    @cached_property
-    def pedestrians(self) -> Bools:
-        """Who is a pedestrian."""
-        return ~self.vehicle
-
-    @cached_property
-    def near(self) -> list[bool]:
-        """Who has a pedestrian within `NEAR_M`."""
-        near: list[bool] = _near(self._frame.state, self.vehicle).tolist()
-        return near
-
-
 @compiled
-def _near(state: Floats, vehicle: Bools) -> Bools:
+def near_pedestrians(state: Floats, vehicle: Bools) -> Bools:
+    """Who of the `n` actors in a frame's state has a pedestrian within `NEAR_M`; pedestrians have themselves."""
     x, y, n = state[X], state[Y], len(vehicle)
     near = np.zeros(n, dtype=np.bool_)
     for k in range(n):
