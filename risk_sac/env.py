@@ -115,7 +115,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
           `info` with `cost` (C_soft), `robustness` (soft minimum) and, at a contact, `collision`.
         """
         if self._controlled:
-            self._adversaries.command(action.clip(-1.0, 1.0).tolist(), self._sim)
+            self._adversaries.command([min(max(share, -1.0), 1.0) for share in action.tolist()], self._sim)
         if self._reflex is not None:
             self._sim.brake(self._reflex.braking(self._frame, self._ego_path(), self._in_sight()))
         before, self._frame = self._frame, self._sim.step()

@@ -48,25 +48,32 @@ def relative_view(frame: Frame) -> RelativeView:
 @compiled
 def frame_view(state: Floats) -> RelativeView:
     """`relative_view` of a frame's state."""
-    x, y, heading, vx, vy = state[X], state[Y], state[HEADING], state[VX], state[VY]
-    length, width = state[LENGTH], state[WIDTH]
-    cos_ego, sin_ego = math.cos(heading[0]), math.sin(heading[0])
-    dx, dy = x[1:] - x[0], y[1:] - y[0]
-    dvx, dvy = vx[1:] - vx[0], vy[1:] - vy[0]
-    turn = heading[1:] - heading[0]
+    n = state.shape[1] - 1
+    others = np.empty((8, n))
+    x, y, vx, vy = others[0], others[1], others[2], others[3]
+    cos, sin, half_length, half_width = others[4], others[5], others[6], others[7]
+    cos_ego, sin_ego = math.cos(state[HEADING, 0]), math.sin(state[HEADING, 0])
+    for i in range(n):
+        dx, dy = state[X, i + 1] - state[X, 0], state[Y, i + 1] - state[Y, 0]
+        dvx, dvy = state[VX, i + 1] - state[VX, 0], state[VY, i + 1] - state[VY, 0]
+        turn = state[HEADING, i + 1] - state[HEADING, 0]
+        x[i], y[i] = dx * cos_ego + dy * sin_ego, dy * cos_ego - dx * sin_ego
+        vx[i], vy[i] = dvx * cos_ego + dvy * sin_ego, dvy * cos_ego - dvx * sin_ego
+        cos[i], sin[i] = math.cos(turn), math.sin(turn)
+        half_length[i], half_width[i] = state[LENGTH, i + 1] / 2, state[WIDTH, i + 1] / 2
     return box_view(
-        dx * cos_ego + dy * sin_ego,
-        dy * cos_ego - dx * sin_ego,
-        dvx * cos_ego + dvy * sin_ego,
-        dvy * cos_ego - dvx * sin_ego,
-        np.cos(turn),
-        np.sin(turn),
-        length[1:] / 2,
-        width[1:] / 2,
-        vx[0] * cos_ego + vy[0] * sin_ego,
-        vy[0] * cos_ego - vx[0] * sin_ego,
-        length[0] / 2,
-        width[0] / 2,
+        x,
+        y,
+        vx,
+        vy,
+        cos,
+        sin,
+        half_length,
+        half_width,
+        state[VX, 0] * cos_ego + state[VY, 0] * sin_ego,
+        state[VY, 0] * cos_ego - state[VX, 0] * sin_ego,
+        state[LENGTH, 0] / 2,
+        state[WIDTH, 0] / 2,
     )
 
 
@@ -99,14 +106,17 @@ def box_view(
         reach[1, i] = ego_half_width + a * s + b * c
         reach[2, i] = a + ego_half_length * c + ego_half_width * s
         reach[3, i] = b + ego_half_length * s + ego_half_width * c
-        squared = np.zeros(2)
+        squared_from_ego = squared_from_other = 0.0
         touching = True
         for axis in range(4):
             clear = abs(separation[axis, i]) - reach[axis, i]
             if clear > 0.0:
                 touching = False
-                squared[axis // 2] += clear * clear
-        gap[i] = math.sqrt(max(squared[0], squared[1]))
+                if axis < 2:
+                    squared_from_ego += clear * clear
+                else:
+                    squared_from_other += clear * clear
+        gap[i] = math.sqrt(max(squared_from_ego, squared_from_other))
         overlap[i] = touching
     return RelativeView(
         x,

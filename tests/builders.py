@@ -5,7 +5,6 @@ In frames it is at rest, straight ahead and of a car's size. Records tell of an 
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -79,7 +78,7 @@ def moved(frame: Frame, **rows: float | Sequence[float] | Floats) -> Frame:
     state = frame.state.copy()
     for name, row in rows.items():
         state[ROWS[name]] = row
-    return replace(frame, state=state)
+    return frame._replace(state=state)
 
 
 def belief_of(
@@ -88,10 +87,10 @@ def belief_of(
     """That the ego knows nothing of some actors, and expects others at x, y, heading with a velocity."""
     from risk_sac.sim.ego import MOTION, Belief  # here, because it loads a compiler, which workers of records need not
 
-    where = np.full((len(MOTION), len(frame.ids)), np.nan)
+    state = frame.state.copy()
     for id_, motion in (expected or {}).items():
-        where[:, frame.ids.index(id_)] = motion
-    return Belief(np.array([id_ not in hidden for id_ in frame.ids]), where)
+        state[list(MOTION), frame.ids.index(id_)] = motion
+    return Belief(np.array([id_ not in hidden for id_ in frame.ids]), state)
 
 
 class Told:

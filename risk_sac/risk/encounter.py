@@ -87,4 +87,7 @@ def _least(slope: Floats, start: Floats) -> float:
                 if slope[flat] >= -1.0:
                     meets = min(meets, (start[steep] - start[flat]) / (slope[flat] - slope[steep]))
             time = max(time, meets)
-    return float(time + (start + slope * time).max())
+    highest = -np.inf
+    for line in range(len(slope)):
+        highest = max(highest, start[line] + slope[line] * time)
+    return float(time + highest)

@@ -1,7 +1,7 @@
 """All that is measured of a frame. Measuring acts on nothing: nobody in the simulation can tell that it was done."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from risk_sac.config import Requirement
 from risk_sac.risk.publish import Assessment, assess, publish
@@ -10,8 +10,7 @@ from risk_sac.risk.stl import Monitor, soft_min
 from risk_sac.types import STEP_S, Bools, Floats, Frame
 
 
-@dataclass(frozen=True, slots=True)
-class Measures:
+class Measures(NamedTuple):
     """What one frame says about risk, and what the requirements say to it."""
 
     assessment: Assessment

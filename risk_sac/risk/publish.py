@@ -75,18 +75,18 @@ class Assessment(NamedTuple):
 
 def assess(frame: Frame, rss: RssParameters, seen: Bools) -> Assessment:
     """All measures of a frame, in one compiled call."""
-    others, least, touched = _assess(frame.state, frame.kind, rss, seen)
+    others, least, touched = _assess(frame.state, frame.kind, tuple(rss), seen)
     return Assessment(others, LeastMargins(*least), touched)
 
 
 @compiled
 def _assess(
-    state: Floats, kind: NDArray[np.int8], rss: RssParameters, seen: Bools
+    state: Floats, kind: NDArray[np.int8], rss: tuple[float, ...], seen: Bools
 ) -> tuple[Floats, tuple[float, float, float, float, float], bool]:
     view = frame_view(state)
     ttc_s = time_to_collision(view)
     walks = kind[1:] == PEDESTRIAN
-    rss_margins = margins(view, walks, rss)
+    rss_margins = margins(view, walks, RssParameters(*rss))  # passing one by its name costs as much as the margins
     encounter_s = time_to_encounter(view, walks)
     charged = in_charge(view)
     n = len(charged)

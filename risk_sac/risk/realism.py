@@ -10,13 +10,14 @@ would mean nothing.
 Source: RISK-SAC, Sec. III-B.
 """
 
+import math
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.jit import compiled
-from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, Bools, Floats, Kind
+from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, Floats, Kind
 
 BUILD_UP_S = 0.4  # in which an emergency braking builds up from nothing to an actor's limit
 ORDINARY_JERK = 0.75  # share of the jerk that this takes, up to which a driver counts as ordinary
@@ -90,11 +91,12 @@ def closeness_term(gap_m: float, previous_gap_m: float, step_s: float) -> float:
 
 @compiled
 def lateral_accel(
-    lateral_mps: Floats, previous_lateral_mps: Floats, turn_rad: Floats, speed_mps: Floats, walks: Bools, step_s: float
-) -> Floats:
-    """Acceleration across the lane of vehicles, and across the walking direction of pedestrians, `n`, m/s²."""
-    turn = np.arctan2(np.sin(turn_rad), np.cos(turn_rad))
-    return np.where(walks, speed_mps * turn, lateral_mps - previous_lateral_mps) / step_s
+    lateral_mps: float, previous_lateral_mps: float, turn_rad: float, speed_mps: float, walks: bool, step_s: float
+) -> float:
+    """Acceleration across the lane of a vehicle, or across the walking direction of a pedestrian, m/s²."""
+    if walks:
+        return speed_mps * math.atan2(math.sin(turn_rad), math.cos(turn_rad)) / step_s
+    return (lateral_mps - previous_lateral_mps) / step_s
 
 
 @compiled
@@ -160,22 +162,20 @@ def adversaries_cost(
       previous_gap_m: the gaps one step before.
       step_s: dt.
     """
-    return soft_cost(
-        state[ACCEL][rows],
-        previous[ACCEL][rows],
-        lateral_accel(
-            state[LATERAL][rows],
-            previous[LATERAL][rows],
-            state[HEADING][rows] - previous[HEADING][rows],
-            state[SPEED][rows],
-            kind[rows] == PEDESTRIAN,
+    columns = np.empty((5, len(rows)))
+    accel, accel_before, across, gap, gap_before = columns[0], columns[1], columns[2], columns[3], columns[4]
+    for k, row in enumerate(rows):
+        accel[k], accel_before[k] = state[ACCEL, row], previous[ACCEL, row]
+        across[k] = lateral_accel(
+            state[LATERAL, row],
+            previous[LATERAL, row],
+            state[HEADING, row] - previous[HEADING, row],
+            state[SPEED, row],
+            kind[row] == PEDESTRIAN,
             step_s,
-        ),
-        limit_mps2,
-        gap_m[rows - 1],
-        previous_gap_m[rows - 1],
-        step_s,
-    )
+        )
+        gap[k], gap_before[k] = gap_m[row - 1], previous_gap_m[row - 1]
+    return soft_cost(accel, accel_before, across, limit_mps2, gap, gap_before, step_s)
 
 
 def broken_hard_rule(

@@ -68,17 +68,16 @@ class Monitor:
         """
         self.names = tuple(requirement.name for requirement in requirements)
         self.shapes = np.array([requirement.shapes for requirement in requirements])  # M; which are part of φ
-        self._per_scale = np.array([1.0 / requirement.scale for requirement in requirements])
         self._slots: dict[str, int] = {}  # text of a sub-formula -> where its value lies
         self._values: list[float] = []
         self._operators: list[Any] = []
         self._program: list[Instruction] = []
-        self._outputs = []
+        self._outputs: list[tuple[int, float]] = []  # slot of each requirement's value, and what it is multiplied by
         signals: set[str] = set()
         for index, requirement in enumerate(requirements):
             tree, root, operators = _parse(index, requirement, step_s, horizon_steps)
             signals |= signals_of(tree)
-            self._outputs.append(self._compile(root, operators))
+            self._outputs.append((self._compile(root, operators), 1.0 / requirement.scale))
         self._inputs = [(name, self._slots[name]) for name in sorted(signals)]
 
     def reset(self) -> None:
@@ -105,7 +104,8 @@ class Monitor:
             raise NotFinite(f"the signals are {dict(signals)}; wanted finite numbers")
         for operator, left, right, slot in self._program:
             values[slot] = operator(values[left]) if right < 0 else operator(values[left], values[right])
-        return _scaled(np.array([values[slot] for slot in self._outputs], dtype=np.float64), self._per_scale)
+        robustness = [values[slot] * per_scale for slot, per_scale in self._outputs]
+        return np.array([min(max(value, -ROBUSTNESS_CLIP), ROBUSTNESS_CLIP) for value in robustness])
 
     def _compile(self, node: Any, operators: Mapping[str, Any]) -> int:
         """Append what computes rtamt's `node` to the program; the slot of its value.
@@ -129,13 +129,6 @@ class Monitor:
             else:
                 self._program.append((sub, left, right, slot))
         return slot
-
-
-@compiled
-def _scaled(robustness: Floats, per_scale: Floats) -> Floats:
-    for i in range(len(robustness)):
-        robustness[i] = min(max(robustness[i] * per_scale[i], -ROBUSTNESS_CLIP), ROBUSTNESS_CLIP)
-    return robustness
 
 
 def check_requirements(requirements: Sequence[Requirement], step_s: float, horizon_steps: int) -> None:

@@ -15,7 +15,7 @@ from risk_sac.sim.commands import Walker
 from risk_sac.sim.pedestrian_control import PedestrianControl
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.sim.vehicle_control import VehicleControl
-from risk_sac.types import Floats, Frame
+from risk_sac.types import LATERAL, SPEED, VX, VY, Floats, Frame
 
 TOLERANCE_MPS = 0.02  # SUMO's rounding, divided by the step
 LEAP_MPS = 4.0  # at a corner of a coarsely drawn lane, a body off its middle moves up to 0.3 m more or less in a step
@@ -82,10 +82,11 @@ class Adversaries:
         self.rows(frame)
         kept = True
         for row, control in self._driven:
-            speed, lateral = float(frame.speed_mps[row]), float(frame.lateral_mps[row])
+            driven = frame.state[:, row].tolist()
+            speed, lateral = driven[SPEED], driven[LATERAL]
             kept &= abs(speed - control.speed_mps) <= TOLERANCE_MPS
             kept &= abs(lateral) <= abs(control.lateral_mps) + TOLERANCE_MPS
-            moved = math.hypot(float(frame.vx_mps[row]), float(frame.vy_mps[row]))
+            moved = math.hypot(driven[VX], driven[VY])
             kept &= abs(moved - math.hypot(speed, lateral)) <= LEAP_MPS
             control.speed_mps, control.lateral_mps = speed, lateral
         return kept

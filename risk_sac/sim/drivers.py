@@ -1,11 +1,10 @@
 """The drivers of an episode's vehicles, and what each is told before a step."""
 
 import libsumo
-import numpy as np
 
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
-from risk_sac.sim.ego import MOTION, Belief
+from risk_sac.sim.ego import Belief
 from risk_sac.sim.placing import emergency_decel_mps2
 from risk_sac.sim.reading import Reading
 from risk_sac.sim.roads import Roads
@@ -46,10 +45,10 @@ class Drivers:
           belief: what the ego makes of it.
           braking_mps2: how hard the ego is to brake at least.
         """
-        look, ego = reading.lookout, self._ego
+        ego = self._ego
         speed, accel = reading.speed_and_accel[0]
         if ego.due:
-            ego.wanted_mps2 = self._decide(ego, 0, reading, _as_believed(reading.frame.state, belief), belief.known)
+            ego.wanted_mps2 = self._decide(ego, 0, reading, belief.state, belief.known)
         ego.tell(speed, accel)
         if braking_mps2:
             ego.brake(speed, accel, braking_mps2)
@@ -57,8 +56,8 @@ class Drivers:
             return
         for row, id_ in enumerate(reading.vehicles):
             driver = self._others.get(id_)
-            if driver is not None and (look.near[row] or driver.telling):
-                driver.wanted_mps2 = self._decide(driver, row, reading, reading.frame.state, look.pedestrians)
+            if driver is not None and (reading.near[row] or driver.telling):
+                driver.wanted_mps2 = self._decide(driver, row, reading, reading.frame.state, reading.walks)
                 driver.tell(*reading.speed_and_accel[row])
 
     def intended_accel(self, reading: Reading) -> dict[str, float]:
@@ -67,7 +66,6 @@ class Drivers:
         They keep the speed they started with, or go slower where SUMO's models or a pedestrian in their way want that.
         SUMO's wish is that of the step before, which is the newest it tells.
         """
-        look = reading.lookout
         found = {}
         for id_, driver in self._released.items():
             row = reading.row.get(id_)
@@ -77,21 +75,11 @@ class Drivers:
             models = (libsumo.vehicle.getSpeedWithoutTraCI(id_) - speed) / STEP_S + accel
             wanted = min(models, max(driver.cruise_mps - speed, 0.0) / STEP_S)
             told = None
-            if self._walkers and look.near[row]:
-                told = self._decide(driver, row, reading, reading.frame.state, look.pedestrians)
+            if reading.near[row]:
+                told = self._decide(driver, row, reading, reading.frame.state, reading.walks)
             found[id_] = wanted if told is None else min(wanted, told)
         return found
 
     def _decide(self, driver: Driver, row: int, reading: Reading, state: Floats, candidates: Bools) -> float | None:
         along = self._roads.along(reading.vehicles[row])
-        return driver.decide(row, reading.speed_and_accel[row][0], along, state, reading.lookout.vehicle, candidates)
-
-
-def _as_believed(state: Floats, belief: Belief) -> Floats:
-    """The state with all actors where the ego expects them, for of whom it does not see it knows no better."""
-    remembered = np.isfinite(belief.expected[0])
-    if not remembered.any():
-        return state
-    believed = state.copy()
-    believed[np.ix_(MOTION, remembered)] = belief.expected[:, remembered]
-    return believed
+        return driver.decide(row, reading.speed_and_accel[row][0], along, state, reading.drives, candidates)

@@ -41,7 +41,7 @@ class Belief(NamedTuple):
     """What the ego makes of the `n` actors of a frame."""
 
     known: Bools  # of the rest it knows nothing
-    expected: Floats  # position, heading and velocity, `5 x n`, of those it remembers; NaN of the rest
+    state: Floats  # the frame's, but those that it remembers are where it expects them
 
 
 class Senses(Protocol):
@@ -82,21 +82,13 @@ class Perception:
 
     def look(self, frame: Frame) -> Belief:
         """See `Senses.look`."""
-        self.seen = _seen(frame.state, frame.kind, *self._sight)
-        return self.update(frame, self.seen)
-
-    def update(self, frame: Frame, seen: Bools) -> Belief:
-        """Takes note of who is in sight.
-
-        Args:
-          frame: all actors, the ego first.
-          seen: which of the others are in sight.
-        """
         if frame.ids is not self._ids:
             self._memory = np.array([self._of(id_) for id_ in frame.ids]).T.copy()
             self._ids = frame.ids
-        self._memory, known, expected = _look(self._memory, frame.state, seen, frame.time_s, self._memory_s)
-        return Belief(known, expected)
+        self.seen, known, state = _look(
+            self._memory, frame.state, frame.kind, frame.time_s, self._memory_s, *self._sight
+        )
+        return Belief(known, state)
 
     def _of(self, id_: str) -> Floats:
         if id_ not in self._ids:
@@ -115,17 +107,20 @@ class Perception:
 
 
 @compiled
-def _seen(state: Floats, kind: NDArray[np.int8], reach_m: float, half_view_rad: float, occlusion: bool) -> Bools:
-    """Which of the others are in sight."""
-    return in_sight(frame_view(state), kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion))
-
-
-@compiled
-def _look(memory: Floats, state: Floats, seen: Bools, now_s: float, memory_s: float) -> tuple[Floats, Bools, Floats]:
-    """The memory after a look at a frame, who is known, and where those are expected who are out of sight."""
+def _look(
+    memory: Floats,
+    state: Floats,
+    kind: NDArray[np.int8],
+    now_s: float,
+    memory_s: float,
+    reach_m: float,
+    half_view_rad: float,
+    occlusion: bool,
+) -> tuple[Bools, Bools, Floats]:
+    """Who of the others is in sight, and both parts of the belief; the memory is brought up to date."""
+    seen = in_sight(frame_view(state), kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion))
     n = state.shape[1]
-    memory = memory.copy()
-    known, expected = np.ones(n, dtype=np.bool_), np.full((len(MOTION), n), np.nan)
+    known, believed = np.ones(n, dtype=np.bool_), state.copy()
     for i in range(1, n):
         unseen_s = now_s - memory[SEEN_S, i]  # NaN: never seen
         if not unseen_s <= FLICKER_S + TIME_TOLERANCE_S:
@@ -137,9 +132,10 @@ def _look(memory: Floats, state: Floats, seen: Bools, now_s: float, memory_s: fl
             for k, row in enumerate(MOTION):
                 memory[THEN + k, i] = state[row, i]
         elif unseen_s <= memory_s + TIME_TOLERANCE_S:
-            expected[:, i] = memory[THEN:, i]
-            expected[0, i] += unseen_s * memory[THEN + 3, i]  # it goes on as it did
-            expected[1, i] += unseen_s * memory[THEN + 4, i]
+            for k, row in enumerate(MOTION):
+                believed[row, i] = memory[THEN + k, i]
+            believed[X, i] += unseen_s * believed[VX, i]  # it goes on as it did
+            believed[Y, i] += unseen_s * believed[VY, i]
         else:
             known[i] = False
-    return memory, known, expected
+    return seen, known, believed

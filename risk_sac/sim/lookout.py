@@ -10,7 +10,6 @@ fast as it may: so one that has stopped for a pedestrian does not start before t
 """
 
 import math
-from functools import cached_property
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from risk_sac.sim.paths import LIMIT, STATION
 from risk_sac.sim.paths import SIN as PATH_SIN
 from risk_sac.sim.paths import X as PATH_X
 from risk_sac.sim.paths import Y as PATH_Y
-from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, Frame, Kind, X, Y
+from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
 
 LOOK_S = 4.0  # how far ahead a collision course counts
 CUT_IN_LOOK_S = 2.0  # the same for whoever drives in the vehicle's own direction, whose sideways motion is soon over
@@ -33,33 +32,9 @@ MOVING_MPS = 0.5
 NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 
 
-class Lookout:
-    """A frame as drivers look at it; what it takes is worked out when the first of them looks."""
-
-    def __init__(self, frame: Frame) -> None:
-        """Looks at nothing yet."""
-        self._frame = frame
-
-    @cached_property
-    def vehicle(self) -> Bools:
-        """Who is a vehicle; the rest are pedestrians."""
-        vehicle: Bools = self._frame.kind == int(Kind.VEHICLE)
-        return vehicle
-
-    @cached_property
-    def pedestrians(self) -> Bools:
-        """Who is a pedestrian."""
-        return ~self.vehicle
-
-    @cached_property
-    def near(self) -> list[bool]:
-        """Who has a pedestrian within `NEAR_M`."""
-        near: list[bool] = _near(self._frame.state, self.vehicle).tolist()
-        return near
-
-
 @compiled
-def _near(state: Floats, vehicle: Bools) -> Bools:
+def near_pedestrians(state: Floats, vehicle: Bools) -> Bools:
+    """Who of the `n` actors in a frame's state has a pedestrian within `NEAR_M`; pedestrians have themselves."""
     x, y, n = state[X], state[Y], len(vehicle)
     near = np.zeros(n, dtype=np.bool_)
     for k in range(n):
@@ -91,6 +66,8 @@ def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
             beyond = -along
         elif along > length and i < last:
             beyond = along - length
+        if max(beyond, abs(across)) >= best:
+            continue
         distance = math.hypot(beyond, across)
         if distance < best:
             best, nearest = distance, i
@@ -126,6 +103,12 @@ def foreseen(points: Floats, front_m: float, speed_mps: float, accel_mps2: float
 
 
 @compiled
+def _turned(angle: float) -> tuple[float, float]:
+    """How long a body of unit length, turned by so much, is along and across."""
+    return abs(math.cos(angle)), abs(math.sin(angle))
+
+
+@compiled
 def targets(
     points: Floats,
     front_m: float,
@@ -153,18 +136,16 @@ def targets(
       leads, m/s, 0 for those that the driver has to stop for.
     """
     x, y, heading, vx, vy = state[X], state[Y], state[HEADING], state[VX], state[VY]
-    half_length, half_width = state[LENGTH] / 2, state[WIDTH] / 2
     n = len(x)
     found, count = np.empty((n, 3)), 0
-    speed_mps = state[SPEED, own]
-    length_m, width_m = 2.0 * half_length[own], 2.0 * half_width[own]
+    speed_mps, length_m, width_m = state[SPEED, own], state[LENGTH, own], state[WIDTH, own]
     corridor = width_m / 2 + MARGIN_M
     kept, fastest = foreseen(points, front_m, speed_mps, 0.0), foreseen(points, front_m, speed_mps, accel_mps2)
     reach = fastest[-1] - front_m + length_m
     for i in range(n):
-        speed = math.hypot(vx[i], vy[i])
         if i == own or not candidate[i]:
             continue
+        speed, half_length, half_width = math.hypot(vx[i], vy[i]), state[LENGTH, i] / 2, state[WIDTH, i] / 2
         s_now, _, way = project(points, x[i], y[i])
         if abs(s_now - front_m) > reach + speed * LOOK_S:
             continue
@@ -174,12 +155,14 @@ def targets(
             continue  # whoever comes from behind, or is overtaken, keeps the distance itself
         look = CUT_IN_LOOK_S if same_way else LOOK_S
         inside_since, nearest = -1.0, math.inf
+        cos, sin = _turned(heading[i] - way)
         for k in range(round(look / TICK_S) + 1):
             t = k * TICK_S
-            s, d, way = project(points, x[i] + vx[i] * t, y[i] + vy[i] * t)
-            turn = heading[i] - way
-            cos, sin = abs(math.cos(turn)), abs(math.sin(turn))
-            if abs(d - offset_m) > corridor + half_length[i] * sin + half_width[i] * cos:
+            s, d, way_then = project(points, x[i] + vx[i] * t, y[i] + vy[i] * t)
+            if way_then != way:
+                way = way_then
+                cos, sin = _turned(heading[i] - way)
+            if abs(d - offset_m) > corridor + half_length * sin + half_width * cos:
                 if inside_since >= 0.0:
                     break
                 continue
@@ -187,15 +170,14 @@ def targets(
                 inside_since = t
                 if vehicle[i] and not same_way and t > speed / (2.0 * YIELDING_MPS2):
                     break  # it can still stop before the corridor: t · v is more than v² / 2b
-            extent = half_length[i] * cos + half_width[i] * sin
+            extent = half_length * cos + half_width * sin
             if s + extent >= kept[k] - length_m and s - extent <= fastest[k] and s + extent > front_m:
                 nearest = min(nearest, s - extent)
         if nearest == math.inf:
             continue
         gap, lead = max(nearest - front_m, 0.0), 0.0
         if same_way:
-            turn = heading[i] - way
-            extent = half_length[i] * abs(math.cos(turn)) + half_width[i] * abs(math.sin(turn))
+            extent = half_length * cos + half_width * sin
             gap, lead = max(s_now - extent - front_m, 0.0), v_along
         found[count, 0], found[count, 1], found[count, 2] = i, gap, lead
         count += 1

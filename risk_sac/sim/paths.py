@@ -53,9 +53,10 @@ class Paths:
 
     def of(self, route: tuple[str, ...], lane: str) -> Path:
         """The path from the start of `lane` along `route`; where the lane does not lead on, it ends with the lane."""
-        if (route, lane) not in self._paths:
-            self._paths[route, lane] = _path(_lanes_ahead(route, lane))
-        return self._paths[route, lane]
+        path = self._paths.get((route, lane))
+        if path is None:
+            path = self._paths[route, lane] = _path(_lanes_ahead(route, lane))
+        return path
 
 
 def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:

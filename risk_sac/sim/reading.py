@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Area, Layout
 from risk_sac.sim.commands import Walker
-from risk_sac.sim.lookout import Lookout
+from risk_sac.sim.lookout import near_pedestrians
 from risk_sac.types import (
     ACCEL,
     HEADING,
@@ -24,6 +24,7 @@ from risk_sac.types import (
     VX,
     VY,
     WIDTH,
+    Bools,
     Floats,
     Frame,
     Kind,
@@ -47,7 +48,9 @@ class Reading(NamedTuple):
     row: Mapping[str, int]  # of each vehicle
     speed_and_accel: Sequence[tuple[float, float]]  # of each vehicle, m/s and m/s²: also in the frame, but quicker here
     offset_m: Sequence[float]  # of each vehicle from its lane's centre; the same
-    lookout: Lookout
+    drives: Bools  # of all actors of the frame, who is a vehicle
+    walks: Bools  # the rest
+    near: Sequence[bool]  # of all actors, who has a pedestrian nearby
 
 
 class Reader:
@@ -70,6 +73,8 @@ class Reader:
         driving, walking = len(self._vehicles), len(self._walkers)
         self._ids = (*self._vehicles, *self._walkers)
         self._kind = np.array([Kind.VEHICLE] * driving + [Kind.PEDESTRIAN] * walking, dtype=np.int8)
+        self._drives = self._kind == int(Kind.VEHICLE)
+        self._walks = ~self._drives
         self._role = np.array([self._roles[id_] for id_ in self._ids], dtype=np.int8)
         self._row = {id_: row for row, id_ in enumerate(self._vehicles)}
         self._attackers = [(row, v) for row, v in enumerate(self._vehicles) if self._roles[v] is Role.ADVERSARY]
@@ -113,7 +118,8 @@ class Reader:
             simulator_collisions=tuple((c.collider, c.victim) for c in libsumo.simulation.getCollisions()),
             teleported=libsumo.simulation.getStartingTeleportIDList(),
         )
-        return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, Lookout(frame))
+        near = near_pedestrians(frame.state, self._drives).tolist() if walkers else [False] * len(self._ids)
+        return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, self._drives, self._walks, near)
 
     def _links(self, ego: str, walkers: Mapping[str, Walker]) -> NDArray[np.uint8]:
         """The letter of the signal ahead of the ego and of each adversary; a pedestrian's is that of its crossing."""

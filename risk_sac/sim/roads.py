@@ -70,12 +70,17 @@ class Roads:
 
     def _lane(self, route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
         """Width of the lanes right and left of `lane` that lead on along `route`, and its own."""
-        if (route, lane) not in self._lanes:
-            edge, _, index = lane.rpartition("_")
-            widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
-            own = int(index)
-            self._lanes[route, lane] = (sum(widths[:own]), sum(widths[own + 1 :]), libsumo.lane.getWidth(lane))
-        return self._lanes[route, lane]
+        widths = self._lanes.get((route, lane))
+        if widths is None:
+            widths = self._lanes[route, lane] = _widths(route, lane)
+        return widths
+
+
+def _widths(route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
+    edge, _, index = lane.rpartition("_")
+    widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
+    own = int(index)
+    return sum(widths[:own]), sum(widths[own + 1 :]), libsumo.lane.getWidth(lane)
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:

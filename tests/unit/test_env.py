@@ -407,7 +407,7 @@ def test_what_happened_before_the_release_does_not_count(family: FamilyName) -> 
     with closing(make_default(family)) as env:
         env.reset(seed=2)
         before = env.trace.measures[0]
-        worse = replace(before, soft_min=-9.0, signals=before.signals | {"ttc_s": 0.0})
+        worse = before._replace(soft_min=-9.0, signals=before.signals | {"ttc_s": 0.0})
         env.trace.measures[0] = worse
         assert env.trace.min_robustness > -9.0
         assert env.trace.min_ttc_s > 0.0

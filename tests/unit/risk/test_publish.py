@@ -1,5 +1,4 @@
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -124,7 +123,7 @@ def test_braking_is_a_deceleration_and_never_negative(accel_mps2: float, braking
 
 
 def at_light(signal: Signal, stop_line_m: float) -> Frame:
-    return replace(frame_of(), signal=signal, stop_line_m=stop_line_m)
+    return frame_of()._replace(signal=signal, stop_line_m=stop_line_m)
 
 
 @pytest.mark.parametrize(
@@ -186,5 +185,5 @@ def test_approaching_a_red_light_counts_down() -> None:
     ],
 )
 def test_braking_for_a_red_light(signal: Signal, speed_mps: float, stop_line_m: float, braking_mps2: float) -> None:
-    frame = replace(frame_of(speed_mps=speed_mps), signal=signal, stop_line_m=stop_line_m)
+    frame = frame_of(speed_mps=speed_mps)._replace(signal=signal, stop_line_m=stop_line_m)
     assert red_light_braking(frame, None) == pytest.approx(braking_mps2)

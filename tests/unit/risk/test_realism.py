@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -46,11 +48,9 @@ def test_swerving_costs_like_braking(side: float) -> None:
 
 
 def test_what_is_across_is_a_vehicles_change_of_lateral_speed_and_a_pedestrians_turn() -> None:
-    across = lateral_accel(
-        np.array([0.5, 9.0]), np.array([0.4, 9.0]), np.array([0.3, 0.1 - 2 * np.pi]), np.array([10.0, 1.5]),
-        np.array([False, True]), 0.1,
-    )  # fmt: skip
-    assert across.tolist() == pytest.approx([1.0, 1.5])  # 0.1 m/s in 0.1 s; 1.5 m/s · 1 rad/s, past the seam at π
+    assert lateral_accel(0.5, 0.4, 0.3, 10.0, False, 0.1) == pytest.approx(1.0)  # 0.1 m/s in 0.1 s
+    # 1.5 m/s · 1 rad/s, past the seam at π
+    assert lateral_accel(9.0, 9.0, 0.1 - 2 * math.pi, 1.5, True, 0.1) == pytest.approx(1.5)
 
 
 def test_closeness_costs_what_is_both_near_and_sudden() -> None:

@@ -1,7 +1,6 @@
 """The oracle on hand-made frames; `tests/integration/test_oracle.py` holds it against SUMO's own list."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -115,6 +114,6 @@ def test_headings_that_pass_south_are_interpolated_the_short_way() -> None:
 def test_sumo_agrees_when_it_names_the_pair_in_either_order() -> None:
     _, frame = frames(*INTO_LEADER)
     assert not agrees(frame, "ego", "lead")
-    assert agrees(replace(frame, simulator_collisions=(("lead", "ego"),)), "ego", "lead")
-    assert agrees(replace(frame, simulator_collisions=(("a", "b"), ("ego", "lead"))), "ego", "lead")
-    assert not agrees(replace(frame, simulator_collisions=(("ego", "left"),)), "ego", "lead")
+    assert agrees(frame._replace(simulator_collisions=(("lead", "ego"),)), "ego", "lead")
+    assert agrees(frame._replace(simulator_collisions=(("a", "b"), ("ego", "lead"))), "ego", "lead")
+    assert not agrees(frame._replace(simulator_collisions=(("ego", "left"),)), "ego", "lead")

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point
 
-from risk_sac.sim.lookout import MARGIN_M, Lookout, project, targets
+from risk_sac.sim.lookout import MARGIN_M, near_pedestrians, project, targets
 from risk_sac.sim.paths import Path
 from risk_sac.types import Kind
 from tests.roads import road
@@ -30,7 +30,7 @@ def target(other: Actor, path: Path | None = None, speed_mps: float = SPEED_MPS,
     """What the other is to a driver 20 m down the path."""
     known = np.ones(2, dtype=np.bool_)
     _, frame = frames((*EGO[:3], speed_mps, *EGO[4:]), other, share=1.0)
-    points, vehicle = (path or road()).points, Lookout(frame).vehicle
+    points, vehicle = (path or road()).points, frame.kind == Kind.VEHICLE
     found = targets(points, FRONT_M, offset_m, 0, ACCEL_MPS2, frame.state, vehicle, known).tolist()
     assert [actor for actor, _, _ in found] in ([], [1])
     return Target(*found[0][1:]) if found else NOBODY
@@ -139,7 +139,7 @@ def test_a_car_that_stands_across_or_tilted_is_stopped_for(side: int) -> None:
 
 def test_nobody_but_the_candidates_counts() -> None:
     _, frame = frames(EGO, walker(50.0, 0.0), share=1.0)
-    vehicle = Lookout(frame).vehicle
+    vehicle = frame.kind == Kind.VEHICLE
     for known in (True, False):
         candidate = np.array([True, known])
         found = targets(road().points, FRONT_M, 0.0, 0, ACCEL_MPS2, frame.state, vehicle, candidate)
@@ -206,10 +206,9 @@ def test_who_has_a_pedestrian_within_forty_metres() -> None:
     _, frame = frames(
         (0.0, 39.9, 0.0, 0.0, 0.0, CAR), (40.1, 0.0, 0.0, 0.0, 0.0, CAR), (0.0, 0.0, 0.0, 0.0, 0.0, WALKER), share=1.0
     )
-    assert Lookout(frame).near == [True, False, True]
-    assert Lookout(frame).pedestrians.tolist() == [False, False, True]
+    assert near_pedestrians(frame.state, frame.kind == Kind.VEHICLE).tolist() == [True, False, True]
     _, frame = frames(EGO, share=1.0)
-    assert Lookout(frame).near == [False]
+    assert near_pedestrians(frame.state, frame.kind == Kind.VEHICLE).tolist() == [False]
 
 
 def test_whom_it_passes_at_its_speed_it_may_meet_at_that_of_a_bend() -> None:
