@@ -41,10 +41,8 @@ class Agent(Protocol):
           explore: act as in training (Alg. 1, l. 7), or as the frozen policy does.
         """
 
-    def td_error(
-        self, observation: Vector, action: Vector, reward: float, next_observation: Vector, terminated: bool
-    ) -> float:
-        """|δ| of one transition, mean over the critics; the arguments are those of a `Transition`."""
+    def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
+        """|δ| of transitions, `batch`, mean over the critics; arguments as for `update`."""
 
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """One step of all networks (Alg. 1, l. 14).
@@ -66,6 +64,11 @@ class Agent(Protocol):
         Raises:
           CheckpointError: the state is of other networks; the agent is not to be used any further.
         """
+
+
+def mean_magnitude(td_errors: Tensor) -> Floats:
+    """|δ| as the replay takes it, `batch`, from those of each critic, `critics x batch`."""
+    return td_errors.abs().mean(dim=0).double().cpu().numpy()
 
 
 def row(vector: Vector, device: torch.device) -> Tensor:

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from risk_sac.agents.agent import UpdateResult, all_finite, loading, row
+from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnitude, row
 from risk_sac.agents.critics import Critics
 from risk_sac.agents.networks import Mlp, bounded_log_std, tanh_gaussian, tanh_gaussian_gradient
 from risk_sac.agents.replay import Batch, Vector
 from risk_sac.config.learner import AgentConfig, SacConfig
+from risk_sac.types import Floats
 
 
 def soft_target(
@@ -147,21 +148,11 @@ class SacAgent:
         action = self._sample(raw).action if explore else torch.tanh(raw.chunk(2, dim=1)[0])
         return action[0].cpu().numpy()
 
-    def td_error(
-        self, observation: Vector, action: Vector, reward: float, next_observation: Vector, terminated: bool
-    ) -> float:
-        """See `Agent.td_error`."""
-        following = row(next_observation, self._device)
-        drawn = self._sample(self._policy.forward(following)[-1])
-        target = self._target(
-            torch.tensor([reward], dtype=torch.float32, device=self._device),
-            torch.tensor([float(terminated)], device=self._device),
-            following,
-            drawn.action,
-            drawn.log_prob,
-        )
-        values = self._critics.values(row(observation, self._device), row(action, self._device))
-        return (target - values).abs().mean().item()
+    def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
+        """See `Agent.td_errors`."""
+        drawn = self._sample(self._policy.forward(batch.next_observation)[-1])
+        target = self._target(reward, batch.terminated, batch.next_observation, drawn.action, drawn.log_prob)
+        return mean_magnitude(target - self._critics.values(batch.observation, batch.action))
 
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """See `Agent.update`."""
@@ -186,7 +177,7 @@ class SacAgent:
         figures = torch.stack((loss_q, loss_pi, self._log_temperature.exp()[0], entropy)).tolist()
         critic_figure, actor_figure, temperature_figure, entropy_figure = all_finite(figures)
         return UpdateResult(
-            td_errors=td_errors.abs().mean(dim=0).double().cpu().numpy(),
+            td_errors=mean_magnitude(td_errors),
             critic_loss=critic_figure,
             actor_loss=actor_figure,
             temperature=temperature_figure,
