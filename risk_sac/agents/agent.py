@@ -6,13 +6,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-import torch
 from torch import Tensor
 
-from risk_sac.agents.replay import Batch, Vector
+from risk_sac.agents.replay import Batch
 from risk_sac.errors import CheckpointError, NotFinite
-from risk_sac.types import Floats
+from risk_sac.types import Floats, Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,11 +67,6 @@ class Agent(Protocol):
 def mean_magnitude(td_errors: Tensor) -> Floats:
     """|δ| as the replay takes it, `batch`, from those of each critic, `critics x batch`."""
     return td_errors.abs().mean(dim=0).double().cpu().numpy()
-
-
-def row(vector: Vector, device: torch.device) -> Tensor:
-    """A batch of one, `1 x size`."""
-    return torch.from_numpy(np.asarray(vector, np.float32)[None]).to(device)
 
 
 def all_finite(figures: list[float]) -> list[float]:

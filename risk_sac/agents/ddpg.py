@@ -6,15 +6,16 @@ Source: Lillicrap et al., "Continuous control with deep reinforcement learning",
 import copy
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnitude, row
+from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnitude
 from risk_sac.agents.critics import Critics
 from risk_sac.agents.networks import Mlp
-from risk_sac.agents.replay import Batch, Vector
+from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import AgentConfig, DdpgConfig
-from risk_sac.types import Floats
+from risk_sac.types import Floats, Vector
 
 
 def deterministic_target(reward: Tensor, terminated: Tensor, next_value: Tensor, discount: float) -> Tensor:
@@ -83,11 +84,11 @@ class DdpgAgent:
 
     def act(self, observation: Vector, explore: bool) -> Vector:
         """See `Agent.act`: the policy's action, with noise while exploring."""
-        action = torch.tanh(self._policy.forward(row(observation, self._device))[-1][0])
+        action = np.tanh(self._policy.respond(observation))
         if explore:
-            noise = torch.randn(action.shape, generator=self._generator, device=self._device)
-            action = (action + self._ddpg.exploration_deviation * noise).clamp(-1.0, 1.0)
-        return action.cpu().numpy()
+            noise = torch.randn(action.shape, generator=self._generator, device=self._device).cpu().numpy()
+            action = np.clip(action + self._ddpg.exploration_deviation * noise, -1.0, 1.0)
+        return action
 
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """See `Agent.td_errors`."""

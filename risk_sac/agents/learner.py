@@ -17,11 +17,12 @@ from risk_sac.agents.agent import Agent, UpdateResult
 from risk_sac.agents.ddpg import DdpgAgent
 from risk_sac.agents.device import choose_device, random_batch
 from risk_sac.agents.lagrangian import DualVariable
-from risk_sac.agents.replay import Batch, Replay, RiskPrioritizedReplay, Transition, UniformReplay, Vector
+from risk_sac.agents.replay import Batch, Replay, RiskPrioritizedReplay, Transition, UniformReplay
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.risk.reward import TrainingReward
+from risk_sac.types import Vector
 
 
 class Learner:

@@ -11,16 +11,13 @@ from typing import Any, Protocol
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from risk_sac.agents.priority import TermScales, importance_weights, priority
 from risk_sac.agents.sum_tree import Indices, SumTree
 from risk_sac.config.learner import ReplayConfig
 from risk_sac.errors import CheckpointError, NotFinite
-from risk_sac.types import Floats
-
-Vector = NDArray[np.float32]
+from risk_sac.types import Floats, Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

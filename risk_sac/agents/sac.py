@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnitude, row
+from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnitude
 from risk_sac.agents.critics import Critics
-from risk_sac.agents.networks import Mlp, bounded_log_std, tanh_gaussian, tanh_gaussian_gradient
-from risk_sac.agents.replay import Batch, Vector
+from risk_sac.agents.networks import Mlp, bounded_log_std, draw_action, tanh_gaussian, tanh_gaussian_gradient
+from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import AgentConfig, SacConfig
-from risk_sac.types import Floats
+from risk_sac.types import Floats, Vector
 
 
 def soft_target(
@@ -123,6 +123,7 @@ class SacAgent:
         device: str = "cpu",
     ) -> None:
         self._config = config
+        self._action_size = action_size
         self._target_entropy = sac.target_entropy_per_action * action_size
         self._device = torch.device(device)
         self._generator = torch.Generator(self._device).manual_seed(seed)
@@ -144,9 +145,10 @@ class SacAgent:
 
     def act(self, observation: Vector, explore: bool) -> Vector:
         """See `Agent.act`: a draw from the policy, or tanh of its mean."""
-        raw = self._policy.forward(row(observation, self._device))[-1]
-        action = self._sample(raw).action if explore else torch.tanh(raw.chunk(2, dim=1)[0])
-        return action[0].cpu().numpy()
+        noise = torch.zeros(self._action_size)
+        if explore:
+            noise = torch.randn(self._action_size, generator=self._generator, device=self._device).cpu()
+        return draw_action(self._policy.respond(observation), noise.numpy())
 
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """See `Agent.td_errors`."""
