@@ -72,8 +72,10 @@ class Learner:
         return self._agent.act(observation, explore)  # Alg. 1, l. 7
 
     def observe(self, transition: Transition) -> None:
-        """Store what a step has brought."""
+        """Store what a step has brought, and price its cost; what the warm-up draws is not the policy's."""
         self._steps += 1
+        if self._steps > self._config.agent.warmup_steps:
+            self._dual.update(transition.cost)  # Alg. 1, l. 15-16
         self._replay.add(transition)  # Alg. 1, l. 12
 
     def update(self) -> UpdateResult | None:
@@ -129,9 +131,6 @@ class Learner:
         batch = self._replay.sample(self._config.agent.batch_size, self._generator).on(self.device)  # Alg. 1, l. 13
         result = self._agent.update(batch, self._shaped(batch))  # Alg. 1, l. 14
         self._replay.update(batch.indices, result.td_errors)
-        # Weighted, since RPER draws costly transitions more often: their plain mean overstates the policy's cost.
-        weight = batch.weight / batch.weight.mean()
-        self._dual.update((weight * batch.cost).mean().item())  # Alg. 1, l. 15-16
         return result
 
     def _shaped(self, batch: Batch) -> Tensor:

@@ -73,7 +73,7 @@ class LagrangianConfig(Settings):
     learning_rate: Positive = 5e-4
     """η_λ."""
     cost_limit: NonNegative = 0.2
-    """d, on the mean realism cost per step."""
+    """d, on the policy's mean realism cost per step; undisturbed traffic costs 0.01 to 0.05."""
     maximum: Positive = 0.5
     """Cap on λ, so that a burst of cost cannot drown the risk reward for good."""
 

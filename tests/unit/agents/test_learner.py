@@ -102,7 +102,8 @@ def test_dual_variable_rises_with_cost_only_where_the_method_constrains_it(
     subject = learner(method)
     for _ in range(CONFIG.agent.warmup_steps):
         subject.observe(transition(cost=0.6))
-    subject.update()
+    assert subject.dual_variable == 0.0
+    subject.observe(transition(cost=0.6))
     # λ = 0 + 0.01 (0.6 - 0.1)
     assert subject.dual_variable == pytest.approx(0.005 if METHODS[method].lagrangian else 0.0)
 
