@@ -171,6 +171,7 @@ METRICS = (
         meaning=f"distinct preventable failures per {PER_STEPS} environment steps",
         figure=Derived(formula=distinct_preventable_rate),
         search_only=True,
+        tested=False,
     ),
     Metric(
         name="covered",
@@ -178,6 +179,7 @@ METRICS = (
         meaning="cells of the fixed taxonomy of failures that a valid one lies in",
         figure=Kept(field="covered", formula=coverage),
         search_only=True,
+        tested=False,
     ),
 )
 
