@@ -272,6 +272,8 @@ class RunMetrics(Record):
     """Valid collisions that the careful driver would have prevented, repetitions included."""
     distinct_preventable: int = 0
     """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
+    covered: int = 0
+    """Kinds of failures found: cells of the fixed taxonomy that a valid collision lies in."""
     artefacts: int = 0
     """Contacts that the simulator or the control made."""
     unresponsive: int = 0

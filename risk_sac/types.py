@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Vector = NDArray[np.float32]  # what a network takes and gives
 Bools = NDArray[np.bool_]
 
 STEP_S = 0.1  # one control step is one simulation step

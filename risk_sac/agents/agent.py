@@ -6,13 +6,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-import torch
 from torch import Tensor
 
-from risk_sac.agents.replay import Batch, Vector
+from risk_sac.agents.replay import Batch
 from risk_sac.errors import CheckpointError, NotFinite
-from risk_sac.types import Floats
+from risk_sac.types import Floats, Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,10 +39,8 @@ class Agent(Protocol):
           explore: act as in training (Alg. 1, l. 7), or as the frozen policy does.
         """
 
-    def td_error(
-        self, observation: Vector, action: Vector, reward: float, next_observation: Vector, terminated: bool
-    ) -> float:
-        """|δ| of one transition, mean over the critics; the arguments are those of a `Transition`."""
+    def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
+        """|δ| of transitions, `batch`, mean over the critics; arguments as for `update`."""
 
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """One step of all networks (Alg. 1, l. 14).
@@ -68,9 +64,9 @@ class Agent(Protocol):
         """
 
 
-def row(vector: Vector, device: torch.device) -> Tensor:
-    """A batch of one, `1 x size`."""
-    return torch.from_numpy(np.asarray(vector, np.float32)[None]).to(device)
+def mean_magnitude(td_errors: Tensor) -> Floats:
+    """|δ| as the replay takes it, `batch`, from those of each critic, `critics x batch`."""
+    return td_errors.abs().mean(dim=0).double().cpu().numpy()
 
 
 def all_finite(figures: list[float]) -> list[float]:

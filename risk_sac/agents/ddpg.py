@@ -6,14 +6,16 @@ Source: Lillicrap et al., "Continuous control with deep reinforcement learning",
 import copy
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from risk_sac.agents.agent import UpdateResult, all_finite, loading, row
+from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnitude
 from risk_sac.agents.critics import Critics
 from risk_sac.agents.networks import Mlp
-from risk_sac.agents.replay import Batch, Vector
+from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import AgentConfig, DdpgConfig
+from risk_sac.types import Floats, Vector
 
 
 def deterministic_target(reward: Tensor, terminated: Tensor, next_value: Tensor, discount: float) -> Tensor:
@@ -82,23 +84,16 @@ class DdpgAgent:
 
     def act(self, observation: Vector, explore: bool) -> Vector:
         """See `Agent.act`: the policy's action, with noise while exploring."""
-        action = torch.tanh(self._policy.forward(row(observation, self._device))[-1][0])
+        action = np.tanh(self._policy.respond(observation))
         if explore:
-            noise = torch.randn(action.shape, generator=self._generator, device=self._device)
-            action = (action + self._ddpg.exploration_deviation * noise).clamp(-1.0, 1.0)
-        return action.cpu().numpy()
+            noise = torch.randn(action.shape, generator=self._generator, device=self._device).cpu().numpy()
+            action = np.clip(action + self._ddpg.exploration_deviation * noise, -1.0, 1.0)
+        return action
 
-    def td_error(
-        self, observation: Vector, action: Vector, reward: float, next_observation: Vector, terminated: bool
-    ) -> float:
-        """See `Agent.td_error`."""
-        target = self._target(
-            torch.tensor([reward], dtype=torch.float32, device=self._device),
-            torch.tensor([float(terminated)], device=self._device),
-            row(next_observation, self._device),
-        )
-        values = self._critics.values(row(observation, self._device), row(action, self._device))
-        return (target - values).abs().mean().item()
+    def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
+        """See `Agent.td_errors`."""
+        target = self._target(reward, batch.terminated, batch.next_observation)
+        return mean_magnitude(target - self._critics.values(batch.observation, batch.action))
 
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """See `Agent.update`."""
@@ -116,7 +111,7 @@ class DdpgAgent:
 
         critic_figure, actor_figure = all_finite(torch.stack((loss_q, loss_mu)).tolist())
         return UpdateResult(
-            td_errors=td_errors.abs().mean(dim=0).double().cpu().numpy(),
+            td_errors=mean_magnitude(td_errors),
             critic_loss=critic_figure,
             actor_loss=actor_figure,
             temperature=0.0,

@@ -9,17 +9,21 @@ from risk_sac.config.learner import LagrangianConfig
 from risk_sac.errors import NotFinite
 
 
-def dual_step(dual_variable: float, mean_cost: float, config: LagrangianConfig) -> float:
+def dual_step(dual_variable: float, cost: float, config: LagrangianConfig) -> float:
     """One projected step of gradient ascent on the dual of (2).
 
-    λ ← min([λ + η_λ (C̄_real - d)]_+, λ_max)
+    λ ← min([λ + η_λ (C_soft - d)]_+, λ_max)
+
+    Deviation: the cost is that of the step just taken, where the paper takes the mean of a mini-batch. A replay's
+    mean tells what the policies of the last 100,000 steps cost, and RPER's draws favour costly ones; λ is to follow
+    the policy that acts now, and it averages over the last 1/η_λ steps by itself.
 
     Deviation: λ is capped at λ_max, which the paper does not do, so that a burst of cost cannot drown
     the risk reward for good.
 
     Args:
       dual_variable: λ ≥ 0.
-      mean_cost: C̄_real, mean realism cost of the mini-batch.
+      cost: C_soft of one step.
       config: η_λ, d and λ_max.
 
     Returns:
@@ -27,7 +31,7 @@ def dual_step(dual_variable: float, mean_cost: float, config: LagrangianConfig) 
 
     Source: RISK-SAC, Alg. 1, l. 16.
     """
-    ascended = dual_variable + config.learning_rate * (mean_cost - config.cost_limit)
+    ascended = dual_variable + config.learning_rate * (cost - config.cost_limit)
     return min(max(ascended, 0.0), config.maximum)
 
 
@@ -39,13 +43,13 @@ class DualVariable:
         self._enabled = enabled
         self.value = min(config.initial, config.maximum) if enabled else 0.0
 
-    def update(self, mean_cost: float) -> None:
-        """Step λ on the mean realism cost of a mini-batch.
+    def update(self, cost: float) -> None:
+        """Step λ on the realism cost of one environment step.
 
         Raises:
-          NotFinite: `mean_cost` is NaN or infinite.
+          NotFinite: `cost` is NaN or infinite.
         """
-        if not math.isfinite(mean_cost):
-            raise NotFinite(f"mean realism cost is {mean_cost}; wanted a finite number. Check C_soft.")
+        if not math.isfinite(cost):
+            raise NotFinite(f"realism cost is {cost}; wanted a finite number. Check C_soft.")
         if self._enabled:
-            self.value = dual_step(self.value, mean_cost, self._config)
+            self.value = dual_step(self.value, cost, self._config)

@@ -6,20 +6,23 @@ actions from [-1, 1] to an environment's box is the caller's.
 Source: RISK-SAC, Alg. 1, l. 7 and 9-16.
 """
 
+import math
 from functools import partial
 from typing import Any
 
 import numpy as np
+from torch import Tensor
 
 from risk_sac.agents.agent import Agent, UpdateResult
 from risk_sac.agents.ddpg import DdpgAgent
 from risk_sac.agents.device import choose_device, random_batch
 from risk_sac.agents.lagrangian import DualVariable
-from risk_sac.agents.replay import Replay, RiskPrioritizedReplay, Transition, UniformReplay, Vector
+from risk_sac.agents.replay import Batch, Replay, RiskPrioritizedReplay, Transition, UniformReplay
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.risk.reward import TrainingReward
+from risk_sac.types import Vector
 
 
 class Learner:
@@ -69,19 +72,22 @@ class Learner:
         return self._agent.act(observation, explore)  # Alg. 1, l. 7
 
     def observe(self, transition: Transition) -> None:
-        """Store what a step has brought."""
+        """Store what a step has brought, and price its cost; what the warm-up draws is not the policy's."""
         self._steps += 1
-        self._replay.add(transition, self._td_error(transition))  # Alg. 1, l. 12
+        if self._steps > self._config.agent.warmup_steps:
+            self._dual.update(transition.cost)  # Alg. 1, l. 15-16
+        self._replay.add(transition)  # Alg. 1, l. 12
 
     def update(self) -> UpdateResult | None:
-        """Learn from memory, `updates_per_step` times; None during the warm-up.
+        """Learn from memory at the pace of `updates_per_step`; None during the warm-up and between two updates.
 
         Raises:
           NotFinite: learning has diverged.
         """
         result = None
         if self._steps >= self._config.agent.warmup_steps and len(self._replay):
-            for _ in range(self._config.agent.updates_per_step):
+            pace = self._config.agent.updates_per_step
+            for _ in range(math.floor(pace * self._steps) - math.floor(pace * (self._steps - 1))):
                 result = self._update_once()
         return result
 
@@ -118,35 +124,25 @@ class Learner:
         return DdpgAgent(observation_size, action_size, self._config.agent, self._config.ddpg, seed, device)
 
     def _update_once(self) -> UpdateResult:
+        new = self._replay.take_unmeasured()
+        if new is not None:
+            new = new.on(self.device)
+            self._replay.update(new.indices, self._agent.td_errors(new, self._shaped(new)))  # Alg. 1, l. 11
         batch = self._replay.sample(self._config.agent.batch_size, self._generator).on(self.device)  # Alg. 1, l. 13
-        # Deviation: formed when sampled, so λ is today's and not the one in force when the step was taken.
-        reward = self._reward(  # Alg. 1, l. 9-10
+        result = self._agent.update(batch, self._shaped(batch))  # Alg. 1, l. 14
+        self._replay.update(batch.indices, result.td_errors)
+        return result
+
+    def _shaped(self, batch: Batch) -> Tensor:
+        """R' of transitions (Alg. 1, l. 9-10), `n`.
+
+        Deviation: formed when sampled, so λ is today's and not the one in force when the step was taken.
+        """
+        return self._reward(
             batch.risk_reward,
             batch.cost,
             batch.robustness,
             batch.next_robustness,
             batch.terminated,
             self._dual.value,
-        )
-        result = self._agent.update(batch, reward)  # Alg. 1, l. 14
-        self._replay.update(batch.indices, result.td_errors)
-        # Weighted, since RPER draws costly transitions more often: their plain mean overstates the policy's cost.
-        weight = batch.weight / batch.weight.mean()
-        self._dual.update((weight * batch.cost).mean().item())  # Alg. 1, l. 15-16
-        return result
-
-    def _td_error(self, transition: Transition) -> float:
-        """|δ| at insertion (Alg. 1, l. 11); uniform replay does without."""
-        if self._method.replay == "uniform":
-            return 0.0
-        reward = self._reward(
-            transition.risk_reward,
-            transition.cost,
-            transition.robustness,
-            transition.next_robustness,
-            float(transition.terminated),
-            self._dual.value,
-        )
-        return self._agent.td_error(
-            transition.observation, transition.action, reward, transition.next_observation, transition.terminated
         )

@@ -9,9 +9,12 @@ import math
 from collections.abc import Sequence
 from itertools import accumulate, pairwise
 
+import numpy as np
 import torch
 import torch.nn.functional as F  # noqa: N812  # the name all of torch's users know
 from torch import Tensor
+
+from risk_sac.types import Vector
 
 # Choice: log σ is squashed smoothly into these bounds; a hard clamp has no gradient outside them.
 LOG_STD_MIN = -5.0
@@ -65,6 +68,27 @@ class Mlp:
             activations.append(_rectified_affine(activations[-1], weight, bias))
         activations.append(_product(activations[-1], self._weights[-1]).add_(self._biases[-1]))
         return activations
+
+    def respond(self, inputs: Vector) -> Vector:
+        """Evaluates the network for one input; numpy, since for one row torch's operators cost more than what they do.
+
+        Args:
+          inputs: `in`.
+
+        Returns:
+          `out`.
+        """
+        if self.parameters.is_cuda:
+            return (
+                self.forward(torch.from_numpy(np.asarray(inputs, np.float32))[None].to(self.parameters.device))[-1][0]
+                .cpu()
+                .numpy()
+            )
+        weights, biases = ([each.numpy() for each in tensors] for tensors in (self._weights, self._biases))
+        activation = np.asarray(inputs, np.float32)
+        for weight, bias in zip(weights[:-1], biases[:-1], strict=True):
+            activation = np.maximum(activation @ weight + bias, 0.0)
+        return np.asarray(activation @ weights[-1] + biases[-1])
 
     def backward(self, activations: Sequence[Tensor], gradient: Tensor) -> None:
         """Writes the gradient of a loss in the parameters.
@@ -122,6 +146,21 @@ def _for_onednn(left: Tensor, right: Tensor) -> bool:
 def bounded_log_std(raw: Tensor) -> Tensor:
     """Squash the network's output into [LOG_STD_MIN, LOG_STD_MAX], elementwise and smoothly."""
     return LOG_STD_MIN + 0.5 * (LOG_STD_MAX - LOG_STD_MIN) * (torch.tanh(raw) + 1.0)
+
+
+def draw_action(raw: Vector, noise: Vector) -> Vector:
+    """Action of one state, as `tanh_gaussian` has it for a batch.
+
+    Args:
+      raw: the policy network's output, μ and what `bounded_log_std` squashes, `2 action_size`.
+      noise: ε, standard normal, `action_size`; 0 for the middle of the policy.
+
+    Returns:
+      Action in [-1, 1], `action_size`.
+    """
+    mean, raw_log_std = np.split(raw, 2)
+    log_std = LOG_STD_MIN + 0.5 * (LOG_STD_MAX - LOG_STD_MIN) * (np.tanh(raw_log_std) + 1.0)
+    return np.tanh(mean + np.exp(log_std) * noise)
 
 
 def tanh_gaussian(mean: Tensor, log_std: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:

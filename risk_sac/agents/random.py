@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from risk_sac.agents.replay import Transition, Vector
+from risk_sac.agents.replay import Transition
+from risk_sac.types import Vector
 
 REDRAWN = 0.1  # share of steps in which an adversary's action is drawn anew: it holds for a second on average
 

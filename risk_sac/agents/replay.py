@@ -11,16 +11,13 @@ from typing import Any, Protocol
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from risk_sac.agents.priority import TermScales, importance_weights, priority
 from risk_sac.agents.sum_tree import Indices, SumTree
 from risk_sac.config.learner import ReplayConfig
 from risk_sac.errors import CheckpointError, NotFinite
-from risk_sac.types import Floats
-
-Vector = NDArray[np.float32]
+from risk_sac.types import Floats, Vector
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,14 +63,20 @@ class Replay(Protocol):
 
     def __len__(self) -> int: ...
 
-    def add(self, transition: Transition, td_error: float) -> None:
-        """Store a transition over the oldest one once full; `td_error` is |δ|."""
+    def add(self, transition: Transition) -> None:
+        """Store a transition over the oldest one once full."""
+
+    def take_unmeasured(self) -> Batch | None:
+        """The transitions added since the last call, whose |δ| `update` is to be told before the next draw.
+
+        None if there are none, or if it makes no difference to what is drawn.
+        """
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
-        """Draw with replacement; at least one transition must be stored."""
+        """Draw with replacement; at least one transition must be stored, and all of them measured."""
 
     def update(self, indices: Indices, td_errors: Floats) -> None:
-        """Take note of the |δ| just measured on sampled transitions."""
+        """Take note of the |δ| just measured; of a repeated index the last one holds."""
 
     def state(self) -> dict[str, Any]:
         """Everything sampling depends on, the filled part only; tensors and plain values."""
@@ -114,6 +117,10 @@ class Storage:
         self._next = (slot + 1) % self.capacity
         self.size = max(self.size, slot + 1)
         return slot
+
+    def newest(self, count: int) -> Indices:
+        """Slots of the newest transitions, oldest of them first."""
+        return np.arange(self._next - count, self._next) % self.capacity
 
     def gather(self, indices: Indices, weight: Floats) -> Batch:
         """The transitions at `indices`, with their importance weights."""
@@ -159,9 +166,12 @@ class UniformReplay:
     def __len__(self) -> int:
         return self._storage.size
 
-    def add(self, transition: Transition, td_error: float) -> None:
-        """Store a transition; `td_error` has no influence."""
+    def add(self, transition: Transition) -> None:
+        """Store a transition."""
         self._storage.add(transition)
+
+    def take_unmeasured(self) -> None:
+        """None: |δ| has no influence."""
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
         """Draw uniformly with replacement; all weights are 1."""
@@ -183,8 +193,11 @@ class RiskPrioritizedReplay:
     """RPER: transitions are drawn in proportion to (9) and weighted by (10).
 
     The measured terms of (9) are kept for every transition, so each leaf of the tree equals (9) under
-    the current scales at any time. The scales are taken from all stored terms again, and the tree is
-    rebuilt, whenever the number of additions has doubled or grown by RESCALE_EVERY.
+    the current scales once its |δ| is told. The scales are taken from all stored terms again, and the tree
+    is rebuilt, whenever the number of additions has doubled or grown by RESCALE_EVERY.
+
+    Choice: |δ| is measured of all new transitions together, just before the next draw, the first that it can matter
+    to (the paper does it one by one at insertion).
     """
 
     # About 1 ms of work for 100,000 stored, spread over this many additions.
@@ -197,25 +210,27 @@ class RiskPrioritizedReplay:
         self._tree = SumTree(config.capacity)
         self._scales = TermScales(np.zeros(3), np.zeros(3))
         self._additions = 0
+        self._unmeasured = 0  # how many of the newest transitions lack |δ|
         self._rescale_at = 1
 
     def __len__(self) -> int:
         return self._storage.size
 
-    def add(self, transition: Transition, td_error: float) -> None:
-        """Store a transition with its priority."""
-        terms = (td_error, transition.accumulated_reward, -transition.robustness)
+    def add(self, transition: Transition) -> None:
+        """Store a transition; it is drawn once its |δ| is told."""
+        terms = (0.0, transition.accumulated_reward, -transition.robustness)
         if not np.isfinite(terms).all():
-            raise NotFinite(f"|δ|, R̂ and -ρ are {terms}; wanted finite numbers. Check the reward and the monitor.")
-        slot = self._storage.add(transition)
-        self._terms[:, slot] = terms
+            raise NotFinite(f"R̂ and -ρ are {terms[1:]}; wanted finite numbers. Check the reward and the monitor.")
+        self._terms[:, self._storage.add(transition)] = terms
         self._additions += 1
-        if self._additions < self._rescale_at:
-            self._refresh(np.array([slot]))
-            return
-        self._rescale_at = self._additions + min(self._additions, self.RESCALE_EVERY)
-        self._scales = TermScales.of(self._terms[:, : len(self)])
-        self._rebuild()
+        self._unmeasured = min(self._unmeasured + 1, self._storage.capacity)
+
+    def take_unmeasured(self) -> Batch | None:
+        """See `Replay.take_unmeasured`; all importance weights are 1."""
+        if not self._unmeasured:
+            return None
+        count, self._unmeasured = self._unmeasured, 0
+        return self._storage.gather(self._storage.newest(count), np.ones(count))
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
         """Draw in proportion to priority, one transition from each of `batch_size` equal slices of the total.
@@ -228,9 +243,16 @@ class RiskPrioritizedReplay:
         return self._storage.gather(indices, importance_weights(probabilities, len(self), self._config.correction))
 
     def update(self, indices: Indices, td_errors: Floats) -> None:
-        """Replace |δ| of sampled transitions; of a repeated index the last one holds."""
+        """See `Replay.update`."""
+        if not np.isfinite(td_errors).all():
+            raise NotFinite(f"|δ| are {td_errors}; wanted finite numbers. Lower the learning rates.")
         self._terms[0, indices] = td_errors
-        self._refresh(indices)
+        if self._additions < self._rescale_at:
+            self._tree.set(indices, priority(self._terms.take(indices, axis=1), self._scales, self._config))
+            return
+        self._rescale_at = self._additions + min(self._additions, self.RESCALE_EVERY)
+        self._scales = TermScales.of(self._terms[:, : len(self)])
+        self._rebuild()
 
     def state(self) -> dict[str, Any]:
         """The stored transitions, their terms and the scales."""
@@ -240,6 +262,7 @@ class RiskPrioritizedReplay:
             "lowest": torch.from_numpy(self._scales.lowest.copy()),
             "inverse_spread": torch.from_numpy(self._scales.inverse_spread.copy()),
             "additions": self._additions,
+            "unmeasured": self._unmeasured,
             "rescale_at": self._rescale_at,
         }
 
@@ -249,11 +272,9 @@ class RiskPrioritizedReplay:
         self._terms[:, : len(self)] = state["terms"].numpy()
         self._scales = TermScales(state["lowest"].numpy(), state["inverse_spread"].numpy())
         self._additions = int(state["additions"])
+        self._unmeasured = int(state["unmeasured"])
         self._rescale_at = int(state["rescale_at"])
         self._rebuild()
-
-    def _refresh(self, indices: Indices) -> None:
-        self._tree.set(indices, priority(self._terms.take(indices, axis=1), self._scales, self._config))
 
     def _rebuild(self) -> None:
         self._tree.rebuild(priority(self._terms[:, : len(self)], self._scales, self._config))

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from risk_sac.agents.agent import UpdateResult, all_finite, loading, row
+from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnitude
 from risk_sac.agents.critics import Critics
-from risk_sac.agents.networks import Mlp, bounded_log_std, tanh_gaussian, tanh_gaussian_gradient
-from risk_sac.agents.replay import Batch, Vector
+from risk_sac.agents.networks import Mlp, bounded_log_std, draw_action, tanh_gaussian, tanh_gaussian_gradient
+from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import AgentConfig, SacConfig
+from risk_sac.types import Floats, Vector
 
 
 def soft_target(
@@ -122,6 +123,7 @@ class SacAgent:
         device: str = "cpu",
     ) -> None:
         self._config = config
+        self._action_size = action_size
         self._target_entropy = sac.target_entropy_per_action * action_size
         self._device = torch.device(device)
         self._generator = torch.Generator(self._device).manual_seed(seed)
@@ -143,25 +145,16 @@ class SacAgent:
 
     def act(self, observation: Vector, explore: bool) -> Vector:
         """See `Agent.act`: a draw from the policy, or tanh of its mean."""
-        raw = self._policy.forward(row(observation, self._device))[-1]
-        action = self._sample(raw).action if explore else torch.tanh(raw.chunk(2, dim=1)[0])
-        return action[0].cpu().numpy()
+        noise = torch.zeros(self._action_size)
+        if explore:
+            noise = torch.randn(self._action_size, generator=self._generator, device=self._device).cpu()
+        return draw_action(self._policy.respond(observation), noise.numpy())
 
-    def td_error(
-        self, observation: Vector, action: Vector, reward: float, next_observation: Vector, terminated: bool
-    ) -> float:
-        """See `Agent.td_error`."""
-        following = row(next_observation, self._device)
-        drawn = self._sample(self._policy.forward(following)[-1])
-        target = self._target(
-            torch.tensor([reward], dtype=torch.float32, device=self._device),
-            torch.tensor([float(terminated)], device=self._device),
-            following,
-            drawn.action,
-            drawn.log_prob,
-        )
-        values = self._critics.values(row(observation, self._device), row(action, self._device))
-        return (target - values).abs().mean().item()
+    def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
+        """See `Agent.td_errors`."""
+        drawn = self._sample(self._policy.forward(batch.next_observation)[-1])
+        target = self._target(reward, batch.terminated, batch.next_observation, drawn.action, drawn.log_prob)
+        return mean_magnitude(target - self._critics.values(batch.observation, batch.action))
 
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """See `Agent.update`."""
@@ -186,7 +179,7 @@ class SacAgent:
         figures = torch.stack((loss_q, loss_pi, self._log_temperature.exp()[0], entropy)).tolist()
         critic_figure, actor_figure, temperature_figure, entropy_figure = all_finite(figures)
         return UpdateResult(
-            td_errors=td_errors.abs().mean(dim=0).double().cpu().numpy(),
+            td_errors=mean_magnitude(td_errors),
             critic_loss=critic_figure,
             actor_loss=actor_figure,
             temperature=temperature_figure,

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from risk_sac.agents.replay import Transition, Vector
+from risk_sac.agents.replay import Transition
 from risk_sac.observation import PER_ADVERSARY, X_M, Y_M
+from risk_sac.types import Vector
 
 AHEAD_M = 5.0  # between the centres: the ego's length
 BRAKING = -0.5  # of the limit

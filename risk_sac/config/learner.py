@@ -27,7 +27,8 @@ class AgentConfig(Settings):
     """τ of the target networks' moving average."""
     warmup_steps: Annotated[int, Field(ge=0, le=10_000_000)] = 1000
     """Environment steps with uniformly random actions and no update."""
-    updates_per_step: Annotated[int, Field(ge=0, le=20)] = 1
+    updates_per_step: Annotated[float, Field(ge=0, le=20)] = 1.0
+    """May be a fraction: 0.25 is one update in four environment steps."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """Where the networks live; `auto` takes the GPU where there is one that updates them faster than the processor.
     Results are reproducible on equal devices only."""
@@ -73,7 +74,7 @@ class LagrangianConfig(Settings):
     learning_rate: Annotated[float, Field(ge=1e-9, le=1)] = 5e-4
     """η_λ."""
     cost_limit: Fraction = 0.2
-    """d, on the mean realism cost per step, which is in [0, 1]."""
+    """d, on the policy's mean realism cost per step, which is in [0, 1]; undisturbed traffic costs 0.01 to 0.05."""
     maximum: Annotated[float, Field(ge=1e-6, le=1000)] = 0.5
     """Cap on λ, so that a burst of cost cannot drown the risk reward for good."""
 

@@ -79,6 +79,16 @@ def distinct_failure_rate(counts: Counts) -> float | None:
     return PER_STEPS * counts.distinct_failures / counts.environment_steps if counts.environment_steps else None
 
 
+def distinct_preventable_rate(counts: Counts) -> float | None:
+    """Distinct preventable failures per `PER_STEPS` environment steps; None without steps."""
+    return PER_STEPS * counts.distinct_preventable / counts.environment_steps if counts.environment_steps else None
+
+
+def coverage(tally: Tally) -> float:
+    """Kinds of failures found: cells of `risk_sac.verdicts.taxonomy`."""
+    return len(tally.kinds)
+
+
 def steps_per_distinct_failure(counts: Counts) -> float | None:
     """Environment steps per distinct failure; None without one."""
     return counts.environment_steps / counts.distinct_failures if counts.distinct_failures else None
@@ -157,6 +167,22 @@ METRICS = (
         figure=Derived(formula=distinct_failure_rate),
         search_only=True,
         tabled=False,  # its reciprocal is
+    ),
+    Metric(
+        name="preventable_per_1000_steps",
+        symbol=f"preventable / {PER_STEPS} steps",
+        meaning=f"distinct preventable failures per {PER_STEPS} environment steps",
+        figure=Derived(formula=distinct_preventable_rate),
+        search_only=True,
+        tested=False,
+    ),
+    Metric(
+        name="covered",
+        symbol="kinds",
+        meaning="cells of the fixed taxonomy of failures that a valid one lies in",
+        figure=Kept(field="covered", formula=coverage),
+        search_only=True,
+        tested=False,
     ),
 )
 

@@ -10,6 +10,7 @@ from risk_sac.metrics.features import Spread, outcome_features
 from risk_sac.records import Collision, EpisodeRecord, Outcome
 from risk_sac.types import STEP_S
 from risk_sac.verdicts.distinct import DistinctFailures
+from risk_sac.verdicts.taxonomy import FailureKind, kind_of
 
 STEPS_PER_S = round(1 / STEP_S)
 WINDOW = 100  # episodes of the sliding ECR and PCR
@@ -35,6 +36,7 @@ class Tally(Counts):
     newest_failures: int = 0  # among them
     newest_preventable: int = 0
     signatures: Counter[str] = field(default_factory=Counter)  # signature -> valid failures
+    kinds: set[FailureKind] = field(default_factory=set)  # of the valid failures
     conflicts_by_second: list[int] = field(init=False)  # valid failures by the second in which they began
     contacts_by_second: list[int] = field(init=False)  # the same by the second of the contact
     _newest: deque[tuple[bool, bool]] = field(init=False, default_factory=lambda: deque(maxlen=WINDOW))
@@ -83,10 +85,12 @@ class Tally(Counts):
         self.distinct_failures += new
         self.preventable += record.collision.preventable
         self.distinct_preventable += new and record.collision.preventable
-        if record.collision.judgement is not None:
-            self.unresponsive += record.collision.judgement.unresponsive
-            self.signatures[record.collision.judgement.signature] += 1
-            self.conflicts_by_second[self._second(record.collision.judgement.conflict_s)] += 1
+        judged = record.collision.judgement
+        if judged is not None:
+            self.kinds.add(kind_of(record.collision, judged))
+            self.unresponsive += judged.unresponsive
+            self.signatures[judged.signature] += 1
+            self.conflicts_by_second[self._second(judged.conflict_s)] += 1
             self.contacts_by_second[self._second(record.collision.time_s)] += 1
 
     def _second(self, time_s: float) -> int:

@@ -76,6 +76,20 @@ def test_warm_up_acts_at_random_and_learns_nothing(random_transition: Make) -> N
     assert not np.array_equal(subject.act(np.ones(3, np.float32), explore=False), before)
 
 
+@pytest.mark.parametrize(("pace", "expected"), [(0.25, 10), (0.3, 12), (1, 40), (3, 120), (0, 0)])
+def test_updates_keep_the_pace_that_is_asked_for(pace: float, expected: int, random_transition: Make) -> None:
+    agent = CONFIG.agent.model_copy(update={"warmup_steps": 1, "updates_per_step": pace})
+    subject, updates = learner(config=CONFIG.model_copy(update={"agent": agent})), []
+    subject._update_once = lambda: updates.append(subject._steps)  # type: ignore[method-assign]
+    stream = np.random.default_rng(0)
+    for _ in range(40):
+        subject.observe(random_transition(stream))
+        subject.update()
+    assert len(updates) == expected
+    for step in range(1, 41):  # spread evenly: never more than one ahead or behind
+        assert abs(sum(at <= step for at in updates) - pace * step) < 1
+
+
 def test_nothing_is_learned_from_an_empty_memory() -> None:
     config = CONFIG.model_copy(update={"agent": CONFIG.agent.model_copy(update={"warmup_steps": 0})})
     assert learner(config=config).update() is None
@@ -88,7 +102,8 @@ def test_dual_variable_rises_with_cost_only_where_the_method_constrains_it(
     subject = learner(method)
     for _ in range(CONFIG.agent.warmup_steps):
         subject.observe(transition(cost=0.6))
-    subject.update()
+    assert subject.dual_variable == 0.0
+    subject.observe(transition(cost=0.6))
     # λ = 0 + 0.01 (0.6 - 0.1)
     assert subject.dual_variable == pytest.approx(0.005 if METHODS[method].lagrangian else 0.0)
 

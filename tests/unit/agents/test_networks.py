@@ -1,6 +1,7 @@
 import copy
 import math
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given
@@ -13,6 +14,7 @@ from risk_sac.agents.networks import (
     ONEDNN_FROM,
     Mlp,
     bounded_log_std,
+    draw_action,
     tanh_gaussian,
     tanh_gaussian_gradient,
 )
@@ -119,3 +121,25 @@ def test_a_copy_learns_apart_from_its_original() -> None:
     twin.parameters.mul_(2.0)  # the layers are views of the flat parameters, in the copy too
     assert twin.forward(inputs)[-1].item() != pytest.approx(before)
     assert network.forward(inputs)[-1].item() == before
+
+
+def test_one_input_gives_what_a_batch_gives() -> None:
+    generator = torch.Generator().manual_seed(0)
+    network = Mlp((5, 16, 16, 6), generator)
+    inputs, noise = torch.randn(40, 5, generator=generator), torch.randn(40, 3, generator=generator)
+    raw = network.forward(inputs)[-1]
+    mean, raw_log_std = raw.chunk(2, dim=1)
+    actions, _ = tanh_gaussian(mean, bounded_log_std(raw_log_std), noise)
+    for row in range(40):
+        alone = network.respond(inputs[row].numpy())
+        assert alone == pytest.approx(raw[row].numpy(), abs=1e-6)
+        assert draw_action(alone, noise[row].numpy()) == pytest.approx(actions[row].numpy(), abs=1e-6)
+        assert draw_action(alone, noise[row].numpy()).dtype == np.float32
+
+
+def test_one_input_meets_the_parameters_of_the_moment() -> None:
+    network = Mlp((2, 4, 1), torch.Generator().manual_seed(0))
+    twin = copy.deepcopy(network)
+    network.parameters.zero_()
+    assert network.respond(np.ones(2, np.float32)).tolist() == [0.0]
+    assert twin.respond(np.ones(2, np.float32)).tolist() != [0.0]

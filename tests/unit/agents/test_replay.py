@@ -14,20 +14,27 @@ CONFIG = ReplayConfig(capacity=1000)
 KINDS = pytest.mark.parametrize("kind", [UniformReplay, RiskPrioritizedReplay])
 
 
+def store(replay: Replay, transition: Transition, td_error: float) -> None:
+    """Adds a transition and tells its |δ|, as the learner does before it draws."""
+    replay.add(transition)
+    new = replay.take_unmeasured()
+    if new is not None:
+        replay.update(new.indices, np.array([td_error]))
+
+
 def filled(kind: type[Replay], count: int, make: Make, seed: int = 0) -> Replay:
     replay = kind(3, 2, CONFIG)
     generator = np.random.default_rng(seed)
     for _ in range(count):
-        replay.add(make(generator), float(generator.exponential()))
+        store(replay, make(generator), float(generator.exponential()))
     return replay
 
 
 @KINDS
 def test_a_batch_holds_what_was_stored(kind: type[Replay], transition: Make) -> None:
     replay = kind(3, 2, CONFIG)
-    replay.add(
-        transition(0.5, cost=0.2, robustness=-1.5, next_robustness=2.5, terminated=True, accumulated_reward=9.0), 0.1
-    )
+    stored = transition(0.5, cost=0.2, robustness=-1.5, next_robustness=2.5, terminated=True, accumulated_reward=9.0)
+    store(replay, stored, 0.1)
     batch = replay.sample(4, np.random.default_rng(0))
     assert batch.observation.tolist() == [[0.5, 0.5, 0.5]] * 4
     assert batch.next_observation.tolist() == [[1.5, 1.5, 1.5]] * 4
@@ -46,7 +53,7 @@ def test_a_batch_holds_what_was_stored(kind: type[Replay], transition: Make) -> 
 def test_the_oldest_transition_gives_way_once_full(kind: type[Replay], transition: Make) -> None:
     replay = kind(3, 2, CONFIG)
     for value in range(CONFIG.capacity + 10):
-        replay.add(transition(float(value)), 1.0)
+        store(replay, transition(float(value)), 1.0)
     assert len(replay) == CONFIG.capacity
     batch = replay.sample(4096, np.random.default_rng(0))
     assert batch.risk_reward.min() >= 10.0
@@ -57,17 +64,17 @@ def test_the_oldest_transition_gives_way_once_full(kind: type[Replay], transitio
 @pytest.mark.parametrize("field", ["risk_reward", "cost", "next_robustness"])
 def test_a_transition_that_is_not_finite_is_refused(kind: type[Replay], field: str, transition: Make) -> None:
     with pytest.raises(NotFinite):
-        kind(3, 2, CONFIG).add(transition(**{field: float("nan")}), 1.0)
+        kind(3, 2, CONFIG).add(transition(**{field: float("nan")}))
 
 
 @pytest.mark.parametrize("changes", [{"accumulated_reward": float("inf")}, {"robustness": float("-inf")}])
 def test_a_priority_that_is_not_finite_is_refused(changes: dict[str, float], transition: Make) -> None:
     replay = RiskPrioritizedReplay(3, 2, CONFIG)
     with pytest.raises(NotFinite):
-        replay.add(transition(**changes), 1.0)
-    with pytest.raises(NotFinite):
-        replay.add(transition(), float("nan"))
+        replay.add(transition(**changes))
     assert len(replay) == 0
+    with pytest.raises(NotFinite):
+        store(replay, transition(), float("nan"))
 
 
 def test_uniform_draws_every_transition_equally_often(random_transition: Make) -> None:
@@ -101,7 +108,7 @@ def test_rper_weights_follow_equation_10(random_transition: Make) -> None:
 def test_rper_prefers_risk_and_surprise(transition: Make) -> None:
     replay = RiskPrioritizedReplay(3, 2, CONFIG)
     for slot in range(64):
-        replay.add(transition(robustness=-2.0 if slot == 7 else 1.0), 5.0 if slot == 9 else 0.1)
+        store(replay, transition(robustness=-2.0 if slot == 7 else 1.0), 5.0 if slot == 9 else 0.1)
     counts = np.bincount(replay.sample(4096, np.random.default_rng(0)).indices, minlength=64)
     assert set(np.argsort(counts)[-2:]) == {7, 9}
     assert counts.min() > 0
@@ -110,7 +117,7 @@ def test_rper_prefers_risk_and_surprise(transition: Make) -> None:
 def test_rper_is_uniform_while_nothing_tells_transitions_apart(transition: Make) -> None:
     replay = RiskPrioritizedReplay(3, 2, CONFIG)
     for _ in range(30):
-        replay.add(transition(), 0.7)
+        store(replay, transition(), 0.7)
     batch = replay.sample(30, np.random.default_rng(0))
     assert sorted(batch.indices) == list(range(30))
     assert batch.weight.tolist() == [1.0] * 30
@@ -120,7 +127,7 @@ def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(ran
     replay = RiskPrioritizedReplay(3, 2, CONFIG)
     generator = np.random.default_rng(3)
     for _ in range(2500):
-        replay.add(random_transition(generator), float(generator.exponential()))
+        store(replay, random_transition(generator), float(generator.exponential()))
         if generator.uniform() < 0.2:
             indices = replay.sample(16, generator).indices
             replay.update(indices, generator.exponential(size=16))
@@ -136,6 +143,23 @@ def test_rper_scales_follow_what_is_stored(random_transition: Make) -> None:
     assert np.array_equal(replay._scales.inverse_spread, scales.inverse_spread)
 
 
+def test_rper_hands_out_the_new_transitions_once_and_in_their_order(transition: Make) -> None:
+    replay = RiskPrioritizedReplay(3, 2, CONFIG)
+    assert replay.take_unmeasured() is None
+    for count in (3, 4, CONFIG.capacity + 5):  # the last wraps around, and its first five are overwritten
+        for value in range(count):
+            replay.add(transition(float(value)))
+        restored = RiskPrioritizedReplay(3, 2, CONFIG)
+        restored.load(replay.state())
+        for each in (replay, restored):
+            new = each.take_unmeasured()
+            assert new is not None
+            assert new.risk_reward.tolist() == list(range(max(0, count - CONFIG.capacity), count))
+            assert each.take_unmeasured() is None
+            each.update(new.indices, new.risk_reward.double().numpy())
+            assert each._terms[0, new.indices].tolist() == new.risk_reward.tolist()
+
+
 @KINDS
 def test_a_loaded_replay_draws_what_the_original_draws(kind: type[Replay], random_transition: Make) -> None:
     original = filled(kind, 1300, random_transition)  # has wrapped around
@@ -147,7 +171,7 @@ def test_a_loaded_replay_draws_what_the_original_draws(kind: type[Replay], rando
     for replay in (original, loaded):
         stream = np.random.default_rng(5)
         for _ in range(800):  # crosses a rescaling
-            replay.add(random_transition(stream), float(stream.exponential()))
+            store(replay, random_transition(stream), float(stream.exponential()))
             drawn = replay.sample(8, stream)
             replay.update(drawn.indices, stream.exponential(size=8))
     first, second = (replay.sample(256, np.random.default_rng(6)) for replay in (original, loaded))
