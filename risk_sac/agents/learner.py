@@ -20,6 +20,7 @@ from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.risk.reward import TrainingReward
+from risk_sac.types import Floats
 
 
 class Learner:
@@ -28,6 +29,9 @@ class Learner:
     Attributes:
       device: where the networks live.
     """
+
+    genes = 0
+    hopeless = False
 
     def __init__(
         self, observation_size: int, action_size: int, method: Method, config: LearnerConfig, seed: int
@@ -61,6 +65,9 @@ class Learner:
     def temperature(self) -> float:
         """α."""
         return self._agent.temperature
+
+    def begin(self, genes: Floats) -> None:
+        """An episode begins; there are no genes."""
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
         """Action in [-1, 1], `action_size`; uniformly random in the first `warmup_steps` explored steps."""
