@@ -16,6 +16,7 @@ from risk_sac.scripts.seen import NOTHING, Act, Seen
 
 EARLIEST_S = 0.5  # after the release: what comes of a motion within the first second is nobody's failure
 LATEST_CUE_S = 6.0  # after that
+NEAREST_CUE_S, CUES_S = 0.3, 4.0  # from meeting the ego
 LONGEST_S = 4.0  # of a strike
 OVER_S = 3.0  # after which nothing more comes of a strike
 SAME_WAY_COS = 0.9
@@ -27,6 +28,8 @@ BACKMOST_M, FOREMOST_M = 0.0, 20.0  # along it: who is farther back strikes its 
 FASTER_MPS = 5.0  # than the ego, at most, to take up a place
 CATCHING_UP = 0.5  # 1/s, of the way to that place
 ANSWER = 0.5  # of full drive, for 1 m/s of difference
+LEAST_EFFORT = 0.4  # of who keeps its time
+IN_THE_WAY_M, WAITING_M = 1.4, 8.0  # from the ego's axis: in its corridor, and the farthest place to wait at
 
 
 class Genes(NamedTuple):
@@ -60,10 +63,14 @@ def act(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
 
 
 def cue(genes: Genes, seen: Seen, pedestrian: bool) -> bool:
-    """Whether it is time to strike: for a pedestrian when the ego is 0.3 to 4.3 s away, else at a time of its own."""
-    if pedestrian:
-        return 0.0 < seen.x_m < (0.3 + 4.0 * genes.cue) * seen.ego_mps
-    return seen.time_s >= EARLIEST_S + LATEST_CUE_S * genes.cue
+    """Whether it is time to strike: for who drives the ego's way at a time of its own, for all others as the ego nears.
+
+    Near is 0.3 to 4.3 s from meeting, as both approach along the ego's axis.
+    """
+    if not pedestrian and seen.cos > SAME_WAY_COS:
+        return seen.time_s >= EARLIEST_S + LATEST_CUE_S * genes.cue
+    closing_mps = seen.ego_mps - seen.cos * seen.speed_mps
+    return 0.0 < seen.x_m < (NEAREST_CUE_S + CUES_S * genes.cue) * closing_mps
 
 
 def is_over(genes: Genes, since_cue_s: float) -> bool:
@@ -88,23 +95,26 @@ def alongside(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
 
 
 def crossing(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
-    """A vehicle from across or opposite: keeps its time to where the ways cross, then goes for it.
+    """A vehicle from across or opposite: keeps its time to where the ways cross, then goes for it, or waits.
 
     `place` is how much later than the ego it means to be there, 2 s at most, or how it drives where the ways do not
-    cross; `aside` is how hard it works at that. `drive`, `steer` and `after` are as in `alongside`, but left is left.
+    cross; `aside` is how hard it works at that, against what its driver would do at a red light. `drive`, `steer` and
+    `after` are as in `alongside`, but left is left.
     """
     if since_cue_s < 0.0:
-        return Act(genes.aside * _keeping_time(genes, seen), 0.0)
+        return Act((LEAST_EFFORT + (1.0 - LEAST_EFFORT) * genes.aside) * _keeping_time(genes, seen), 0.0)
     return _strike(genes, since_cue_s, 0.5 * _signed(genes.steer))
 
 
 def walking(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
-    """A pedestrian: waits (`aside` < ½) or walks on, then steps out, and may pause, or turn.
+    """A pedestrian: walks up to the ego's way and waits there, or walks on, then steps out, and may pause or turn.
 
-    `drive` and `steer` are those of the strike, `after` is the drive that follows.
+    `aside` is how far from the ego's axis it waits, up to 8 m; within 1.4 m it does not wait. `drive` and `steer` are
+    those of the strike, `after` is the drive that follows.
     """
     if since_cue_s < 0.0:
-        return Act(-1.0, 0.0) if genes.aside < 0.5 else NOTHING
+        aside_m = WAITING_M * genes.aside
+        return Act(-1.0, 0.0) if IN_THE_WAY_M < abs(seen.y_m) < aside_m else NOTHING
     return _strike(genes, since_cue_s, 0.6 * _signed(genes.steer))
 
 

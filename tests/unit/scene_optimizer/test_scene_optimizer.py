@@ -343,5 +343,6 @@ def test_simple_regret_is_a_fraction_of_sobols(function, largest, dimension, noi
         asked = drive(optimizer, 80, lambda episode, u: function(u) + noises[episode])
         return largest - max(map(function, asked))
 
-    found, by_chance = (np.mean([regret(kind, seed) for seed in range(3)]) for kind in (BotorchOptimizer, SobolOptimizer))
+    pair = BotorchOptimizer, SobolOptimizer
+    found, by_chance = (np.mean([regret(kind, seed) for seed in range(3)]) for kind in pair)
     assert found < share * by_chance

@@ -74,15 +74,22 @@ def test_crossing_traffic_hurries_when_it_would_be_late_and_waits_when_early(sid
     assert act(keen, late, -0.1, pedestrian=False).drive == 1.0
     assert act(keen, early, -0.1, pedestrian=False).drive == -1.0
     assert act(keen, late._replace(y_m=20.0 * side), -0.1, pedestrian=False).drive == 0.0
-    assert act(keen._replace(aside=0.0), late, -0.1, pedestrian=False).drive == 0.0
+    assert act(keen._replace(aside=0.0), late, -0.1, pedestrian=False).drive == 0.4
+
+
+def test_crossing_traffic_has_its_cue_when_the_ego_is_near():
+    oncoming = Seen(0.0, 50.0, 3.0, -1.0, 0.0, 10.0, 10.0)  # 2.5 s from meeting
+    assert cue(MIDDLE._replace(cue=0.6), oncoming, pedestrian=False)
+    assert not cue(MIDDLE, oncoming, pedestrian=False)
 
 
 def test_a_pedestrian_waits_or_walks_on_until_the_ego_is_near():
     far, near = (Seen(3.0, x_m, -5.0, 0.0, 1.0, 1.0, 10.0) for x_m in (30.0, 20.0))
     assert not cue(MIDDLE, far, pedestrian=True)
     assert cue(MIDDLE, near, pedestrian=True)
-    assert act(MIDDLE._replace(aside=0.2), far, -0.1, pedestrian=True).drive == -1.0
-    assert act(MIDDLE._replace(aside=0.8), far, -0.1, pedestrian=True) == Act(0.0, 0.0)
+    assert act(MIDDLE._replace(aside=0.7), far, -0.1, pedestrian=True).drive == -1.0
+    assert act(MIDDLE._replace(aside=0.6), far, -0.1, pedestrian=True) == Act(0.0, 0.0)
+    assert act(MIDDLE, far._replace(y_m=1.3), -0.1, pedestrian=True) == Act(0.0, 0.0)
     assert act(MIDDLE._replace(drive=1.0), near, 0.0, pedestrian=True).drive == 1.0
 
 
