@@ -20,7 +20,7 @@ class ScriptFollower:
 
     Attributes:
       hopeless: whether nothing is to be expected of the episode any more: all that act have fallen behind, or have been
-        through with their scripts for a while.
+        through with their scripts for a while. Choice: such an episode is truncated; it counts as safe, with its steps.
     """
 
     device = "cpu"

@@ -78,7 +78,7 @@ class Elites:
         """Takes up how near each adversary came to the ego, where none was nearer."""
         for name, gap_m in nearest_m.items():
             known = self._misses.get(name)
-            if known is None or gap_m < known.gap_m:
+            if known is None or gap_m <= known.gap_m:
                 self._misses[name] = Elite(
                     point=point, worth=NEAR_MISS_WORTH, striker=name, kind=f"near miss of {name}", gap_m=gap_m
                 )
