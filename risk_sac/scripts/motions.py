@@ -23,8 +23,9 @@ SAME_WAY_COS = 0.9
 CROSSING_SIN = 0.4
 
 IN_LANE_M = 1.2  # who is nearer to the ego's axis is its leader
-NEAREST_M, FARTHEST_M = 1.9, 3.5  # from the ego's axis: touching it, and beyond the middle of the next lane
-BACKMOST_M, FOREMOST_M = 0.0, 20.0  # along it: who is farther back strikes its flank
+NEAREST_M, FARTHEST_M = 1.9, 3.1  # from the ego's axis: touching it, and hardly off the middle of the next lane
+FOREMOST_M = 12.0  # along it, from the ego's middle: who is farther back than that strikes its flank
+BEFORE_M = 5.0  # a leader's middle before the ego's, at least
 FASTER_MPS = 5.0  # than the ego, at most, to take up a place
 CATCHING_UP = 0.5  # 1/s, of the way to that place
 ANSWER = 0.5  # of full drive, for 1 m/s of difference
@@ -85,13 +86,17 @@ def alongside(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
     and `steer`, towards the ego, are those of the strike, `after` is the drive that follows.
     """
     if since_cue_s < 0.0:
-        away_m = BACKMOST_M + (FOREMOST_M - BACKMOST_M) * genes.place - seen.x_m
-        wanted_mps = seen.ego_mps + _clip(CATCHING_UP * away_m, FASTER_MPS)
-        if seen.time_s < EARLIEST_S:
-            return Act(_clip(ANSWER * (wanted_mps - seen.speed_mps)), 0.0)
-        aside_m = NEAREST_M + (FARTHEST_M - NEAREST_M) * genes.aside if abs(seen.y_m) > IN_LANE_M else 0.0
-        return Act(_clip(ANSWER * (wanted_mps - seen.speed_mps)), _clip(math.copysign(aside_m, seen.y_m) - seen.y_m))
+        return _taking_place(genes, seen)
     return _strike(genes, since_cue_s, genes.steer * _clip(-seen.y_m))
+
+
+def _taking_place(genes: Genes, seen: Seen) -> Act:
+    leads = abs(seen.y_m) < IN_LANE_M
+    place_m = FOREMOST_M * genes.place + (BEFORE_M if leads else 0.0)
+    aside_m = 0.0 if leads else NEAREST_M + (FARTHEST_M - NEAREST_M) * genes.aside
+    wanted_mps = seen.ego_mps + _clip(CATCHING_UP * (place_m - seen.x_m), FASTER_MPS)
+    steer = _clip(math.copysign(aside_m, seen.y_m) - seen.y_m) if seen.time_s >= EARLIEST_S else 0.0
+    return Act(_clip(ANSWER * (wanted_mps - seen.speed_mps)), steer)
 
 
 def crossing(genes: Genes, seen: Seen, since_cue_s: float) -> Act:

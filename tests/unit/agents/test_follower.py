@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from risk_sac.agents.follower import BEHIND_STEPS, ScriptFollower
 from risk_sac.observation import PER_ADVERSARY, X_M, Y_M
@@ -26,7 +27,7 @@ def test_it_has_genes_for_every_adversary():
 
 
 def test_who_is_passive_does_nothing_and_one_at_least_acts():
-    ahead = observed((10, 3.3), (12, 3.3), (14, -3.3))
+    ahead = observed((6, 3.3), (12, 3.3), (14, -3.3))
     action = follower(0.1, 0.9, 0.3).act(ahead).reshape(-1, 2)
     assert not action[[0, 2]].any()
     assert action[1].any()
@@ -40,12 +41,11 @@ def test_who_has_left_the_net_does_nothing():
 
 
 def test_it_strikes_at_its_cue_and_begins_anew_with_every_episode():
-    subject, ahead = follower(0.9, 0.0, 0.0), observed((10, 3.3), (12, 3.3), (14, -3.3))
+    subject, ahead = follower(0.9, 0.0, 0.0), observed((6, 3.3), (12, 3.3), (14, -3.3))
     drives = [subject.act(ahead)[0] for _ in range(10)]
-    assert drives[:5] == [0.0] * 5  # 10 m ahead is where it wants to be
-    assert drives[5:] == [-1.0] * 5
+    assert drives == pytest.approx([0.0] * 5 + [-1.0] * 5, abs=1e-6)  # 6 m ahead is where it wants to be
     subject.begin(np.tile(MIDDLE, 3))
-    assert subject.act(ahead)[0] == 0.0
+    assert subject.act(ahead)[0] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_an_episode_is_hopeless_once_all_that_act_have_fallen_behind():
@@ -59,7 +59,7 @@ def test_an_episode_is_hopeless_once_all_that_act_have_fallen_behind():
 
 
 def test_an_episode_is_hopeless_a_while_after_the_last_strike():
-    subject, ahead = follower(0.9, 0.0, 0.0), observed((10, 3.3), (12, 3.3), (14, -3.3))
+    subject, ahead = follower(0.9, 0.0, 0.0), observed((6, 3.3), (12, 3.3), (14, -3.3))
     steps = 0
     while not subject.hopeless:
         subject.act(ahead)

@@ -50,8 +50,8 @@ def test_who_drives_the_egos_way_does_the_same_from_the_other_side(script, one, 
 
 def test_a_neighbour_takes_up_its_place_and_then_comes_over():
     far = MIDDLE._replace(place=1.0, aside=0.0)
-    assert act(far, beside(), -0.1, pedestrian=False) == Act(1.0, -1.0)  # up to 20 m ahead, and to the edge of its lane
-    assert act(far, beside(20.0, 1.9), -0.1, pedestrian=False) == Act(0.0, 0.0)
+    assert act(far, beside(), -0.1, pedestrian=False) == Act(1.0, -1.0)  # up to 12 m ahead, and to the edge of its lane
+    assert act(far, beside(12.0, 1.9), -0.1, pedestrian=False) == Act(0.0, 0.0)
     strike = MIDDLE._replace(drive=0.0, steer=0.7, after=1.0, lasts=0.25)
     assert act(strike, beside(), 0.5, pedestrian=False) == Act(-1.0, -0.7)
     assert act(strike, beside(), 1.5, pedestrian=False) == Act(1.0, 0.0)
@@ -63,7 +63,7 @@ def test_a_neighbour_stays_in_the_middle_of_its_lane_right_after_the_release():
 
 
 def test_a_leader_keeps_its_lane_until_its_cue():
-    assert act(MIDDLE, beside(12.0, 0.2), -0.1, pedestrian=False).steer == pytest.approx(-0.2)
+    assert act(MIDDLE, beside(11.0, 0.2), -0.1, pedestrian=False) == Act(0.0, pytest.approx(-0.2))
 
 
 @pytest.mark.parametrize("side", [1, -1])
