@@ -12,7 +12,7 @@ while before it brakes, a pedestrian may hesitate.
 import math
 from typing import NamedTuple
 
-from risk_sac.scripts.seen import NOTHING, Act, Seen
+from risk_sac.scripts.seen import Act, Seen
 
 EARLIEST_S = 0.5  # after the release: what comes of a motion within the first second is nobody's failure
 LATEST_CUE_S = 6.0  # after that
@@ -30,7 +30,7 @@ FASTER_MPS = 5.0  # than the ego, at most, to take up a place
 CATCHING_UP = 0.5  # 1/s, of the way to that place
 ANSWER = 0.5  # of full drive, for 1 m/s of difference
 LEAST_EFFORT = 0.4  # of who keeps its time
-IN_THE_WAY_M, WAITING_M = 1.4, 8.0  # from the ego's axis: in its corridor, and the farthest place to wait at
+TURNING = 0.5  # of what is possible, at most
 
 
 class Genes(NamedTuple):
@@ -58,9 +58,8 @@ def act(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
       since_cue_s: negative before its cue.
       pedestrian: whether it is one.
     """
-    if pedestrian:
-        return walking(genes, seen, since_cue_s)
-    return (alongside if seen.cos > SAME_WAY_COS else crossing)(genes, seen, since_cue_s)
+    same_way = seen.cos > SAME_WAY_COS and not pedestrian
+    return (alongside if same_way else crossing)(genes, seen, since_cue_s)
 
 
 def cue(genes: Genes, seen: Seen, pedestrian: bool) -> bool:
@@ -100,27 +99,16 @@ def _taking_place(genes: Genes, seen: Seen) -> Act:
 
 
 def crossing(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
-    """A vehicle from across or opposite: keeps its time to where the ways cross, then goes for it, or waits.
+    """A vehicle from across or opposite, or a pedestrian: keeps its time to where the ways cross, then goes for it.
 
-    `place` is how much later than the ego it means to be there, 2 s at most, or how it drives where the ways do not
-    cross; `aside` is how hard it works at that, against what its driver would do at a red light. `drive`, `steer` and
-    `after` are as in `alongside`, but left is left.
+    `place` is how much later than the ego it means to be there, 2 s at most, or how it moves where the ways do not
+    cross; `aside` is how hard it works at that, against what a driver would do at a red light. So it waits for the ego,
+    slows down as the ego does, and sets off when the ego does. `drive` and `steer`, to the left or the right, are those
+    of the strike, `after` is the drive that follows.
     """
     if since_cue_s < 0.0:
         return Act((LEAST_EFFORT + (1.0 - LEAST_EFFORT) * genes.aside) * _keeping_time(genes, seen), 0.0)
-    return _strike(genes, since_cue_s, 0.5 * _signed(genes.steer))
-
-
-def walking(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
-    """A pedestrian: walks up to the ego's way and waits there, or walks on, then steps out, and may pause or turn.
-
-    `aside` is how far from the ego's axis it waits, up to 8 m; within 1.4 m it does not wait. `drive` and `steer` are
-    those of the strike, `after` is the drive that follows.
-    """
-    if since_cue_s < 0.0:
-        aside_m = WAITING_M * genes.aside
-        return Act(-1.0, 0.0) if IN_THE_WAY_M < abs(seen.y_m) < aside_m else NOTHING
-    return _strike(genes, since_cue_s, 0.6 * _signed(genes.steer))
+    return _strike(genes, since_cue_s, TURNING * _signed(genes.steer))
 
 
 def _strike(genes: Genes, since_cue_s: float, steer: float) -> Act:

@@ -28,9 +28,6 @@ class Act(NamedTuple):
     steer: float
 
 
-NOTHING = Act(0.0, 0.0)  # a vehicle's own driver drives, a pedestrian walks on
-
-
 def adversaries_seen(observation: NDArray[np.float32], adversaries: int, step: int) -> list[Seen | None]:
     """Each adversary, in the family's order; None for one that has left the net.
 

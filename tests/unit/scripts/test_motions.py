@@ -83,14 +83,16 @@ def test_crossing_traffic_has_its_cue_when_the_ego_is_near():
     assert not cue(MIDDLE, oncoming, pedestrian=False)
 
 
-def test_a_pedestrian_waits_or_walks_on_until_the_ego_is_near():
-    far, near = (Seen(3.0, x_m, -5.0, 0.0, 1.0, 1.0, 10.0) for x_m in (30.0, 20.0))
-    assert not cue(MIDDLE, far, pedestrian=True)
-    assert cue(MIDDLE, near, pedestrian=True)
-    assert act(MIDDLE._replace(aside=0.7), far, -0.1, pedestrian=True).drive == -1.0
-    assert act(MIDDLE._replace(aside=0.6), far, -0.1, pedestrian=True) == Act(0.0, 0.0)
-    assert act(MIDDLE, far._replace(y_m=1.3), -0.1, pedestrian=True) == Act(0.0, 0.0)
-    assert act(MIDDLE._replace(drive=1.0), near, 0.0, pedestrian=True).drive == 1.0
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_pedestrian_waits_for_the_ego_and_then_steps_out(side):
+    far = Seen(3.0, 60.0, -5.0 * side, 0.0, 1.0 * side, 1.0, 10.0)
+    near = far._replace(x_m=40.0)
+    keen = MIDDLE._replace(aside=1.0, cue=0.2, drive=0.7)
+    assert act(keen, far, -0.1, pedestrian=True).drive == -1.0
+    assert act(keen, near, -0.1, pedestrian=True).drive == 1.0
+    assert not cue(keen, far._replace(x_m=11.5), pedestrian=True)
+    assert cue(keen, far._replace(x_m=10.5), pedestrian=True)
+    assert act(keen, near, 0.0, pedestrian=True).drive == pytest.approx(0.4)
 
 
 def test_a_vehicle_has_its_cue_at_a_time_of_its_own():
