@@ -18,6 +18,7 @@ from risk_sac.types import Bools, Floats, Frame
 from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
 
 PER_ACTOR = (*MOTION, "link")
+ON_THE_MOVE_MPS = 1.0
 
 
 PER_OTHER: dict[str, Callable[[Assessment], Floats | Bools]] = {
@@ -59,9 +60,11 @@ class Trace:
         return min(m.soft_min for m in self.since_release)
 
     def nearest_m(self, actors: Collection[str]) -> dict[str, float]:
-        """How near each of some actors came to the ego since the release, m, while it was ahead and in sight."""
+        """How near each of some actors came to the ego, m, while it was ahead and in sight and the ego on the move."""
         nearest: dict[str, float] = {}
         for frame, measures in zip(self.frames[self.released :], self.since_release, strict=True):
+            if frame.ego_speed_mps < ON_THE_MOVE_MPS:
+                continue
             ahead_m, gap_m, seen = (measures.assessment.others[row].tolist() for row in (AHEAD, GAP, SEEN))
             for name, ahead, gap, visible in zip(frame.ids[1:], ahead_m, gap_m, seen, strict=True):
                 if ahead > 0.0 and visible and name in actors:

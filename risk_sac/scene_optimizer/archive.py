@@ -14,7 +14,7 @@ from risk_sac.scene_optimizer.elites import Elite, Elites
 from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
 from risk_sac.types import Floats
 
-INITIAL, RANDOM_SHARE = 12, 0.2  # points drawn at random: the first ones, and of the rest
+INITIAL, RANDOM_SHARE = 12, 0.15  # points drawn at random: the first ones, and of the rest, where elites abound
 DEVIATIONS = (0.05, 0.15, 0.4)  # of a mutation
 SHARES = (0.2, 0.5, 1.0)  # of the coordinates that it changes
 CROSSED, CROSSING_DEVIATION = 0.5, 0.2  # how often, and how far, it also moves along the line to another elite
@@ -37,7 +37,8 @@ class ArchiveOptimizer:
         """See `SceneOptimizer.ask`."""
         self._asked += 1
         pool = self._elites.pool()
-        if self._asked <= INITIAL or not pool or self._random.random() < RANDOM_SHARE:
+        random_share = max(RANDOM_SHARE, 1.0 / (2 + self._elites.failures))
+        if self._asked <= INITIAL or not pool or self._random.random() < random_share:
             self._parent = None
             return self._random.random(self._dimension)
         self._parent = self._elites.draw(pool, self._random)

@@ -21,7 +21,7 @@ class Encounter:
 
     collision: Collision | None = None
     nearest_m: Mapping[str, float] = field(default_factory=dict)
-    """Adversary → how near it came to the ego while it was ahead and in sight; who never was is left out."""
+    """Adversary → how near it came while it was ahead and in sight, the ego on the move; who never was is left out."""
 
 
 NOBODY = Encounter()

@@ -44,6 +44,11 @@ class Elites:
         self._misses: dict[str, Elite] = {}  # by adversary
         self._preventable: set[str] = set()  # niches
 
+    @property
+    def failures(self) -> int:
+        """Niches that were reached."""
+        return len(self._failures)
+
     def pool(self) -> list[Elite]:
         """Whom to build on: all failures, and the near misses of who has none."""
         struck = {elite.striker for elite in self._failures.values()}
