@@ -13,6 +13,7 @@ from risk_sac.types import STEP_S, Floats
 
 PASSIVE = 0.4  # an adversary whose gene `active` is smaller does nothing, unless it is the largest of all
 BEHIND_M, BEHIND_STEPS = 6.0, 8  # who has fallen so far behind the ego, and for so long, will not strike it any more
+STANDING_MPS, STANDING_STEPS = 0.5, 30  # an ego that stands for so long waits for a signal, or for a queue
 
 
 class ScriptFollower:
@@ -20,7 +21,8 @@ class ScriptFollower:
 
     Attributes:
       hopeless: whether nothing is to be expected of the episode any more: all that act have fallen behind, or have been
-        through with their scripts for a while. Choice: such an episode is truncated; it counts as safe, with its steps.
+        through with their scripts for a while, or the ego stands and stands. Choice: such an episode is truncated; it
+        counts as safe, with its steps.
     """
 
     device = "cpu"
@@ -43,7 +45,7 @@ class ScriptFollower:
         threshold = min(PASSIVE, max(row[0] for row in rows))
         self._scripts = [Genes(*row) if row[0] >= threshold else None for row in rows]
         self._cued: list[int | None] = [None] * len(rows)
-        self._step, self._behind = 0, 0
+        self._step, self._behind, self._standing = 0, 0, 0
         self.hopeless = False
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
@@ -75,7 +77,10 @@ class ScriptFollower:
         ]
         behind = all(one.x_m < -BEHIND_M for _, one, _ in acting)
         self._behind = self._behind + 1 if behind else 0
-        self.hopeless = self._behind >= BEHIND_STEPS or all(is_over(script, since_s) for script, _, since_s in acting)
+        standing = all(one.ego_mps < STANDING_MPS for _, one, _ in acting)
+        self._standing = self._standing + 1 if standing else 0
+        over = all(is_over(script, since_s) for script, _, since_s in acting)
+        self.hopeless = over or self._behind >= BEHIND_STEPS or self._standing >= STANDING_STEPS
 
     def observe(self, transition: Transition) -> None:
         """Forgets it."""

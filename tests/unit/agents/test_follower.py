@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from risk_sac.agents.follower import BEHIND_STEPS, ScriptFollower
+from risk_sac.agents.follower import BEHIND_STEPS, STANDING_STEPS, ScriptFollower
 from risk_sac.observation import PER_ADVERSARY, X_M, Y_M
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scripts.motions import SIZE, Genes
@@ -56,6 +56,16 @@ def test_an_episode_is_hopeless_once_all_that_act_have_fallen_behind():
     assert subject.hopeless
     subject.begin(np.tile(MIDDLE, 3))
     assert not subject.hopeless
+
+
+def test_an_episode_is_hopeless_once_the_ego_has_stood_for_a_while():
+    subject, ahead = follower(0.9, 0.0, 0.0), observed((6, 3.3), (12, 3.3), (14, -3.3))
+    standing = ahead.copy()
+    standing[-1] = 0.0
+    for observation in [standing] * 10 + [ahead] + [standing] * STANDING_STEPS:
+        assert not subject.hopeless
+        subject.act(observation)
+    assert subject.hopeless
 
 
 def test_an_episode_is_hopeless_a_while_after_the_last_strike():
