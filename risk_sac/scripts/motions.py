@@ -94,7 +94,7 @@ def _taking_place(genes: Genes, seen: Seen) -> Act:
     place_m = FOREMOST_M * genes.place + (BEFORE_M if leads else 0.0)
     aside_m = 0.0 if leads else NEAREST_M + (FARTHEST_M - NEAREST_M) * genes.aside
     wanted_mps = seen.ego_mps + _clip(CATCHING_UP * (place_m - seen.x_m), FASTER_MPS)
-    waits_s = EARLIEST_S + LATEST_CUE_S * genes.cue / 2  # it comes out of its lane half-way to its cue
+    waits_s = EARLIEST_S + LATEST_CUE_S * genes.cue / 4  # for most of the time to its cue it is beside the ego
     steer = _clip(math.copysign(aside_m, seen.y_m) - seen.y_m) if seen.time_s >= waits_s else 0.0
     return Act(_clip(ANSWER * (wanted_mps - seen.speed_mps)), steer)
 

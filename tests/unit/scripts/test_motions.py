@@ -57,9 +57,9 @@ def test_a_neighbour_takes_up_its_place_and_then_comes_over():
     assert act(strike, beside(), 1.5, pedestrian=False) == Act(1.0, 0.0)
 
 
-def test_a_neighbour_stays_in_the_middle_of_its_lane_half_of_the_time_to_its_cue():
-    assert act(MIDDLE, beside(time_s=1.9), -0.1, pedestrian=False).steer == 0.0
-    assert act(MIDDLE, beside(time_s=2.0), -0.1, pedestrian=False).steer < 0.0
+def test_a_neighbour_stays_in_the_middle_of_its_lane_a_quarter_of_the_time_to_its_cue():
+    assert act(MIDDLE, beside(time_s=1.2), -0.1, pedestrian=False).steer == 0.0
+    assert act(MIDDLE, beside(time_s=1.3), -0.1, pedestrian=False).steer < 0.0
 
 
 def test_a_leader_keeps_its_lane_until_its_cue():
