@@ -30,7 +30,7 @@ class Elite:
     point: Floats  # its scene and its genes, in the unit cube
     worth: float
     striker: str
-    kind: str  # elites of one kind share their chances, as do those of one striker
+    kind: str  # elites of one kind share their chances
     gap_m: float = 0.0  # that a near miss left
     drawn: int = 0
     credit: float = 0.0  # for what was new among its children
@@ -57,11 +57,10 @@ class Elites:
     def draw(self, pool: list[Elite], random: np.random.Generator) -> Elite:
         """One of the pool, the likelier the more it is worth and yielded, and the less it and its kind were tried.
 
-        p ∝ worth · (1 + credit) / (1 + drawn) / √(elites of its kind · elites of its striker)
+        p ∝ worth · (1 + credit) / (1 + drawn) / √(elites of its kind)
         """
-        kinds, strikers = Counter(e.kind for e in pool), Counter(e.striker for e in pool)
-        shared = [math.sqrt(kinds[e.kind] * strikers[e.striker]) for e in pool]
-        weights = np.array([e.worth * (1 + e.credit) / (1 + e.drawn) / n for e, n in zip(pool, shared, strict=True)])
+        alike = Counter(elite.kind for elite in pool)
+        weights = np.array([e.worth * (1 + e.credit) / (1 + e.drawn) / math.sqrt(alike[e.kind]) for e in pool])
         elite = pool[random.choice(len(pool), p=weights / weights.sum())]
         elite.drawn += 1
         return elite
