@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.random import RandomAgent
 from risk_sac.agents.scripted import ScriptedAgent
@@ -23,17 +24,22 @@ from risk_sac.run_folder.durable import sha256
 from risk_sac.run_folder.episode_json import records_from_json, records_to_json
 from risk_sac.run_folder.results import FAILURES, series_name
 from risk_sac.run_folder.series import write_series
-from risk_sac.scene_optimizer import BotorchOptimizer, SceneOptimizer, SobolOptimizer
+from risk_sac.scene_optimizer import ArchiveOptimizer, BotorchOptimizer, SceneOptimizer, SobolOptimizer
 
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
 PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
-Actor = Learner | RandomAgent | ScriptedAgent
+Actor = Learner | RandomAgent | ScriptedAgent | ScriptFollower
 CONTROLS: Mapping[str, type[RandomAgent | ScriptedAgent]] = {
     "scripted": ScriptedAgent,
     "random": RandomAgent,
     "none": RandomAgent,
+}
+OPTIMIZERS: Mapping[str, type[BotorchOptimizer | ArchiveOptimizer | SobolOptimizer]] = {
+    "botorch": BotorchOptimizer,
+    "archive": ArchiveOptimizer,
+    "sobol": SobolOptimizer,
 }
 
 
@@ -58,7 +64,8 @@ class RunState:
       spec: what to run.
       problem: what to falsify.
       env: the closed loop.
-      optimizer: proposes the scenes.
+      scene_size: coordinates of a proposed point that say the scene; those behind are the genes of scripts.
+      optimizer: proposes the scenes, and the genes of scripts where the agent follows some.
       agent: drives the adversaries.
       reward: what the agent is trained on, and the scenes are scored by.
       records: of the episodes so far.
@@ -71,14 +78,17 @@ class RunState:
         self.spec = spec
         self.problem = Problem.from_spec(spec)
         self.env = RiskSacEnv(self.problem, spec.learner.reward, controlled=method.agent != "none")
-        optimizer = BotorchOptimizer if method.scenes == "botorch" else SobolOptimizer  # Alg. 1, l. 1
-        self.optimizer: SceneOptimizer = optimizer(self.problem.space.dimension, spec.learner.scenes, spec.seed)
         self.agent: Actor  # Alg. 1, l. 2
         if method.agent in CONTROLS:
             self.agent = CONTROLS[method.agent](self.env.action_size, spec.seed)
+        elif method.agent == "scripts":
+            self.agent = ScriptFollower(self.problem.family)
         else:
             sizes = self.env.observation_size, self.env.action_size
             self.agent = Learner(*sizes, method, spec.learner, spec.seed)
+        self.scene_size = self.problem.space.dimension
+        size = self.scene_size + self.agent.genes
+        self.optimizer: SceneOptimizer = OPTIMIZERS[method.scenes](size, spec.learner.scenes, spec.seed)  # Alg. 1, l. 1
         self.reward = TrainingReward(method, spec.learner)
         self.records: list[EpisodeRecord] = []
         self.series: dict[int, SeriesFile] = {}

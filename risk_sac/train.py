@@ -22,6 +22,7 @@ from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run import RunState, RunSummary
 from risk_sac.run_folder.crashes import CrashGuard
+from risk_sac.scene_optimizer import Encounter
 
 SIM_CRASH = "sim_crash"  # reason of a rejection
 
@@ -81,7 +82,7 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
     env, agent, learning, index = run.env, run.agent, run.learning, len(run.records)
     seed, playable = episode_seed(run.spec.seed, index), guard.begin(index)
     point = run.optimizer.ask()  # Alg. 1, l. 4
-    scene = run.problem.space.from_unit(point)
+    scene, genes = run.problem.space.from_unit(point[: run.scene_size]), point[run.scene_size :]
     tally = Tally()
     if not playable:
         run.optimizer.tell(point, None)
@@ -91,6 +92,7 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
     except InfeasibleScene as infeasible:
         run.optimizer.tell(point, None)
         return _record(run, seed, scene.values, tally, rejected=infeasible.reason)
+    agent.begin(genes)
     for step in range(run.problem.family.horizon_steps):  # Alg. 1, l. 6
         guard.step(step)
         action = agent.act(observation, explore=learning)  # Alg. 1, l. 7
@@ -114,10 +116,12 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
             )
             agent.update()  # Alg. 1, l. 13-16
         observation = next_observation
-        if terminated or truncated:  # Alg. 1, l. 17-19
+        if terminated or truncated or agent.hopeless:  # Alg. 1, l. 17-19
             break
-    objective = run.optimizer.tell(point, tally.shaped_return / tally.steps)  # Alg. 1, l. 21-22
-    return _record(run, seed, scene.values, tally, objective=objective, collision=info.get("collision"))
+    collision = info.get("collision")
+    encounter = Encounter(collision=collision, nearest_m=env.trace.nearest_m(run.problem.family.adversaries))
+    objective = run.optimizer.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
+    return _record(run, seed, scene.values, tally, objective=objective, collision=collision)
 
 
 @dataclass(slots=True)

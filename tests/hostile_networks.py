@@ -527,7 +527,7 @@ def _forged_archives() -> Iterator[Hostile]:
 def _requests() -> Iterator[Hostile]:
     """What is wrong before anyone looks inside."""
     for declared in ("", "text/plain", "application/json", "multipart/form-data", "application/x-tar", "image/svg+xml"):
-        yield Hostile(f"declared as {declared!r}", lambda: NET.encode(), "wanted one of application/xml", declared, 415)
+        yield Hostile(f"declared as {declared!r}", lambda: NET.encode(), "wanted application/xml", declared, 415)
     yield Hostile("33 MiB", lambda: NET.encode() + b" " * (33 << 20), "larger than 33554432 bytes", XML, 413)
 
 

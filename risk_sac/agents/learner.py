@@ -22,7 +22,7 @@ from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.risk.reward import TrainingReward
-from risk_sac.types import Vector
+from risk_sac.types import Floats, Vector
 
 
 class Learner:
@@ -31,6 +31,9 @@ class Learner:
     Attributes:
       device: where the networks live.
     """
+
+    genes = 0
+    hopeless = False
 
     def __init__(
         self, observation_size: int, action_size: int, method: Method, config: LearnerConfig, seed: int
@@ -64,6 +67,9 @@ class Learner:
     def temperature(self) -> float:
         """α."""
         return self._agent.temperature
+
+    def begin(self, genes: Floats) -> None:
+        """An episode begins; there are no genes."""
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
         """Action in [-1, 1], `action_size`; uniformly random in the first `warmup_steps` explored steps."""
@@ -124,11 +130,11 @@ class Learner:
         return DdpgAgent(observation_size, action_size, self._config.agent, self._config.ddpg, seed, device)
 
     def _update_once(self) -> UpdateResult:
-        new = self._replay.take_unmeasured()
-        if new is not None:
+        batch_size = self._config.agent.batch_size
+        while (new := self._replay.take_unmeasured(batch_size)) is not None:
             new = new.on(self.device)
             self._replay.update(new.indices, self._agent.td_errors(new, self._shaped(new)))  # Alg. 1, l. 11
-        batch = self._replay.sample(self._config.agent.batch_size, self._generator).on(self.device)  # Alg. 1, l. 13
+        batch = self._replay.sample(batch_size, self._generator).on(self.device)  # Alg. 1, l. 13
         result = self._agent.update(batch, self._shaped(batch))  # Alg. 1, l. 14
         self._replay.update(batch.indices, result.td_errors)
         return result

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from risk_sac.agents.replay import Transition
-from risk_sac.types import Vector
+from risk_sac.types import Floats, Vector
 
 REDRAWN = 0.1  # share of steps in which an adversary's action is drawn anew: it holds for a second on average
 
@@ -20,6 +20,8 @@ class RandomAgent:
     device = "cpu"
     dual_variable = 0.0
     temperature = 0.0
+    genes = 0
+    hopeless = False
 
     def __init__(self, action_size: int, seed: int) -> None:
         self._generator = np.random.default_rng(seed)
@@ -27,6 +29,9 @@ class RandomAgent:
 
     def _draw(self, adversaries: int) -> Vector:
         return self._generator.uniform(-1.0, 1.0, (adversaries, 2)).astype(np.float32)
+
+    def begin(self, genes: Floats) -> None:
+        """An episode begins; there are no genes."""
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
         """The observation makes no difference."""

@@ -66,10 +66,10 @@ class Replay(Protocol):
     def add(self, transition: Transition) -> None:
         """Store a transition over the oldest one once full."""
 
-    def take_unmeasured(self) -> Batch | None:
-        """The transitions added since the last call, whose |δ| `update` is to be told before the next draw.
+    def take_unmeasured(self, most: int) -> Batch | None:
+        """New transitions, the oldest first, whose |δ| `update` is to be told before the next draw.
 
-        None if there are none, or if it makes no difference to what is drawn.
+        None once all were taken, or if |δ| makes no difference to what is drawn.
         """
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
@@ -170,7 +170,7 @@ class UniformReplay:
         """Store a transition."""
         self._storage.add(transition)
 
-    def take_unmeasured(self) -> None:
+    def take_unmeasured(self, most: int) -> None:
         """None: |δ| has no influence."""
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
@@ -225,12 +225,13 @@ class RiskPrioritizedReplay:
         self._additions += 1
         self._unmeasured = min(self._unmeasured + 1, self._storage.capacity)
 
-    def take_unmeasured(self) -> Batch | None:
+    def take_unmeasured(self, most: int) -> Batch | None:
         """See `Replay.take_unmeasured`; all importance weights are 1."""
         if not self._unmeasured:
             return None
-        count, self._unmeasured = self._unmeasured, 0
-        return self._storage.gather(self._storage.newest(count), np.ones(count))
+        indices = self._storage.newest(self._unmeasured)[:most]
+        self._unmeasured -= len(indices)
+        return self._storage.gather(indices, np.ones(len(indices)))
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
         """Draw in proportion to priority, one transition from each of `batch_size` equal slices of the total.

@@ -6,7 +6,7 @@ import numpy as np
 
 from risk_sac.agents.replay import Transition
 from risk_sac.observation import PER_ADVERSARY, X_M, Y_M
-from risk_sac.types import Vector
+from risk_sac.types import Floats, Vector
 
 AHEAD_M = 5.0  # between the centres: the ego's length
 BRAKING = -0.5  # of the limit
@@ -22,9 +22,14 @@ class ScriptedAgent:
     device = "cpu"
     dual_variable = 0.0
     temperature = 0.0
+    genes = 0
+    hopeless = False
 
     def __init__(self, action_size: int, seed: int) -> None:
         self._adversaries = action_size // 2
+
+    def begin(self, genes: Floats) -> None:
+        """An episode begins; there are no genes."""
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
         """Acts on what `risk_sac.observation` says of each adversary; nothing is random."""

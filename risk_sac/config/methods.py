@@ -12,6 +12,7 @@ MethodName = Literal[
     "sac",
     "ddpg-lag",
     "ddpg",
+    "archive",
     "bo-only",
     "random",
     "no-adversary",
@@ -21,15 +22,17 @@ MethodName = Literal[
 class Method(Settings):
     """One row of the table of methods."""
 
-    agent: Literal["sac", "ddpg", "scripted", "random", "none"]
-    """`scripted`: cuts in and brakes, or keeps on; `random`: uniform actions, held for a while; `none`: SUMO drives
-    the adversary vehicles, pedestrians stand."""
+    agent: Literal["sac", "ddpg", "scripts", "scripted", "random", "none"]
+    """`scripts`: each adversary follows a script whose genes are searched with the scene; `scripted`: cuts in and
+    brakes, or keeps on; `random`: uniform actions, held for a while; `none`: SUMO drives the adversary vehicles,
+    pedestrians stand."""
     lagrangian: bool = False
     """Whether λ follows the realism cost; without it λ stays 0."""
     shaping: bool = False
     """Whether robustness shapes the reward (Eq. 6-8)."""
     replay: Literal["uniform", "rper"] = "uniform"
-    scenes: Literal["botorch", "sobol"] = "sobol"
+    scenes: Literal["botorch", "archive", "sobol"] = "sobol"
+    """`archive`: bred from those that led to distinct failures, together with the scripts' genes."""
     summary: str
 
     @property
@@ -58,6 +61,11 @@ METHODS: dict[MethodName, Method] = {
     "sac": Method(agent="sac", scenes="botorch", summary="Plain SAC on the risk reward."),
     "ddpg-lag": Method(agent="ddpg", lagrangian=True, scenes="botorch", summary="DDPG under the realism constraint."),
     "ddpg": Method(agent="ddpg", scenes="botorch", summary="Plain DDPG on the risk reward."),
+    "archive": Method(
+        agent="scripts",
+        scenes="archive",
+        summary="Search without learning: scenes and adversaries' scripts, bred from those that made the ego fail.",
+    ),
     "bo-only": Method(
         agent="scripted", scenes="botorch", summary="Control: BoTorch scenes, and adversaries that follow one script."
     ),

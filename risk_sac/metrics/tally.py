@@ -42,6 +42,7 @@ class Tally(Counts):
     _newest: deque[tuple[bool, bool]] = field(init=False, default_factory=lambda: deque(maxlen=WINDOW))
     _spread: Spread = field(init=False, default_factory=Spread)
     _distinct: DistinctFailures = field(init=False, default_factory=DistinctFailures)
+    _distinct_preventable: DistinctFailures = field(init=False, default_factory=DistinctFailures)
 
     def __post_init__(self) -> None:
         if self.horizon_steps < 1:
@@ -84,7 +85,8 @@ class Tally(Counts):
         self.failures += 1
         self.distinct_failures += new
         self.preventable += record.collision.preventable
-        self.distinct_preventable += new and record.collision.preventable
+        if record.collision.preventable:  # whichever of its kind came first
+            self.distinct_preventable += self._distinct_preventable.add(record.collision)
         judged = record.collision.judgement
         if judged is not None:
             self.kinds.add(kind_of(record.collision, judged))

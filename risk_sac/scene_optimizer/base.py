@@ -1,33 +1,52 @@
 """The seam between Algorithm 1 and whatever proposes its scenes."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
+from risk_sac.records import Collision
 from risk_sac.types import Floats
 
 State = dict[str, Any]
 """Tensors and plain values only, so that `torch.load(weights_only=True)` reads it."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Encounter:
+    """Whom the ego met in an episode."""
+
+    collision: Collision | None = None
+    nearest_m: Mapping[str, float] = field(default_factory=dict)
+    """Adversary → how near it came while it was ahead and in sight, the ego on the move; who never was is left out."""
+
+
+NOBODY = Encounter()
+
+
 class SceneOptimizer(Protocol):
-    """Proposes scenes in the unit cube and learns from their mean shaped returns."""
+    """Proposes points of the unit cube, and learns from what came of them.
+
+    A point is a scene and, where the adversaries follow scripts, their genes behind it.
+    """
 
     def ask(self) -> Floats:
-        """The next scene to try.
+        """The next point to try.
 
         Returns:
             `d`, in [0, 1].
         """
 
-    def tell(self, u: Floats, mean_return: float | None) -> float | None:
+    def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
         """Score a finished episode.
 
         Args:
             u: `d`, in [0, 1]; need not come from `ask`.
             mean_return: R̄_e, mean shaped reward per step; None if C_hard rejected the scene.
+            encounter: whom the ego met.
 
         Returns:
             f_e (Eq. 11), or None for a rejected scene, which has no return to score.

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.scene_optimizer.base import State, check_identity, check_told
+from risk_sac.scene_optimizer.base import NOBODY, Encounter, State, check_identity, check_told
 from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
 from risk_sac.scene_optimizer.sobol import SobolSequence
 from risk_sac.types import Floats
@@ -60,7 +60,9 @@ class BotorchOptimizer:
             return self._sobol.draw()[0].numpy()
         return self._propose(values, random)
 
-    def tell(self, u: Floats, mean_return: float | None) -> float | None:  # Alg. 1, l. 21-22
+    def tell(  # Alg. 1, l. 21-22
+        self, u: Floats, mean_return: float | None, encounter: Encounter = NOBODY
+    ) -> float | None:
         """See `SceneOptimizer.tell`."""
         point = check_told(u, mean_return, self._dimension)
         value = np.nan if mean_return is None else mean_return

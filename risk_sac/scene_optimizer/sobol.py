@@ -4,7 +4,7 @@ import torch
 from torch.quasirandom import SobolEngine
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.scene_optimizer.base import State, check_identity, check_told
+from risk_sac.scene_optimizer.base import NOBODY, Encounter, State, check_identity, check_told
 from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
 from risk_sac.types import Floats
 
@@ -48,7 +48,7 @@ class SobolOptimizer:
         """See `SceneOptimizer.ask`."""
         return self._sequence.draw()[0].numpy()
 
-    def tell(self, u: Floats, mean_return: float | None) -> float | None:
+    def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
         """See `SceneOptimizer.tell`."""
         check_told(u, mean_return, self._dimension)
         if mean_return is None:

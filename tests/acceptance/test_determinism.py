@@ -15,6 +15,7 @@ from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder.checkpoint import previous
 from risk_sac.run_folder.episode_json import records_to_json
 from risk_sac.run_folder.results import FAILURES
+from risk_sac.scene_optimizer.archive import INITIAL
 from risk_sac.train import train
 
 EPISODES, EVALUATION = 6, 1
@@ -126,6 +127,17 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("stopped")
     run(folder, limit=4)
     return folder
+
+
+def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path: Path) -> None:
+    bred = spec(method="archive").model_copy(update={"budget": Budget(episodes=INITIAL + 6)})
+    whole, first, rest = Listener(), Listener(INITIAL + 3), Listener()
+    expected = train(bred, tmp_path / "whole", whole)
+    train(bred, tmp_path / "parts", first)
+    resumed = train(bred, tmp_path / "parts", rest)
+    assert len(first.records) == INITIAL + 3
+    assert records_to_json(rest.records) == records_to_json(whole.records)
+    assert resumed.digest == expected.digest
 
 
 @pytest.mark.parametrize("damaged", ["newest", "both"])

@@ -17,7 +17,7 @@ from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heart
 from tests.builders import episode_record, run_metrics
 
 WELL_BEHAVED, DIES, HANGS, BABBLES, DISK_FULL, EXITS, SEGFAULTS, FREEZES, WAITS = 0, 9, 15, 7, 28, 3, 11, 19, 41
-RAISES = 2
+RAISES = 43
 ONCE = 100  # added to one of them: the run's second worker behaves well
 EPISODE_S = 0.05
 WAITS_AT = (10, 41)  # episodes that one that waits begins only once the test has put a file into its folder

@@ -16,10 +16,9 @@ POST = b"POST %s HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/%s\r\n
 
 
 @pytest.fixture(scope="module")
-def campaign(serve_shared, client):
-    campaign_id = client.post("/v1/campaigns", json=SPEC).raise_for_status().json()["id"]
-    while client.get(f"/v1/campaigns/{campaign_id}").json()["state"] != "succeeded":
-        pass
+def campaign(shared):
+    campaign_id = shared.client.post("/v1/campaigns", json=SPEC).raise_for_status().json()["id"]
+    assert shared.wait(campaign_id)["state"] == "succeeded"
     return campaign_id
 
 

@@ -440,3 +440,22 @@ def test_a_closed_environment_can_start_again(low: RiskSacEnv) -> None:
     expected = episode(low, 3)
     low.close()
     assert same(episode(low, 3), expected)
+
+
+def test_the_nearest_miss_is_the_least_distance_while_ahead_and_in_sight_and_the_ego_on_the_move(
+    low: RiskSacEnv,
+) -> None:
+    frames = counted = 0
+    for seed in range(6):
+        episode(low, seed)
+        series, released = low.trace.series(), low.trace.released
+        least = {}
+        for i, name in enumerate(series["ids"][1:], start=1):
+            ahead = series["x_m"][released:, i] > series["x_m"][released:, 0]  # the road leads straight to the east
+            seen, moves = series["visible"][released:, i] == 1, series["speed_mps"][released:, 0] >= 1.0
+            counts = ahead & seen & moves
+            frames, counted = frames + len(counts), counted + counts.sum()
+            if counts.any():
+                least[name] = series["distance_m"][released:, i][counts].min()
+        assert low.trace.nearest_m(series["ids"]) == least
+    assert 0.1 < counted / frames < 0.9

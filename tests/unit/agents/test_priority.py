@@ -20,7 +20,7 @@ def test_priority_of_a_hand_computed_case() -> None:
 
 def test_terms_weigh_in_with_their_configured_share() -> None:
     stored = np.random.default_rng(0).gamma(2.0, [[1.0], [100.0], [1e-3]], size=(3, 10_000))
-    config = ReplayConfig(td_weight=5.0, return_weight=3.0, robustness_weight=2.0, priority_floor=1e-9)
+    config = ReplayConfig(td_weight=5.0, return_weight=3.0, robustness_weight=2.0, priority_floor=1e-6)
     assert priority(stored, TermScales.of(stored), config).mean() == pytest.approx(10.0, rel=1e-3)
 
 

@@ -17,7 +17,7 @@ KINDS = pytest.mark.parametrize("kind", [UniformReplay, RiskPrioritizedReplay])
 def store(replay: Replay, transition: Transition, td_error: float) -> None:
     """Adds a transition and tells its |δ|, as the learner does before it draws."""
     replay.add(transition)
-    new = replay.take_unmeasured()
+    new = replay.take_unmeasured(1)
     if new is not None:
         replay.update(new.indices, np.array([td_error]))
 
@@ -145,19 +145,20 @@ def test_rper_scales_follow_what_is_stored(random_transition: Make) -> None:
 
 def test_rper_hands_out_the_new_transitions_once_and_in_their_order(transition: Make) -> None:
     replay = RiskPrioritizedReplay(3, 2, CONFIG)
-    assert replay.take_unmeasured() is None
+    assert replay.take_unmeasured(9) is None
     for count in (3, 4, CONFIG.capacity + 5):  # the last wraps around, and its first five are overwritten
         for value in range(count):
             replay.add(transition(float(value)))
         restored = RiskPrioritizedReplay(3, 2, CONFIG)
         restored.load(replay.state())
         for each in (replay, restored):
-            new = each.take_unmeasured()
-            assert new is not None
-            assert new.risk_reward.tolist() == list(range(max(0, count - CONFIG.capacity), count))
-            assert each.take_unmeasured() is None
-            each.update(new.indices, new.risk_reward.double().numpy())
-            assert each._terms[0, new.indices].tolist() == new.risk_reward.tolist()
+            taken = []
+            while (new := each.take_unmeasured(2)) is not None:
+                assert len(new.indices) <= 2
+                taken += new.risk_reward.tolist()
+                each.update(new.indices, new.risk_reward.double().numpy())
+                assert each._terms[0, new.indices].tolist() == new.risk_reward.tolist()
+            assert taken == list(range(max(0, count - CONFIG.capacity), count))
 
 
 @KINDS

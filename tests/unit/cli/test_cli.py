@@ -89,7 +89,7 @@ def test_the_list_names_failed_rules_in_full_within_80_columns(capsys: pytest.Ca
     rules = "conflict_after_release, ego_model_saw, no_spawn_overlap"
     contact = synthetic_contact(judgement(None, conflict_type=ConflictType.CROSSING))
     failed = contact.episode.model_copy(update={"outcome": Outcome.DEGENERATE, "reason": rules})
-    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(replace(contact, episode=failed),))
+    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(Contact.of(SPEC.id, failed),))
     Console(width=80).print(_contacts(results))
     printed = capsys.readouterr().out
     assert "…" not in printed

@@ -13,7 +13,7 @@ def lines(**judged: object) -> list[str]:
 
 def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke() -> None:
     assert lines() == [
-        "mixed · episode 000007 · failure",
+        "mixed · episode low-random-0-train-7 · failure",
         "the ego's front, at 10.0 m/s, touched the left of adversary 'pedestrian', at 1.0 m/s, "
         "which it had seen for 1.0 s",
         JUDGED.signature,

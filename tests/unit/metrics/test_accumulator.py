@@ -140,8 +140,7 @@ def test_incremental_equals_batch(records):
     assert metrics.window_ecr == effective_collision_rate(counted(records[-WINDOW:]))
     assert metrics.pcr == preventable_collision_rate(counted(records))
     assert metrics.window_pcr == preventable_collision_rate(counted(records[-WINDOW:]))
-    distinct = [hits[position] for position in distinct_failures(hits)]
-    assert metrics.distinct_preventable == sum(hit.preventable for hit in distinct)
+    assert metrics.distinct_preventable == len(distinct_failures([hit for hit in hits if hit.preventable]))
     judged = [hit for hit in hits if hit.judgement is not None]
     assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(judged)
     assert sum(metrics.signatures.values()) == len(judged)

@@ -44,7 +44,7 @@ def test_page_has_command_digest_tables_and_the_paper(comparison, spec):
     preventable, kinds = "5.833 [5.000, 6.667]", "1.000 [1.000, 1.000]"
     assert f"| 0.167 (1 of 2 seeds) | {preventable} | {kinds} | 117 | 40.0 | 0.0 % | 0.0 % | 12.5 % |" in first
     assert second.startswith("| sac | 2 | 0.125")
-    assert "| – | 400 |" in second
+    assert "| – | 2.500 [0.000, 5.000] | 0.500 [0.000, 1.000] | 400 |" in second
     assert line(page, "| low | search | 0.50").split(" | ")[3] == "0.97"
     assert "| low | search | 8 | 12.5 % |" in page
     assert "risk-sac run --spec d/spec.yaml --family low --method risk-sac --seed 0 --out repeated" in page

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
 from risk_sac.scene_optimizer import (
+    ArchiveOptimizer,
     BotorchOptimizer,
     RunningMaximum,
     SceneOptimizer,
@@ -22,7 +23,7 @@ from risk_sac.scene_optimizer import (
 from risk_sac.types import Floats
 
 QUICK = SceneOptimizerConfig(initial_scenes=6, window=24, refit_every=5, candidates=64)
-KINDS = (SobolOptimizer, BotorchOptimizer)
+KINDS = (SobolOptimizer, BotorchOptimizer, ArchiveOptimizer)
 returns = st.floats(-100, 100)
 
 
@@ -92,7 +93,7 @@ def test_running_maximum_rises_towards_the_largest_return_and_never_past_it(valu
         assert before is None or maximum.smoothed >= before.smoothed
 
 
-# What both optimisers promise
+# What all optimisers promise
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -342,5 +343,6 @@ def test_simple_regret_is_a_fraction_of_sobols(function, largest, dimension, noi
         asked = drive(optimizer, 80, lambda episode, u: function(u) + noises[episode])
         return largest - max(map(function, asked))
 
-    found, by_chance = (np.mean([regret(kind, seed) for seed in range(3)]) for kind in reversed(KINDS))
+    pair = BotorchOptimizer, SobolOptimizer
+    found, by_chance = (np.mean([regret(kind, seed) for seed in range(3)]) for kind in pair)
     assert found < share * by_chance

@@ -1,0 +1,96 @@
+"""Adversaries that follow scripts: what a search over scenes and scripts drives them with."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from risk_sac.agents.replay import Transition
+from risk_sac.scenario.family import Family
+from risk_sac.scripts.motions import SIZE, Genes, act, cue, is_over
+from risk_sac.scripts.seen import Seen, adversaries_seen
+from risk_sac.types import STEP_S, Floats, Vector
+
+PASSIVE = 0.4  # an adversary whose gene `active` is smaller does nothing, unless it is the largest of all
+BEHIND_M, BEHIND_STEPS = 6.0, 8  # who has fallen so far behind the ego, and for so long, will not strike it any more
+STANDING_MPS, STANDING_STEPS = 0.5, 30  # an ego that stands for so long waits for a signal, or for a queue
+
+
+class ScriptFollower:
+    """Each adversary acts by genes of its own, which an episode is begun with; λ and α are 0.
+
+    Attributes:
+      hopeless: whether nothing is to be expected of the episode any more: all that act have fallen behind, or have been
+        through with their scripts for a while, or the ego stands and stands. Choice: such an episode is truncated; it
+        counts as safe, with its steps.
+    """
+
+    device = "cpu"
+    dual_variable = 0.0
+    temperature = 0.0
+
+    def __init__(self, family: Family) -> None:
+        """Follows nothing yet; see `begin`."""
+        self._pedestrian = [False] * len(family.vehicles) + [True] * len(family.pedestrians)
+        self.begin(np.zeros(self.genes))
+
+    @property
+    def genes(self) -> int:
+        """How many genes say what happens in an episode."""
+        return SIZE * len(self._pedestrian)
+
+    def begin(self, genes: Floats) -> None:
+        """Begins an episode with these genes, in [0, 1]; `SIZE` for each adversary."""
+        rows: list[list[float]] = genes.reshape(-1, SIZE).tolist()
+        threshold = min(PASSIVE, max(row[0] for row in rows))
+        self._scripts = [Genes(*row) if row[0] >= threshold else None for row in rows]
+        self._cued: list[int | None] = [None] * len(rows)
+        self._step, self._behind, self._standing = 0, 0, 0
+        self.hopeless = False
+
+    def act(self, observation: Vector, explore: bool = True) -> Vector:
+        """Acts on what `risk_sac.observation` says of each adversary; nothing is random."""
+        seen = adversaries_seen(observation, len(self._pedestrian), self._step)
+        actions = np.zeros((len(seen), 2), dtype=np.float32)
+        since_cue_s = [self._since_cue_s(i, one) for i, one in enumerate(seen)]
+        for i, one in enumerate(seen):
+            script = self._scripts[i]
+            if script is not None and one is not None:
+                actions[i] = act(script, one, since_cue_s[i], self._pedestrian[i])
+        self._foresee(seen, since_cue_s)
+        self._step += 1
+        return actions.ravel()
+
+    def _since_cue_s(self, i: int, seen: Seen | None) -> float:
+        """How long ago an adversary had its cue, s; negative before."""
+        script = self._scripts[i]
+        if self._cued[i] is None and script and seen and cue(script, seen, self._pedestrian[i]):
+            self._cued[i] = self._step
+        cued = self._cued[i]
+        return -STEP_S if cued is None else (self._step - cued) * STEP_S
+
+    def _foresee(self, seen: Sequence[Seen | None], since_cue_s: Sequence[float]) -> None:
+        acting = [
+            (script, one, since_s)
+            for script, one, since_s in zip(self._scripts, seen, since_cue_s, strict=True)
+            if script is not None and one is not None
+        ]
+        behind = all(one.x_m < -BEHIND_M for _, one, _ in acting)
+        self._behind = self._behind + 1 if behind else 0
+        standing = all(one.ego_mps < STANDING_MPS for _, one, _ in acting)
+        self._standing = self._standing + 1 if standing else 0
+        over = all(is_over(script, since_s) for script, _, since_s in acting)
+        self.hopeless = over or self._behind >= BEHIND_STEPS or self._standing >= STANDING_STEPS
+
+    def observe(self, transition: Transition) -> None:
+        """Forgets it."""
+
+    def update(self) -> None:
+        """Nothing to learn."""
+
+    def state(self) -> dict[str, Any]:
+        """Nothing to keep: an episode is begun anew."""
+        return {}
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Nothing to restore."""

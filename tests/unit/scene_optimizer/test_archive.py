@@ -1,0 +1,101 @@
+"""What the archive search adds to the promises in test_scene_optimizer.py."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from risk_sac.config import SceneOptimizerConfig
+from risk_sac.records import Collision, Grade, ReferenceOutcome
+from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
+from risk_sac.scene_optimizer.archive import INITIAL, mutated
+from risk_sac.scene_optimizer.elites import NEW, NEW_PREVENTABLE, Elites
+from tests.builders import collision, judgement
+
+HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)
+
+
+def failure(grade: Grade, kind: str = "cut-in", impact_mps: float = 5.0, striker: str = "left") -> Collision:
+    careful = ReferenceOutcome(avoids=grade is Grade.CAREFUL, impact_speed_mps=impact_mps)
+    return collision(other_id=striker, judgement=judgement(grade, signature=kind, drivers={"careful": careful}))
+
+
+def test_a_niche_keeps_what_the_careful_driver_came_nearest_to_preventing():
+    elites = Elites()
+    for point, grade, impact_mps in (
+        (HERE, Grade.UNAVOIDABLE, 9.0),
+        (THERE, Grade.IDEAL, 2.0),
+        (HERE, Grade.IDEAL, 4.0),
+    ):
+        elites.add_failure(point, failure(grade, impact_mps=impact_mps), None)
+    (almost,) = elites.pool()
+    np.testing.assert_array_equal(almost.point, THERE)
+    elites.add_failure(HERE, failure(Grade.CAREFUL), None)
+    (preventable,) = elites.pool()
+    np.testing.assert_array_equal(preventable.point, HERE)
+    assert preventable.worth > almost.worth
+
+
+def test_a_parent_is_credited_with_what_was_new_and_most_with_what_was_preventable():
+    elites = Elites()
+    elites.add_failure(HERE, failure(Grade.IDEAL), None)
+    (parent,) = elites.pool()
+    elites.add_failure(THERE, failure(Grade.IDEAL), parent)
+    assert parent.credit == 0.0
+    elites.add_failure(THERE, failure(Grade.CAREFUL), parent)
+    assert parent.credit == NEW_PREVENTABLE
+    elites.add_failure(THERE, failure(Grade.IDEAL, "leader"), parent)
+    assert parent.credit == NEW_PREVENTABLE + NEW
+    elites.add_failure(THERE, failure(Grade.CAREFUL), parent)
+    assert parent.credit == NEW_PREVENTABLE + NEW
+
+
+def test_near_misses_stand_in_for_who_has_struck_nobody():
+    elites = Elites()
+    elites.add_misses(HERE, {"left": 3.0, "right": 2.0})
+    elites.add_misses(THERE, {"left": 1.0, "right": 5.0})
+    assert {e.striker: e.point[0] for e in elites.pool()} == {"left": 0.75, "right": 0.25}
+    elites.add_failure(HERE, failure(Grade.IDEAL, striker="left"), None)
+    assert [e.kind for e in elites.pool()] == ["cut-in", "near miss of right"]
+
+
+def test_preventable_failures_are_built_on_most_often():
+    elites, random = Elites(), np.random.default_rng(0)
+    for kind, grade in (("a", Grade.CAREFUL), ("b", Grade.IDEAL), ("c", Grade.UNAVOIDABLE)):
+        elites.add_failure(HERE, failure(grade, kind, impact_mps=10.0), None)
+    drawn = [elites.draw(elites.pool(), random).kind for _ in range(60)]
+    assert drawn.count("a") > drawn.count("b") + drawn.count("c")
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0, 1), min_size=2, max_size=2), st.integers(0, 2**31))
+def test_mutants_stay_in_the_unit_cube(corner, seed):
+    mutant = mutated(np.full(5, corner[0]), np.full(5, corner[1]), np.random.default_rng(seed))
+    assert mutant.min() >= 0
+    assert mutant.max() <= 1
+
+
+def found(seed: int, episodes: int, *, told: bool) -> int:
+    """Kinds of failure found, of those that lie side by side in a corner of the cube."""
+    optimizer, kinds = ArchiveOptimizer(6, SceneOptimizerConfig(), seed), set()
+    for _ in range(episodes):
+        u = optimizer.ask()
+        in_corner = (u[:2] < 0.3).all() and u[2] > 0.4
+        kind = f"{int(10 * u[3])} {int(4 * u[4])}"
+        hit = failure(Grade.CAREFUL, kind) if in_corner else None
+        kinds |= {kind} if in_corner else set()
+        optimizer.tell(u, 0.0, Encounter(collision=hit if told else None))
+    return len(kinds)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_it_finds_more_kinds_of_failure_than_chance(seed):
+    assert found(seed, 300, told=True) > 1.5 * found(seed, 300, told=False)
+
+
+def test_a_failure_that_a_rule_refuses_is_not_built_on():
+    optimizer = ArchiveOptimizer(2, SceneOptimizerConfig(), 0)
+    refused = failure(Grade.CAREFUL).model_copy(update={"verdicts": {"inside_limits": False}})
+    for _ in range(INITIAL):
+        optimizer.tell(optimizer.ask(), 0.0, Encounter(collision=refused))
+    assert optimizer.state()["elites"]["failures"] == {}

@@ -1,0 +1,111 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.observation import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
+from risk_sac.scripts.motions import SIZE, Genes, act, cue, is_over
+from risk_sac.scripts.seen import Act, Seen, adversaries_seen
+
+MIDDLE = Genes(*[0.5] * SIZE)
+unit = st.floats(0, 1)
+genes = st.builds(Genes, *[unit] * SIZE)
+seen = st.builds(
+    lambda time_s, x_m, y_m, turn, speed_mps, ego_mps: Seen(
+        time_s, x_m, y_m, math.cos(turn), math.sin(turn), speed_mps, ego_mps
+    ),
+    st.floats(0, 15),
+    st.floats(-200, 200),
+    st.floats(-40, 40),
+    st.floats(-math.pi, math.pi),
+    st.floats(0, 20),
+    st.floats(0, 20),
+)
+
+
+def beside(x_m: float = 8.0, y_m: float = 3.3, *, time_s: float = 2.0, speed_mps: float = 10.0) -> Seen:
+    """A neighbour, at the ego's speed unless said otherwise."""
+    return Seen(time_s, x_m, y_m, 1.0, 0.0, speed_mps, 10.0)
+
+
+def mirrored(one: Seen) -> Seen:
+    return one._replace(y_m=-one.y_m, sin=-one.sin)
+
+
+@given(genes, seen, st.floats(-1, 15), st.booleans())
+def test_every_action_is_one(script, one, since_cue_s, pedestrian):
+    drive, steer = act(script, one, since_cue_s, pedestrian)
+    assert -1 <= drive <= 1
+    assert -1 <= steer <= 1
+
+
+@given(genes, seen, st.floats(-1, 15))
+def test_who_drives_the_egos_way_does_the_same_from_the_other_side(script, one, since_cue_s):
+    along = one._replace(cos=1.0, sin=0.0)
+    drive, steer = act(script, along, since_cue_s, pedestrian=False)
+    assert act(script, mirrored(along), since_cue_s, pedestrian=False) == Act(drive, pytest.approx(-steer))
+
+
+def test_a_neighbour_takes_up_its_place_and_then_comes_over():
+    far = MIDDLE._replace(place=1.0, aside=0.0)
+    assert act(far, beside(), -0.1, pedestrian=False) == Act(1.0, -1.0)  # up to 12 m ahead, and to the edge of its lane
+    assert act(far, beside(12.0, 1.9), -0.1, pedestrian=False) == Act(0.0, 0.0)
+    strike = MIDDLE._replace(drive=0.0, steer=0.7, after=1.0, lasts=0.25)
+    assert act(strike, beside(), 0.5, pedestrian=False) == Act(-1.0, -0.7)
+    assert act(strike, beside(), 1.5, pedestrian=False) == Act(1.0, 0.0)
+
+
+def test_a_neighbour_stays_in_the_middle_of_its_lane_a_quarter_of_the_time_to_its_cue():
+    assert act(MIDDLE, beside(time_s=1.2), -0.1, pedestrian=False).steer == 0.0
+    assert act(MIDDLE, beside(time_s=1.3), -0.1, pedestrian=False).steer < 0.0
+
+
+def test_a_leader_keeps_its_lane_until_its_cue():
+    assert act(MIDDLE, beside(11.0, 0.2), -0.1, pedestrian=False) == Act(0.0, pytest.approx(-0.2))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_crossing_traffic_hurries_when_it_would_be_late_and_waits_when_early(side):
+    late = Seen(0.0, 20.0, 40.0 * side, 0.0, -1.0 * side, 10.0, 10.0)  # 4 s from the ego's axis, the ego 2 s
+    early = late._replace(y_m=10.0 * side)
+    keen = MIDDLE._replace(aside=1.0)
+    assert act(keen, late, -0.1, pedestrian=False).drive == 1.0
+    assert act(keen, early, -0.1, pedestrian=False).drive == -1.0
+    assert act(keen, late._replace(y_m=20.0 * side), -0.1, pedestrian=False).drive == 0.0
+    assert act(keen._replace(aside=0.0), late, -0.1, pedestrian=False).drive == 0.4
+
+
+def test_crossing_traffic_has_its_cue_when_the_ego_is_near():
+    oncoming = Seen(0.0, 50.0, 3.0, -1.0, 0.0, 10.0, 10.0)  # 2.5 s from meeting
+    assert cue(MIDDLE._replace(cue=0.6), oncoming, pedestrian=False)
+    assert not cue(MIDDLE, oncoming, pedestrian=False)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_pedestrian_waits_for_the_ego_and_then_steps_out(side):
+    far = Seen(3.0, 60.0, -5.0 * side, 0.0, 1.0 * side, 1.0, 10.0)
+    near = far._replace(x_m=40.0)
+    keen = MIDDLE._replace(aside=1.0, cue=0.2, drive=0.7)
+    assert act(keen, far, -0.1, pedestrian=True).drive == -1.0
+    assert act(keen, near, -0.1, pedestrian=True).drive == 1.0
+    assert not cue(keen, far._replace(x_m=11.5), pedestrian=True)
+    assert cue(keen, far._replace(x_m=10.5), pedestrian=True)
+    assert act(keen, near, 0.0, pedestrian=True).drive == pytest.approx(0.4)
+
+
+def test_a_vehicle_has_its_cue_at_a_time_of_its_own():
+    assert not cue(MIDDLE, beside(time_s=3.4), pedestrian=False)
+    assert cue(MIDDLE, beside(time_s=3.5), pedestrian=False)
+    assert not is_over(MIDDLE, 5.0)
+    assert is_over(MIDDLE, 5.1)
+
+
+def test_the_observation_is_read_back_in_metres():
+    observation = np.zeros(2 * PER_ADVERSARY + 1, np.float32)
+    observation[:7] = 12 / X_M, -3 / Y_M, 0.1, 0.1, 0.6, -0.8, 9 / SPEED_MPS
+    observation[-1] = 11 / SPEED_MPS
+    first, gone = adversaries_seen(observation, 2, step=20)
+    assert gone is None
+    assert first == pytest.approx(Seen(2.0, 12.0, -3.0, 0.6, -0.8, 9.0, 11.0))
