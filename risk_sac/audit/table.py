@@ -120,7 +120,7 @@ def _searches(runs: Sequence[Searched]) -> str:
     for family, method in dict.fromkeys((run.family, run.method) for run in runs):
         group = [run for run in runs if (run.family, run.method) == (family, method)]
         valid = [hit for run in group for hit in run.valid]
-        distinct = [run.valid[i] for run in group for i in distinct_failures(run.valid)]
+        preventable = [[hit for hit in run.valid if hit.preventable] for run in group]
         rows.append(
             [
                 family,
@@ -129,8 +129,8 @@ def _searches(runs: Sequence[Searched]) -> str:
                 str(sum(len(run.records) for run in group)),
                 str(sum(len(run.contacts) for run in group)),
                 str(len(valid)),
-                str(len(distinct)),
-                str(sum(hit.preventable for hit in distinct)),
+                str(sum(len(distinct_failures(run.valid)) for run in group)),
+                str(sum(map(len, map(distinct_failures, preventable)))),
                 str(len({hit.judgement.signature for hit in valid if hit.judgement})),
                 _spread([hit.judgement.conflict_s for hit in valid if hit.judgement]),
                 _spread([hit.time_s for hit in valid]),
