@@ -27,8 +27,8 @@ class AgentConfig(Settings):
     """τ of the target networks' moving average."""
     warmup_steps: Annotated[int, Field(ge=0, le=10_000_000)] = 1000
     """Environment steps with uniformly random actions and no update."""
-    updates_per_step: Annotated[float, Field(ge=0, le=20)] = 1.0
-    """May be a fraction: 0.25 is one update in four environment steps."""
+    updates_per_step: Annotated[float, Field(ge=0, le=20)] = 0.25
+    """One update in four environment steps: an update costs as much as several of them."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """Where the networks live; `auto` takes the GPU where there is one that updates them faster than the processor.
     Results are reproducible on equal devices only."""

@@ -14,6 +14,7 @@ from risk_sac.config import METHODS, AgentConfig, LearnerConfig, MethodName, Rep
 STEPS = 10_000
 CONFIG = LearnerConfig(
     agent=AgentConfig(
+        updates_per_step=1,
         hidden_sizes=(64, 64),
         batch_size=64,
         actor_learning_rate=1e-3,

@@ -83,7 +83,7 @@ def by_a_learner(name: FamilyName, folder: Path, monkeypatch: pytest.MonkeyPatch
             return outcome
 
     monkeypatch.setattr("risk_sac.run.RiskSacEnv", Watched)
-    agent = AgentConfig(hidden_sizes=(16, 16), batch_size=16, warmup_steps=150)
+    agent = AgentConfig(hidden_sizes=(16, 16), batch_size=16, warmup_steps=150, updates_per_step=1)
     spec = RunSpec(
         family=name,
         method="risk-sac",
