@@ -59,7 +59,9 @@ def main(arguments: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m service.demo", description=__doc__)
     parser.add_argument("--family", default="mixed", help="scenario family")
-    parser.add_argument("--methods", nargs="+", default=["archive", "risk-sac", "random"], help="search methods, side by side")
+    parser.add_argument(
+        "--methods", nargs="+", default=["archive", "risk-sac", "random"], help="search methods, side by side"
+    )
     parser.add_argument("--episodes", type=int, default=200, help="search episodes of each run")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="one run per method and seed")
     parser.add_argument("--out", type=Path, default=Path("results/demo.json"), help="where the results go")
