@@ -130,12 +130,14 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         collision = None if contact is None else self._judge(contact)
         self._touched |= self._in_contact()
         cost = self._cost(before, self._frame, previous, self._measures)
-        valid = collision is not None and collision.valid
+        worth = 0.0
+        if collision is not None and collision.valid:
+            worth = 1.0 if collision.preventable else self._reward.unpreventable
         reward = risk_reward(
             self._measures.signals["ttc_s"],
             self._measures.signals["rss_margin"],
-            float(valid),
-            float(collision is not None and not valid),
+            worth,
+            float(collision is not None and not collision.valid),
             self._reward,
         )
         truncated = self._steps >= self.problem.family.horizon_steps

@@ -79,9 +79,9 @@ class ReferenceOutcome(Record):
     """How a reference driver fares in the ego's place."""
 
     avoids: bool
-    """Does not touch, or stands when it is struck, or is struck from behind."""
+    """Does not touch, or stands when it is struck, or is struck from behind; who has passed by then has not."""
     impact_speed_mps: Real
-    """Of the reference driver at its contact; 0 if it avoids."""
+    """Of the reference driver at its contact, or where it has passed the ego; 0 if it avoids."""
 
 
 class Judgement(Record):

@@ -81,21 +81,23 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
     """
     env, agent, learning, index = run.env, run.agent, run.learning, len(run.records)
     seed, playable = episode_seed(run.spec.seed, index), guard.begin(index)
-    point = run.optimizer.ask()  # Alg. 1, l. 4
+    pair = run.pair()
+    point = pair.optimizer.ask()  # Alg. 1, l. 4
     scene, genes = run.problem.space.from_unit(point[: run.scene_size]), point[run.scene_size :]
     tally = Tally()
     if not playable:
-        run.optimizer.tell(point, None)
+        run.told(pair, point, None)
         return _record(run, seed, scene.values, tally, rejected=SIM_CRASH)
     try:
         observation, info = env.reset(seed=seed, options={"scene": scene})  # Alg. 1, l. 5
     except InfeasibleScene as infeasible:
-        run.optimizer.tell(point, None)
+        run.told(pair, point, None)
         return _record(run, seed, scene.values, tally, rejected=infeasible.reason)
-    agent.begin(genes)
+    actor, own = pair.actor, pair.actor is agent
+    actor.begin(genes)
     for step in range(run.problem.family.horizon_steps):  # Alg. 1, l. 6
         guard.step(step)
-        action = agent.act(observation, explore=learning)  # Alg. 1, l. 7
+        action = actor.act(observation, explore=learning)  # Alg. 1, l. 7
         robustness = info["robustness"]
         next_observation, risk_reward, terminated, truncated, info = env.step(action)  # Alg. 1, l. 8
         parts = risk_reward, info["cost"], robustness, info["robustness"]
@@ -112,15 +114,17 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
                     next_observation=next_observation,
                     terminated=terminated,
                     accumulated_reward=tally.shaped_return,
-                )
+                ),
+                own=own,
             )
-            agent.update()  # Alg. 1, l. 13-16
+            if own:
+                agent.update()  # Alg. 1, l. 13-16
         observation = next_observation
-        if terminated or truncated or agent.hopeless:  # Alg. 1, l. 17-19
+        if terminated or truncated or actor.hopeless:  # Alg. 1, l. 17-19
             break
     collision = info.get("collision")
     encounter = Encounter(collision=collision, nearest_m=env.trace.nearest_m(run.problem.family.adversaries))
-    objective = run.optimizer.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
+    objective = run.told(pair, point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
     return _record(run, seed, scene.values, tally, objective=objective, collision=collision)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from risk_sac.agents.adam import Adam
 from risk_sac.agents.networks import Mlp
 from risk_sac.config.learner import AgentConfig
 
@@ -45,7 +46,7 @@ class Critics:
         self._targets = copy.deepcopy(self._critics)
         self._parameters = [critic.parameters for critic in self._critics]
         self._target_parameters = [target.parameters for target in self._targets]
-        self._optimizer = torch.optim.Adam(self._parameters, lr=config.critic_learning_rate, fused=True)
+        self._optimizer = Adam(self._parameters, [config.critic_learning_rate] * count)
 
     def values(self, observation: Tensor, action: Tensor) -> Tensor:
         """Q_ψi, `critics x batch`."""
@@ -93,7 +94,7 @@ class Critics:
         return {
             "critics": self._parameters,
             "targets": self._target_parameters,
-            "optimizer": self._optimizer.state_dict(),
+            "optimizer": self._optimizer.state(),
         }
 
     def load(self, state: dict[str, Any]) -> None:
@@ -101,7 +102,7 @@ class Critics:
         for name, parameters in (("critics", self._parameters), ("targets", self._target_parameters)):
             for mine, stored in zip(parameters, state[name], strict=True):
                 mine.copy_(stored)
-        self._optimizer.load_state_dict(state["optimizer"])
+        self._optimizer.load(state["optimizer"])
 
 
 def _evaluate(networks: list[Mlp], observation: Tensor, action: Tensor) -> Tensor:

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from risk_sac.agents.adam import Adam
 from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnitude
 from risk_sac.agents.critics import Critics
 from risk_sac.agents.networks import Mlp
@@ -80,7 +81,7 @@ class DdpgAgent:
         self._policy = Mlp((observation_size, *config.hidden_sizes, action_size), self._generator)
         self._target_policy = copy.deepcopy(self._policy)
         self._critics = Critics(1, observation_size, action_size, config, self._generator)
-        self._actor_optimizer = torch.optim.Adam([self._policy.parameters], lr=config.actor_learning_rate, fused=True)
+        self._actor_optimizer = Adam([self._policy.parameters], [config.actor_learning_rate])
 
     def act(self, observation: Vector, explore: bool) -> Vector:
         """See `Agent.act`: the policy's action, with noise while exploring."""
@@ -125,7 +126,7 @@ class DdpgAgent:
                 "policy": self._policy.parameters,
                 "target_policy": self._target_policy.parameters,
                 "critics": self._critics.state(),
-                "actor_optimizer": self._actor_optimizer.state_dict(),
+                "actor_optimizer": self._actor_optimizer.state(),
                 "generator": self._generator.get_state(),
             }
         )
@@ -137,7 +138,7 @@ class DdpgAgent:
             self._policy.parameters.copy_(state["policy"])
             self._target_policy.parameters.copy_(state["target_policy"])
             self._critics.load(state["critics"])
-            self._actor_optimizer.load_state_dict(state["actor_optimizer"])
+            self._actor_optimizer.load(state["actor_optimizer"])
             self._generator.set_state(state["generator"])
 
     def _target(self, reward: Tensor, terminated: Tensor, next_observation: Tensor) -> Tensor:

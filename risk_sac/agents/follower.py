@@ -82,7 +82,7 @@ class ScriptFollower:
         over = all(is_over(script, since_s) for script, _, since_s in acting)
         self.hopeless = over or self._behind >= BEHIND_STEPS or self._standing >= STANDING_STEPS
 
-    def observe(self, transition: Transition) -> None:
+    def observe(self, transition: Transition, *, own: bool = True) -> None:
         """Forgets it."""
 
     def update(self) -> None:

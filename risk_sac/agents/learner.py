@@ -56,7 +56,7 @@ class Learner:
         self._replay: Replay = replay(observation_size, action_size, config.replay)
         self._dual = DualVariable(config.lagrangian, enabled=method.lagrangian)
         self._generator = np.random.default_rng(seed)
-        self._steps = 0
+        self._steps, self._updates = 0, 0
 
     @property
     def dual_variable(self) -> float:
@@ -77,15 +77,22 @@ class Learner:
             return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
         return self._agent.act(observation, explore)  # Alg. 1, l. 7
 
-    def observe(self, transition: Transition) -> None:
-        """Store what a step has brought, and price its cost; what the warm-up draws is not the policy's."""
+    def observe(self, transition: Transition, *, own: bool = True) -> None:
+        """Store what a step has brought, and price its cost if it is the policy's; what the warm-up draws is not.
+
+        Args:
+          transition: the step.
+          own: whether this learner acted, and nobody else.
+        """
         self._steps += 1
-        if self._steps > self._config.agent.warmup_steps:
+        if own and self._steps > self._config.agent.warmup_steps:
             self._dual.update(transition.cost)  # Alg. 1, l. 15-16
         self._replay.add(transition)  # Alg. 1, l. 12
 
     def update(self) -> UpdateResult | None:
         """Learn from memory at the pace of `updates_per_step`; None during the warm-up and between two updates.
+
+        What the warm-up left undone is made up for, a step's share and at least one update at a time.
 
         Raises:
           NotFinite: learning has diverged.
@@ -93,7 +100,9 @@ class Learner:
         result = None
         if self._steps >= self._config.agent.warmup_steps and len(self._replay):
             pace = self._config.agent.updates_per_step
-            for _ in range(math.floor(pace * self._steps) - math.floor(pace * (self._steps - 1))):
+            due = math.floor(pace * self._steps) - self._updates
+            for _ in range(min(due, max(1, math.ceil(pace)))):
+                self._updates += 1
                 result = self._update_once()
         return result
 
@@ -106,6 +115,7 @@ class Learner:
             "dual_variable": self._dual.value,
             "generator": self._generator.bit_generator.state,
             "steps": self._steps,
+            "updates": self._updates,
         }
 
     def load(self, state: dict[str, Any]) -> None:
@@ -121,7 +131,7 @@ class Learner:
         self._agent.load(state["agent"])
         self._dual.value = state["dual_variable"]
         self._generator.bit_generator.state = state["generator"]
-        self._steps = state["steps"]
+        self._steps, self._updates = state["steps"], state["updates"]
 
     def _sac(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
         return SacAgent(observation_size, action_size, self._config.agent, self._config.sac, seed, device)

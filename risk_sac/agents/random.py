@@ -39,7 +39,7 @@ class RandomAgent:
         self._action = np.where(redrawn[:, None], self._draw(len(self._action)), self._action)
         return self._action.ravel()
 
-    def observe(self, transition: Transition) -> None:
+    def observe(self, transition: Transition, *, own: bool = True) -> None:
         """Forgets it."""
 
     def update(self) -> None:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
+from risk_sac.agents.adam import Adam
 from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnitude
 from risk_sac.agents.critics import Critics
 from risk_sac.agents.networks import Mlp, bounded_log_std, draw_action, tanh_gaussian, tanh_gaussian_gradient
@@ -130,12 +131,9 @@ class SacAgent:
         self._policy = Mlp((observation_size, *config.hidden_sizes, 2 * action_size), self._generator)
         self._critics = Critics(2, observation_size, action_size, config, self._generator)
         self._log_temperature = torch.full((1,), math.log(sac.initial_temperature), device=self._device)
-        self._actor_optimizer = torch.optim.Adam(
-            [
-                {"params": [self._policy.parameters], "lr": config.actor_learning_rate},
-                {"params": [self._log_temperature], "lr": sac.temperature_learning_rate},
-            ],
-            fused=True,
+        self._actor_optimizer = Adam(
+            [self._policy.parameters, self._log_temperature],
+            [config.actor_learning_rate, sac.temperature_learning_rate],
         )
 
     @property
@@ -193,7 +191,7 @@ class SacAgent:
                 "policy": self._policy.parameters,
                 "critics": self._critics.state(),
                 "log_temperature": self._log_temperature,
-                "actor_optimizer": self._actor_optimizer.state_dict(),
+                "actor_optimizer": self._actor_optimizer.state(),
                 "generator": self._generator.get_state(),
             }
         )
@@ -205,7 +203,7 @@ class SacAgent:
             self._policy.parameters.copy_(state["policy"])
             self._critics.load(state["critics"])
             self._log_temperature.copy_(state["log_temperature"])
-            self._actor_optimizer.load_state_dict(state["actor_optimizer"])
+            self._actor_optimizer.load(state["actor_optimizer"])
             self._generator.set_state(state["generator"])
 
     def _target(

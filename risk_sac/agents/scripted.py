@@ -39,7 +39,7 @@ class ScriptedAgent:
         drive, steer = np.where(ahead, BRAKING, 0.0), np.where(ahead, np.clip(-y_m, -1.0, 1.0), 0.0)
         return np.stack((drive, steer), axis=1).ravel().astype(np.float32)
 
-    def observe(self, transition: Transition) -> None:
+    def observe(self, transition: Transition, *, own: bool = True) -> None:
         """Forgets it."""
 
     def update(self) -> None:

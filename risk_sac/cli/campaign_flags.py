@@ -25,6 +25,9 @@ def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, method
     parser.add_argument(
         "--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)"
     )
+    parser.add_argument(
+        "--cpu-s", type=float, metavar="S", help="processor time after which a search ends (default: none)"
+    )
     parser.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags go first")
 
 
@@ -34,7 +37,8 @@ def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:
     Raises:
       ConfigError: so many seeds are too many.
     """
-    flags = {name: getattr(options, name) for name in ("families", "methods", "episodes", "evaluation_episodes")}
+    names = ("families", "methods", "episodes", "evaluation_episodes", "cpu_s")
+    flags = {name: getattr(options, name) for name in names}
     return flags | {"seeds": _seeds(options, seeds)}
 
 

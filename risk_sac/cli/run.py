@@ -22,13 +22,16 @@ def add_run(commands: Commands) -> None:
     run.add_argument("--method", metavar="NAME", help=f"one of {', '.join(METHODS)} (default: risk-sac)")
     run.add_argument("--episodes", type=int, metavar="N", help="search episodes (default: 300)")
     run.add_argument("--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)")
+    run.add_argument(
+        "--cpu-s", type=float, metavar="S", help="processor time after which the search ends (default: none)"
+    )
     run.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
     run.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags go first")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
 
 
 def _run(options: argparse.Namespace) -> int:
-    names = ("family", "method", "seed", "episodes", "evaluation_episodes")
+    names = ("family", "method", "seed", "episodes", "evaluation_episodes", "cpu_s")
     spec = read_spec(options.spec, {name: getattr(options, name) for name in names})
     from risk_sac.execution.runs import run  # here, because loading torch takes seconds
 

@@ -26,7 +26,8 @@ class AgentConfig(Settings):
     target_rate: Annotated[float, Field(ge=1e-5, le=1)] = 0.005
     """τ of the target networks' moving average."""
     warmup_steps: Annotated[int, Field(ge=0, le=10_000_000)] = 1000
-    """Environment steps with uniformly random actions and no update."""
+    """Environment steps before the first update, the warm start's among them; the policy's own ones are uniformly
+    random."""
     updates_per_step: Annotated[float, Field(ge=0, le=20)] = 0.25
     """One update in four environment steps: an update costs as much as several of them."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
@@ -83,7 +84,9 @@ class RewardConfig(Settings):
     """R_risk (terms of Eq. 1) and the shaping potential (Eq. 6-8)."""
 
     valid_collision: Weight = 20.0
-    """Bonus for a valid collision."""
+    """Bonus for a valid collision that the careful driver would have prevented."""
+    unpreventable: Fraction = 0.5
+    """Share of that bonus for any other valid collision."""
     degenerate_collision: Weight = 4.0
     """Penalty for contact that a validity rule refuses."""
     ttc_weight: Weight = 0.2
@@ -95,6 +98,15 @@ class RewardConfig(Settings):
     """β of Eq. 7; robustness is in units of each requirement's scale."""
     zero_terminal_potential: bool = True
     """φ = 0 at terminal states, which policy invariance needs; False is Eq. 8 to the letter."""
+
+
+class WarmStartConfig(Settings):
+    """Episodes of an archive search that fill a learner's memory before its policy acts; the same for all learners."""
+
+    episodes: Annotated[int, Field(ge=0, le=10_000)] = 60
+    """At most; 0: the policy acts from the first episode on, uniformly at random for `warmup_steps`."""
+    failures: Annotated[int, Field(ge=1, le=10_000)] = 15
+    """Valid failures that are enough."""
 
 
 class SceneOptimizerConfig(Settings):
@@ -124,6 +136,7 @@ class LearnerConfig(Settings):
     replay: ReplayConfig = ReplayConfig()
     lagrangian: LagrangianConfig = LagrangianConfig()
     reward: RewardConfig = RewardConfig()
+    warm_start: WarmStartConfig = WarmStartConfig()
     scenes: SceneOptimizerConfig = SceneOptimizerConfig()
     checkpoint_every: Annotated[int, Field(ge=1, le=100_000)] = 20
     """Episodes between two checkpoints."""

@@ -1,11 +1,14 @@
 """The methods as rows of data: base agent × {lagrangian, shaping, replay} × scene sampler."""
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from risk_sac.config.base import Settings
 
 MethodName = Literal[
     "risk-sac",
+    "risk-sac-diverse",
     "risk-sac-only-rper",
     "risk-sac-only-rs",
     "sac-lag",
@@ -33,6 +36,8 @@ class Method(Settings):
     replay: Literal["uniform", "rper"] = "uniform"
     scenes: Literal["botorch", "archive", "sobol"] = "sobol"
     """`archive`: bred from those that led to distinct failures, together with the scripts' genes."""
+    scripts_share: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    """Of a learner's episodes after its warm start, the share in which adversaries go on to follow searched scripts."""
     summary: str
 
     @property
@@ -50,6 +55,15 @@ METHODS: dict[MethodName, Method] = {
         replay="rper",
         scenes="botorch",
         summary="The paper's method: SAC with λ, robustness shaping, RPER and BoTorch scenes.",
+    ),
+    "risk-sac-diverse": Method(
+        agent="sac",
+        lagrangian=True,
+        shaping=True,
+        replay="rper",
+        scenes="archive",
+        scripts_share=0.75,
+        summary="RISK-SAC and archive search in one loop: each learns from what the other finds.",
     ),
     "risk-sac-only-rper": Method(
         agent="sac", lagrangian=True, replay="rper", scenes="botorch", summary="Ablation: no reward shaping."

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import ValidationError
 
-from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.config import Budget, CampaignSpec, RunSpec
 from risk_sac.errors import ConfigError
 
 T = TypeVar("T", RunSpec, CampaignSpec)
@@ -55,7 +55,7 @@ def campaign_yaml(spec: CampaignSpec) -> str:
 
 def _with_budget(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     """Moves the budget's fields from the flags to where a spec has them."""
-    budget = {name: given.pop(name) for name in ("episodes", "evaluation_episodes") if name in given}
+    budget = {name: given.pop(name) for name in Budget.model_fields if name in given}
     stored = data.get("budget", {})
     return data | {"budget": {**stored, **budget}} if budget and isinstance(stored, dict) else data
 

@@ -77,6 +77,7 @@ class Recorder:
                 device=summary.device,
                 wall_s=self.results.wall_s + summary.wall_s,
                 cpu_s=self.results.cpu_s + summary.cpu_s,
+                episode_cpu_s=summary.episode_cpu_s,
                 contacts=tuple(self._contacts),
             )
         )

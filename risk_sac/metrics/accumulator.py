@@ -19,6 +19,16 @@ class MetricsAccumulator:
         self._tally = Tally(horizon_steps=horizon_steps)
         self._dual_variable = self._temperature = 0.0
 
+    @property
+    def episodes(self) -> int:
+        """Added so far."""
+        return self._tally.episodes
+
+    @property
+    def failures(self) -> int:
+        """Valid ones among them."""
+        return self._tally.failures
+
     def add(self, record: EpisodeRecord) -> RunMetrics:
         """Count one more episode.
 

@@ -80,15 +80,14 @@ def _curves(comparison: Comparison, drawn: Curves) -> Figure:
     family, curve = drawn.family, drawn.curve
     figure, axes = _canvas(CURVE_IN)
     counts = []
-    for rank, (method, values) in enumerate(curve_values(comparison, family, curve)):
+    for rank, (method, at, values) in enumerate(curve_values(comparison, family, curve)):
         counts.append(len(values))
         look = LOOKS[method]
         front = 100 - rank  # the reference lies on top
-        episodes = np.arange(1, values.shape[1] + 1)
-        first = min(curve.first, len(episodes)) - 1
-        episodes, values = episodes[first:], values[:, first:]
+        first = min(curve.first, len(at)) - 1
+        at, values = at[first:], values[:, first:]
         axes.plot(
-            episodes,
+            at,
             values.mean(axis=0),
             color=look.colour,
             linestyle=look.dashes,
@@ -97,8 +96,8 @@ def _curves(comparison: Comparison, drawn: Curves) -> Figure:
             zorder=front,
         )
         if len(values) > 1:
-            axes.fill_between(episodes, *_band(values), color=look.colour, alpha=0.13, linewidth=0, zorder=1)
-    axes.set_xlabel("search episode")
+            axes.fill_between(at, *_band(values), color=look.colour, alpha=0.13, linewidth=0, zorder=1)
+    axes.set_xlabel("processor time, s" if curve.timed else "search episode")
     axes.set_ylabel(curve.label)
     axes.margins(x=0)
     if curve.log:

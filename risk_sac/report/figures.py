@@ -13,6 +13,7 @@ from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import METRICS, WINDOW, Metric, preventable
 from risk_sac.records import Outcome, Phase
+from risk_sac.report.budgets import cpu_s, found_after_each
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.runs import FinishedRun
 from risk_sac.types import Floats
@@ -20,11 +21,12 @@ from risk_sac.types import Floats
 Format = Literal["png", "svg"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 SETTLED = 10  # episodes before which a windowed rate is mostly noise
+TIMED_S, TIMES = 30.0, 121  # processor time that is drawn, and at how many points of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """A figure over the episodes of the search."""
+    """A figure over the episodes of the search, or over the processor time it took."""
 
     name: str
     label: str
@@ -33,6 +35,18 @@ class Curve:
     log: bool = False
     top: float | None = None
     first: int = 1  # episode at which it begins
+    timed: bool = False  # over processor time
+
+    def over(self, runs: Sequence[FinishedRun]) -> tuple[Floats, Floats]:
+        """Where it is drawn, `n`, and the runs' values there, `runs x n`; no further than all runs came."""
+        if not self.timed:
+            values = np.array([self.values(run) for run in runs])
+            return np.arange(1.0, values.shape[1] + 1), values
+        at = np.linspace(0.0, TIMED_S, TIMES)
+        at = at[at <= min(max(cpu_s(run), default=0.0) for run in runs)]
+        over = [np.searchsorted(cpu_s(run), at, side="right") for run in runs]  # episodes that are over by then
+        held = [np.append(0.0, self.values(run))[count] for run, count in zip(runs, over, strict=True)]
+        return at, np.array(held)
 
 
 def window_ecr(run: FinishedRun) -> Floats:
@@ -53,6 +67,16 @@ def _window_rate(counted: Sequence[bool]) -> Floats:
     return rates
 
 
+def preventable_found(run: FinishedRun) -> Floats:
+    """Distinct preventable failures found, after each episode."""
+    return np.array([float(found.preventable) for found in found_after_each(run)])
+
+
+def distinct_found(run: FinishedRun) -> Floats:
+    """Distinct valid failures found, after each episode."""
+    return np.array([float(found.distinct) for found in found_after_each(run)])
+
+
 CURVES = (
     Curve(
         name="ecr",
@@ -69,6 +93,20 @@ CURVES = (
         methods=lambda method: True,
         top=1.0,
         first=SETTLED,
+    ),
+    Curve(
+        name="preventable_found",
+        label="distinct preventable failures",
+        values=preventable_found,
+        methods=lambda method: True,
+        timed=True,
+    ),
+    Curve(
+        name="distinct_found",
+        label="distinct failures",
+        values=distinct_found,
+        methods=lambda method: True,
+        timed=True,
     ),
     Curve(
         name="lambda",
@@ -129,12 +167,14 @@ def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
     return draw(comparison, figures[name], format_)
 
 
-def curve_values(comparison: Comparison, family: FamilyName, curve: Curve) -> Iterator[tuple[MethodName, Floats]]:
-    """The methods of a figure with their runs' values, `runs x episodes`."""
+def curve_values(
+    comparison: Comparison, family: FamilyName, curve: Curve
+) -> Iterator[tuple[MethodName, Floats, Floats]]:
+    """The methods of a figure, where they are drawn, `n`, and their runs' values there, `runs x n`."""
     for method in comparison.methods:
         runs = comparison.of_cell(family, method)
-        if runs and curve.methods(method):
-            yield method, np.array([curve.values(run) for run in runs])
+        if runs and curve.methods(method) and (not curve.timed or all(map(cpu_s, runs))):
+            yield method, *curve.over(runs)
 
 
 def _figures(comparison: Comparison) -> dict[str, Curves | Times | Bars]:

@@ -3,10 +3,12 @@
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from statistics import median
 
 from risk_sac.config import FamilyName, RunSpec
 from risk_sac.metrics import METRICS, RATIOS, Estimate, Metric, Ratio
 from risk_sac.records import Phase
+from risk_sac.report.budgets import LIMITS, found_within
 from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import LEVEL, Comparison, PairedTest
 from risk_sac.report.provenance import this_platform
@@ -33,6 +35,7 @@ def table_markdown(comparison: Comparison) -> str:
             sections += [
                 _cells(comparison, family, phase),
                 _funnel(comparison, family, phase),
+                _budgets(comparison, family) if phase == "search" else "",
                 _times(comparison, family, phase),
                 _signatures(comparison, family, phase),
                 _tests(comparison, family, phase),
@@ -97,6 +100,25 @@ def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
         for cell in comparison.group(family, phase)
     )
     return f"### The funnel: {family}, {phase}\n\n" + _table(columns, rows)
+
+
+def _budgets(comparison: Comparison, family: FamilyName) -> str:
+    """What a user gets for processor time and for episodes: median over seeds, and the least and the most."""
+    rows = []
+    for method in comparison.methods:
+        runs = comparison.of_cell(family, method)
+        for limit in LIMITS:
+            found = [each for each in (found_within(run, limit) for run in runs) if each is not None]
+            if found:
+                rows.append([method, limit.name, str(len(found)), *map(_spread, zip(*found, strict=True))])
+    if not rows:
+        return ""
+    columns = ["method", "within", "runs", "preventable", "distinct", _symbol("covered")]
+    return f"### What a budget finds: {family}\n\n" + _table(columns, rows, left=2)
+
+
+def _spread(values: Sequence[int]) -> str:
+    return f"{median(values):g} ({min(values)}–{max(values)})"
 
 
 def _times(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
@@ -224,6 +246,9 @@ def _definitions() -> str:
         "- contacts, valid, distinct, preventable: what the ego touched; without artefacts and degenerate contacts; "
         "each kind once; of these, what the careful driver would have prevented (PCR counts repetitions too). What was "
         "found before contacts were judged counts as not preventable, and is in no histogram and no signature.",
+        "- what a budget finds: distinct preventable failures, distinct valid ones and kinds in the episodes that "
+        "ended within it; median over the runs that spent it, least and most. Processor time is that of one process, "
+        "its start apart.",
         "- careful driver: UN Regulation 157's careful and competent human driver, for pedestrians and crossing "
         "vehicles after Engström et al. (arXiv 2208.08651), in the ego's place; the striker's motion is kept.",
         f"- {_defined('unresponsive_share')}",

@@ -26,6 +26,7 @@ class FinishedRun:
     versions: Mapping[str, str]
     wall_s: float
     cpu_s: float
+    episode_cpu_s: tuple[float, ...] = ()  # to the end of each episode; none where it was not measured
 
     @property
     def cell(self) -> tuple[FamilyName, MethodName]:
@@ -92,4 +93,5 @@ def finished_run(results: Results, records: tuple[EpisodeRecord, ...]) -> Finish
         versions=results.versions or {},
         wall_s=results.wall_s,
         cpu_s=results.cpu_s,
+        episode_cpu_s=results.episode_cpu_s,
     )

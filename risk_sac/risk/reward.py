@@ -23,8 +23,11 @@ Value = TypeVar("Value", float, Floats, "Tensor")
 def collision_bonus(valid: Value, bonus: float) -> Value:
     """Sparse reward for a valid collision, first term of R_risk in (1).
 
+    Deviation: the paper pays all valid collisions alike. Which of them a careful driver would have prevented is what a
+    user wants to know.
+
     Args:
-      valid: 1 in the step of a valid collision, else 0.
+      valid: in the step of a valid collision 1, or less where nobody would have prevented it; else 0.
       bonus: its size, at least 0.
     """
     return bonus * valid
@@ -76,12 +79,12 @@ def risk_reward(
 ) -> Value:
     """Risk reward of one step, R_risk(s, a) of (1).
 
-    R_risk = bonus · [valid] - penalty · [degenerate] + w_ttc · exp(-TTC / scale) + w_rss · [RSS violated]
+    R_risk = bonus · valid - penalty · [degenerate] + w_ttc · exp(-TTC / scale) + w_rss · [RSS violated]
 
     Args:
       ttc_s: time to collision after the step, s.
       rss_margin: smallest RSS margin after the step, scaled.
-      valid_collision: 1 if the step ended in a valid collision.
+      valid_collision: what the valid collision is worth in which the step ended, in (0, 1]; else 0.
       degenerate_collision: 1 if it ended in contact that a validity rule refuses.
       config: sizes of the four terms.
     """

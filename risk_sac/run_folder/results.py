@@ -59,6 +59,7 @@ class Results:
     device: str | None = None  # where the networks lived; None while the run goes on
     wall_s: float = 0.0  # over all resumes
     cpu_s: float = 0.0  # the same in processor time
+    episode_cpu_s: tuple[float, ...] = ()  # to the end of each; none while it goes on, or in an older folder
     contacts: tuple[Contact, ...] = ()  # in the order of the episodes
 
     def contact(self, id_: str) -> Contact:

@@ -22,6 +22,9 @@ from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STA
 DRIVERS = {"careful": (CAREFUL, CAREFUL_PERCEIVES_S), "fsm": (FUZZY, 0.0), "rss": (RSS, 0.0), "ideal": (IDEAL, 0.0)}
 INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
 R157_BRAKES_MPS2, R157_DELAY_S = 6.0, 0.35
+# Choice: who was further along than the ego by the time of the contact, and so is missed, avoids it by being faster and
+# not by care. Such is a driver who brakes later than the ego did for a pedestrian that then runs into the ego's flank.
+LEAD_M = 0.1
 AVOIDED = ReferenceOutcome(avoids=True, impact_speed_mps=0.0)
 
 
@@ -77,7 +80,15 @@ def _outcome(
     half_length, half_width = float(e.length_m[0]) / 2, float(e.width_m[0]) / 2
     if first >= last:  # it is struck before it perceives
         ending = Ending(
-            True, last * e.step_s, float(e.speed_mps[-1, 0]), *_pose(path), track.x[-1], track.y[-1], track.heading[-1]
+            True,
+            last * e.step_s,
+            float(e.speed_mps[-1, 0]),
+            *_pose(path),
+            track.x[-1],
+            track.y[-1],
+            track.heading[-1],
+            0.0,
+            float(e.speed_mps[-1, 0]),
         )
     else:
         speed = float(e.speed_mps[first, 0])
@@ -85,9 +96,12 @@ def _outcome(
         ending = drive(
             driver, path, half_length, half_width, track, first, speed, grip, HORIZON_S - perceives_s, e.step_s
         )
-    if not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, half_length, half_width, track):
+    blameless = (
+        not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, half_length, half_width, track)
+    )
+    if blameless and ending.lead_m <= LEAD_M:
         return AVOIDED
-    return ReferenceOutcome(avoids=False, impact_speed_mps=float(ending.speed_mps))
+    return ReferenceOutcome(avoids=False, impact_speed_mps=float(ending.passing_mps if blameless else ending.speed_mps))
 
 
 def _pose(path: Path) -> tuple[float, float, float]:

@@ -56,6 +56,8 @@ class Ending(NamedTuple):
     other_x: float
     other_y: float
     other_heading: float
+    lead_m: float  # how much further along the path it was than the recorded ego, as long as that is recorded
+    passing_mps: float  # its speed at that time
 
 
 @compiled
@@ -101,6 +103,7 @@ def drive(
       step_s: between two recorded frames.
     """
     s, braking, wanted, danger_s = path.s[first], 0.0, 0.0, math.inf
+    lead, passing = 0.0, speed
     last = len(track.x) - 1
     x, y, heading = pose_at(path, s)
     other_x, other_y, other_heading = place(track, float(first))
@@ -127,14 +130,16 @@ def drive(
             if since >= danger_s + delay:
                 braking = towards_command(braking, wanted, grip, FINE_S)
         own_frame = first + (since + FINE_S) / step_s
+        k = min(int(own_frame), last - 1)
+        recorded_s = path.s[k] + (own_frame - k) * (path.s[k + 1] - path.s[k])
         if looks and danger_s == math.inf and own_frame < last:  # nothing to perceive yet: the recorded ego drives on
-            k = int(own_frame)
-            s_next = path.s[k] + (own_frame - k) * (path.s[k + 1] - path.s[k])
-            speed, s = (s_next - s) / FINE_S, s_next
+            speed, s = (recorded_s - s) / FINE_S, recorded_s
         else:
             slower = max(speed - braking * FINE_S, 0.0)
             s += (speed + slower) / 2 * FINE_S
             speed = slower
+        if own_frame <= last:
+            lead, passing = s - recorded_s, speed
         if speed <= STANDING_MPS and braking > 0.0:
             break
         x, y, heading = pose_at(path, s)
@@ -145,8 +150,10 @@ def drive(
         if touches(
             x, y, heading, half_length, half_width, other_x, other_y, other_heading, track.half_length, track.half_width
         ):
-            return Ending(True, own_frame * step_s, speed, x, y, heading, other_x, other_y, other_heading)
-    return Ending(False, math.inf, speed, x, y, heading, other_x, other_y, other_heading)
+            return Ending(
+                True, own_frame * step_s, speed, x, y, heading, other_x, other_y, other_heading, lead, passing
+            )
+    return Ending(False, math.inf, speed, x, y, heading, other_x, other_y, other_heading, lead, passing)
 
 
 @compiled

@@ -26,6 +26,7 @@ from tests.unit.verdicts.staged import (
     sideways,
     stage,
     straight,
+    waiting,
 )
 
 WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
@@ -107,6 +108,18 @@ def test_who_is_struck_from_behind_has_avoided() -> None:
     behind = stage(straight(0.0, 0.0, 0.0, 12.0), straight(-20.0, 0.0, 0.0, 14.0))
     assert all(found.avoids for name, found in outcomes(behind).items() if name in ("careful", "ideal"))
     assert set(outcomes(evidence)) == {"careful", "fsm", "rss", "ideal", "r157_ttc"}
+
+
+def test_who_has_passed_by_then_has_not_avoided() -> None:
+    # The ego brakes with 6 m/s² from 0.3 s on for a pedestrian that comes into sight at 0, and is struck on its flank
+    # at 1.4 s. The careful driver brakes 0.75 s after 0.5 s, and would have been gone.
+    ego = straight(-1.5 * 12.0, 0.0, 0.0, 12.0, (0.3, -6.0))
+    walker = waiting(CAR_M[0] / 2 + 10.0, -1.425 - 2.5, math.pi / 2, 2.0, until_s=0.0)
+    evidence = stage(ego, walker, kinds=WALKING, seen_from_s=0.0)
+    assert evidence.time_s[-1] == pytest.approx(1.4)
+    found = outcomes(evidence)["careful"]
+    assert not found.avoids
+    assert found.impact_speed_mps == pytest.approx(10.6, abs=0.1)  # as it passes
 
 
 # v_rel 5: 5/12 + 0.35 = 0.767 s, 3.83 m. It intrudes by 0.3 m when its side is 1.35 m from the ego's middle: 1.025 m

@@ -1,0 +1,61 @@
+"""What a search had found when a budget was spent, counted by hand."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from risk_sac.config import CampaignSpec
+from risk_sac.report import FinishedRun, compare, table_markdown
+from risk_sac.report.budgets import Limit, cpu_s, episodes, found_after_each, found_within
+from risk_sac.report.figures import CURVES
+
+
+@pytest.fixture
+def run(spec: CampaignSpec, finished: Callable[..., FinishedRun]) -> FinishedRun:
+    """F is a failure that nobody would have prevented, f one that the careful driver would have, r a refused scene."""
+    return replace(finished(spec.runs()[0], ".FrfFf", "f"), episode_cpu_s=(2.0, 4.0, 4.5, 9.0, 10.0, 12.0, 20.0))
+
+
+def test_each_kind_counts_once_from_the_episode_on_that_found_it(run: FinishedRun) -> None:
+    counts = [(found.preventable, found.distinct) for found in found_after_each(run)]
+    assert counts == [(0, 0), (0, 1), (0, 1), (1, 2), (1, 2), (1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"),
+    [
+        (Limit("", cpu_s, 1.0), (0, 0)),  # the first episode ended later
+        (Limit("", cpu_s, 8.9), (0, 1)),
+        (Limit("", cpu_s, 9.0), (1, 2)),
+        (Limit("", episodes, 2), (0, 1)),
+        (Limit("", episodes, 6), (1, 2)),
+    ],
+)
+def test_what_ended_within_the_limit_counts(run: FinishedRun, limit: Limit, expected: tuple[int, int]) -> None:
+    found = found_within(run, limit)
+    assert found is not None
+    assert (found.preventable, found.distinct) == expected
+
+
+def test_a_run_that_never_got_so_far_says_nothing(run: FinishedRun) -> None:
+    assert found_within(run, Limit("", cpu_s, 12.1)) is None  # its evaluation took longer, but its search did not
+    assert found_within(run, Limit("", episodes, 7)) is None
+    assert found_within(replace(run, episode_cpu_s=()), Limit("", cpu_s, 1.0)) is None
+
+
+def test_a_curve_over_time_holds_what_was_found_and_ends_with_the_shortest_run(run: FinishedRun) -> None:
+    curve = next(curve for curve in CURVES if curve.name == "distinct_found")
+    shorter = replace(run, episode_cpu_s=tuple(each / 2 for each in run.episode_cpu_s))
+    at, values = curve.over([run, shorter])
+    assert at[-1] == 6.0
+    by_time = dict(zip(at.tolist(), values.T.tolist(), strict=True))
+    assert (by_time[0.0], by_time[2.0], by_time[4.0], by_time[4.5]) == ([0, 0], [0, 1], [1, 1], [1, 2])
+
+
+def test_the_page_says_it_by_method(spec: CampaignSpec, runs: list[FinishedRun]) -> None:
+    timed = [replace(run, episode_cpu_s=(3.0, 6.0, 9.0, 12.0, 13.0)) for run in runs]
+    page = table_markdown(compare(spec, timed, "a command"))
+    assert "### What a budget finds: low" in page
+    assert "| risk-sac | 10 CPU s | 2 | 1 (1–1) | 1.5 (1–2) | " in page
+    assert "What a budget finds: low" not in table_markdown(compare(spec, runs, "a command"))  # nothing was measured
