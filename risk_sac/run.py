@@ -4,18 +4,12 @@ Source: RISK-SAC, Algorithm 1, l. 1-2.
 """
 
 import logging
-import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import NamedTuple
 
-from risk_sac.agents.follower import ScriptFollower
-from risk_sac.agents.learner import Learner
-from risk_sac.agents.random import RandomAgent
-from risk_sac.agents.scripted import ScriptedAgent
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.metrics import MetricsAccumulator, results_digest
@@ -27,32 +21,12 @@ from risk_sac.run_folder.durable import sha256
 from risk_sac.run_folder.episode_json import records_from_json, records_to_json
 from risk_sac.run_folder.results import FAILURES, series_name
 from risk_sac.run_folder.series import write_series
-from risk_sac.scene_optimizer import ArchiveOptimizer, BotorchOptimizer, Encounter, SceneOptimizer, SobolOptimizer
-from risk_sac.scene_optimizer.base import NOBODY
-from risk_sac.types import Floats
+from risk_sac.searchers import Searchers
 
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
 PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
-Actor = Learner | RandomAgent | ScriptedAgent | ScriptFollower
-CONTROLS: Mapping[str, type[RandomAgent | ScriptedAgent]] = {
-    "scripted": ScriptedAgent,
-    "random": RandomAgent,
-    "none": RandomAgent,
-}
-OPTIMIZERS: Mapping[str, type[BotorchOptimizer | ArchiveOptimizer | SobolOptimizer]] = {
-    "botorch": BotorchOptimizer,
-    "archive": ArchiveOptimizer,
-    "sobol": SobolOptimizer,
-}
-
-
-class Pair(NamedTuple):
-    """Who makes an episode."""
-
-    optimizer: SceneOptimizer  # proposes the scene, and the genes of scripts where the actor follows some
-    actor: Actor
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +51,7 @@ class RunState:
       spec: what to run.
       problem: what to falsify.
       env: the closed loop.
-      scene_size: coordinates of a proposed point that say the scene; those behind are the genes of scripts.
-      agent: the method's, which drives the adversaries once it is warm, and learns.
+      searchers: who propose the scenes and drive the adversaries.
       reward: what the agent is trained on, and the scenes are scored by.
       records: of the episodes so far.
       series: by episode, where the ego touched something.
@@ -87,22 +60,12 @@ class RunState:
     def __init__(self, spec: RunSpec, folder: Path) -> None:
         """Begins a run anew; `resume` goes on with what lies in the folder."""
         self._cpu_began_s = time.process_time()
-        method = METHODS[spec.method]
         self.spec = spec
         self.problem = Problem.from_spec(spec)
-        self.env = RiskSacEnv(self.problem, spec.learner.reward, controlled=method.agent != "none")
-        self.agent: Actor  # Alg. 1, l. 2
-        if method.agent in CONTROLS:
-            self.agent = CONTROLS[method.agent](self.env.action_size, spec.seed)
-        elif method.agent == "scripts":
-            self.agent = ScriptFollower(self.problem.family)
-        else:
-            sizes = self.env.observation_size, self.env.action_size
-            self.agent = Learner(*sizes, method, spec.learner, spec.seed)
-        self.scene_size = self.problem.space.dimension
-        self._own = self._pair(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
-        self._guide = self._pair(ScriptFollower(self.problem.family), ArchiveOptimizer) if method.learns else None
-        self.reward = TrainingReward(method, spec.learner)
+        controlled = METHODS[spec.method].agent != "none"
+        self.env = RiskSacEnv(self.problem, spec.learner.reward, controlled=controlled)
+        self.searchers = Searchers(spec, self.problem, self.env.observation_size, self.env.action_size)
+        self.reward = TrainingReward(METHODS[spec.method], spec.learner)
         self.records: list[EpisodeRecord] = []
         self.series: dict[int, SeriesFile] = {}
         self._episode_cpu_s: list[float] = []
@@ -124,27 +87,6 @@ class RunState:
         spent = bool(played) and budget.cpu_s is not None and self._episode_cpu_s[played - 1] >= budget.cpu_s
         return played < budget.episodes and not spent
 
-    def pair(self) -> Pair:
-        """Who makes the next episode: the method's own sampler and agent, or what guides a learner.
-
-        Choice: a learner's memory is filled by an archive search that goes on until it has found failures enough, and
-        not by uniform actions, which hardly find any. All learners are warmed alike.
-        """
-        if self._guide is None or not self.learning:
-            return self._own
-        warm_start = self.spec.learner.warm_start
-        count = self._search.episodes
-        if count < warm_start.episodes and self._search.failures < warm_start.failures:
-            return self._guide
-        share = METHODS[self.spec.method].scripts_share
-        return self._guide if math.floor(share * (count + 1)) > math.floor(share * count) else self._own
-
-    def told(self, pair: Pair, point: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
-        """Tells who proposes scenes what came of the episode; f_e by the proposer's account."""
-        if pair is not self._own:
-            self._own.optimizer.tell(point[: self.scene_size], mean_return, encounter)
-        return pair.optimizer.tell(point, mean_return, encounter)
-
     @property
     def environment_steps(self) -> int:
         """Of all episodes so far."""
@@ -160,6 +102,7 @@ class RunState:
             file = self._folder / FAILURES / series_name(record.index)
             self.series[record.index] = write_series(file, self.env.trace.series())
         self.records.append(record)
+        self.searchers.add(record)
         self._episode_cpu_s.append(time.process_time() - self._cpu_began_s)
         return self._count(record)
 
@@ -169,11 +112,9 @@ class RunState:
             return
         state = {
             "records": records_to_json(self.records),
-            "episode_cpu_s": self._episode_cpu_s,
             "series": {index: file.sha256 for index, file in self.series.items()},
-            "optimizer": self._own.optimizer.state(),
-            "agent": self.agent.state(),
-            "guide": self._guide.optimizer.state() if self._guide else None,
+            "episode_cpu_s": self._episode_cpu_s,
+            **self.searchers.state(),
         }
         checkpoint.save(self._folder / CHECKPOINT, state, self.spec.digest)
         self._saved = len(self.records)
@@ -188,10 +129,7 @@ class RunState:
             return []
         self.records = records_from_json(state["records"])
         self.series = _series(self._folder, self.records, state.get("series", {}))  # older checkpoints have none
-        self._own.optimizer.load(state["optimizer"])
-        if self._guide:
-            self._guide.optimizer.load(state["guide"])
-        self.agent.load(state["agent"])
+        self.searchers.load(state, self.records)
         self._episode_cpu_s = list(state["episode_cpu_s"])
         self._cpu_began_s = time.process_time() - self._episode_cpu_s[-1]
         self._saved = len(self.records)
@@ -206,7 +144,7 @@ class RunState:
             digest=results_digest(self.records),
             finished=self.finished,
             versions={name: version(name) for name in PACKAGES},
-            device=self.agent.device,
+            device=self.searchers.agent.device,
             wall_s=wall_s,
             cpu_s=cpu_s,
             episode_cpu_s=tuple(self._episode_cpu_s),
@@ -215,9 +153,6 @@ class RunState:
     def close(self) -> None:
         """Ends the simulation."""
         self.env.close()
-
-    def _pair(self, actor: Actor, optimizer: type[BotorchOptimizer | ArchiveOptimizer | SobolOptimizer]) -> Pair:
-        return Pair(optimizer(self.scene_size + actor.genes, self.spec.learner.scenes, self.spec.seed), actor)
 
     def _count(self, record: EpisodeRecord) -> RunMetrics:
         return (self._search if record.phase == "train" else self._evaluation).add(record)

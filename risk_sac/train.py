@@ -79,22 +79,23 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
     Choice: scenes keep coming from the method's own sampler during evaluation, since it is the pair of
     sampler and policy that generates scenarios.
     """
-    env, agent, learning, index = run.env, run.agent, run.learning, len(run.records)
+    env, agent, learning, index = run.env, run.searchers.agent, run.learning, len(run.records)
     seed, playable = episode_seed(run.spec.seed, index), guard.begin(index)
-    pair = run.pair()
-    point = pair.optimizer.ask()  # Alg. 1, l. 4
-    scene, genes = run.problem.space.from_unit(point[: run.scene_size]), point[run.scene_size :]
+    optimizer, actor = run.searchers.next(learning=learning)
+    point = optimizer.ask()  # Alg. 1, l. 4
+    scene_size = run.searchers.scene_size
+    scene, genes = run.problem.space.from_unit(point[:scene_size]), point[scene_size:]
     tally = Tally()
     if not playable:
-        run.told(pair, point, None)
+        run.searchers.tell(point, None)
         return _record(run, seed, scene.values, tally, rejected=SIM_CRASH)
     try:
         observation, info = env.reset(seed=seed, options={"scene": scene})  # Alg. 1, l. 5
     except InfeasibleScene as infeasible:
-        run.told(pair, point, None)
+        run.searchers.tell(point, None)
         return _record(run, seed, scene.values, tally, rejected=infeasible.reason)
-    actor, own = pair.actor, pair.actor is agent
     actor.begin(genes)
+    own = actor is agent
     for step in range(run.problem.family.horizon_steps):  # Alg. 1, l. 6
         guard.step(step)
         action = actor.act(observation, explore=learning)  # Alg. 1, l. 7
@@ -124,7 +125,7 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
             break
     collision = info.get("collision")
     encounter = Encounter(collision=collision, nearest_m=env.trace.nearest_m(run.problem.family.adversaries))
-    objective = run.told(pair, point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
+    objective = run.searchers.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
     return _record(run, seed, scene.values, tally, objective=objective, collision=collision)
 
 
@@ -171,8 +172,8 @@ def _record(
         min_ttc_s=TTC_CAP_S if crashed else run.env.trace.min_ttc_s,
         min_robustness=ROBUSTNESS_CLIP if crashed else run.env.trace.min_robustness,
         objective=objective,
-        dual_variable=run.agent.dual_variable,
-        temperature=run.agent.temperature,
+        dual_variable=run.searchers.agent.dual_variable,
+        temperature=run.searchers.agent.temperature,
         environment_steps=run.environment_steps + tally.steps,
         collision=collision,
     )

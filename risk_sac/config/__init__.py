@@ -12,6 +12,7 @@ from risk_sac.config.learner import (
     RewardConfig,
     SacConfig,
     SceneOptimizerConfig,
+    WarmStartConfig,
 )
 from risk_sac.config.methods import METHODS, Method, MethodName
 from risk_sac.config.odd import CrossingType, DynamicElements, Environment, Odd, Scenery, SignalType
@@ -44,4 +45,5 @@ __all__ = [
     "SensorConfig",
     "Settings",
     "SignalType",
+    "WarmStartConfig",
 ]

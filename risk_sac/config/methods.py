@@ -1,8 +1,6 @@
 """The methods as rows of data: base agent × {lagrangian, shaping, replay} × scene sampler."""
 
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from risk_sac.config.base import Settings
 
@@ -36,8 +34,8 @@ class Method(Settings):
     replay: Literal["uniform", "rper"] = "uniform"
     scenes: Literal["botorch", "archive", "sobol"] = "sobol"
     """`archive`: bred from those that led to distinct failures, together with the scripts' genes."""
-    scripts_share: Annotated[float, Field(ge=0, lt=1)] = 0.0
-    """Of a learner's episodes after its warm start, the share in which adversaries go on to follow searched scripts."""
+    takes_turns: bool = False
+    """Whether a learner's warm start goes on beside it: scripts and policy act in turn, by what they yield."""
     summary: str
 
     @property
@@ -62,7 +60,7 @@ METHODS: dict[MethodName, Method] = {
         shaping=True,
         replay="rper",
         scenes="archive",
-        scripts_share=0.75,
+        takes_turns=True,
         summary="RISK-SAC and archive search in one loop: each learns from what the other finds.",
     ),
     "risk-sac-only-rper": Method(

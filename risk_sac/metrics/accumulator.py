@@ -24,11 +24,6 @@ class MetricsAccumulator:
         """Added so far."""
         return self._tally.episodes
 
-    @property
-    def failures(self) -> int:
-        """Valid ones among them."""
-        return self._tally.failures
-
     def add(self, record: EpisodeRecord) -> RunMetrics:
         """Count one more episode.
 

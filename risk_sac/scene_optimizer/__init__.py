@@ -1,12 +1,13 @@
 """Ask / tell search over initial scenes in the unit cube, Eq. 11 and Alg. 1, l. 1, 4, 21-22."""
 
 from risk_sac.scene_optimizer.archive import ArchiveOptimizer
-from risk_sac.scene_optimizer.base import Encounter, SceneOptimizer, State
+from risk_sac.scene_optimizer.base import NOBODY, Encounter, SceneOptimizer, State
 from risk_sac.scene_optimizer.bayesian import BotorchOptimizer
 from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
 from risk_sac.scene_optimizer.sobol import SobolOptimizer
 
 __all__ = [
+    "NOBODY",
     "ArchiveOptimizer",
     "BotorchOptimizer",
     "Encounter",

@@ -16,12 +16,20 @@ from typing import Any
 import torch
 from llvmlite import binding
 
-from risk_sac.config import AgentConfig, Budget, LearnerConfig, ReplayConfig, RunSpec, SceneOptimizerConfig
+from risk_sac.config import (
+    AgentConfig,
+    Budget,
+    LearnerConfig,
+    ReplayConfig,
+    RunSpec,
+    SceneOptimizerConfig,
+    WarmStartConfig,
+)
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.train import train
 
 RECORDED = Path(__file__).with_suffix(".json")
-METHODS = ("random", "bo-only", "risk-sac")
+METHODS = ("random", "bo-only", "risk-sac", "risk-sac-diverse")
 SEEDS = {"low": 67, "mixed": 0, "dense": 68}  # at least one of each family's runs has a contact to be judged
 PACKAGES = ("botorch", "gpytorch", "libsumo", "llvmlite", "numba", "numpy", "scipy", "torch")
 # Small enough for a second, and still learning and modelling before the run is over.
@@ -29,6 +37,7 @@ BUDGET = Budget(episodes=3, evaluation_episodes=1)
 LEARNER = LearnerConfig(
     agent=AgentConfig(hidden_sizes=(32, 32), batch_size=32, warmup_steps=100),
     replay=ReplayConfig(capacity=1000),
+    warm_start=WarmStartConfig(episodes=1),
     scenes=SceneOptimizerConfig(initial_scenes=2, refit_every=1, candidates=32, exploration=0.0),
 )
 

@@ -18,7 +18,7 @@ family: mixed
 method: risk-sac
 seed: 2
 budget: {evaluation_episodes: 1}
-learner: {agent: {hidden_sizes: [32, 32], batch_size: 32, warmup_steps: 100}}
+learner: {agent: {hidden_sizes: [32, 32], batch_size: 32, warmup_steps: 100}, warm_start: {episodes: 1}}
 """
 
 

@@ -9,7 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.config import AgentConfig, Budget, LearnerConfig, ReplayConfig, RunSpec, SceneOptimizerConfig
+from risk_sac.config import (
+    AgentConfig,
+    Budget,
+    LearnerConfig,
+    ReplayConfig,
+    RunSpec,
+    SceneOptimizerConfig,
+    WarmStartConfig,
+)
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder.checkpoint import previous
@@ -23,6 +31,7 @@ EPISODES, EVALUATION = 6, 1
 LEARNER = LearnerConfig(
     agent=AgentConfig(hidden_sizes=(32, 32), batch_size=32, warmup_steps=150),
     replay=ReplayConfig(capacity=1000),
+    warm_start=WarmStartConfig(episodes=2),
     scenes=SceneOptimizerConfig(initial_scenes=2, refit_every=1, candidates=32, exploration=0.0),
     checkpoint_every=1,
 )
@@ -136,6 +145,18 @@ def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path: Pa
     train(bred, tmp_path / "parts", first)
     resumed = train(bred, tmp_path / "parts", rest)
     assert len(first.records) == INITIAL + 3
+    assert records_to_json(rest.records) == records_to_json(whole.records)
+    assert resumed.digest == expected.digest
+
+
+@pytest.mark.parametrize("limit", [1, 3, 7])
+def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path: Path, limit: int) -> None:
+    shared = spec(method="risk-sac-diverse").model_copy(update={"budget": Budget(episodes=9)})
+    whole, first, rest = Listener(), Listener(limit), Listener()
+    expected = train(shared, tmp_path / "whole", whole)
+    train(shared, tmp_path / "parts", first)
+    resumed = train(shared, tmp_path / "parts", rest)
+    assert len(first.records) == limit
     assert records_to_json(rest.records) == records_to_json(whole.records)
     assert resumed.digest == expected.digest
 

@@ -27,6 +27,7 @@ seeds: [0, 1]
 budget: {episodes: 9, evaluation_episodes: 1}
 learner:
   agent: {hidden_sizes: [32, 32], batch_size: 32, warmup_steps: 100}
+  warm_start: {episodes: 1}
   scenes: {initial_scenes: 2, candidates: 32}
   checkpoint_every: 2
 """

@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunSpec, SceneOptimizerConfig
+from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunSpec, SceneOptimizerConfig, WarmStartConfig
 from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.local import LocalExecutor
 from service.settings import ServiceSettings
@@ -25,6 +25,7 @@ SPEC = RunSpec(
     budget=Budget(episodes=EPISODES, evaluation_episodes=2),
     learner=LearnerConfig(
         agent=AgentConfig(hidden_sizes=(16, 16), batch_size=16, warmup_steps=500),
+        warm_start=WarmStartConfig(episodes=2),
         scenes=SceneOptimizerConfig(initial_scenes=8),  # some of the few scenes come from a model
         checkpoint_every=3,
     ),

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from risk_sac.config import AgentConfig, Budget, EgoConfig, FamilyName, LearnerConfig, RunSpec
+from risk_sac.config import AgentConfig, Budget, EgoConfig, FamilyName, LearnerConfig, RunSpec, WarmStartConfig
 from risk_sac.env import Observation, RiskSacEnv, make_default
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.scenario.families import FAMILIES
@@ -88,7 +88,7 @@ def by_a_learner(name: FamilyName, folder: Path, monkeypatch: pytest.MonkeyPatch
         family=name,
         method="risk-sac",
         seed=0,
-        learner=LearnerConfig(agent=agent),
+        learner=LearnerConfig(agent=agent, warm_start=WarmStartConfig(episodes=0)),
         budget=Budget(episodes=8, evaluation_episodes=2),
     )
     train(spec, folder, Silent())

@@ -29,6 +29,7 @@ SMALL = {  # what costs time or memory, and is bounded for that
     "learner.agent.batch_size": 8,
     "learner.agent.updates_per_step": 1,
     "learner.agent.warmup_steps": 20,
+    "learner.warm_start.episodes": 1,
     "learner.agent.device": "cpu",
     "learner.replay.capacity": 1000,
     "learner.scenes.initial_scenes": 2,
@@ -114,7 +115,7 @@ def play(spec: RunSpec, folder: Path) -> None:
         for contact in run.series.values():
             series = read_series(folder / "failures" / contact.name)
             assert all(np.isfinite(series[name]).all() for name in ("robustness", "soft_min", "least_ttc_s"))
-        assert_finite(run.agent.state())
+        assert_finite(run.searchers.agent.state())
     finally:
         run.close()
 

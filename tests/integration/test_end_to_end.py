@@ -11,7 +11,11 @@ SPEC = {
     "methods": ["risk-sac"],
     "seeds": [1],
     "budget": {"episodes": 5, "evaluation_episodes": 1},
-    "learner": {"checkpoint_every": 2, "agent": {"warmup_steps": 200, "hidden_sizes": [16], "batch_size": 16}},
+    "learner": {
+        "checkpoint_every": 2,
+        "agent": {"warmup_steps": 200, "hidden_sizes": [16], "batch_size": 16},
+        "warm_start": {"episodes": 1},
+    },
 }
 
 

@@ -25,7 +25,7 @@ def spec(times: Callable[[int, int], int]) -> dict[str, Any]:
         "methods": ["risk-sac", "random"],
         "seeds": list(range(times(1, 2))),
         "budget": {"episodes": times(20, 60), "evaluation_episodes": 3},
-        "learner": {"checkpoint_every": 3, "agent": {"warmup_steps": 200}},
+        "learner": {"checkpoint_every": 3, "agent": {"warmup_steps": 200}, "warm_start": {"episodes": 2}},
     }
 
 
