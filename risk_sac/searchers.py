@@ -79,14 +79,20 @@ class Searchers:
         Args:
           learning: whether it is one of the search; in the evaluation the method's own searcher is on its own.
         """
-        warm_start = self._spec.learner.warm_start
         if self._guide is None or not learning:
             self._next = self._own
-        elif self._episodes < warm_start.episodes and self._failures < warm_start.failures:
+        elif not self._warm:
             self._next = self._guide
         else:
             self._next = (self._guide, self._own)[self._turns.next()] if self._turns else self._own
         return self._next
+
+    @property
+    def _warm(self) -> bool:
+        """Whether the guide has done its part; one that goes on anyway has time until it has found enough."""
+        warm_start = self._spec.learner.warm_start
+        spent = self._episodes >= warm_start.episodes and not (self._turns and warm_start.episodes)
+        return spent or self._failures >= warm_start.failures
 
     def tell(self, point: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
         """Tells what came of the scene that the next one was asked for; see `SceneOptimizer.tell`.
