@@ -1,49 +1,18 @@
 """The comparison of methods over seeds: cells, pairwise tests, and what they rest on. Pure."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import groupby
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunSpec
-from risk_sac.metrics import RESAMPLING_SEED, Metric, MetricName, bootstrap_interval
 from risk_sac.records import RECORDED, Phase
+from risk_sac.report.budgets import HEADLINE, found_within
 from risk_sac.report.cells import Cell, cell_of, metrics_of
+from risk_sac.report.paired import PairedTest, corrected, paired_tests
 from risk_sac.report.runs import FinishedRun
-from risk_sac.report.statistics import holm, vargha_delaney, wilcoxon_p
 
 REFERENCE: MethodName = "risk-sac"
-LEVEL = 0.05
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PairedTest:
-    """The reference against another method in one metric, runs paired by seed."""
-
-    family: FamilyName
-    phase: Phase
-    metric: MetricName
-    reference: MethodName
-    method: MethodName
-    pairs: int
-    """Seeds for which both have a value."""
-    difference: float | None
-    """Mean of reference - method; null without a pair."""
-    low: float | None
-    """95 % interval of the difference, bootstrapped over the pairs; null with fewer than two."""
-    high: float | None
-    p: float | None
-    """Wilcoxon signed-rank, exact, two-sided; null with fewer than two pairs."""
-    p_holm: float | None
-    """Corrected over all tests of the same family and phase."""
-    a12: float | None
-    """Vargha-Delaney: chance that the reference's value is the larger one."""
-
-    __pydantic_config__ = {"use_attribute_docstrings": True}  # noqa: RUF012 - a body of the service shows it
-
-    @property
-    def significant(self) -> bool:
-        """Whether the corrected p is below 5 %."""
-        return self.p_holm is not None and self.p_holm < LEVEL
+HEADLINER: MethodName = "risk-sac-diverse"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,6 +36,7 @@ class Comparison:
     missing: tuple[MissingRun, ...]
     cells: tuple[Cell, ...]  # by family, phase and method
     tests: tuple[PairedTest, ...]
+    headline: tuple[PairedTest, ...]  # what a user pays for, by family; declared before any run, so corrected by itself
 
     @property
     def reference(self) -> MethodName:
@@ -133,6 +103,7 @@ def compare(
         missing=missing,
         cells=tuple(_cells(kept)),
         tests=tuple(_tests(spec, methods, kept)),
+        headline=tuple(_headline(spec, methods, kept)),
     )
 
 
@@ -152,51 +123,36 @@ def _tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[Fin
     """Every other method against the first, corrected per family and phase."""
     phases: tuple[Phase, ...] = ("search", "evaluation") if spec.budget.evaluation_episodes else ("search",)
     for family in spec.families:
-        by_method = {method: {run.spec.seed: run for run in runs if run.cell == (family, method)} for method in methods}
+        by_method = _by_method(family, methods, runs)
         for phase in phases:
-            yield from _corrected(
-                [
-                    _paired_test(metric, phase, by_method[methods[0]], by_method[other], (family, methods[0], other))
-                    for metric in metrics_of(phase)
-                    if metric.tested
-                    for other in methods[1:]
-                ]
-            )
+            tests: list[PairedTest] = []
+            for metric in (metric for metric in metrics_of(phase) if metric.tested):
+                values = {
+                    method: {run.spec.seed: metric.value(run.metrics[phase]) for run in of_method}
+                    for method, of_method in by_method.items()
+                }
+                tests += paired_tests(family, phase, metric.name, methods[0], values)
+            yield from corrected(tests)
 
 
-def _paired_test(
-    metric: Metric,
-    phase: Phase,
-    ours: Mapping[int, FinishedRun],
-    theirs: Mapping[int, FinishedRun],
-    names: tuple[FamilyName, MethodName, MethodName],
-) -> PairedTest:
-    family, reference, method = names
-    pairs = []
-    for seed in sorted(ours.keys() & theirs.keys()):
-        one, other = (metric.value(runs[seed].metrics[phase]) for runs in (ours, theirs))
-        if one is not None and other is not None:
-            pairs.append((one, other))
-    differences = [one - other for one, other in pairs]
-    low, high = bootstrap_interval(differences, RESAMPLING_SEED) if len(pairs) > 1 else (None, None)
-    return PairedTest(
-        family=family,
-        phase=phase,
-        metric=metric.name,
-        reference=reference,
-        method=method,
-        pairs=len(pairs),
-        difference=sum(differences) / len(pairs) if pairs else None,
-        low=low,
-        high=high,
-        p=wilcoxon_p(differences) if len(pairs) > 1 else None,
-        p_holm=None,
-        a12=vargha_delaney(*zip(*pairs, strict=True)) if pairs else None,
-    )
+def _headline(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[FinishedRun]) -> Iterator[PairedTest]:
+    """Our own search against every other one, corrected per family; the first method where it does not take part."""
+    first = HEADLINER if HEADLINER in methods else methods[0]
+    for family in spec.families:
+        values = {
+            method: {run.spec.seed: _paid(run) for run in of_method}
+            for method, of_method in _by_method(family, methods, runs).items()
+        }
+        yield from corrected(paired_tests(family, "search", HEADLINE.name, first, values))
 
 
-def _corrected(tests: Sequence[PairedTest]) -> Iterator[PairedTest]:
-    """Holm over the tests that have a p."""
-    adjusted = iter(holm([test.p for test in tests if test.p is not None]))
-    for test in tests:
-        yield test if test.p is None else replace(test, p_holm=next(adjusted))
+def _paid(run: FinishedRun) -> float | None:
+    """What a user pays for."""
+    found = found_within(run, HEADLINE)
+    return None if found is None else float(found.preventable)
+
+
+def _by_method(
+    family: FamilyName, methods: Sequence[MethodName], runs: Sequence[FinishedRun]
+) -> Mapping[MethodName, Sequence[FinishedRun]]:
+    return {method: [run for run in runs if run.cell == (family, method)] for method in methods}

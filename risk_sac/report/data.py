@@ -33,6 +33,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
         "reference": comparison.reference,
         "cells": [asdict(cell) for cell in comparison.cells],
         "tests": [asdict(test) for test in comparison.tests],
+        "headline": [asdict(test) for test in comparison.headline],
         "runs": [_row(run) for run in comparison.runs],
     }
 

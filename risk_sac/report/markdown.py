@@ -6,17 +6,18 @@ from collections.abc import Iterable, Iterator, Sequence
 from statistics import median
 
 from risk_sac.config import FamilyName, RunSpec
-from risk_sac.metrics import METRICS, RATIOS, Estimate, Metric, Ratio
+from risk_sac.metrics import Estimate
 from risk_sac.records import Phase
-from risk_sac.report.budgets import LIMITS, found_within
+from risk_sac.report.budgets import HEADLINE, LIMITS, found_within
 from risk_sac.report.cells import Cell, metrics_of
-from risk_sac.report.comparison import LEVEL, Comparison, PairedTest
+from risk_sac.report.comparison import Comparison
+from risk_sac.report.definitions import ROWS, definitions, symbol
+from risk_sac.report.paired import LEVEL, PairedTest
 from risk_sac.report.provenance import this_platform
 from risk_sac.report.statistics import pairs_needed, smallest_p
 
 DASH = "–"
 CONTROL = "no-adversary"
-ROWS: dict[str, Metric | Ratio] = {row.name: row for row in (*METRICS, *RATIOS)}
 SHARES = ("artefact_rate", "degenerate_rate", "rejected_rate")  # the last columns of the table of methods
 # RISK-SAC's row of the paper's Table I, by family.
 PAPER: dict[str, dict[FamilyName, float]] = {
@@ -40,7 +41,7 @@ def table_markdown(comparison: Comparison) -> str:
                 _signatures(comparison, family, phase),
                 _tests(comparison, family, phase),
             ]
-    sections += [_control(comparison), _paper(comparison), _definitions(), _repeat(comparison)]
+    sections += [_control(comparison), _paper(comparison), definitions(), _repeat(comparison)]
     return "\n".join(section for section in sections if section)
 
 
@@ -71,8 +72,8 @@ def _missing(comparison: Comparison) -> str:
 def _cells(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     seeds = len(comparison.spec.seeds)
     columns = ["method", "seeds", *(metric.heading for metric in metrics_of(phase) if metric.tabled)]
-    columns += [_symbol("steps_per_distinct_failure"), *(["CPU s / distinct"] if phase == "search" else [])]
-    columns += map(_symbol, SHARES)
+    columns += [symbol("steps_per_distinct_failure"), *(["CPU s / distinct"] if phase == "search" else [])]
+    columns += map(symbol, SHARES)
     rows = [_cell(cell, seeds) for cell in comparison.group(family, phase)]
     return f"## {family}, {phase}\n\n" + _table(columns, rows) if rows else ""
 
@@ -89,7 +90,7 @@ def _cell(cell: Cell, seeds: int) -> list[str]:
 
 def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     """From contacts to what is worth a person's time, summed over seeds."""
-    columns = ["method", "episodes", "contacts", "valid", "distinct", "preventable", _symbol("unresponsive_share")]
+    columns = ["method", "episodes", "contacts", "valid", "distinct", "preventable", symbol("unresponsive_share")]
     rows = (
         [
             cell.method,
@@ -113,8 +114,13 @@ def _budgets(comparison: Comparison, family: FamilyName) -> str:
                 rows.append([method, limit.name, str(len(found)), *map(_spread, zip(*found, strict=True))])
     if not rows:
         return ""
-    columns = ["method", "within", "runs", "preventable", "distinct", _symbol("covered")]
-    return f"### What a budget finds: {family}\n\n" + _table(columns, rows, left=2)
+    columns = ["method", "within", "runs", "preventable", "distinct", symbol("covered")]
+    table = f"### What a budget finds: {family}\n\n" + _table(columns, rows, left=2)
+    tests = [test for test in comparison.headline if test.family == family]
+    if not tests:
+        return table
+    title = f"Distinct preventable failures within {HEADLINE.name}, {tests[0].reference} against the others:\n\n"
+    return f"{table}\n{title}" + _tested(tests)
 
 
 def _spread(values: Sequence[int]) -> str:
@@ -164,15 +170,18 @@ def _tests(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     tests = [test for test in comparison.tests if (test.family, test.phase) == (family, phase)]
     if not tests:
         return ""
+    return f"### {comparison.reference} against the others: {family}, {phase}\n\n" + _tested(tests)
+
+
+def _tested(tests: Sequence[PairedTest]) -> str:
     columns = ["metric", "against", "pairs", "difference (95 %)", "A12", "p", "p (Holm)"]
-    title = f"### {comparison.reference} against the others: {family}, {phase}\n\n"
-    return title + _table(columns, map(_test, tests), left=2) + "\n" + "".join(_power(tests)) + "\n"
+    return _table(columns, map(_test, tests), left=2) + "\n" + "".join(_power(tests)) + "\n"
 
 
 def _test(test: PairedTest) -> list[str]:
     p_holm = _p(test.p_holm)
     return [
-        _symbol(test.metric),
+        symbol(test.metric) if test.metric in ROWS else test.metric,
         test.method,
         str(test.pairs),
         _number(test.difference, "+.3f") + _interval(test.low, test.high, "+.3f"),
@@ -206,7 +215,7 @@ def _control(comparison: Comparison) -> str:
         return ""
     rows = ([cell.family, cell.phase, str(cell.episodes), _percent(cell.raw_rate)] for cell in cells)
     title = "## The simulator's own artefacts\n\nContacts of any kind with `no-adversary`, where nobody attacks.\n\n"
-    return title + _table(["family", "phase", "episodes", _symbol("raw_rate")], rows, left=2)
+    return title + _table(["family", "phase", "episodes", symbol("raw_rate")], rows, left=2)
 
 
 def _paper(comparison: Comparison) -> str:
@@ -221,58 +230,13 @@ def _paper(comparison: Comparison) -> str:
             mean = cell.estimates[name].mean
             rows[-1] += [_number(mean, ".2f"), f"{'≤ ' if name == 'rho_c' else ''}{paper[cell.family]:.2f}"]
     columns = ["family", "phase"]
-    for symbol in map(_symbol, PAPER):
-        columns += [symbol, f"{symbol} paper"]
+    for heading in map(symbol, PAPER):
+        columns += [heading, f"{heading} paper"]
     title = (
         "## Beside the paper\n\nThe paper's RISK-SAC was measured in CARLA, against another ego and with other "
         "definitions of a failure, of realism and of outcome features; the numbers are no target.\n\n"
     )
     return title + _table(columns, rows, left=2)
-
-
-def _definitions() -> str:
-    lines = [f"- {_defined(metric.name)}" for metric in METRICS]
-    lines += [
-        "- search: the training episodes, rejected scenes included; evaluation: the frozen policy acting by its mean.",
-        "- mean over seeds and, in brackets, its 95 % interval: percentile bootstrap over seeds, which with fewer than "
-        "about ten seeds is narrower than its name; Wilson's for the rates of a single run.",
-        "- n of m seeds: the mean is over the n runs that have a value; OFD needs two valid failures.",
-        "- distinct: valid failures that resemble no earlier one of the same run: another signature, or the same one "
-        "with other outcome features; summed over seeds.",
-        f"- {_defined('steps_per_distinct_failure')}",
-        "- CPU s / distinct: the same with the processor seconds of the whole runs, evaluation episodes included; a "
-        "process's start and what a crashed attempt spent are not.",
-        f"- {_defined('artefact_rate')}",
-        "- contacts, valid, distinct, preventable: what the ego touched; without artefacts and degenerate contacts; "
-        "each kind once; of these, what the careful driver would have prevented (PCR counts repetitions too). What was "
-        "found before contacts were judged counts as not preventable, and is in no histogram and no signature.",
-        "- what a budget finds: distinct preventable failures, distinct valid ones and kinds in the episodes that "
-        "ended within it; median over the runs that spent it, least and most. Processor time is that of one process, "
-        "its start apart.",
-        "- careful driver: UN Regulation 157's careful and competent human driver, for pedestrians and crossing "
-        "vehicles after Engström et al. (arXiv 2208.08651), in the ego's place; the striker's motion is kept.",
-        f"- {_defined('unresponsive_share')}",
-        "- time since the release: from when the adversaries are handed to the policy to the beginning of the "
-        "conflict, and to the contact; what began before the release stands in the first second.",
-        f"- {_defined('degenerate_rate')} {_defined('rejected_rate')}",
-        "- difference: mean over the seeds that both methods have a value for, first method minus the other, with a "
-        "paired bootstrap 95 % interval.",
-        "- A12 (Vargha-Delaney): chance that a run of the first method has the larger value; 0.5 is no difference.",
-        "- p: Wilcoxon signed-rank, two-sided, exact also with ties; zero differences are left out.",
-        "- p (Holm): corrected over all methods and metrics of one family and phase, which are one family of "
-        f"hypotheses; bold below {LEVEL:g}.",
-        f"- {_symbol('distinct_per_1000_steps')} is tested in place of its reciprocal, "
-        f"{_symbol('steps_per_distinct_failure')}, because a run without a failure has it too.",
-    ]
-    return "## Definitions\n\n" + "\n".join(lines) + "\n"
-
-
-def _symbol(name: str) -> str:
-    return ROWS[name].symbol
-
-
-def _defined(name: str) -> str:
-    return f"{ROWS[name].symbol}: {ROWS[name].meaning}."
 
 
 def _repeat(comparison: Comparison) -> str:

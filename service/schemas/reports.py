@@ -66,6 +66,9 @@ class Table(Body):
     cells: list[Cell]
     """By family, phase and method, the reference first; none before a run has finished."""
     tests: list[PairedTest]
+    headline: list[PairedTest]
+    """Of distinct preventable failures within 30 processor seconds: risk-sac-diverse, or the first method, against the
+    others; declared before any run, so corrected by themselves."""
     runs: list[ReportedRun]
 
 
@@ -82,7 +85,8 @@ class Figure(Body):
     """A figure of the report."""
 
     name: Annotated[str, Field(examples=["ecr_low", "bars_rho_c_evaluation"])]
-    """With a family: `ecr_`, `pcr_`, `lambda_` and `alpha_`, curves over the search; `times_`, histograms of the time
+    """With a family: `ecr_`, `pcr_`, `lambda_` and `alpha_`, curves over the search; `preventable_found_` and
+    `distinct_found_`, what was found over processor time; `times_`, histograms of the time
     from the adversaries' release to conflict and contact. `bars_` with a metric: all families."""
     files: list[FigureFile]
 
