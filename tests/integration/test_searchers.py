@@ -1,0 +1,95 @@
+"""Who makes which episode of a run: the method's own searcher or its guide, and when a search is over."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from risk_sac.agents.follower import ScriptFollower
+from risk_sac.agents.learner import Learner
+from risk_sac.config import AgentConfig, Budget, LearnerConfig, MethodName, RunSpec, WarmStartConfig
+from risk_sac.problem import Problem
+from risk_sac.records import EpisodeRecord, Outcome, RunMetrics, SeriesFile
+from risk_sac.searchers import Searchers
+from risk_sac.train import train
+from tests.builders import episode_record
+
+WARM = 3
+
+
+@dataclass
+class Listener:
+    records: list[EpisodeRecord] = field(default_factory=list)
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        self.records.append(record)
+
+    def should_stop(self) -> bool:
+        return False
+
+
+def spec(method: MethodName, budget: Budget, warm_start: WarmStartConfig | None = None) -> RunSpec:
+    agent = AgentConfig(hidden_sizes=(8,), batch_size=8, warmup_steps=50)
+    learner = LearnerConfig(agent=agent, warm_start=warm_start or WarmStartConfig(episodes=WARM))
+    return RunSpec(family="low", method=method, seed=5, budget=budget, learner=learner)
+
+
+def played(folder: Path, wanted: RunSpec) -> list[EpisodeRecord]:
+    listener = Listener()
+    assert train(wanted, folder, listener).finished
+    return listener.records
+
+
+@pytest.mark.parametrize("method", ["risk-sac", "ddpg"])
+def test_a_learner_is_warmed_by_what_an_archive_search_would_have_tried(tmp_path: Path, method: MethodName) -> None:
+    bred = played(tmp_path / "bred", spec("archive", Budget(episodes=WARM + 1)))
+    warmed = played(tmp_path / "warmed", spec(method, Budget(episodes=WARM + 1)))
+    same = [
+        (one.scene, one.steps, one.outcome) == (two.scene, two.steps, two.outcome)
+        for one, two in zip(bred, warmed, strict=True)
+    ]
+    assert same == [True] * WARM + [False]
+    assert {record.temperature for record in warmed[:WARM]} == {warmed[0].temperature}  # nothing is learned meanwhile
+
+
+def searchers(method: MethodName, warm_start: WarmStartConfig) -> Searchers:
+    wanted = spec(method, Budget(episodes=100), warm_start)
+    return Searchers(wanted, Problem.from_spec(wanted), observation_size=20, action_size=4)
+
+
+def makers(subject: Searchers, outcomes: list[Outcome]) -> list[type]:
+    """Who acts in each episode, the next one included."""
+    found = []
+    for index, outcome in enumerate(outcomes):
+        found.append(type(subject.next(learning=True).actor))
+        subject.add(episode_record(index, outcome))
+    return [*found, type(subject.next(learning=True).actor)]
+
+
+def test_a_guide_has_done_its_part_after_so_many_episodes_or_failures() -> None:
+    few = WarmStartConfig(episodes=3, failures=2)
+    quiet, eventful = [Outcome.SAFE] * 3, [Outcome.FAILURE, Outcome.FAILURE]
+    assert makers(searchers("risk-sac", few), quiet) == [ScriptFollower] * 3 + [Learner]
+    assert makers(searchers("risk-sac", few), eventful) == [ScriptFollower] * 2 + [Learner]
+    assert makers(searchers("risk-sac", WarmStartConfig(episodes=0)), []) == [Learner]
+    assert makers(searchers("archive", few), quiet) == [ScriptFollower] * 4
+
+
+def test_a_guide_that_goes_on_anyway_has_time_until_it_has_found_enough() -> None:
+    few = WarmStartConfig(episodes=3, failures=2)
+    assert makers(searchers("risk-sac-diverse", few), [Outcome.SAFE] * 20) == [ScriptFollower] * 21
+    taken = makers(searchers("risk-sac-diverse", few), [Outcome.FAILURE] * 2 + [Outcome.SAFE] * 60)
+    assert taken[:2] == [ScriptFollower] * 2
+    assert set(taken[2:]) == {ScriptFollower, Learner}
+
+
+def test_the_frozen_policy_is_on_its_own() -> None:
+    subject = searchers("risk-sac-diverse", WarmStartConfig())
+    assert type(subject.next(learning=False).actor) is Learner
+
+
+def test_a_search_ends_when_its_processor_time_is_spent_and_is_then_evaluated(tmp_path: Path) -> None:
+    budget = Budget(episodes=50, evaluation_episodes=2, cpu_s=1e-3)
+    records = played(tmp_path, spec("random", budget))
+    assert [record.phase for record in records] == ["train", "evaluate", "evaluate"]
+    assert records == played(tmp_path, spec("random", budget))  # told again, and not gone on with
