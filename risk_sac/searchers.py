@@ -35,7 +35,7 @@ OPTIMIZERS: Mapping[str, type[BotorchOptimizer | ArchiveOptimizer | SobolOptimiz
     "archive": ArchiveOptimizer,
     "sobol": SobolOptimizer,
 }
-STEP_COSTS = 1.0, 4.0  # of the guide and of a policy that learns as it acts; measured in processor time
+STEP_COSTS = 1.0, 8.0  # of the guide and of a policy that learns as it acts; measured in processor time
 
 
 class Searcher(NamedTuple):

@@ -7,7 +7,7 @@ from risk_sac.verdicts.distinct import DistinctFailures
 
 NEW, NEW_PREVENTABLE = 1.0, 4.0  # what a distinct failure is worth, and one that is preventable besides
 KEPT = 0.98  # of what an earlier episode counts, after another one by the same searcher
-EXPECTED, EXPECTED_STEPS = 0.25, 1000.0  # worth per steps, of who has not been tried; as much as that is it believed
+EXPECTED, EXPECTED_STEPS = 0.05, 1000.0  # worth per steps, of who has not been tried; as much as that is it believed
 LEAST = 0.02  # chance of either
 
 
