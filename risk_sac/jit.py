@@ -14,7 +14,7 @@ import numba
 Function = TypeVar("Function", bound=Callable[..., Any])
 SETTINGS = vars(numba.config)
 HERE = Path(__file__).parent
-COMPILED = ("*.py", "risk/*.py", "sim/*.py", "verdicts/*.py")  # where compiled functions are
+COMPILED = ("*.py", "agents/sum_tree.py", "risk/*.py", "sim/*.py", "verdicts/*.py")  # where compiled functions are
 
 
 def _cache_folder() -> str:

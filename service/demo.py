@@ -1,4 +1,4 @@
-"""`python -m service.demo`: start the service, let RISK-SAC search, say what it found."""
+"""`python -m service.demo`: start the service, let RISK-SAC and an archive search work together, say what it found."""
 
 import argparse
 import contextlib
@@ -60,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m service.demo", description=__doc__)
     parser.add_argument("--family", default="mixed", help="scenario family")
     parser.add_argument(
-        "--methods", nargs="+", default=["archive", "risk-sac", "random"], help="search methods, side by side"
+        "--methods", nargs="+", default=["risk-sac-diverse", "random"], help="search methods, side by side"
     )
     parser.add_argument("--episodes", type=int, default=200, help="search episodes of each run")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="one run per method and seed")
