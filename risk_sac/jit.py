@@ -14,7 +14,17 @@ import numba
 Function = TypeVar("Function", bound=Callable[..., Any])
 SETTINGS = vars(numba.config)
 HERE = Path(__file__).parent
-COMPILED = ("*.py", "agents/sum_tree.py", "risk/*.py", "sim/*.py", "verdicts/*.py")  # where compiled functions are
+COMPILED = (  # where compiled functions are, and the constants that are compiled into them
+    "geometry.py",
+    "jit.py",
+    "observation.py",
+    "types.py",
+    "agents/sum_tree.py",
+    "risk/*.py",
+    "scenario/limits.py",
+    "sim/*.py",
+    "verdicts/*.py",
+)
 
 
 def _cache_folder() -> str:
