@@ -38,7 +38,7 @@ class Budget(Settings):
     """Search episodes, rejected scenes included."""
     evaluation_episodes: Annotated[int, Field(ge=0, le=10_000)] = 0
     """Episodes of the frozen policy after the search."""
-    cpu_s: Annotated[float, Field(gt=0, le=1e7)] | None = None
+    cpu_s: Annotated[float, Field(ge=0.1, le=1e7)] | None = None
     """Processor time after which a search ends that has episodes left, s; how many it has played then depends on the
     processor."""
 
