@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m service.demo", description=__doc__)
-    parser.add_argument("--family", default="mixed", help="scenario family")
+    parser.add_argument("--family", default="low", help="scenario family")
     parser.add_argument(
         "--methods", nargs="+", default=["risk-sac-diverse", "random"], help="search methods, side by side"
     )
