@@ -90,6 +90,27 @@ def test_updates_keep_the_pace_that_is_asked_for(pace: float, expected: int, ran
         assert abs(sum(at <= step for at in updates) - pace * step) < 1
 
 
+def test_updates_that_the_warm_up_left_undone_are_made_up_for_one_a_step(random_transition: Make) -> None:
+    agent = CONFIG.agent.model_copy(update={"warmup_steps": 41, "updates_per_step": 0.25})
+    subject, updates = learner(config=CONFIG.model_copy(update={"agent": agent})), []
+    subject._update_once = lambda: updates.append(subject._steps)  # type: ignore[method-assign]
+    stream = np.random.default_rng(0)
+    for _ in range(80):
+        subject.observe(random_transition(stream))
+        subject.update()
+    # At step 41 ten are due. One is paid in each step, until at step 53 thirteen are due and thirteen paid.
+    assert updates == [*range(41, 54), *range(56, 81, 4)]
+
+
+def test_what_a_guide_does_costs_the_policy_nothing(transition: Make) -> None:
+    subject = learner("sac-lag")
+    for _ in range(CONFIG.agent.warmup_steps + 5):
+        subject.observe(transition(cost=0.6), own=False)
+    assert subject.dual_variable == 0.0
+    subject.observe(transition(cost=0.6))
+    assert subject.dual_variable > 0.0
+
+
 def test_nothing_is_learned_from_an_empty_memory() -> None:
     config = CONFIG.model_copy(update={"agent": CONFIG.agent.model_copy(update={"warmup_steps": 0})})
     assert learner(config=config).update() is None
