@@ -141,6 +141,8 @@ def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int) -> 
 
 
 def _execute(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished:
+    import torch  # noqa: F401 - before libsumo: if memory ends while torch is loaded after it, the process crashes
+
     from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
     from risk_sac.train import train
 

@@ -27,7 +27,7 @@ def live(spec):
     learner = Learner({OBSERVATION}, {ACTION}, METHODS[spec.method], spec.learner, 0)
     observation, action = np.ones({OBSERVATION}, np.float32), np.ones({ACTION}, np.float32)
     for step in range(min(spec.learner.replay.capacity, spec.budget.episodes * {HORIZON})):
-        learner._replay.add(
+        learner.observe(
             Transition(
                 observation=observation, action=action, risk_reward=0.1, cost=0.1, robustness=0.5, next_robustness=0.4,
                 next_observation=observation, terminated=False, accumulated_reward=float(step % 7),

@@ -27,7 +27,7 @@ from risk_sac.verdicts.conflict import Conflict, find_conflict
 from risk_sac.verdicts.course import touches
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S, careful, ideal
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.reference import reference_outcomes, replayed_contact_s
+from risk_sac.verdicts.reference import LEAD_M, reference_outcomes, replayed_contact_s
 from risk_sac.verdicts.rollout import STANDING_MPS
 
 EPISODES = 120
@@ -114,7 +114,10 @@ def struck_side(
 
 
 def avoids(sim: SumoSimulation, struck: Struck, driver: str) -> bool:
-    """Whether the driver, with SUMO's ego under it, does not touch, stands when struck, or is struck from behind."""
+    """Whether the driver, with SUMO's ego under it, does not touch, stands when struck, or is struck from behind.
+
+    And has not passed the place where the recorded ego was by then.
+    """
     evidence = struck.evidence
     driven, last = speeds(struck, driver), len(evidence.time_s) - 1
     if struck.conflict.frame + round(CAREFUL_PERCEIVES_S / STEP_S) >= last and driver == "careful":
@@ -133,20 +136,24 @@ def avoids(sim: SumoSimulation, struck: Struck, driver: str) -> bool:
             for values in (evidence.speed_mps, evidence.lateral_mps)
         ),
     )
+    lead_m = 0.0
     for step, speed in enumerate(driven[1:], start=1):
         # Its path is kept, not its lateral speed: who is slower moves aside later.
         to = np.interp((way_m, way_m + speed * STEP_S), recorded_m, aside_m)
         way_m += speed * STEP_S
+        if step <= last:
+            lead_m = way_m - recorded_m[step]
         libsumo.vehicle.setSpeed("ego", speed)
         libsumo.vehicle.changeSublane("ego", float(to[1] - to[0]))
         before, frame = frame, sim.step()
         for k in range(1, FINE + 1):
             ego, other = pose(before, frame, k / FINE), strikers_pose(struck, step - 1 + k / FINE)
             if touches(*ego, half_length, half_width, *other, *size):
-                return speed <= STANDING_MPS or struck_side(ego, other, half_length, half_width, *size) == "rear"
+                rear = struck_side(ego, other, half_length, half_width, *size) == "rear"
+                return (speed <= STANDING_MPS or rear) and lead_m <= LEAD_M
         if speed <= STANDING_MPS and step > struck.conflict.frame:
-            return True
-    return True
+            break
+    return lead_m <= LEAD_M
 
 
 @pytest.mark.parametrize("family", ["low", "mixed", "dense"])

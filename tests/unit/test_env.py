@@ -340,7 +340,8 @@ def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low: Ri
         for step, (_, reward, terminated, _, _) in enumerate(outcomes[1:], start=1):
             bonus = 0.0
             if terminated and collision is not None:
-                bonus = config.valid_collision if collision.valid else -config.degenerate_collision
+                worth = 1.0 if collision.preventable else config.unpreventable
+                bonus = worth * config.valid_collision if collision.valid else -config.degenerate_collision
             at = LEAD_IN_STEPS + step
             assert reward == pytest.approx(reward_by_hand(series, at, config, bonus), abs=1e-9)
 
