@@ -11,10 +11,10 @@ settings.load_profile("first call may compile")
 
 
 @pytest.fixture(scope="session")
-def postgresql(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PostgreSql]:
+def postgresql() -> Iterator[PostgreSql]:
     """A PostgreSQL server; tests that need one are skipped where it is not installed."""
     bin_ = binaries()
     if bin_ is None:
         pytest.skip("PostgreSQL is not installed")
-    with running(bin_, tmp_path_factory.mktemp("postgresql")) as server:
+    with running(bin_) as server:
         yield server

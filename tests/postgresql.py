@@ -67,24 +67,23 @@ def binaries() -> Path | None:
 
 
 @contextmanager
-def running(bin_: Path, folder: Path) -> Iterator[PostgreSql]:
-    """Start a server; it refuses to run as root, who therefore lends it another user."""
+def running(bin_: Path) -> Iterator[PostgreSql]:
+    """Start a server; it refuses to run as root, who therefore lends it another user.
+
+    Its folder is none of pytest's: every session that begins closes those to other users, and a server that no longer
+    gets at its own ends within a minute.
+    """
     user = "nobody" if os.geteuid() == 0 else None
-    if user:
-        for parent in (folder, *folder.parents):  # pytest's temporary folders are closed to others
-            if str(parent).startswith(f"{tempfile.gettempdir()}/"):
-                parent.chmod(0o711)
-    data = folder / "cluster"
-    data.mkdir(mode=0o700)
-    if user:
-        os.chown(data, pwd.getpwnam(user).pw_uid, -1)
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
-    initdb = [bin_ / "initdb", "-D", data, "-U", "tests", "-A", "trust", "-E", "UTF8", "--locale=C", "--no-sync"]
-    subprocess.run(initdb, check=True, user=user, **QUIET)
-    options = ["-D", data, "-p", str(port), "-h", "127.0.0.1", "-k", "", "-c", "fsync=off"]
-    server = PostgreSql([bin_ / "postgres", *options], port, user)
-    try:
-        yield server
-    finally:
-        server.stop()
+    with tempfile.TemporaryDirectory(prefix="postgresql-") as data:
+        if user:
+            os.chown(data, pwd.getpwnam(user).pw_uid, -1)
+        with socket.create_server(("127.0.0.1", 0)) as probe:
+            port = probe.getsockname()[1]
+        initdb = [bin_ / "initdb", "-D", data, "-U", "tests", "-A", "trust", "-E", "UTF8", "--locale=C", "--no-sync"]
+        subprocess.run(initdb, check=True, user=user, **QUIET)
+        options = ["-D", data, "-p", str(port), "-h", "127.0.0.1", "-k", "", "-c", "fsync=off"]
+        server = PostgreSql([bin_ / "postgres", *options], port, user)
+        try:
+            yield server
+        finally:
+            server.stop()

@@ -109,7 +109,7 @@ def test_a_database_server_that_goes_away_pauses_what_runs_until_it_is_back(tmp_
     bin_ = binaries()
     if bin_ is None:
         pytest.skip("PostgreSQL is not installed")
-    with running(bin_, tmp_path) as server, servers(tmp_path, database_url=server.new_database()) as serve:
+    with running(bin_) as server, servers(tmp_path, database_url=server.new_database()) as serve:
         service = serve()
         campaign_id = service.post(budget={"episodes": 60})
         service.wait_for(campaign_id, lambda seen: seen["progress"]["episodes_done"] > 3)
