@@ -70,8 +70,7 @@ def binaries() -> Path | None:
 def running(bin_: Path) -> Iterator[PostgreSql]:
     """Start a server; it refuses to run as root, who therefore lends it another user.
 
-    Its folder is none of pytest's: every session that begins closes those to other users, and a server that no longer
-    gets at its own ends within a minute.
+    Its folder is none of pytest's, which are closed to other users.
     """
     user = "nobody" if os.geteuid() == 0 else None
     with tempfile.TemporaryDirectory(prefix="postgresql-") as data:
