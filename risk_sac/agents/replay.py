@@ -234,21 +234,14 @@ class RiskPrioritizedReplay:
         return self._storage.gather(indices, np.ones(len(indices)))
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
-        """See `draw`."""
-        return self._storage.gather(*self.draw(batch_size, generator))
-
-    def draw(self, batch_size: int, generator: np.random.Generator) -> tuple[Indices, Floats]:
         """Draw in proportion to priority, one transition from each of `batch_size` equal slices of the total.
 
         Choice: stratified, as Schaul et al. do; the expected count of a transition stays batch_size · P(i).
-
-        Returns:
-          Slots and importance weights, `batch_size` each.
         """
         fractions = (np.arange(batch_size) + generator.random(batch_size)) / batch_size
         indices = self._tree.find(fractions)
         probabilities = self._tree[indices] / self._tree.total
-        return indices, importance_weights(probabilities, len(self), self._config.correction)
+        return self._storage.gather(indices, importance_weights(probabilities, len(self), self._config.correction))
 
     def update(self, indices: Indices, td_errors: Floats) -> None:
         """See `Replay.update`."""

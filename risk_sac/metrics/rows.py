@@ -76,12 +76,12 @@ def outcome_dispersion(tally: Tally) -> float | None:
 
 def distinct_failure_rate(counts: Counts) -> float | None:
     """Distinct failures per `PER_STEPS` environment steps; None without steps."""
-    return PER_STEPS * counts.distinct_failures / counts.environment_steps if counts.environment_steps else None
+    return _per_steps(counts.distinct_failures, counts)
 
 
 def distinct_preventable_rate(counts: Counts) -> float | None:
     """Distinct preventable failures per `PER_STEPS` environment steps; None without steps."""
-    return PER_STEPS * counts.distinct_preventable / counts.environment_steps if counts.environment_steps else None
+    return _per_steps(counts.distinct_preventable, counts)
 
 
 def coverage(tally: Tally) -> float:
@@ -92,6 +92,10 @@ def coverage(tally: Tally) -> float:
 def steps_per_distinct_failure(counts: Counts) -> float | None:
     """Environment steps per distinct failure; None without one."""
     return counts.environment_steps / counts.distinct_failures if counts.distinct_failures else None
+
+
+def _per_steps(count: int, counts: Counts) -> float | None:
+    return PER_STEPS * count / counts.environment_steps if counts.environment_steps else None
 
 
 def _share(count: int, of: int) -> float:

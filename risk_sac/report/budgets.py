@@ -5,20 +5,8 @@ One run serves all budgets that are smaller than its own.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
-from risk_sac.metrics import Tally
-from risk_sac.report.runs import FinishedRun
-from risk_sac.scenario.families import FAMILIES
-
-
-class Found(NamedTuple):
-    """By one run's search."""
-
-    preventable: int  # distinct failures
-    distinct: int  # valid failures
-    covered: int  # cells of the taxonomy
-
+from risk_sac.report.runs import FinishedRun, Found
 
 NOTHING = Found(0, 0, 0)
 
@@ -43,6 +31,7 @@ def cpu_s(run: FinishedRun) -> Sequence[float]:
 
 
 HEADLINE = Limit("30 CPU s", cpu_s, 30.0)
+PAID_FOR = f"preventable within {HEADLINE.name}"
 LIMITS = (Limit("10 CPU s", cpu_s, 10.0), HEADLINE, Limit("300 episodes", episodes, 300.0))
 
 
@@ -52,14 +41,4 @@ def found_within(run: FinishedRun, limit: Limit) -> Found | None:
     if not spent or spent[-1] < limit.most:
         return None
     within = sum(after <= limit.most for after in spent)
-    return [NOTHING, *found_after_each(run)][within]
-
-
-def found_after_each(run: FinishedRun) -> list[Found]:
-    """What had been found after each search episode."""
-    tally = Tally(horizon_steps=FAMILIES[run.spec.family].horizon_steps)
-    found = []
-    for record in run.phase("search"):
-        tally.add(record)
-        found.append(Found(tally.distinct_preventable, tally.distinct_failures, len(tally.kinds)))
-    return found
+    return run.found[within - 1] if within else NOTHING

@@ -6,7 +6,7 @@ from itertools import groupby
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunSpec
 from risk_sac.records import RECORDED, Phase
-from risk_sac.report.budgets import HEADLINE, found_within
+from risk_sac.report.budgets import HEADLINE, PAID_FOR, found_within
 from risk_sac.report.cells import Cell, cell_of, metrics_of
 from risk_sac.report.paired import PairedTest, corrected, paired_tests
 from risk_sac.report.runs import FinishedRun
@@ -143,7 +143,7 @@ def _headline(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[
             method: {run.spec.seed: _paid(run) for run in of_method}
             for method, of_method in _by_method(family, methods, runs).items()
         }
-        yield from corrected(paired_tests(family, "search", HEADLINE.name, first, values))
+        yield from corrected(paired_tests(family, "search", PAID_FOR, first, values))
 
 
 def _paid(run: FinishedRun) -> float | None:

@@ -13,7 +13,7 @@ from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import METRICS, WINDOW, Metric, preventable
 from risk_sac.records import Outcome, Phase
-from risk_sac.report.budgets import cpu_s, found_after_each
+from risk_sac.report.budgets import cpu_s
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.runs import FinishedRun
 from risk_sac.types import Floats
@@ -67,16 +67,6 @@ def _window_rate(counted: Sequence[bool]) -> Floats:
     return rates
 
 
-def preventable_found(run: FinishedRun) -> Floats:
-    """Distinct preventable failures found, after each episode."""
-    return np.array([float(found.preventable) for found in found_after_each(run)])
-
-
-def distinct_found(run: FinishedRun) -> Floats:
-    """Distinct valid failures found, after each episode."""
-    return np.array([float(found.distinct) for found in found_after_each(run)])
-
-
 CURVES = (
     Curve(
         name="ecr",
@@ -97,14 +87,14 @@ CURVES = (
     Curve(
         name="preventable_found",
         label="distinct preventable failures",
-        values=preventable_found,
+        values=lambda run: np.array([float(found.preventable) for found in run.found]),
         methods=lambda method: True,
         timed=True,
     ),
     Curve(
         name="distinct_found",
         label="distinct failures",
-        values=distinct_found,
+        values=lambda run: np.array([float(found.distinct) for found in run.found]),
         methods=lambda method: True,
         timed=True,
     ),

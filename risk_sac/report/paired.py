@@ -18,7 +18,7 @@ class PairedTest:
     family: FamilyName
     phase: Phase
     metric: MetricName
-    """Or, of what a user pays for, the budget."""
+    """Or what a user pays for, `preventable within 30 CPU s`."""
     reference: MethodName
     method: MethodName
     pairs: int

@@ -4,16 +4,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
 from risk_sac.config import FamilyName, MethodName, RunSpec
 from risk_sac.errors import ConfigError
-from risk_sac.metrics import MetricsAccumulator, results_digest
+from risk_sac.metrics import MetricsAccumulator, Tally, results_digest
 from risk_sac.records import RECORDED, EpisodeRecord, Phase, RunMetrics
 from risk_sac.run_folder.episode_json import records_from_lines
 from risk_sac.run_folder.results import EPISODES, Results, read_results
 from risk_sac.scenario.families import FAMILIES
+
+
+class Found(NamedTuple):
+    """By one run's search."""
+
+    preventable: int  # distinct failures
+    distinct: int  # valid failures
+    covered: int  # cells of the taxonomy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +58,15 @@ class FinishedRun:
             if records:
                 found[phase] = accumulator.metrics()
         return found
+
+    @cached_property
+    def found(self) -> tuple[Found, ...]:
+        """What the search had found after each of its episodes."""
+        tally, found = Tally(horizon_steps=FAMILIES[self.spec.family].horizon_steps), []
+        for record in self.phase("search"):
+            tally.add(record)
+            found.append(Found(tally.distinct_preventable, tally.distinct_failures, len(tally.kinds)))
+        return tuple(found)
 
 
 def read_run(folder: Path) -> FinishedRun:

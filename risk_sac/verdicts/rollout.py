@@ -141,6 +141,8 @@ def drive(
         if own_frame <= last:
             lead, passing = s - recorded_s, speed
         if speed <= STANDING_MPS and braking > 0.0:
+            if own_frame < last:  # it stays, while the recorded ego may come past
+                lead = s - path.s[last]
             break
         x, y, heading = pose_at(path, s)
         other_x, other_y, other_heading = place(track, own_frame)

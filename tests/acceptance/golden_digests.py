@@ -29,7 +29,7 @@ from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.train import train
 
 RECORDED = Path(__file__).with_suffix(".json")
-METHODS = ("random", "bo-only", "risk-sac", "risk-sac-diverse")
+METHODS = ("random", "bo-only", "risk-sac")
 SEEDS = {"low": 67, "mixed": 0, "dense": 68}  # at least one of each family's runs has a contact to be judged
 PACKAGES = ("botorch", "gpytorch", "libsumo", "llvmlite", "numba", "numpy", "scipy", "torch")
 # Small enough for a second, and still learning and modelling before the run is over.

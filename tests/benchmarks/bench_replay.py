@@ -71,12 +71,12 @@ def test_rper_sampling_and_update_beat_a_cumulative_sum() -> None:
     errors = generator.exponential(size=BATCH)
 
     def turn(replay: RiskPrioritizedReplay) -> None:
-        replay.update(replay.draw(BATCH, generator)[0], errors)
+        replay.update(replay.sample(BATCH, generator).indices, errors)
 
     times = interleaved(lambda: turn(tree), lambda: turn(plain), rounds=ROUNDS)
     tree_s, plain_s = np.median(times.wall_s, axis=0)
     print(
-        f"\nRPER draw + update, {STORED} stored, batch {BATCH}: {tree_s * 1e6:.0f} µs;"
+        f"\nRPER sample + update, {STORED} stored, batch {BATCH}: {tree_s * 1e6:.0f} µs;"
         f" cumulative sum {plain_s * 1e6:.0f} µs; {plain_s / tree_s:.2f} times as fast"
     )
     assert plain_s / tree_s >= 2.5

@@ -152,6 +152,7 @@ def avoids(sim: SumoSimulation, struck: Struck, driver: str) -> bool:
                 rear = struck_side(ego, other, half_length, half_width, *size) == "rear"
                 return (speed <= STANDING_MPS or rear) and lead_m <= LEAD_M
         if speed <= STANDING_MPS and step > struck.conflict.frame:
+            lead_m = way_m - recorded_m[last] if step < last else lead_m
             break
     return lead_m <= LEAD_M
 

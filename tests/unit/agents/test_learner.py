@@ -76,30 +76,29 @@ def test_warm_up_acts_at_random_and_learns_nothing(random_transition: Make) -> N
     assert not np.array_equal(subject.act(np.ones(3, np.float32), explore=False), before)
 
 
-@pytest.mark.parametrize(("pace", "expected"), [(0.25, 10), (0.3, 12), (1, 40), (3, 120), (0, 0)])
-def test_updates_keep_the_pace_that_is_asked_for(pace: float, expected: int, random_transition: Make) -> None:
-    agent = CONFIG.agent.model_copy(update={"warmup_steps": 1, "updates_per_step": pace})
+def steps_of_updates(pace: float, warmup_steps: int, steps: int, make: Make) -> list[int]:
+    """In which step each update came."""
+    agent = CONFIG.agent.model_copy(update={"warmup_steps": warmup_steps, "updates_per_step": pace})
     subject, updates = learner(config=CONFIG.model_copy(update={"agent": agent})), []
     subject._update_once = lambda: updates.append(subject._steps)  # type: ignore[method-assign]
     stream = np.random.default_rng(0)
-    for _ in range(40):
-        subject.observe(random_transition(stream))
+    for _ in range(steps):
+        subject.observe(make(stream))
         subject.update()
+    return updates
+
+
+@pytest.mark.parametrize(("pace", "expected"), [(0.25, 10), (0.3, 12), (1, 40), (3, 120), (0, 0)])
+def test_updates_keep_the_pace_that_is_asked_for(pace: float, expected: int, random_transition: Make) -> None:
+    updates = steps_of_updates(pace, 1, 40, random_transition)
     assert len(updates) == expected
     for step in range(1, 41):  # spread evenly: never more than one ahead or behind
         assert abs(sum(at <= step for at in updates) - pace * step) < 1
 
 
 def test_updates_that_the_warm_up_left_undone_are_made_up_for_one_a_step(random_transition: Make) -> None:
-    agent = CONFIG.agent.model_copy(update={"warmup_steps": 41, "updates_per_step": 0.25})
-    subject, updates = learner(config=CONFIG.model_copy(update={"agent": agent})), []
-    subject._update_once = lambda: updates.append(subject._steps)  # type: ignore[method-assign]
-    stream = np.random.default_rng(0)
-    for _ in range(80):
-        subject.observe(random_transition(stream))
-        subject.update()
     # At step 41 ten are due. One is paid in each step, until at step 53 thirteen are due and thirteen paid.
-    assert updates == [*range(41, 54), *range(56, 81, 4)]
+    assert steps_of_updates(0.25, 41, 80, random_transition) == [*range(41, 54), *range(56, 81, 4)]
 
 
 def test_what_a_guide_does_costs_the_policy_nothing(transition: Make) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.report import FinishedRun, compare, table_markdown
-from risk_sac.report.budgets import Limit, cpu_s, episodes, found_after_each, found_within
+from risk_sac.report.budgets import Limit, cpu_s, episodes, found_within
 from risk_sac.report.figures import CURVES
 
 
@@ -18,7 +18,7 @@ def run(spec: CampaignSpec, finished: Callable[..., FinishedRun]) -> FinishedRun
 
 
 def test_each_kind_counts_once_from_the_episode_on_that_found_it(run: FinishedRun) -> None:
-    counts = [(found.preventable, found.distinct) for found in found_after_each(run)]
+    counts = [(found.preventable, found.distinct) for found in run.found]
     assert counts == [(0, 0), (0, 1), (0, 1), (1, 2), (1, 2), (1, 2)]
 
 

@@ -117,9 +117,20 @@ def test_who_has_passed_by_then_has_not_avoided() -> None:
     walker = waiting(CAR_M[0] / 2 + 10.0, -1.425 - 2.5, math.pi / 2, 2.0, until_s=0.0)
     evidence = stage(ego, walker, kinds=WALKING, seen_from_s=0.0)
     assert evidence.time_s[-1] == pytest.approx(1.4)
-    found = outcomes(evidence)["careful"]
-    assert not found.avoids
-    assert found.impact_speed_mps == pytest.approx(10.6, abs=0.1)  # as it passes
+    for seen in (evidence, mirrored(evidence)):
+        found = outcomes(seen)["careful"]
+        assert not found.avoids
+        assert found.impact_speed_mps == pytest.approx(10.6, abs=0.1)  # as it passes
+
+
+def test_who_stands_before_the_ego_comes_past_has_avoided() -> None:
+    # The ego brakes with 9 m/s² down to 2 m/s and rolls on into who stands 15.5 m ahead. The bound brakes with 8 m/s²
+    # and stands after 1.88 s and 14.06 m, where the ego is at 13.1 m, and not yet at 15.5 m.
+    ego = straight(-1.5 * 15.0, 0.0, 0.0, 15.0, (0.0, -9.0), (13.0 / 9.0, 0.0))
+    walker = straight(CAR_M[0] / 2 + 15.5 + 0.25, 0.0, 0.0, 0.0)
+    evidence = stage(ego, walker, kinds=WALKING, seen_from_s=0.0)
+    assert evidence.time_s[-1] > 2.5
+    assert outcomes(evidence)["ideal"].avoids
 
 
 # v_rel 5: 5/12 + 0.35 = 0.767 s, 3.83 m. It intrudes by 0.3 m when its side is 1.35 m from the ego's middle: 1.025 m
