@@ -35,5 +35,5 @@ def artefact_verdicts(evidence: Evidence, striker: int, conflict: Conflict, hand
 
 
 def conflict_after_release(conflict: Conflict) -> bool:
-    """Whether the conflict began 1 s or more after the adversaries' release: what was there before they inherited."""
-    return conflict.time_s >= AFTER_RELEASE_S - 1e-6
+    """Whether the conflict was noticed 1 s or more after the adversaries' release: what was there they inherited."""
+    return conflict.noticed_s >= AFTER_RELEASE_S - 1e-6

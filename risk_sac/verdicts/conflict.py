@@ -37,6 +37,7 @@ class Conflict:
     type: ConflictType
     frame: int  # when it began for a driver who sees what the ego sees
     time_s: float  # t0, from the release
+    noticed_s: float  # from when on a nervous driver would have braked: for whoever beside it hung over the line, too
     x_m: float  # where the striker was then
     y_m: float
     position: str  # ahead | alongside
@@ -58,12 +59,13 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         begins = lasts = course & _at_the_carriageway(evidence, striker)
     elif same_way:
-        offset, accel = column(evidence.lane_offset_m, striker), column(evidence.accel_mps2, striker)
-        speed = column(evidence.speed_mps, 0)
-        begins, lasts = lane_conflicts(seen, speed, offset, accel, evidence.ground.lane_width_m)
+        begins, lasts = _lane_conflicts(evidence, striker, seen, course)
     else:
         begins = lasts = course | _cannot_stop(path, evidence, striker)
-    frame = _since(begins & known, lasts & known)
+    frame = noticed = _since(begins & known, lasts & known)
+    if same_way:
+        begins_early, lasts_early = _lane_conflicts(evidence, striker, seen, np.ones_like(course))
+        noticed = _since(begins_early & known, lasts_early & known)
     unseen = _since(begins, lasts)
     course_from = _since(course & known, course & known)
     if same_way and unseen == len(course) - 1:  # neither led nor cut in: the ego itself came over
@@ -72,12 +74,19 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
         type=_type(evidence, striker, frame, same_way, seen.across_m),
         frame=frame,
         time_s=float(evidence.time_s[frame]),
+        noticed_s=float(evidence.time_s[min(noticed, frame)]),
         x_m=float(evidence.x_m[frame, striker]),
         y_m=float(evidence.y_m[frame, striker]),
         position="ahead" if seen.gap_m[frame] > 0.0 else "alongside",
         hidden=not known[unseen],
         course_from=course_from,
     )
+
+
+def _lane_conflicts(evidence: Evidence, striker: int, seen: AlongSeries, meets: Bools) -> tuple[Bools, Bools]:
+    e = evidence
+    offset, accel = column(e.lane_offset_m, striker), column(e.accel_mps2, striker)
+    return lane_conflicts(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, meets)
 
 
 def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:

@@ -60,7 +60,9 @@ def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground) -> bool:
         return time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S
     seen = along(path, 0, float(path.s[0]), speed, half_length, other)
     if math.cos(seen.turn_rad) > SAME_WAY_COS:
-        begins, _ = lane_conflict(seen, speed, f.lane_offset_m[i], f.accel_mps2[i], ground.lane_width_m)
+        offset, accel = f.lane_offset_m[i], f.accel_mps2[i]
+        # Taken for about to meet: the policy is not handed a vehicle that hangs over beside the ego already.
+        begins, _ = lane_conflict(seen, speed, offset, accel, ground.lane_width_m, True)
         return begins
     entry_m, meets_m = _entry(path, speed, half_length, half_width, other, float(f.speed_mps[i]))
     stops = not math.isfinite(entry_m)

@@ -156,6 +156,12 @@ def cut_in(
     return stage(ego_motion, sideways(beside, at_s, -side * rate, LANE_M))
 
 
+def hangs_over(at_s: float, comes_at_s: float) -> Evidence:
+    """Beside the ego and as fast, it moves half a metre over, stays there for a while, and then comes."""
+    beside = sideways(straight(-1.5 * 12.0 + CAR_M[0] - 3.0, LANE_M, 0.0, 12.0), at_s, -1.2, 0.5)
+    return stage(straight(-1.5 * 12.0, 0.0, 0.0, 12.0), sideways(beside, comes_at_s, -1.2, LANE_M - 0.5))
+
+
 def leader_brakes(gap: float = 20.0, speed: float = 14.0, braking: float = 8.0, at_s: float = 2.0) -> Evidence:
     """`gap` metres ahead at the ego's speed, it brakes to a standstill."""
     return stage(straight(0.0, 0.0, 0.0, speed), straight(CAR_M[0] + gap, 0.0, 0.0, speed, (at_s, -braking)))

@@ -15,6 +15,7 @@ from tests.unit.verdicts.staged import (
     LANE_M,
     crossing_car,
     cut_in,
+    hangs_over,
     leader_brakes,
     mirrored,
     pedestrian_crosses,
@@ -70,6 +71,13 @@ def test_who_drifts_over_alongside_is_in_conflict_whatever_its_speed(found: Stag
     conflict = found(cut_in(gap=-3.0, ego=12.0, other=12.0))
     assert (conflict.type, conflict.position) == (ConflictType.CUT_IN, "alongside")
     assert conflict.time_s == pytest.approx(2.3125, abs=0.1)
+
+
+def test_who_hangs_over_alongside_is_noticed_and_in_conflict_once_it_comes(found: Staged) -> None:
+    conflict = found(hangs_over(at_s=1.0, comes_at_s=3.0))
+    assert (conflict.type, conflict.position) == (ConflictType.CUT_IN, "alongside")
+    assert conflict.noticed_s == pytest.approx(1.3125, abs=0.1)
+    assert conflict.time_s == pytest.approx(3.0, abs=0.11)
 
 
 def test_without_recorded_offsets_the_place_across_the_path_decides(found: Staged) -> None:
