@@ -4,9 +4,11 @@ Everything a campaign can get wrong beyond its types is found here, without load
 """
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 
-from risk_sac.config import CampaignSpec, EgoConfig, Odd, Requirement, RunSpec
+from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Odd, Requirement, RunSpec
 from risk_sac.config.demand import check_demand
+from risk_sac.config.methods import MethodName
 from risk_sac.errors import ConfigError, OddError
 from risk_sac.observation import observation_size
 from risk_sac.risk.rss import RssParameters
@@ -40,8 +42,10 @@ class Problem:
         Raises:
           OddError: the ODD contradicts itself or leaves no scene.
           FormulaError: a user's requirement cannot be monitored online.
-          ConfigError: a user's requirement takes the name of a shipped one, or the run takes too much memory.
+          ConfigError: a user's requirement takes the name of a shipped one, the run takes too much memory, or its
+            method needs a package that is not installed.
         """
+        check_installed(spec.method)
         family = FAMILIES[spec.family]
         odd = intersect(family.odd, spec.odd)
         if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
@@ -113,9 +117,22 @@ def _rss_parameters(odd: Odd) -> RssParameters:
 
 def check_campaign(spec: CampaignSpec) -> None:
     """Refuses a campaign that could not run; see `Problem.from_spec` for the errors."""
+    for method in spec.methods:
+        check_installed(method)
     alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()
     for family in spec.families:
         first, *others = (run for run in alike if run.family == family)
         problem = Problem.from_spec(first)
         for run in others:
             problem.check_demand(run)
+
+
+def check_installed(method: MethodName) -> None:
+    """Refuses a method whose package is not there.
+
+    Raises:
+      ConfigError: naming it.
+    """
+    needed = METHODS[method].needs
+    if needed and find_spec(needed) is None:
+        raise ConfigError(f"method {method!r} needs {needed}; pip install 'risk-sac[dev]'", field="methods")

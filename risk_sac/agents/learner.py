@@ -47,7 +47,7 @@ class Learner:
         self._config = config
         self._reward = TrainingReward(method, config)
         self._action_size = action_size
-        make = {"sac": self._sac, "ddpg": self._ddpg}[method.agent]
+        make = {"sac": self._sac, "ddpg": self._ddpg, "sb3": self._sb3}[method.agent]
         self._make = partial(make, observation_size, action_size, seed)
         trial = random_batch(observation_size, action_size, config.agent.batch_size)
         self.device = choose_device(config.agent.device, self._make, trial)
@@ -138,6 +138,11 @@ class Learner:
 
     def _ddpg(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
         return DdpgAgent(observation_size, action_size, self._config.agent, self._config.ddpg, seed, device)
+
+    def _sb3(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
+        from risk_sac.agents.sb3 import Sb3Agent  # an extra
+
+        return Sb3Agent(observation_size, action_size, self._config.agent, self._config.sac, seed, device)
 
     def _update_once(self) -> UpdateResult:
         batch_size = self._config.agent.batch_size

@@ -11,6 +11,7 @@ MethodName = Literal[
     "risk-sac-only-rs",
     "sac-lag",
     "sac",
+    "sb3-sac",
     "ddpg-lag",
     "ddpg",
     "archive",
@@ -23,7 +24,7 @@ MethodName = Literal[
 class Method(Settings):
     """One row of the table of methods."""
 
-    agent: Literal["sac", "ddpg", "scripts", "scripted", "random", "none"]
+    agent: Literal["sac", "ddpg", "sb3", "scripts", "scripted", "random", "none"]
     """`scripts`: each adversary follows a script whose genes are searched with the scene; `scripted`: cuts in and
     brakes, or keeps on; `random`: uniform actions, held for a while; `none`: SUMO drives the adversary vehicles,
     pedestrians stand."""
@@ -36,12 +37,14 @@ class Method(Settings):
     """`archive`: bred from those that led to distinct failures, together with the scripts' genes."""
     takes_turns: bool = False
     """Whether a learner's warm start goes on beside it: scripts and policy act in turn, by what they yield."""
+    needs: str = ""
+    """A package that is not installed with this one, as it is imported."""
     summary: str
 
     @property
     def learns(self) -> bool:
         """Whether its adversaries do; the others are controls."""
-        return self.agent in ("sac", "ddpg")
+        return self.agent in ("sac", "ddpg", "sb3")
 
 
 # Choice: all learners search scenes with BoTorch, so that their rows differ in the learner alone.
@@ -71,6 +74,12 @@ METHODS: dict[MethodName, Method] = {
     ),
     "sac-lag": Method(agent="sac", lagrangian=True, scenes="botorch", summary="SAC under the realism constraint."),
     "sac": Method(agent="sac", scenes="botorch", summary="Plain SAC on the risk reward."),
+    "sb3-sac": Method(
+        agent="sb3",
+        scenes="botorch",
+        needs="stable_baselines3",
+        summary="Control: the update of Stable-Baselines3's SAC in the place of ours; needs the `dev` extra.",
+    ),
     "ddpg-lag": Method(agent="ddpg", lagrangian=True, scenes="botorch", summary="DDPG under the realism constraint."),
     "ddpg": Method(agent="ddpg", scenes="botorch", summary="Plain DDPG on the risk reward."),
     "archive": Method(

@@ -108,7 +108,7 @@ CURVES = (
         name="alpha",
         label="temperature α",
         values=lambda run: np.array([record.temperature for record in run.phase("search")]),
-        methods=lambda method: METHODS[method].agent == "sac",
+        methods=lambda method: METHODS[method].agent in ("sac", "sb3"),
         log=True,
     ),
 )

@@ -98,3 +98,12 @@ def test_rss_asks_the_same_of_any_ego_and_reckons_with_the_worst_friction() -> N
     assert problem(
         odd=Odd(environment=Environment(friction=Interval(low=0.6, high=1)))
     ).rss.brake_min_mps2 == pytest.approx(0.6 * 9.81)
+
+
+def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign = CampaignSpec(families=("low",), methods=("random", "sb3-sac"))
+    check_campaign(campaign)
+    monkeypatch.setattr("risk_sac.problem.find_spec", lambda name: None)
+    with pytest.raises(ConfigError, match=r"'sb3-sac' needs stable_baselines3; pip install") as refusal:
+        check_campaign(campaign)
+    assert refusal.value.field == "methods"

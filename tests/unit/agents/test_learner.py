@@ -25,7 +25,7 @@ CONFIG = LearnerConfig(
     replay=ReplayConfig(capacity=1000),
     lagrangian=LagrangianConfig(learning_rate=0.01, cost_limit=0.1),
 )
-LEARNING = tuple(name for name, method in METHODS.items() if method.agent in ("sac", "ddpg"))
+LEARNING = tuple(name for name, method in METHODS.items() if method.learns)
 
 
 def learner(method: MethodName = "risk-sac", config: LearnerConfig = CONFIG, seed: int = 0) -> Learner:
