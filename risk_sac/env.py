@@ -13,7 +13,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.config import FamilyName, RewardConfig, RunSpec
+from risk_sac.config import METHODS, FamilyName, RewardConfig, RunSpec
 from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.geometry import overlapping_pairs, relative_view
 from risk_sac.observation import LIMIT, Encoder
@@ -69,6 +69,15 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self.action_size = 2 * len(problem.family.adversaries)
         self.action_space = gym.spaces.Box(-1.0, 1.0, (self.action_size,), np.float32)
         self.observation_space = gym.spaces.Box(-LIMIT, LIMIT, (self.observation_size,), np.float32)
+
+    @classmethod
+    def of(cls, spec: RunSpec) -> "RiskSacEnv":
+        """The environment that the episodes of a run are played in.
+
+        Raises:
+          ConfigError: the spec poses no problem that can be run.
+        """
+        return cls(Problem.from_spec(spec), spec.learner.reward, controlled=METHODS[spec.method].agent != "none")
 
     # The state of an episode, set by `_start`.
     layout: Layout  # where everybody started
@@ -273,8 +282,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
 def make_default(family: FamilyName) -> RiskSacEnv:
     """The family's default problem, as registered with Gymnasium."""
-    spec = RunSpec(family=family, method="risk-sac", seed=0)
-    return RiskSacEnv(Problem.from_spec(spec), spec.learner.reward)
+    return RiskSacEnv.of(RunSpec(family=family, method="risk-sac", seed=0))
 
 
 for _family in FAMILIES:

@@ -13,7 +13,6 @@ from pathlib import Path
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.metrics import MetricsAccumulator, results_digest
-from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder import checkpoint
@@ -61,9 +60,8 @@ class RunState:
         """Begins a run anew; `resume` goes on with what lies in the folder."""
         self._cpu_began_s = time.process_time()
         self.spec = spec
-        self.problem = Problem.from_spec(spec)
-        controlled = METHODS[spec.method].agent != "none"
-        self.env = RiskSacEnv(self.problem, spec.learner.reward, controlled=controlled)
+        self.env = RiskSacEnv.of(spec)
+        self.problem = self.env.problem
         self.searchers = Searchers(spec, self.problem, self.env.observation_size, self.env.action_size)
         self.reward = TrainingReward(METHODS[spec.method], spec.learner)
         self.records: list[EpisodeRecord] = []

@@ -27,6 +27,9 @@ def add_evaluate(commands: Commands) -> None:
     evaluate.set_defaults(command=_evaluate)
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
     evaluate.add_argument("--jobs", type=int, metavar="N", help="runs at a time (default: one per core)")
+    evaluate.add_argument(
+        "--verify", type=int, default=3, metavar="N", help="how often each distinct failure is replayed (default: 3)"
+    )
     evaluate.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of runs, tables and figures")
 
 
@@ -39,7 +42,8 @@ def _evaluate(options: argparse.Namespace) -> int:
     with progress_bar() as bar:
         jobs = options.jobs if options.jobs is not None else os.cpu_count() or 1
         executor = os.environ.get("RISK_SAC_EXECUTOR", "local")
-        evaluation = evaluate(spec, options.out, options.typed, jobs, partial(_drawn, Board(bar)), executor)
+        drawn = partial(_drawn, Board(bar))
+        evaluation = evaluate(spec, options.out, options.typed, jobs, drawn, executor, max(options.verify, 0))
     for job in evaluation.failed:
         complain(f"{job.name}: {job.reason}")
     comparison = evaluation.comparison

@@ -18,7 +18,8 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executors import executor_named
 from risk_sac.execution.processes import Job, Progress, Queue, program
 from risk_sac.execution.stopping import STOPPING, stop_signal
-from risk_sac.problem import Problem
+from risk_sac.failures.verify import TIMES, verify
+from risk_sac.problem import check_campaign
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
 
 SPEC, RUNS, LOCK = "spec.yaml", "runs", ".lock"
@@ -34,7 +35,13 @@ class Evaluation:
 
 
 def evaluate(
-    spec: CampaignSpec, folder: Path, command: str, jobs: int, progress: Progress, executor: str = "local"
+    spec: CampaignSpec,
+    folder: Path,
+    command: str,
+    jobs: int,
+    progress: Progress,
+    executor: str = "local",
+    times: int = TIMES,
 ) -> Evaluation:
     """Executes what is not finished yet and writes the report of what is.
 
@@ -47,6 +54,7 @@ def evaluate(
       jobs: processes at a time.
       progress: told how the runs go.
       executor: where they execute, by its name in `risk_sac.execution.executors`.
+      times: how often each distinct failure is replayed, see `risk_sac.failures.verify`; 0: not at all.
 
     Raises:
       ConfigError: a family's settings pose no problem that can be run, there is no such executor, or the folder
@@ -55,13 +63,14 @@ def evaluate(
     """
     if jobs < 1:
         raise ConfigError(f"got {jobs}; wanted at least one process", field="jobs")
-    for run in {run.family: run for run in spec.runs()}.values():
-        Problem.from_spec(run)  # before the folder is claimed
+    check_campaign(spec)  # before the folder is claimed
     make_executor = executor_named(executor)
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
     with _claimed(spec, folder) as lock, stop_signal((*STOPPING, *hung_up)) as stopping:
         queue = [Job(spec=run, folder=folder / RUNS / run.id) for run in spec.runs()]
         Queue(queue, make_executor(program(folder / SPEC, lock)), progress).execute(jobs, stopping)
+        if times and not stopping():
+            verify([job.folder for job in queue if job.state == "finished"], times, jobs)
         comparison = _report(spec, folder, command, queue)
         return Evaluation(
             comparison=comparison,

@@ -14,6 +14,7 @@ from risk_sac.report.comparison import Comparison
 from risk_sac.report.definitions import ROWS, definitions, symbol
 from risk_sac.report.paired import LEVEL, PairedTest
 from risk_sac.report.provenance import this_platform
+from risk_sac.report.runs import FinishedRun
 from risk_sac.report.statistics import pairs_needed, smallest_p
 
 DASH = "–"
@@ -90,17 +91,33 @@ def _cell(cell: Cell, seeds: int) -> list[str]:
 
 def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     """From contacts to what is worth a person's time, summed over seeds."""
-    columns = ["method", "episodes", "contacts", "valid", "distinct", "preventable", symbol("unresponsive_share")]
+    columns = ["method", "episodes", "contacts", "valid", "distinct", "preventable", "verified"]
+    columns.append(symbol("unresponsive_share"))
     rows = (
         [
             cell.method,
             *map(str, (cell.episodes, cell.raw_collisions, cell.failures)),
             *map(str, (cell.distinct_failures, cell.distinct_preventable)),
+            _verified(comparison.of_cell(family, cell.method), phase),
             DASH if cell.unresponsive_share is None else _percent(cell.unresponsive_share),
         ]
         for cell in comparison.group(family, phase)
     )
     return f"### The funnel: {family}, {phase}\n\n" + _table(columns, rows)
+
+
+def _verified(runs: Sequence[FinishedRun], phase: Phase) -> str:
+    """How many of the distinct failures that were replayed were the same each time."""
+    repetitions = [
+        run.verified.episodes[record.index]
+        for run in runs
+        if run.verified
+        for record in run.phase(phase)
+        if record.index in run.verified.episodes
+    ]
+    if not all(run.verified for run in runs):
+        return DASH
+    return f"{sum(repetition.verified for repetition in repetitions)} of {len(repetitions)}"
 
 
 def _budgets(comparison: Comparison, family: FamilyName) -> str:

@@ -1,7 +1,7 @@
 """A finished run as the report reads it from its folder."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -14,6 +14,7 @@ from risk_sac.metrics import MetricsAccumulator, Tally, results_digest
 from risk_sac.records import RECORDED, EpisodeRecord, Phase, RunMetrics
 from risk_sac.run_folder.episode_json import records_from_lines
 from risk_sac.run_folder.results import EPISODES, Results, read_results
+from risk_sac.run_folder.verified import Verified, read_verified
 from risk_sac.scenario.families import FAMILIES
 
 
@@ -36,6 +37,7 @@ class FinishedRun:
     wall_s: float
     cpu_s: float
     episode_cpu_s: tuple[float, ...] = ()  # to the end of each episode; none where it was not measured
+    verified: Verified | None = None  # None where nothing was replayed
 
     @property
     def cell(self) -> tuple[FamilyName, MethodName]:
@@ -61,10 +63,12 @@ class FinishedRun:
 
     @cached_property
     def found(self) -> tuple[Found, ...]:
-        """What the search had found after each of its episodes."""
+        """What the search had found after each of its episodes; what does not repeat was not found."""
         tally, found = Tally(horizon_steps=FAMILIES[self.spec.family].horizon_steps), []
+        flaky = self.verified.flaky if self.verified else frozenset()
         for record in self.phase("search"):
-            tally.add(record)
+            if record.index not in flaky:
+                tally.add(record)
             found.append(Found(tally.distinct_preventable, tally.distinct_failures, len(tally.kinds)))
         return tuple(found)
 
@@ -85,7 +89,7 @@ def read_run(folder: Path) -> FinishedRun:
             f"{folder / EPISODES} does not hold the {len(results.contacts)} contacts and the other episodes that "
             f"digest {results.digest[:12]} was formed over; delete the folder and run it again"
         )
-    return finished_run(results, records)
+    return replace(finished_run(results, records), verified=read_verified(folder, results.digest))
 
 
 def read_records(file: Path) -> tuple[EpisodeRecord, ...]:

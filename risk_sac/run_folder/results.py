@@ -3,6 +3,7 @@
 results.json    the spec, the metrics and every contact, sealed; rewritten at each checkpoint and at the end
 episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
 failures/       the time series of every contact, see `risk_sac.run_folder.series`
+verified.json   which failures repeated, see `risk_sac.run_folder.verified`
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
 

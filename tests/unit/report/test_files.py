@@ -59,11 +59,11 @@ def section(page, title):
 
 def test_page_has_the_funnel_of_every_method(comparison):
     assert section(table_markdown(comparison), "### The funnel: low, search\n") == [
-        "| method | episodes | contacts | valid | distinct | preventable | unresponsive |",
-        "| --- | ---: | ---: | ---: | ---: | ---: | ---: |",
-        "| risk-sac | 8 | 4 | 4 | 3 | 2 | 25.0 % |",
-        "| sac | 8 | 3 | 1 | 1 | 1 | 0.0 % |",
-        "| no-adversary | 8 | 1 | 0 | 0 | 0 | – |",
+        "| method | episodes | contacts | valid | distinct | preventable | verified | unresponsive |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+        "| risk-sac | 8 | 4 | 4 | 3 | 2 | – | 25.0 % |",
+        "| sac | 8 | 3 | 1 | 1 | 1 | – | 0.0 % |",
+        "| no-adversary | 8 | 1 | 0 | 0 | 0 | – | – |",
     ]
 
 
@@ -88,7 +88,7 @@ def test_page_has_histograms_and_signatures_of_those_who_found_something(compari
 def test_page_of_runs_from_before_contacts_were_judged_has_no_empty_histograms(spec, runs):
     old = [replace(run, records=tuple(map(unjudged, run.records))) for run in runs]
     page = table_markdown(compare(spec, old, ""))
-    assert "| risk-sac | 8 | 4 | 4 | 2 | 0 | 0.0 % |" in page  # unjudged ones differ by striker and speeds alone
+    assert "| risk-sac | 8 | 4 | 4 | 2 | 0 | – | 0.0 % |" in page  # unjudged ones differ by striker and speeds alone
     assert "by the time since" not in page
     assert "by signature" not in page
     assert not [name for name in figure_names(compare(spec, old, "")) if name.startswith("times_")]

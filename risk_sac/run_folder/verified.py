@@ -1,0 +1,82 @@
+"""Which failures of a run repeat: `verified.json` in its folder, beside the results that it speaks of."""
+
+from collections import defaultdict
+from collections.abc import Mapping
+from pathlib import Path
+from typing import ClassVar
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from risk_sac.errors import DamagedError
+from risk_sac.records import EpisodeRecord, Record
+from risk_sac.run_folder.durable import replace_file
+from risk_sac.run_folder.results import Results
+from risk_sac.run_folder.seal import seal, unseal
+from risk_sac.verdicts.distinct import DistinctFailures
+
+VERIFIED = "verified.json"
+
+
+class Repetition(Record):
+    """How often an episode was played again, in a fresh process each time, and what came of it."""
+
+    times: int
+    same: int
+    """Of these, with every array of its series as it was, to the bit."""
+
+    @property
+    def verified(self) -> bool:
+        """Whether it was the same each time; if not, it is flaky."""
+        return self.same == self.times > 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verified:
+    """The distinct failures of a run."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # see `unseal`
+
+    digest: str  # of the results
+    episodes: Mapping[int, Repetition]  # by index
+
+    @property
+    def flaky(self) -> frozenset[int]:
+        """The episodes that were not the same each time."""
+        return frozenset(index for index, repetition in self.episodes.items() if not repetition.verified)
+
+
+_VERIFIED = TypeAdapter(Verified)
+
+
+def distinct_failures(results: Results) -> list[EpisodeRecord]:
+    """The first failure of each kind in each phase, and the first preventable one, in the order of the episodes."""
+    found: defaultdict[tuple[str, bool], DistinctFailures] = defaultdict(DistinctFailures)
+    episodes = []
+    for episode in (contact.episode for contact in results.contacts):
+        collision = episode.collision
+        if collision is None or not collision.valid:
+            continue
+        new = found[episode.phase, False].add(collision)
+        new_preventable = collision.preventable and found[episode.phase, True].add(collision)
+        if new or new_preventable:
+            episodes.append(episode)
+    return episodes
+
+
+def write_verified(folder: Path, verified: Verified) -> None:
+    """Replaces the file in one step.
+
+    Raises:
+      OSError: the folder cannot be written.
+    """
+    replace_file(folder / VERIFIED, seal(_VERIFIED.dump_json(verified, indent=2)))
+
+
+def read_verified(folder: Path, digest: str) -> Verified | None:
+    """What was found of the results with this digest; None if nothing was, or if the file is damaged."""
+    try:
+        found = _VERIFIED.validate_json(unseal((folder / VERIFIED).read_bytes()))
+    except (FileNotFoundError, DamagedError, ValidationError):
+        return None
+    return found if found.digest == digest else None
