@@ -2,7 +2,7 @@
 
 import io
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -24,16 +24,22 @@ def canvas(size_in: tuple[float, float]) -> Figure:
     return figure
 
 
-def picture(draw: Callable[[], Figure], format_: str, dpi: float, style: dict[Any, Any]) -> bytes:
-    """A figure as a file; the same figure gives the same bytes.
+def picture(draw: Callable[[], Figure], formats: Sequence[str], dpi: float, style: dict[Any, Any]) -> list[bytes]:
+    """A figure as a file of each format; the same figure gives the same bytes.
 
     Args:
       draw: makes the figure; in the style, and while nothing else is drawn.
-      format_: png | svg | pdf.
+      formats: png | svg | pdf.
       dpi: dots per inch.
       style: matplotlib's settings that differ from its defaults; its types name them one by one.
     """
-    file = io.BytesIO()
+    files = []
     with _DRAWING, mpl.rc_context(style | {"svg.hashsalt": "risk-sac"}):
-        draw().savefig(file, format=format_, dpi=dpi, metadata=_UNDATED[format_])
-    return file.getvalue()
+        figure = draw()
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # it is laid out now; each file would do it again, a little differently
+        for format_ in formats:
+            file = io.BytesIO()
+            figure.savefig(file, format=format_, dpi=dpi, metadata=_UNDATED[format_])
+            files.append(file.getvalue())
+    return files

@@ -160,6 +160,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """Everything recorded since the last reset."""
         return self._trace
 
+    def signal_heads(self) -> bytes:
+        """SUMO's letter of each link of each signal now, the signals in the order of their names."""
+        return self._sim.signal_heads()
+
     def close(self) -> None:
         """Ends the simulation."""
         self._sim.close()
@@ -222,7 +226,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             raise InfeasibleScene(f"scene of {scene.family!r} breaks {rule}: {dict(scene.values)}", reason=rule)
 
     def _careful_driver_in_conflict(self) -> bool:
-        return bool(conflicts_now(self._frame, self._ego_path(), self._in_sight(), self._ground).any())
+        # Wary: the policy is not handed a vehicle that hangs over beside the ego already.
+        return bool(conflicts_now(self._frame, self._ego_path(), self._in_sight(), self._ground, wary=True).any())
 
     def _ego_path(self) -> Path:
         return polyline(*self._sim.ego_path(), float(self._frame.heading_rad[0]))

@@ -42,10 +42,8 @@ class Problem:
         Raises:
           OddError: the ODD contradicts itself or leaves no scene.
           FormulaError: a user's requirement cannot be monitored online.
-          ConfigError: a user's requirement takes the name of a shipped one, the run takes too much memory, or its
-            method needs a package that is not installed.
+          ConfigError: a user's requirement takes the name of a shipped one, or the run takes too much memory.
         """
-        check_installed(spec.method)
         family = FAMILIES[spec.family]
         odd = intersect(family.odd, spec.odd)
         if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
@@ -116,7 +114,7 @@ def _rss_parameters(odd: Odd) -> RssParameters:
 
 
 def check_campaign(spec: CampaignSpec) -> None:
-    """Refuses a campaign that could not run; see `Problem.from_spec` for the errors."""
+    """Refuses a campaign that could not run; see `Problem.from_spec` and `check_installed` for the errors."""
     for method in spec.methods:
         check_installed(method)
     alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()

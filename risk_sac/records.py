@@ -93,6 +93,9 @@ class Judgement(Record):
     """How the striker came into the ego's way."""
     conflict_s: Real
     """When the conflict began; negative before the release."""
+    noticed_s: float | None = None
+    """The same if whoever hangs over its line beside the ego is in conflict at once; `conflict_after_release` goes by
+    it. Null in what was judged before there was a difference."""
     conflict_x_m: Real
     """Where the striker was then, on the map."""
     conflict_y_m: Real

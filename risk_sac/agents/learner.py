@@ -21,6 +21,7 @@ from risk_sac.agents.replay import Batch, Replay, RiskPrioritizedReplay, Transit
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
+from risk_sac.problem import check_installed
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.types import Floats, Vector
 
@@ -50,7 +51,8 @@ class Learner:
         make = {"sac": self._sac, "ddpg": self._ddpg, "sb3": self._sb3}[method.agent]
         self._make = partial(make, observation_size, action_size, seed)
         trial = random_batch(observation_size, action_size, config.agent.batch_size)
-        self.device = choose_device(config.agent.device, self._make, trial)
+        wanted = config.agent.device if method.agent != "sb3" else "cpu"
+        self.device = choose_device(wanted, self._make, trial)
         self._agent = self._make(self.device)
         replay = RiskPrioritizedReplay if method.replay == "rper" else UniformReplay
         self._replay: Replay = replay(observation_size, action_size, config.replay)
@@ -140,9 +142,10 @@ class Learner:
         return DdpgAgent(observation_size, action_size, self._config.agent, self._config.ddpg, seed, device)
 
     def _sb3(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
-        from risk_sac.agents.sb3 import Sb3Agent  # an extra
+        check_installed("sb3-sac")
+        from risk_sac.agents.sb3 import Sb3Agent  # here, because it is an extra
 
-        return Sb3Agent(observation_size, action_size, self._config.agent, self._config.sac, seed, device)
+        return Sb3Agent(observation_size, action_size, self._config.agent, self._config.sac, seed)
 
     def _update_once(self) -> UpdateResult:
         batch_size = self._config.agent.batch_size

@@ -1,7 +1,8 @@
 """Stable-Baselines3's SAC in the place of ours: a control that tells whether our learner is any good.
 
 Memory, warm start and pace stay the learner's, and so do widths, batch and rates, so that two rows differ in the update
-alone. SB3 has one learning rate for all networks; it gets the actor's, which is also its default.
+alone. SB3 has one learning rate for all networks; it gets the actor's, which is also its default. It stays on the
+processor: of a GPU's generator it would draw unseeded.
 """
 
 import copy
@@ -21,6 +22,7 @@ from torch import Tensor
 from risk_sac.agents.agent import UpdateResult, all_finite, loading
 from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import AgentConfig, SacConfig
+from risk_sac.errors import NotFinite
 from risk_sac.types import Floats, Vector
 
 
@@ -51,7 +53,6 @@ class Sb3Agent:
         config: AgentConfig,
         sac: SacConfig,
         seed: int,
-        device: str = "cpu",
     ) -> None:
         self._generator = torch.Generator().manual_seed(seed).get_state()
         with self._noise():
@@ -66,7 +67,7 @@ class Sb3Agent:
                 ent_coef=f"auto_{sac.initial_temperature}",
                 target_entropy=sac.target_entropy_per_action * action_size,
                 policy_kwargs={"net_arch": list(config.hidden_sizes)},
-                device=device,
+                device="cpu",
             )
         self._model.set_logger(Logger(None, []))
         self._log_temperature = cast(Tensor, self._model.log_ent_coef)
@@ -104,8 +105,11 @@ class Sb3Agent:
             rewards=reward[:, None],
         )
         self._model.replay_buffer = cast(ReplayBuffer, _Given(samples))
-        with self._noise():
-            self._model.train(gradient_steps=1, batch_size=len(reward))
+        try:
+            with self._noise():
+                self._model.train(gradient_steps=1, batch_size=len(reward))
+        except ValueError as error:  # what torch's distributions say of a mean that is NaN
+            raise NotFinite(f"an update of SB3's SAC failed: {error}") from error
         told = self._model.logger.name_to_value
         critic_loss, actor_loss, temperature = all_finite(
             [told["train/critic_loss"], told["train/actor_loss"], self.temperature]
@@ -133,4 +137,4 @@ class Sb3Agent:
         with loading():
             self._model.set_parameters(copy.deepcopy(state["parameters"]))
             self._log_temperature.data.copy_(state["log_temperature"])
-            self._generator = state["generator"]
+            self._generator = torch.Generator().set_state(state["generator"]).get_state()

@@ -11,13 +11,25 @@ from risk_sac.cli.campaigns import add_campaigns
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
 from risk_sac.cli.evaluate import add_evaluate
 from risk_sac.cli.keys import add_keys
+from risk_sac.cli.replay import add_bundle, add_replay
 from risk_sac.cli.run import add_run
 from risk_sac.cli.serve import add_serve
 from risk_sac.cli.show import add_show
 from risk_sac.cli.verify import add_verify
 from risk_sac.errors import ConfigError, RiskSacError
 
-COMMANDS = (add_run, add_evaluate, add_audit, add_show, add_verify, add_serve, add_campaigns, add_keys)
+COMMANDS = (
+    add_run,
+    add_evaluate,
+    add_audit,
+    add_show,
+    add_verify,
+    add_bundle,
+    add_replay,
+    add_serve,
+    add_campaigns,
+    add_keys,
+)
 EPILOG = """exit status, but of `campaigns`, which says its own: 0 done; 1 failed; 2 a wrong setting or argument;
 130 interrupted, and the same command goes on."""
 

@@ -34,7 +34,8 @@ def add_evaluate(commands: Commands) -> None:
 
 
 def _evaluate(options: argparse.Namespace) -> int:
-    defaults = {"families": get_args(FamilyName), "methods": tuple(METHODS), "seeds": range(SEEDS)}
+    methods = [name for name, method in METHODS.items() if not method.needs]
+    defaults = {"families": get_args(FamilyName), "methods": methods, "seeds": range(SEEDS)}
     defaults = {name: list(values) for name, values in defaults.items()}
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS), defaults)
     from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
@@ -43,7 +44,7 @@ def _evaluate(options: argparse.Namespace) -> int:
         jobs = options.jobs if options.jobs is not None else os.cpu_count() or 1
         executor = os.environ.get("RISK_SAC_EXECUTOR", "local")
         drawn = partial(_drawn, Board(bar))
-        evaluation = evaluate(spec, options.out, options.typed, jobs, drawn, executor, max(options.verify, 0))
+        evaluation = evaluate(spec, options.out, options.typed, jobs, drawn, executor, options.verify)
     for job in evaluation.failed:
         complain(f"{job.name}: {job.reason}")
     comparison = evaluation.comparison

@@ -22,16 +22,13 @@ def _verify(options: argparse.Namespace) -> int:
     from risk_sac.failures.verify import verify
 
     specs = {folder: read_results(folder).spec for folder in options.runs}
-    found = verify(options.runs, max(options.times, 1), os.cpu_count() or 1)
+    found = verify(options.runs, options.times, os.cpu_count() or 1)
     if missing := [folder for folder in specs if folder not in found]:
-        raise SimulationError(
-            f"{missing[0]} was not verified: its run is not finished, or replaying it was interrupted"
-        )
+        raise SimulationError(f"{missing[0]} was not verified: its run is unfinished, or cannot be replayed")
     for folder, verified in found.items():
         repeated = len(verified.episodes) - len(verified.flaky)
         console.print(f"{specs[folder].id}: {repeated} of {counted(len(verified.episodes), 'distinct failure')} repeat")
         for index in sorted(verified.flaky):
-            console.print(
-                f"  flaky: episode {index}, {verified.episodes[index].same} of {options.times} times the same"
-            )
+            repetition = verified.episodes[index]
+            console.print(f"  flaky: episode {index}, {repetition.same} of {repetition.times} times the same")
     return FAILED if any(verified.flaky for verified in found.values()) else OK

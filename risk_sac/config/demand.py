@@ -47,7 +47,7 @@ def demand_bytes(spec: RunSpec, observation_size: int, action_size: int, horizon
     demand = {"budget.episodes": EPISODE_BYTES * spec.budget.total_episodes}
     if not method.learns:
         return demand
-    stochastic = method.agent in ("sac", "sb3")
+    stochastic = method.stochastic
     actor = (observation_size, *agent.hidden_sizes, action_size * (2 if stochastic else 1))
     critic = (observation_size + action_size, *agent.hidden_sizes, 1)
     critics, actor_targets = (2, 0) if stochastic else (1, 1)

@@ -42,9 +42,14 @@ class Method(Settings):
     summary: str
 
     @property
+    def stochastic(self) -> bool:
+        """Whether it learns a policy that draws its actions."""
+        return self.agent in ("sac", "sb3")
+
+    @property
     def learns(self) -> bool:
         """Whether its adversaries do; the others are controls."""
-        return self.agent in ("sac", "ddpg", "sb3")
+        return self.stochastic or self.agent == "ddpg"
 
 
 # Choice: all learners search scenes with BoTorch, so that their rows differ in the learner alone.

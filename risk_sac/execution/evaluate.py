@@ -63,6 +63,8 @@ def evaluate(
     """
     if jobs < 1:
         raise ConfigError(f"got {jobs}; wanted at least one process", field="jobs")
+    if times < 0:
+        raise ConfigError(f"got {times}; wanted 0 or more", field="verify")
     check_campaign(spec)  # before the folder is claimed
     make_executor = executor_named(executor)
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
@@ -70,7 +72,7 @@ def evaluate(
         queue = [Job(spec=run, folder=folder / RUNS / run.id) for run in spec.runs()]
         Queue(queue, make_executor(program(folder / SPEC, lock)), progress).execute(jobs, stopping)
         if times and not stopping():
-            verify([job.folder for job in queue if job.state == "finished"], times, jobs)
+            verify([job.folder for job in queue if job.state == "finished"], times, jobs, stopping)
         comparison = _report(spec, folder, command, queue)
         return Evaluation(
             comparison=comparison,

@@ -51,7 +51,7 @@ def draw(family: FamilyName, contact: Contact, folder: Path, file: Path) -> None
 
 def recording_bytes(family: FamilyName, recording: Recording, format_: str) -> bytes:
     """The picture of a contact as a file: png, pdf or svg."""
-    return picture(partial(draw_recording, family, recording), format_, DPI, {})
+    return picture(partial(draw_recording, family, recording), [format_], DPI, {})[0]
 
 
 def draw_recording(family: FamilyName, recording: Recording) -> Figure:

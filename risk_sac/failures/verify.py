@@ -4,33 +4,45 @@ import json
 import logging
 import subprocess
 import sys
-from collections import defaultdict
-from collections.abc import Mapping, Sequence
+import tempfile
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from risk_sac.errors import ConfigError
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import Repetition, Verified, distinct_failures, read_verified, write_verified
 
 logger = logging.getLogger(__name__)
 
 TIMES = 3  # by default
+POLL_S = 0.05
 
 
-def verify(folders: Sequence[Path], times: int = TIMES, jobs: int = 1) -> Mapping[Path, Verified]:
-    """Replays the distinct failures of finished runs, each in `times` fresh processes, and notes what came of it.
+def verify(
+    folders: Sequence[Path], times: int = TIMES, jobs: int = 1, stopping: Callable[[], bool] = lambda: False
+) -> Mapping[Path, Verified]:
+    """Replays the distinct failures of finished runs, each in `times` processes, and notes what came of it.
 
-    What was verified as often before is not replayed again. Should a process crash or be interrupted, nothing is noted.
+    What was verified as often before is not replayed again. Of a run whose series cannot be read nothing is noted, and
+    of none whose replay was interrupted; the log says so.
 
     Args:
       folders: of the runs.
       times: how often.
       jobs: processes at a time.
+      stopping: whether to leave off, asked again and again.
+
+    Returns:
+      What is noted, by folder.
 
     Raises:
-      ConfigError: a folder holds no run.
+      ConfigError: a folder holds no run, or `times` is not positive.
       OSError: a folder cannot be written.
     """
+    if times < 1:
+        raise ConfigError(f"got {times}; wanted at least 1", field="times")
     found: dict[Path, Verified] = {}
     missing: dict[Path, Verified] = {}  # with nothing replayed yet
     for folder in folders:
@@ -43,19 +55,20 @@ def verify(folders: Sequence[Path], times: int = TIMES, jobs: int = 1) -> Mappin
         else:
             episodes = {episode.index: Repetition(times=0, same=0) for episode in distinct_failures(results)}
             missing[folder] = Verified(digest=results.digest, episodes=episodes)
-    if failed := [folder for folder, verified in missing.items() if verified.episodes]:
-        with ThreadPoolExecutor(jobs) as threads:
-            for same in threads.map(_same, [failed] * times):
-                if same is None:
-                    return found
-                for folder in failed:
+    failed = [folder for folder, verified in missing.items() if verified.episodes]
+    with ThreadPoolExecutor(max(jobs, 1)) as threads:
+        for same in threads.map(lambda _: _same(failed, stopping), range(times if failed else 0)):
+            for folder in failed:
+                if folder in same and folder in missing:
                     missing[folder] = _counted(missing[folder], same[folder])
+                else:
+                    missing.pop(folder, None)
     for folder, verified in missing.items():
         write_verified(folder, verified)
     return found | missing
 
 
-def _counted(verified: Verified, same: set[int]) -> Verified:
+def _counted(verified: Verified, same: Collection[int]) -> Verified:
     """With one more replay, of which these episodes were the same."""
     episodes = {
         index: Repetition(times=before.times + 1, same=before.same + (index in same))
@@ -64,15 +77,19 @@ def _counted(verified: Verified, same: set[int]) -> Verified:
     return Verified(digest=verified.digest, episodes=episodes)
 
 
-def _same(folders: Sequence[Path]) -> Mapping[Path, set[int]] | None:
-    """The failures that were the same in a fresh process; None if it was interrupted or crashed."""
+def _same(folders: Sequence[Path], stopping: Callable[[], bool]) -> Mapping[Path, Collection[int]]:
+    """By run, the failures that were the same in a fresh process; of a run that was not replayed nothing."""
     command = [sys.executable, "-m", "risk_sac.failures.replay", *map(str, folders)]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)
-    if ended.returncode != 0:
-        logger.warning("replaying failures ended with status %d: %s", ended.returncode, ended.stderr[-2000:])
-        return None
-    same: defaultdict[Path, set[int]] = defaultdict(set)
-    for line in map(json.loads, ended.stdout.splitlines()):
-        if line["same"]:
-            same[Path(line["folder"])].add(line["index"])
-    return same
+    with tempfile.TemporaryFile("w+") as told, subprocess.Popen(command, stdout=told) as process:
+        while process.poll() is None:
+            if stopping():
+                process.terminate()
+            time.sleep(POLL_S)
+        if process.returncode != 0:
+            logger.warning("replaying failures ended with status %d", process.returncode)
+        told.seek(0)
+        lines = [json.loads(line) for line in told if line.endswith("\n")]
+    for line in lines:
+        if "error" in line:
+            logger.warning("the failures of %s cannot be replayed: %s", line["folder"], line["error"])
+    return {Path(line["folder"]): line["same"] for line in lines if "same" in line}

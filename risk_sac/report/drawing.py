@@ -53,7 +53,8 @@ def _looks() -> dict[MethodName, Look]:
     """By the table of methods, so that a method looks the same whichever others are compared."""
     others = [method for method in METHODS if method not in _OWN]
     drawn = {
-        method: Look(_MUTED[place % len(_MUTED)], _DASHES[place % len(_DASHES)]) for place, method in enumerate(others)
+        method: Look(_MUTED[place % len(_MUTED)], _DASHES[(place + place // len(_MUTED)) % len(_DASHES)])
+        for place, method in enumerate(others)
     }
     return {method: _OWN.get(method) or drawn[method] for method in METHODS}
 
@@ -61,9 +62,9 @@ def _looks() -> dict[MethodName, Look]:
 LOOKS = _looks()
 
 
-def draw(comparison: Comparison, figure: Curves | Times | Bars, format_: Format) -> bytes:
-    """One figure as a file; the same comparison gives the same bytes."""
-    return picture(partial(_draw, comparison, figure), format_, DPI, STYLE)
+def draw(comparison: Comparison, figure: Curves | Times | Bars, formats: Sequence[Format]) -> list[bytes]:
+    """One figure as a file of each format; the same comparison gives the same bytes."""
+    return picture(partial(_draw, comparison, figure), formats, DPI, STYLE)
 
 
 def _draw(comparison: Comparison, figure: Curves | Times | Bars) -> Figure:

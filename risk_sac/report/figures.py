@@ -108,7 +108,7 @@ CURVES = (
         name="alpha",
         label="temperature α",
         values=lambda run: np.array([record.temperature for record in run.phase("search")]),
-        methods=lambda method: METHODS[method].agent in ("sac", "sb3"),
+        methods=lambda method: METHODS[method].stochastic,
         log=True,
     ),
 )
@@ -144,7 +144,12 @@ def figure_names(comparison: Comparison) -> tuple[str, ...]:
 
 
 def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
-    """One figure as a file; the same comparison gives the same bytes.
+    """See `figure_files`."""
+    return figure_files(comparison, name, [format_])[0]
+
+
+def figure_files(comparison: Comparison, name: str, formats: Sequence[Format] = FORMATS) -> list[bytes]:
+    """One figure as a file of each format; the same comparison gives the same bytes.
 
     Raises:
         ConfigError: there is no such figure.
@@ -154,7 +159,7 @@ def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
     figures = _figures(comparison)
     if name not in figures:
         raise ConfigError(f"got {name!r}; wanted one of {', '.join(figures) or 'none: no run has finished'}")
-    return draw(comparison, figures[name], format_)
+    return draw(comparison, figures[name], formats)
 
 
 def curve_values(

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.data import table_csv, table_json
-from risk_sac.report.figures import FORMATS, figure_bytes, figure_names
+from risk_sac.report.figures import FORMATS, figure_files, figure_names
 from risk_sac.report.markdown import table_markdown
 
 FIGURES = "figures"
@@ -22,8 +22,8 @@ def write_report(comparison: Comparison, folder: Path) -> None:
         "table.csv": table_csv(comparison).encode(),
     }
     for name in figure_names(comparison):
-        for format_ in FORMATS:
-            files[f"{FIGURES}/{name}.{format_}"] = figure_bytes(comparison, name, format_)
+        for format_, content in zip(FORMATS, figure_files(comparison, name), strict=True):
+            files[f"{FIGURES}/{name}.{format_}"] = content
     (folder / FIGURES).mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         _replace(folder / name, content)

@@ -142,6 +142,11 @@ class SumoSimulation:
             self._hide()
         return self._reading.frame
 
+    def signal_heads(self) -> bytes:
+        """The letters of all signals, one after the other."""
+        states = map(libsumo.trafficlight.getRedYellowGreenState, sorted(libsumo.trafficlight.getIDList()))
+        return "".join(states).encode()
+
     def _look(self) -> Belief:
         """Reads what there is, and lets the ego perceive it."""
         self._reading = self._reader.read(self._walkers)

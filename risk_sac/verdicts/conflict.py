@@ -37,7 +37,7 @@ class Conflict:
     type: ConflictType
     frame: int  # when it began for a driver who sees what the ego sees
     time_s: float  # t0, from the release
-    noticed_s: float  # from when on a nervous driver would have braked: for whoever beside it hung over the line, too
+    noticed_s: float  # the same if whoever hangs over beside the ego is in conflict at once; never later
     x_m: float  # where the striker was then
     y_m: float
     position: str  # ahead | alongside

@@ -55,6 +55,11 @@ def cell_of(collision: Collision) -> Cell:
     return tuple(bisect_right(axis.edges, values[axis.name]) for axis in AXES)
 
 
+def niche_of(collision: Collision) -> tuple[str, Cell]:
+    """What two failures share that are not distinct."""
+    return signature_of(collision), cell_of(collision)
+
+
 class DistinctFailures:
     """Counts distinct failures, one by one; a policy that repeats its one way to make the ego fail is paid once."""
 
@@ -77,10 +82,10 @@ class DistinctFailures:
         Raises:
           NotFinite: one of its features is NaN.
         """
-        key = signature_of(collision), cell_of(collision)
-        if key in self._found:
+        niche = niche_of(collision)
+        if niche in self._found:
             return False
-        self._found.add(key)
+        self._found.add(niche)
         return True
 
 

@@ -33,6 +33,7 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
         definitions=DEFINITIONS,
         conflict_type=conflict.type,
         conflict_s=conflict.time_s,
+        noticed_s=conflict.noticed_s,
         conflict_x_m=conflict.x_m,
         conflict_y_m=conflict.y_m,
         position=conflict.position,

@@ -23,7 +23,7 @@ STANDING_MPS = 0.1
 YIELDS = frozenset(b"ruyg")  # signals at which a driver is expected to stop, or to let others pass
 
 
-def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground) -> Bools:
+def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, wary: bool = False) -> Bools:
     """With whom of `frame.ids` the careful driver in the ego's place is in a conflict.
 
     A crossing vehicle that has to stop or to yield, and still can at 3.4 m/s², is expected to: in a record the contact
@@ -34,6 +34,7 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground) -> Boo
       path: the ego's path ahead, from its centre; see `risk_sac.verdicts.path.polyline`.
       known: `n`, whom the ego knows of.
       ground: where it takes place.
+      wary: whether who hangs over beside the ego counts even if the two would not meet.
 
     Returns:
       `n`; False for the ego.
@@ -43,32 +44,32 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground) -> Boo
     within_reach = apart_m <= HORIZON_S * (frame.speed_mps + frame.ego_speed_mps)
     for i in np.flatnonzero(known & within_reach):
         if i > 0:
-            found[i] = _in_conflict(frame, path, int(i), ground)
+            found[i] = _in_conflict(frame, path, int(i), ground, wary)
     return found
 
 
-def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground) -> bool:
+def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground, wary: bool) -> bool:
     f = frame
     other = Body(f.x_m[i], f.y_m[i], f.heading_rad[i], f.vx_mps[i], f.vy_mps[i], f.length_m[i] / 2, f.width_m[i] / 2)
     speed, half_length = f.ego_speed_mps, float(f.length_m[0]) / 2
     half_width = float(f.width_m[0]) / 2 + CORRIDOR_M
+    meets = time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S
     if f.kind[i] == Kind.PEDESTRIAN:
         here = slice(i, i + 1)
         areas = ground.roadway + ground.crossings
         if ground.roadway and not soon_inside(areas, f.x_m[here], f.y_m[here], f.vx_mps[here], f.vy_mps[here], KERB_S):
             return False
-        return time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S
+        return meets
     seen = along(path, 0, float(path.s[0]), speed, half_length, other)
     if math.cos(seen.turn_rad) > SAME_WAY_COS:
         offset, accel = f.lane_offset_m[i], f.accel_mps2[i]
-        # Taken for about to meet: the policy is not handed a vehicle that hangs over beside the ego already.
-        begins, _ = lane_conflict(seen, speed, offset, accel, ground.lane_width_m, True)
+        begins, _ = lane_conflict(seen, speed, offset, accel, ground.lane_width_m, meets or wary)
         return begins
     entry_m, meets_m = _entry(path, speed, half_length, half_width, other, float(f.speed_mps[i]))
     stops = not math.isfinite(entry_m)
     if stops and int(f.link[i]) in YIELDS:
         return False
-    if time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S:
+    if meets:
         return True
     return not stops and _both_come(entry_m, meets_m - path.s[0], speed, half_length, other, float(f.speed_mps[i]))
 

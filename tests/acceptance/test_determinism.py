@@ -112,7 +112,7 @@ def test_another_process_gives_the_same_results(uninterrupted: tuple[RunSummary,
     assert done.stdout.split()[-1] == uninterrupted[0].digest
 
 
-@pytest.mark.parametrize("stop_after", [1, 4, EPISODES])
+@pytest.mark.parametrize("stop_after", [pytest.param(1, marks=pytest.mark.torture), 4, EPISODES])
 def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
     uninterrupted: tuple[RunSummary, Listener], tmp_path: Path, stop_after: int
 ) -> None:
@@ -150,7 +150,7 @@ def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path: Pa
     assert resumed.digest == expected.digest
 
 
-@pytest.mark.parametrize("limit", [1, 3, 7])
+@pytest.mark.parametrize("limit", [*(pytest.param(limit, marks=pytest.mark.torture) for limit in (1, 3)), 7])
 def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path: Path, limit: int) -> None:
     at_once = LEARNER.model_copy(update={"warm_start": WarmStartConfig(episodes=0)})  # both act from the beginning on
     changes = {"budget": Budget(episodes=9), "learner": at_once}

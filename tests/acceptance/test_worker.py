@@ -105,7 +105,7 @@ def test_a_worker_told_to_stop_leaves_a_checkpoint_and_goes_on_from_there(launch
     assert digest(launcher) == undisturbed
 
 
-@pytest.mark.parametrize("moment_s", [0.2, 1.5, 4.0])
+@pytest.mark.parametrize("moment_s", [pytest.param(0.2, marks=pytest.mark.torture), 1.5, 4.0])
 def test_a_worker_with_nothing_to_keep_leaves_at_once(launcher: Launcher, moment_s: float) -> None:
     launcher.submit()
     time.sleep(moment_s)  # into the start of Python, an import, or the first episode's compilation
@@ -124,7 +124,7 @@ def test_workers_killed_crashed_and_stopped_come_to_the_same_results(launcher: L
     assert digest(launcher) == undisturbed
 
 
-@pytest.mark.parametrize("size", [0, 20_000])
+@pytest.mark.parametrize("size", [pytest.param(0, marks=pytest.mark.torture), 20_000])
 def test_a_disk_that_is_full_is_told_and_leaves_a_run_that_goes_on(
     launcher: Launcher, undisturbed: str, size: int
 ) -> None:

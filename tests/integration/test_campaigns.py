@@ -12,6 +12,9 @@ from tests.server import LONG_S
 
 DATABASES = ["sqlite", "postgresql"]
 EACH_DATABASE = pytest.mark.parametrize("serve", DATABASES, indirect=True)
+SQLITE_FIRST = pytest.mark.parametrize(
+    "serve", ["sqlite", pytest.param("postgresql", marks=pytest.mark.torture)], indirect=True
+)
 EACH_DATABASE_SHARED = pytest.mark.parametrize("serve_shared", DATABASES, indirect=True)
 
 
@@ -100,7 +103,7 @@ def test_cancel_stops_at_an_episode_and_keeps_what_was_found(shared):
     assert shared.client.post(f"/v1/campaigns/{campaign_id}/cancel").json() == campaign
 
 
-@EACH_DATABASE
+@SQLITE_FIRST
 def test_a_worker_that_ignores_the_cancel_is_killed_after_its_grace(serve, scripted):
     service = serve(grace_s=0.5, lease_s=60)
     campaign_id = service.post(seeds=[scripted.HANGS], budget={"episodes": 1000})
@@ -113,8 +116,16 @@ def test_a_worker_that_ignores_the_cancel_is_killed_after_its_grace(serve, scrip
     assert service.workers() == []
 
 
-@EACH_DATABASE
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("serve", "number"),
+    [
+        ("sqlite", signal.SIGKILL),
+        ("postgresql", signal.SIGTERM),
+        pytest.param("sqlite", signal.SIGTERM, marks=pytest.mark.torture),
+        pytest.param("postgresql", signal.SIGKILL, marks=pytest.mark.torture),
+    ],
+    indirect=["serve"],
+)
 def test_a_restarted_server_goes_on_without_losing_or_repeating_an_episode(serve, number):
     service = serve()
     campaign_id = service.post(seeds=[0, 1, 2], budget={"episodes": 20})
@@ -130,7 +141,7 @@ def test_a_restarted_server_goes_on_without_losing_or_repeating_an_episode(serve
         assert sorted(service.episodes(campaign_id, run["id"])) == list(range(20))
 
 
-@EACH_DATABASE
+@SQLITE_FIRST
 def test_two_servers_never_share_a_data_folder(serve):
     service = serve()
     second = subprocess.run(
@@ -145,7 +156,7 @@ def test_two_servers_never_share_a_data_folder(serve):
     assert "is in use by another process" in second.stderr
 
 
-@EACH_DATABASE
+@SQLITE_FIRST
 def test_a_campaign_that_has_ended_can_be_deleted_with_its_files(serve):
     service = serve()
     kept, gone = service.post(budget={"episodes": 2}), service.post(budget={"episodes": 300})
@@ -162,7 +173,7 @@ def test_a_campaign_that_has_ended_can_be_deleted_with_its_files(serve):
     assert service.get(kept, "/episodes")["items"]
 
 
-@EACH_DATABASE
+@SQLITE_FIRST
 def test_campaigns_go_when_they_have_been_kept_long_enough(serve):
     service = serve(retention_days=1e-6)
     campaign_id = service.post(budget={"episodes": 2})
@@ -170,7 +181,7 @@ def test_campaigns_go_when_they_have_been_kept_long_enough(serve):
     assert not (service.data_dir / "campaigns" / campaign_id).exists()
 
 
-@EACH_DATABASE
+@SQLITE_FIRST
 def test_a_project_without_worker_hours_left_waits(serve):
     service = serve(quota_cpu_hours=1e-5, max_workers=1)
     campaign_id = service.post(seeds=[0, 1], budget={"episodes": 10})

@@ -105,7 +105,7 @@ def test_a_wrong_spec_is_refused_with_the_field(client: Client) -> None:
     assert [field.field for field in caught.value.fields] == ["budget.episodes"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.torture)])
 def test_a_server_that_is_lost_and_restarted_is_a_pause(number: int, serve: Callable[..., Service]) -> None:
     service = serve()
 

@@ -71,6 +71,7 @@ OF_ODD = {f"odd.{path}.{end}" for path in SENSIBLE for end in ("low", "high")}  
 BOUNDED = [number for number in numbers(schema()) if number.path not in OF_ODD]
 FLOATS = [number for number in BOUNDED if number.type == "number"]
 CORNERS = 12
+IN_TIME = (0, 4, 7, 8)  # two of SAC and two of DDPG; the others in `make torture`
 LEARNING = [name for name, method in METHODS.items() if method.learns]
 
 
@@ -139,7 +140,10 @@ def assert_finite(state: Any) -> None:
         assert np.isfinite(state)
 
 
-@pytest.mark.parametrize("corner", range(CORNERS))
+@pytest.mark.parametrize(
+    "corner",
+    [corner if corner in IN_TIME else pytest.param(corner, marks=pytest.mark.torture) for corner in range(CORNERS)],
+)
 def test_a_run_with_floats_at_their_bounds_stays_finite(corner: int, tmp_path: Path) -> None:
     """Over all corners each float is at its low end, at its high end and at its default equally often."""
     ends = {}

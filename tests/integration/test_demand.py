@@ -61,9 +61,9 @@ def run(method: str = "risk-sac", *, episodes: int = 5, capacity: int = 1000, **
     [
         run(hidden_sizes=[1500, 1500]),
         run("ddpg-lag", hidden_sizes=[1500, 1500]),
-        run(episodes=300, capacity=50_000),
+        pytest.param(run(episodes=300, capacity=50_000), marks=pytest.mark.torture),
         run("sac", episodes=300, capacity=50_000),
-        run(hidden_sizes=[1024, 1024, 1024], batch_size=4096),
+        pytest.param(run(hidden_sizes=[1024, 1024, 1024], batch_size=4096), marks=pytest.mark.torture),
     ],
     ids=["networks", "networks of DDPG", "prioritised replay", "uniform replay", "batch"],
 )

@@ -36,7 +36,7 @@ def statuses(client, campaign):
     return {answer.status_code for answer in answers}
 
 
-@pytest.mark.parametrize("serve", ["sqlite", "postgresql"], indirect=True)
+@pytest.mark.parametrize("serve", ["sqlite", pytest.param("postgresql", marks=pytest.mark.torture)], indirect=True)
 def test_lost_keys_open_nothing(serve):
     service = serve()
     campaign = service.wait(service.post(budget={"episodes": 1}))["id"]

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from risk_sac.config import METHODS
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import results_digest
 from risk_sac.report import (
@@ -19,6 +20,7 @@ from risk_sac.report import (
     table_markdown,
     write_report,
 )
+from risk_sac.report.drawing import LOOKS
 from risk_sac.report.figures import window_ecr, window_pcr
 from risk_sac.run_folder.episode_json import records_to_json
 from risk_sac.run_folder.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
@@ -269,3 +271,7 @@ def never_close(record):
 def unjudged(record):
     collision = record.collision and record.collision.model_copy(update={"judgement": None})
     return record.model_copy(update={"collision": collision})
+
+
+def test_every_method_has_a_look_of_its_own():
+    assert len({(look.colour, look.dashes) for look in LOOKS.values()}) == len(METHODS)

@@ -1,0 +1,195 @@
+"""A failure in one file that stands alone: what is needed to play it again anywhere, and to see what it was.
+
+The file is an .npz: the arrays of the episode's series, the letters of all signal heads, and `manifest`, a JSON text.
+Nothing in it is executed, and its reader believes nothing that it says of itself.
+"""
+
+import hashlib
+import io
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from importlib.resources import files
+from math import prod
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.failures.replay import Series, actions_of, trajectory_digest
+from risk_sac.problem import Problem
+from risk_sac.records import EpisodeRecord, Record
+from risk_sac.run_folder.durable import replace_file
+from risk_sac.types import Scene
+
+PACKAGES = ("libsumo", "numpy")  # that decide how an episode goes, its scene and its actions given
+PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+CODE, WORLD = "risk_sac", "sumo_nets"
+MOST_ARRAYS, MOST_FILE_BYTES, MOST_BYTES = 64, 2**25, 2**28  # a full series of dense has 23 arrays and some 5 MB
+MANIFEST, HEADS = "manifest", "signal_heads"
+
+
+class Manifest(Record):
+    """What a bundle says of its failure."""
+
+    format: Literal[1] = 1  # another one with whatever an older reader would misread
+    id: str
+    """The episode's, as the run that found it names it."""
+    spec: RunSpec
+    episode: EpisodeRecord
+    versions: Mapping[str, str]
+    """Package → version that it was replayed with when the bundle was made."""
+    code: str
+    """SHA-256 over the sources."""
+    world: Mapping[str, str]
+    """File of the road network or of the vehicle types → its SHA-256."""
+    digest: str
+    """Of the series, see `risk_sac.failures.replay.trajectory_digest`."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bundle:
+    """A failure that stands alone."""
+
+    manifest: Manifest
+    series: Series
+    signal_heads: NDArray[np.uint8]  # T since the release x heads, SUMO's letters
+
+
+def make_bundle(spec: RunSpec, episode: EpisodeRecord, series: Series, signal_heads: NDArray[np.uint8]) -> Bundle:
+    """A bundle of what was just played here."""
+    manifest = Manifest(
+        id=episode.id_in(spec.id),
+        spec=spec,
+        episode=episode,
+        versions=versions(),
+        code=code_digest(),
+        world=world_of(spec, episode),
+        digest=trajectory_digest(series),
+    )
+    return Bundle(manifest=manifest, series=series, signal_heads=signal_heads)
+
+
+def versions() -> dict[str, str]:
+    """Of the packages that decide how an episode goes, as they are installed."""
+    return {name: version(name) for name in PACKAGES}
+
+
+def code_digest() -> str:
+    """SHA-256 over the sources of the method."""
+    digest = hashlib.sha256()
+    for source in sorted(Path(str(files(CODE))).rglob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
+    """The files that SUMO reads for an episode, with their SHA-256, as they are here."""
+    net = Problem.from_spec(spec).family.layout(episode.scene).net
+    return {name: hashlib.sha256((files(WORLD) / name).read_bytes()).hexdigest() for name in (net, "vtypes.add.xml")}
+
+
+def write_bundle(file: Path, bundle: Bundle) -> None:
+    """Writes the whole file or none.
+
+    Raises:
+      OSError: the disk refuses it.
+    """
+    content = io.BytesIO()
+    arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
+    np.savez_compressed(content, allow_pickle=False, **arrays)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(file, content.getbuffer())
+
+
+def read_bundle(file: Path) -> Bundle:
+    """Reads what may come from anybody.
+
+    Raises:
+      ConfigError: it is no bundle, one of another version, damaged, too large, or holds no episode that can be played.
+      OSError: it cannot be read.
+    """
+    content = _read(file)
+    try:
+        arrays = _arrays(content)
+        text = str(arrays.pop(MANIFEST))
+        heads = arrays.pop(HEADS)
+    except Exception as error:  # what zipfile, zlib and numpy raise of bytes that mean nothing is an open set
+        raise _refused(file, f"is no bundle of a failure, or is damaged: {error}") from error
+    try:
+        manifest = Manifest.model_validate_json(text)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise _refused(file, f"has a manifest of another version, or none: {where}: {first['msg']}") from error
+    if trajectory_digest(arrays) != manifest.digest:
+        raise _refused(file, "is damaged: its arrays do not have the digest in its manifest")
+    try:
+        _check_playable(manifest, arrays)
+    except (RiskSacError, ValueError) as error:
+        raise _refused(file, f"holds no episode that can be played: {error}") from error
+    return Bundle(manifest=manifest, series=arrays, signal_heads=heads)
+
+
+def _read(file: Path) -> bytes:
+    with file.open("rb") as stream:
+        content = stream.read(MOST_FILE_BYTES + 1)
+    if len(content) > MOST_FILE_BYTES:
+        raise _refused(file, f"is larger than {MOST_FILE_BYTES} bytes")
+    return content
+
+
+def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
+    arrays: dict[str, NDArray[Any]] = {}
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        entries = archive.infolist()
+        if len(entries) > MOST_ARRAYS or sum(entry.file_size for entry in entries) > MOST_BYTES:
+            raise ValueError(f"{len(entries)} arrays; wanted at most {MOST_ARRAYS}, of {MOST_BYTES} bytes in all")
+        for entry in entries:
+            name = entry.filename.removesuffix(".npy")
+            if entry.compress_type not in PACKED:  # the others are unpacked whole, whatever size they say
+                raise ValueError(f"{name} is packed in another way than a bundle's arrays are")
+            if name in arrays:
+                raise ValueError(f"two arrays are called {name}")
+            with archive.open(entry) as packed:
+                arrays[name] = _array(packed.read(entry.file_size))
+    return arrays
+
+
+def _array(content: bytes) -> NDArray[Any]:
+    """One array, whose header must not promise more than follows: numpy makes room for it before it reads."""
+    stream = io.BytesIO(content)
+    major, _ = np.lib.format.read_magic(stream)
+    header = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
+    shape, _, kind = header(stream)
+    if kind.hasobject or prod(shape) * kind.itemsize != len(content) - stream.tell():
+        raise ValueError("an array that is not what its header says")
+    stream.seek(0)
+    array: NDArray[Any] = np.load(stream, allow_pickle=False)
+    return array
+
+
+def _check_playable(manifest: Manifest, series: Series) -> None:
+    """Refuses what no run could have recorded, before anything of it reaches the simulator."""
+    problem, episode = Problem.from_spec(manifest.spec), manifest.episode
+    problem.space.check(Scene(problem.family.name, episode.scene))
+    if episode.seed < 0:
+        raise ValueError(f"seed {episode.seed}")
+    for name in ("time_s", "released_s", "actions"):
+        if name not in series or series[name].dtype.kind != "f":
+            raise ValueError(f"{name} is missing, or holds no numbers")
+    if series["time_s"].ndim != 1 or series["released_s"].ndim != 0 or series["actions"].ndim != 2:
+        raise ValueError("times and actions of other dimensions")
+    actions = actions_of(series)
+    most, size = problem.family.horizon_steps, 2 * len(problem.family.adversaries)
+    if not 0 < len(actions) <= most or actions.shape[1] != size or not np.isfinite(actions).all():
+        raise ValueError(f"actions of shape {actions.shape}; wanted up to {most} x {size} finite numbers")
+
+
+def _refused(file: Path, why: str) -> ConfigError:
+    return ConfigError(f"{file} {why}", field="BUNDLE")

@@ -1,0 +1,230 @@
+"""A failure in one file, replayed elsewhere; and files that are no such thing."""
+
+import io
+import json
+import shutil
+import subprocess
+import sys
+import warnings
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from risk_sac.cli import main
+from risk_sac.errors import ConfigError
+from risk_sac.failures.bundle import MANIFEST, MOST_ARRAYS, MOST_FILE_BYTES, read_bundle
+from risk_sac.failures.replay import trajectory_digest
+from risk_sac.run_folder.results import read_results
+
+RUN = ["--family", "dense", "--method", "random", "--seed", "1", "--episodes", "20"]
+Arrays = dict[str, np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of the first contact of a run, whose folder is somewhere else now."""
+    folder = tmp_path_factory.mktemp("bundle")
+    assert main(["run", *RUN, "--out", str(folder / "run")]) == 0
+    contact = read_results(folder / "run").contacts[0]
+    assert main(["bundle", str(folder / "run"), contact.id, "--out", str(folder / "failure.npz")]) == 0
+    (folder / "run").rename(folder / "elsewhere")
+    return folder / "failure.npz"
+
+
+def replayed(file: Path, capsys: pytest.CaptureFixture[str]) -> tuple[int, str, str]:
+    status = main(["replay", str(file)])
+    printed = capsys.readouterr()
+    return status, printed.out.replace("\n", " "), printed.err.replace("\n", " ")
+
+
+def test_a_fresh_process_elsewhere_plays_it_again_to_the_bit(bundle: Path, tmp_path: Path) -> None:
+    shutil.copy(bundle, tmp_path)
+    command = [sys.executable, "-m", "risk_sac", "replay", bundle.name]
+    told = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert told.returncode == 0, told.stderr
+    collision = read_bundle(bundle).manifest.episode.collision
+    assert collision is not None
+    said = f"the ego strikes {collision.other_id} at {collision.ego_speed_mps:.1f} m/s; every array is as recorded"
+    assert said in told.stdout.replace("\n", " ")
+
+
+def test_it_holds_every_signal_head_of_every_frame_since_the_release(bundle: Path) -> None:
+    found = read_bundle(bundle)
+    frames = int((found.series["time_s"] >= found.series["released_s"]).sum())
+    assert len(found.signal_heads) == frames
+    assert found.signal_heads.shape[1] >= 4
+    assert set(found.signal_heads.tobytes()) <= set(b"rRyYgGuoOs")
+
+
+def changed(bundle: Path, file: Path, change: Callable[[Arrays], None]) -> Path:
+    with np.load(bundle) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    change(arrays)
+    np.savez_compressed(file, **arrays)
+    return file
+
+
+def manifest(arrays: Arrays, **changes: Any) -> None:
+    arrays[MANIFEST] = np.array(json.dumps(json.loads(str(arrays[MANIFEST])) | changes))
+
+
+def episode(arrays: Arrays, **changes: Any) -> None:
+    manifest(arrays, episode=json.loads(str(arrays[MANIFEST]))["episode"] | changes)
+
+
+def series(arrays: Arrays, **changes: np.ndarray | None) -> None:
+    """Changes arrays, or takes them out, and the digest with them."""
+    arrays |= changes
+    for name in [name for name, values in arrays.items() if values is None]:
+        del arrays[name]
+    kept = {name: values for name, values in arrays.items() if name not in (MANIFEST, "signal_heads")}
+    manifest(arrays, digest=trajectory_digest(kept))
+
+
+def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def steer(arrays: Arrays) -> None:
+        turned = arrays["actions"].copy()
+        turned[-8:] *= -1.0
+        series(arrays, actions=turned)
+
+    status, out, _ = replayed(changed(bundle, tmp_path / "a.npz", steer), capsys)
+    assert status == 1
+    assert "not as recorded" in out
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (lambda arrays: arrays["x_m"].__imul__(2.0), "is damaged: its arrays do not have the digest"),
+        (lambda arrays: manifest(arrays, format=2), "has a manifest of another version, or none: format"),
+        (lambda arrays: manifest(arrays, spec={"family": "low"}), "has a manifest of another version, or none: spec"),
+        (lambda arrays: manifest(arrays, world={}), "was found on another dense/dense.net.xml"),
+        (lambda arrays: arrays.pop(MANIFEST), "is no bundle of a failure, or is damaged"),
+        (lambda arrays: episode(arrays, seed=-1), "holds no episode that can be played: seed -1"),
+        (lambda arrays: episode(arrays, scene={"friction": 1.0}), "holds no episode that can be played: scene"),
+        (lambda arrays: series(arrays, actions=None), "holds no episode that can be played: actions is missing"),
+        (
+            lambda arrays: series(arrays, actions=np.full((9, 99), 0.5)),
+            "no episode that can be played: actions of",
+        ),
+        (lambda arrays: series(arrays, actions=arrays["actions"] * np.nan), "holds no episode that can be played: act"),
+        (lambda arrays: series(arrays, time_s=np.zeros((2, 2))), "holds no episode that can be played: times"),
+        (lambda arrays: arrays.update({f"a{i}": np.zeros(1) for i in range(MOST_ARRAYS)}), "arrays; wanted at most"),
+    ],
+    ids=[
+        *("damaged", "newer", "another spec", "another net", "no manifest", "another seed", "another scene"),
+        *("no actions", "wide actions", "no numbers", "times in a square", "many arrays"),
+    ],
+)
+def test_what_cannot_be_replayed_is_refused_in_one_line(
+    change: Callable[[Arrays], None],
+    complaint: str,
+    bundle: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    status, out, err = replayed(changed(bundle, tmp_path / "a.npz", change), capsys)
+    assert status == 2
+    assert complaint in err
+    assert not out
+
+
+def array(shape: tuple[int, ...], content: bytes) -> bytes:
+    """One in numpy's format with the shape that it says it has."""
+    stream = io.BytesIO()
+    np.lib.format.write_array_header_1_0(stream, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    return stream.getvalue() + content
+
+
+def pickled() -> bytes:
+    stream = io.BytesIO()
+    np.lib.format.write_array(stream, np.array([{}], dtype=object), allow_pickle=True)
+    return stream.getvalue()
+
+
+def zipped(*contents: bytes, packed: int = zipfile.ZIP_DEFLATED) -> bytes:
+    file = io.BytesIO()
+    with warnings.catch_warnings(action="ignore"), zipfile.ZipFile(file, "w", packed) as archive:
+        for content in contents:
+            archive.writestr("x_m.npy", content)
+    return file.getvalue()
+
+
+def larger_than_it_is(claimed: int) -> bytes:
+    """An archive whose entry claims to have so many bytes."""
+    content = bytearray(zipped(bytes(100)))
+    entry = content.rindex(b"PK\x01\x02")
+    content[entry + 24 : entry + 28] = claimed.to_bytes(4, "little")
+    return bytes(content)
+
+
+ONE = array((1,), bytes(8))
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (lambda: b"", "is no bundle"),
+        (lambda: b"\x89PNG\r\n", "is no bundle"),
+        (lambda: zipped(b"no array"), "is no bundle"),
+        (lambda: zipped(array((10**11,), bytes(8))), "an array that is not what its header says"),
+        (lambda: zipped(array((0, 10**30), b"")), "is no bundle"),
+        (lambda: zipped(ONE[:10] + b"{[]: 1}".ljust(len(ONE) - 19) + b"\n" + bytes(8)), "is no bundle"),
+        (lambda: zipped(pickled()), "an array that is not what its header says"),
+        (lambda: zipped(ONE, ONE), "two arrays are called x_m"),
+        (lambda: zipped(ONE, packed=zipfile.ZIP_LZMA), "x_m is packed in another way"),
+        (lambda: zipped(ONE, packed=zipfile.ZIP_BZIP2), "x_m is packed in another way"),
+        (lambda: larger_than_it_is(2**28 + 1), "wanted at most"),
+        (lambda: bytes(MOST_FILE_BYTES + 1), "is larger than"),
+    ],
+    ids=[
+        *("empty", "a picture", "no array", "a lying header", "an endless shape", "a header that is none", "pickled"),
+        *("twice the same", "lzma", "bzip2", "a bomb", "large"),
+    ],
+)
+def test_hostile_files_are_refused_in_one_line(
+    content: Callable[[], bytes], complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "a.npz").write_bytes(content())
+    status, out, err = replayed(tmp_path / "a.npz", capsys)
+    assert status == 2
+    assert complaint in err
+    assert not out
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_flipped_bit_is_noticed_or_makes_no_difference(
+    seed: int, bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = bytearray(bundle.read_bytes())
+    content[int(np.random.default_rng(seed).integers(len(content)))] ^= 1 << seed
+    (tmp_path / "a.npz").write_bytes(content)
+    try:
+        found = read_bundle(tmp_path / "a.npz")
+    except ConfigError:
+        return
+    assert found.manifest == read_bundle(bundle).manifest
+
+
+def test_a_bundle_that_is_cut_short_is_refused(
+    bundle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = bundle.read_bytes()
+    for end in (len(content) // 2, len(content) - 1):
+        (tmp_path / "a.npz").write_bytes(content[:end])
+        assert replayed(tmp_path / "a.npz", capsys)[0] == 2
+
+
+def test_a_failure_that_does_not_repeat_gets_no_bundle(
+    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = bundle.parent / "elsewhere"
+    contact = read_results(run).contacts[0]
+    monkeypatch.setattr("risk_sac.failures.replay.actions_of", lambda series: series["actions"][-3:])
+    assert main(["bundle", str(run), contact.id, "--out", str(tmp_path / "a.npz")]) == 1
+    assert "does not repeat here" in capsys.readouterr().err.replace("\n", " ")
+    assert not (tmp_path / "a.npz").exists()
