@@ -2,7 +2,9 @@
 
 import logging
 import threading
+import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from risk_sac.config import CampaignSpec
@@ -23,6 +25,7 @@ from service.workers.messages import EpisodeDone, Event, Failed, Finished, Start
 logger = logging.getLogger(__name__)
 
 TICK_S = 1.0
+GATHER_S = 0.5  # clients ask once a second
 UNKILLABLE_S = 3.0  # how long after SIGKILL a worker may take to vanish
 
 
@@ -164,10 +167,9 @@ class Manager:
 
     def _work(self) -> None:
         while True:
-            for number, message in self._executor.events(TICK_S):
-                with self._lock:
-                    self._handle(self._active[number], message)
+            heard = self._hear()
             with self._lock:
+                self._take_in(heard)
                 if self._stopping:
                     if not self._active:
                         return
@@ -175,6 +177,17 @@ class Manager:
                     self._tend()
                 elif not self._active:
                     self._storage.try_again()
+
+    def _hear(self) -> list[tuple[int, Event | Exited]]:
+        """What workers say. Episodes are gathered for a moment: written together they cost less, and show at once."""
+        heard = self._executor.events(TICK_S)
+        until = time.monotonic() + GATHER_S
+        while heard and all(isinstance(message, EpisodeDone) for _, message in heard):
+            more = self._executor.events(max(until - time.monotonic(), 0.0))
+            if not more:
+                break
+            heard += more
+        return heard
 
     def _tend(self) -> None:
         try:
@@ -189,15 +202,32 @@ class Manager:
             if isinstance(message, Exited):
                 del self._active[number]
                 self._end(active, message)
-            elif isinstance(message, EpisodeDone) and not active.abandoned:
-                if self._ledger.add_episode(number, message):
-                    self._deaths.pop(number, None)
             elif isinstance(message, Finished | Failed):
                 active.last = message
             elif isinstance(message, Started):
                 logger.info("process %d", message.pid, extra=active.ids)
         except StorageError as error:
             self._pause(str(error), active)
+
+    def _take_in(self, heard: Sequence[tuple[int, Event | Exited]]) -> None:
+        """Acts on messages in their order, on episodes that come one after the other at once."""
+        episodes: list[tuple[int, EpisodeDone]] = []
+        for number, message in heard:
+            if isinstance(message, EpisodeDone):
+                episodes.append((number, message))
+                continue
+            self._add_episodes(episodes)
+            episodes = []
+            self._handle(self._active[number], message)
+        self._add_episodes(episodes)
+
+    def _add_episodes(self, told: Sequence[tuple[int, EpisodeDone]]) -> None:
+        wanted = [(number, event) for number, event in told if not self._active[number].abandoned]
+        try:
+            for number in self._ledger.add_episodes(wanted) if wanted else ():
+                self._deaths.pop(number, None)
+        except StorageError as error:
+            self._pause(str(error))
 
     def _end(self, active: _Active, exited: Exited) -> None:
         """Decide what became of a run; a worker's own account goes before its exit status."""

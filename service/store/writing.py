@@ -2,10 +2,10 @@
 
 import secrets
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 
-from sqlalchemy import delete, select
+from sqlalchemy import delete, select, tuple_
 from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
@@ -74,34 +74,48 @@ class Ledger:
             row.started_at = row.started_at or time.time()
             row.attempts += 1
 
-    def add_episode(self, number: int, event: EpisodeDone) -> bool:
-        """Store an episode, or replace it where a resumed run reports another outcome; False if it was known."""
-        with self._writing("storing an episode") as session:
-            (campaign,) = hold_campaigns(session, RunRow.number == number)
-            run = session.get_one(RunRow, number)
-            query = select(EpisodeRow).filter_by(run_number=number, phase=event.record.phase, index=event.record.index)
-            row = session.scalars(query).one_or_none()
-            self._repeated_s[number] = self._repeated_s.get(number, 0.0) + event.wall_s
-            if row is not None and row.record == to_text(event.record) and row.series_sha256 == event.series_sha256:
-                return False
-            new = row is None
-            if row is None:
-                row = EpisodeRow(campaign_number=campaign.number, run_number=number, sequence=next_sequence(campaign))
-                session.add(row)
-            else:
-                count(run, Outcome(row.outcome), -1)
-            fill(row, event)
-            count(run, event.record.outcome, +1)
-            if event.record.searching:
-                run.metrics = to_text(event.metrics)
-            else:
-                run.evaluation = to_text(event.metrics)
-            tally(run)
-            busy_s = self._repeated_s.pop(number)
-            run.busy_s += busy_s
-            add_usage(session, campaign.project, busy_s)
-            campaign.revision += 1  # its state follows those of its runs, which an episode leaves alone
-            return new
+    def add_episodes(self, events: Sequence[tuple[int, EpisodeDone]]) -> set[int]:
+        """Store episodes, each with its run's number, or replace those of which a resumed run reports another outcome.
+
+        Returns:
+          Numbers of the runs to which one was new.
+        """
+        with self._writing("storing episodes") as session:
+            of_these = RunRow.number.in_({number for number, _ in events})
+            campaigns = {campaign.number: campaign for campaign in hold_campaigns(session, of_these)}
+            runs = {run.number: run for run in session.scalars(select(RunRow).where(of_these))}
+            known = _known_episodes(session, events)
+            grown, changed = set(), set()
+            for number, event in events:
+                run, row = runs[number], known.get(_place(number, event))
+                campaign = campaigns[run.campaign_number]
+                self._repeated_s[number] = self._repeated_s.get(number, 0.0) + event.wall_s
+                if row is not None and row.record == to_text(event.record) and row.series_sha256 == event.series_sha256:
+                    continue
+                if row is None:
+                    grown.add(number)
+                    row = known[_place(number, event)] = EpisodeRow(
+                        campaign_number=campaign.number, run_number=number, sequence=next_sequence(campaign)
+                    )
+                    session.add(row)
+                else:
+                    count(run, Outcome(row.outcome), -1)
+                fill(row, event)
+                count(run, event.record.outcome, +1)
+                if event.record.searching:
+                    run.metrics = to_text(event.metrics)
+                else:
+                    run.evaluation = to_text(event.metrics)
+                changed.add(number)
+            for number in changed:
+                run = runs[number]
+                campaign = campaigns[run.campaign_number]
+                tally(run)
+                busy_s = self._repeated_s.pop(number)
+                run.busy_s += busy_s
+                add_usage(session, campaign.project, busy_s)
+                campaign.revision += 1  # its state follows those of its runs, which an episode leaves alone
+            return grown
 
     def end_run(self, number: int, state: State, reason: str | None = None, result: Finished | None = None) -> None:
         """A run reached its end; its campaign ends with the last one."""
@@ -194,6 +208,19 @@ class Ledger:
             for row in session.identity_map.values():
                 if isinstance(row, CampaignRow):
                     self._store.revisions.note(row.id, row.project, row.revision)
+
+
+def _place(number: int, event: EpisodeDone) -> tuple[int, str, int]:
+    return number, event.record.phase, event.record.index
+
+
+def _known_episodes(
+    session: Session, events: Sequence[tuple[int, EpisodeDone]]
+) -> dict[tuple[int, str, int], EpisodeRow]:
+    """The rows of those that were stored before, by their places."""
+    place = tuple_(EpisodeRow.run_number, EpisodeRow.phase, EpisodeRow.index)
+    query = select(EpisodeRow).where(place.in_([_place(number, event) for number, event in events]))
+    return {(row.run_number, row.phase, row.index): row for row in session.scalars(query)}
 
 
 def _move(session: Session, run: RunRow, state: State, reason: str | None = None) -> None:

@@ -184,7 +184,7 @@ class Recorded:
                 series_sha256=kept and kept.sha256,
                 wall_s=0.5,
             )
-            self._ledger.add_episode(run.number, word)
+            self._ledger.add_episodes([(run.number, word)])
 
     def _finish(self, campaign: StoredCampaign, run: StoredRun, done: Sequence[EpisodeRecord]) -> None:
         folder, spec = self._settings.run_folder(campaign.id, run.id), campaign.run_spec(run)

@@ -26,7 +26,7 @@ def campaign(ledger, episode, done):
         ledger.start_run(number)
     for index in range(5):
         for number in numbers:
-            ledger.add_episode(number, episode(index, Outcome.FAILURE if index == 2 else Outcome.SAFE))
+            ledger.add_episodes([(number, episode(index, Outcome.FAILURE if index == 2 else Outcome.SAFE))])
         if index == 1:
             ledger.requeue_run(first)
             ledger.start_run(first)
@@ -89,7 +89,7 @@ def test_many_writers_and_readers_agree_on_one_order(store, ledger, episode, don
             if index % 7 == 6:
                 ledger.requeue_run(number)
                 ledger.start_run(number)
-            ledger.add_episode(number, episode(index))
+            ledger.add_episodes([(number, episode(index))])
         ledger.end_run(number, State.SUCCEEDED, result=done)
 
     def read(limit):
@@ -124,7 +124,7 @@ def test_what_goes_on_has_not_ended(store, ledger, episode):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
     assert store.events(campaign.id, limit=100).items == ()
     ledger.start_run(campaign.runs[0].number)
-    ledger.add_episode(campaign.runs[0].number, episode(0))
+    ledger.add_episodes([(campaign.runs[0].number, episode(0))])
     page = store.events(campaign.id, limit=100)
     assert short(page.items[-1]) == "low-random-0-train-0"
     assert page.last is None
@@ -135,10 +135,10 @@ def test_an_episode_that_comes_out_otherwise_keeps_its_place(store, ledger, epis
     number = campaign.runs[0].number
     ledger.start_run(number)
     for index in range(2):
-        ledger.add_episode(number, episode(index))
+        ledger.add_episodes([(number, episode(index))])
     before = store.events(campaign.id, limit=100).items
-    ledger.add_episode(number, episode(0, Outcome.FAILURE))
-    ledger.add_episode(number, episode(2))
+    ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
+    ledger.add_episodes([(number, episode(2))])
     after = store.events(campaign.id, limit=100).items
     assert [short(each) for each in after] == [*map(short, before), "low-random-0-train-2"]
     assert [each.sequence for each in after] == [1, 2, 3, 4, 5]

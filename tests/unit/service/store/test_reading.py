@@ -22,7 +22,7 @@ def judged(event, kind):
 
 def test_a_record_comes_back_with_its_numbers_that_are_not_finite(store, ledger, episode):
     campaign = ledger.create(SPEC)
-    ledger.add_episode(start(store, ledger), episode(5, Outcome.FAILURE))
+    ledger.add_episodes([(start(store, ledger), episode(5, Outcome.FAILURE))])
     found = store.failure(campaign.id, "low-risk-sac-3-train-5")
     assert found.id == "low-risk-sac-3-train-5"
     assert found.record.min_ttc_s == math.inf
@@ -33,9 +33,9 @@ def test_pages_continue_where_they_ended_while_more_arrives(store, ledger, episo
     campaign = ledger.create(SPEC)
     number = start(store, ledger)
     for index in range(5):
-        ledger.add_episode(number, episode(index, Outcome.FAILURE if index % 2 else Outcome.SAFE))
+        ledger.add_episodes([(number, episode(index, Outcome.FAILURE if index % 2 else Outcome.SAFE))])
     first = store.episodes(campaign.id, limit=3)
-    ledger.add_episode(number, episode(5))
+    ledger.add_episodes([(number, episode(5))])
     second = store.episodes(campaign.id, limit=3, after=first.last)
     assert [item.record.index for item in first.items + second.items] == [0, 1, 2, 3, 4, 5]
     assert second.last is None
@@ -57,7 +57,7 @@ def test_campaigns_are_listed_newest_first(store, ledger):
 )
 def test_what_does_not_exist_is_not_found(store, ledger, episode, failure_id):
     campaign = ledger.create(SPEC)
-    ledger.add_episode(start(store, ledger), episode(0))
+    ledger.add_episodes([(start(store, ledger), episode(0))])
     with pytest.raises(NotFoundError):
         store.failure(campaign.id, failure_id)
     with pytest.raises(NotFoundError, match="no run 'x'; its runs are low-risk-sac-3"):
@@ -136,7 +136,7 @@ def test_lists_are_filtered_by_state_family_method_and_label(store, ledger):
 
 def test_a_database_that_lost_an_episode_is_not_opened(store, ledger, episode, database_url):
     ledger.create(SPEC)
-    ledger.add_episode(start(store, ledger), episode(0))
+    ledger.add_episodes([(start(store, ledger), episode(0))])
     with store.engine.begin() as connection:
         connection.exec_driver_sql("DELETE FROM episodes")
     with pytest.raises(StorageError, match="run 'low-risk-sac-3' lacks episodes"):
@@ -155,9 +155,9 @@ def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, 
     ]
     for number in numbers:
         for index, kind in enumerate(kinds):
-            ledger.add_episode(number, judged(episode(index, Outcome.FAILURE), kind))
-        ledger.add_episode(number, judged(episode(5, Outcome.DEGENERATE), judgement(None)))
-        ledger.add_episode(number, episode(6))
+            ledger.add_episodes([(number, judged(episode(index, Outcome.FAILURE), kind))])
+        ledger.add_episodes([(number, judged(episode(5, Outcome.DEGENERATE), judgement(None)))])
+        ledger.add_episodes([(number, episode(6))])
 
     def found(run_id=None, **wanted):
         outcomes = (Outcome.FAILURE, Outcome.DEGENERATE)
@@ -180,7 +180,7 @@ def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, 
 
 def test_an_episode_comes_with_the_funnel_at_its_time(store, ledger, episode):
     campaign = ledger.create(SPEC)
-    ledger.add_episode(start(store, ledger), episode(0))
+    ledger.add_episodes([(start(store, ledger), episode(0))])
     (stored,) = store.episodes(campaign.id, limit=10).items
     assert stored.funnel == Funnel(contacts=2, valid=1, distinct=1, preventable=1)
 

@@ -94,7 +94,7 @@ def test_what_is_there_keeps_its_checksums_and_goes_on(upgraded, episode):
     ledger = Ledger(upgraded)
     number = upgraded.waiting()["default"]
     ledger.start_run(number)
-    ledger.add_episode(number, episode(6))
+    ledger.add_episodes([(number, episode(6))])
     assert told(upgraded, campaign_id) == [*before, "low-random-1 running", "low-random-1-train-6"]
 
 
@@ -113,7 +113,7 @@ def test_a_page_of_events_ends_where_it_says(store, ledger, episode):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
     ledger.start_run(campaign.runs[0].number)
     for index in range(3):
-        ledger.add_episode(campaign.runs[0].number, episode(index))
+        ledger.add_episodes([(campaign.runs[0].number, episode(index))])
     assert store.events(campaign.id, limit=4).last == 4
     assert store.events(campaign.id, limit=5).last is None
     assert len(store.events(campaign.id, limit=4, after=3).items) == 2
@@ -136,12 +136,12 @@ def test_what_was_told_as_it_was_written_is_told_again_from_every_position(store
     waiting, at_work = [run.number for run in campaign.runs], []
     ledger.start_run(other.runs[0].number)
     for index in range(60):
-        ledger.add_episode(other.runs[0].number, episode(index))
+        ledger.add_episodes([(other.runs[0].number, episode(index))])
         if waiting and (not at_work or chance.random() < 0.4):
             at_work.append(waiting.pop(chance.randrange(len(waiting))))
             ledger.start_run(at_work[-1])
         elif chance.random() < 0.8:
-            ledger.add_episode(chance.choice(at_work), episode(chance.randrange(30)))
+            ledger.add_episodes([(chance.choice(at_work), episode(chance.randrange(30)))])
         else:
             waiting.append(at_work.pop(chance.randrange(len(at_work))))
             ledger.requeue_run(waiting[-1], "its worker died")
@@ -183,8 +183,8 @@ def test_a_refused_write_takes_no_number(store, ledger, episode):
     ledger.start_run(number)
     with pytest.raises(TransitionError):
         ledger.start_run(number)
-    ledger.add_episode(number, episode(0))
-    ledger.add_episode(number, episode(0))  # told again by a run that was taken up
+    ledger.add_episodes([(number, episode(0))])
+    ledger.add_episodes([(number, episode(0))])  # told again by a run that was taken up
     ledger.requeue_run(number)
     assert [each.sequence for each in store.events(campaign.id, limit=9).items] == [1, 2, 3, 4, 5]
     assert store.campaign(campaign.id).state is State.QUEUED

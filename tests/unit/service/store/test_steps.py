@@ -57,7 +57,7 @@ def test_one_step_back_leaves_what_the_version_before_wrote_and_all_rows(setting
     ledger = Ledger(store)
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
     ledger.start_run(campaign.runs[0].number)
-    ledger.add_episode(campaign.runs[0].number, episode(0, Outcome.FAILURE))
+    ledger.add_episodes([(campaign.runs[0].number, episode(0, Outcome.FAILURE))])
     told = repr(store.events(campaign.id, limit=9))  # in which a NaN is what it is
     store.close()
     assert tables(settings.url)["step"] == newest_step()

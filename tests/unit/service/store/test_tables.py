@@ -10,7 +10,7 @@ SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3,
 
 def test_a_value_that_changed_on_the_disk_is_noticed(store, ledger, episode):
     campaign = ledger.create(SPEC)
-    ledger.add_episode(start(store, ledger), episode(0, Outcome.FAILURE))
+    ledger.add_episodes([(start(store, ledger), episode(0, Outcome.FAILURE))])
     with store.engine.begin() as connection:
         connection.exec_driver_sql("UPDATE episodes SET wall_s = 0.5000001")
     with pytest.raises(StorageError, match="row 1 of the table 'episodes' is damaged"):
@@ -37,7 +37,7 @@ def test_a_filter_by_grade_or_signature_uses_its_index(store):
 @pytest.mark.parametrize("change", ["grade = NULL", "broke = NULL", "signature = 'x'", "funnel = NULL"])
 def test_a_judgement_that_changed_on_the_disk_is_noticed(store, ledger, episode, change):
     campaign = ledger.create(SPEC)
-    ledger.add_episode(start(store, ledger), episode(0, Outcome.FAILURE))
+    ledger.add_episodes([(start(store, ledger), episode(0, Outcome.FAILURE))])
     with store.engine.begin() as connection:
         connection.exec_driver_sql(f"UPDATE episodes SET {change}")
     with pytest.raises(StorageError, match="row 1 of the table 'episodes' is damaged"):

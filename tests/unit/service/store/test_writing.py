@@ -4,6 +4,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.records import Outcome
 from service.errors import ConflictError, NotFoundError, TransitionError
 from service.store.states import State
+from service.store.stored import StoredEpisode
 from service.workers.messages import Finished
 from tests.begun import start
 
@@ -31,11 +32,29 @@ def test_runs_leave_the_queue_in_the_order_they_came(store, ledger):
     assert store.waiting() == {}
 
 
+def test_episodes_told_together_are_each_stored_and_one_change(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    first, second = start(store, ledger), start(store, ledger)
+    ledger.add_episodes([(second, episode(0))])
+    before = int(store.campaign(campaign.id).revision)
+    told = [(first, episode(0)), (second, episode(0)), (first, episode(0)), (first, episode(1, Outcome.FAILURE))]
+    assert ledger.add_episodes(told) == {first}
+    found = store.campaign(campaign.id)
+    assert int(found.revision) == before + 1
+    assert [(run.episodes_done, run.failures) for run in found.runs[:2]] == [(2, 1), (1, 0)]
+    stored = [event for event in store.events(campaign.id, limit=9).items if isinstance(event, StoredEpisode)]
+    assert [(event.run_id, event.record.index) for event in stored] == [
+        (found.runs[1].id, 0),
+        (found.runs[0].id, 0),
+        (found.runs[0].id, 1),
+    ]
+
+
 def test_an_episode_reported_twice_is_stored_and_counted_once(store, ledger, episode):
     campaign = ledger.create(SPEC)
     number = start(store, ledger)
     reports = (episode(0), episode(1, Outcome.FAILURE), episode(1, Outcome.FAILURE), episode(0), episode(2))
-    assert [ledger.add_episode(number, report) for report in reports] == [True, True, False, False, True]
+    assert [bool(ledger.add_episodes([(number, report)])) for report in reports] == [True, True, False, False, True]
     run = store.campaign(campaign.id).runs[0]
     assert (run.episodes_done, run.failures, run.raw_collisions, run.rejected) == (3, 1, 1, 0)
     assert [item.record.index for item in store.episodes(campaign.id, limit=10).items] == [0, 1, 2]
@@ -46,8 +65,8 @@ def test_an_episode_reported_twice_is_stored_and_counted_once(store, ledger, epi
 def test_an_episode_that_comes_out_otherwise_replaces_the_first(store, ledger, episode):
     campaign = ledger.create(SPEC)
     number = start(store, ledger)
-    assert ledger.add_episode(number, episode(0, Outcome.FAILURE))
-    assert not ledger.add_episode(number, episode(0))
+    assert ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
+    assert not ledger.add_episodes([(number, episode(0))])
     (stored,) = store.episodes(campaign.id, limit=10).items
     assert stored.record.outcome is Outcome.SAFE
     assert (store.campaign(campaign.id).runs[0].failures, store.campaign(campaign.id).runs[0].episodes_done) == (0, 1)
@@ -56,8 +75,8 @@ def test_an_episode_that_comes_out_otherwise_replaces_the_first(store, ledger, e
 def test_search_and_evaluation_episodes_of_one_index_are_two(store, ledger, episode):
     campaign = ledger.create(SPEC)
     number = start(store, ledger)
-    ledger.add_episode(number, episode(0))
-    ledger.add_episode(number, episode(0, phase="evaluate"))
+    ledger.add_episodes([(number, episode(0))])
+    ledger.add_episodes([(number, episode(0, phase="evaluate"))])
     (run, *_) = store.campaign(campaign.id).runs
     assert run.episodes_done == 2
     assert run.metrics == run.evaluation == episode(0).metrics
@@ -136,7 +155,7 @@ def test_every_stored_change_has_another_revision(store, ledger, episode, metric
     seen = [store.revision(campaign.id)]
     number = start(store, ledger)
     seen.append(store.revision(campaign.id))
-    ledger.add_episode(number, episode(0))
+    ledger.add_episodes([(number, episode(0))])
     seen.append(store.revision(campaign.id))
     ledger.requeue_run(number, "worker was killed by SIGKILL")
     seen.append(store.revision(campaign.id))
@@ -158,7 +177,7 @@ def test_the_same_idempotency_key_finds_the_campaign_or_conflicts(store, ledger)
 def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):
     campaign, kept = ledger.create(SPEC), ledger.create(SPEC)
     for _ in range(5):
-        ledger.add_episode(start(store, ledger), episode(0))
+        ledger.add_episodes([(start(store, ledger), episode(0))])
     ledger.delete(campaign.id)
     with pytest.raises(NotFoundError):
         store.revision(campaign.id)
@@ -173,11 +192,11 @@ def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):
 def test_a_run_has_the_sums_of_what_its_phases_counted(store, ledger, episode, metrics):
     campaign = ledger.create(SPEC)
     number = start(store, ledger)
-    ledger.add_episode(number, episode(0, Outcome.FAILURE))
+    ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
     assert tallies(store, campaign) == (1, 1, 1)
     counted = metrics.model_copy(update={"distinct_failures": 4, "preventable": 3, "distinct_preventable": 2})
     evaluated = episode(0, Outcome.FAILURE, phase="evaluate").model_copy(update={"metrics": counted})
-    ledger.add_episode(number, evaluated)
+    ledger.add_episodes([(number, evaluated)])
     assert tallies(store, campaign) == (5, 4, 3)
     done = Finished(finished=True, metrics=counted, evaluation=counted, digest="d", versions={}, wall_s=1.0)
     ledger.end_run(number, State.SUCCEEDED, result=done)

@@ -41,7 +41,7 @@ def test_what_is_stored_is_counted(store, ledger, episode, scrape):
     for run in (first, second):
         ledger.start_run(run.number)
     for index in range(4):
-        ledger.add_episode(first.number, episode(index, Outcome.FAILURE if index % 2 else Outcome.REJECTED))
+        ledger.add_episodes([(first.number, episode(index, Outcome.FAILURE if index % 2 else Outcome.REJECTED))])
     seen = scrape()
     assert seen["risk_sac_episodes_total", "low", "random"] == 4
     assert seen["risk_sac_episodes_total", "low", "sac"] == 0
@@ -63,7 +63,7 @@ def test_what_is_stored_is_counted(store, ledger, episode, scrape):
 def test_a_run_from_before_contacts_were_judged_has_an_ecr_alone(store, ledger, episode, scrape):
     run = ledger.create(SPEC).runs[0]
     ledger.start_run(run.number)
-    ledger.add_episode(run.number, episode(0))
+    ledger.add_episodes([(run.number, episode(0))])
     with store.engine.begin() as connection:
         connection.exec_driver_sql("UPDATE runs SET metrics = '{\"ecr\": 0.5}' WHERE metrics IS NOT NULL")
     rates = {key[0]: value for key, value in scrape().items() if key[0].startswith("risk_sac_run_")}
@@ -75,11 +75,11 @@ def test_counters_do_not_fall_when_a_campaign_is_deleted(store, ledger, episode,
     for campaign in (kept, deleted):
         ledger.start_run(campaign.runs[0].number)
         for index in range(3):
-            ledger.add_episode(campaign.runs[0].number, episode(index))
+            ledger.add_episodes([(campaign.runs[0].number, episode(index))])
     assert scrape()["risk_sac_episodes_total", "low", "random"] == 6
     ledger.delete(deleted.id)
     assert scrape()["risk_sac_episodes_total", "low", "random"] == 6
-    ledger.add_episode(kept.runs[0].number, episode(3))
+    ledger.add_episodes([(kept.runs[0].number, episode(3))])
     assert scrape()["risk_sac_episodes_total", "low", "random"] == 7
     ledger.delete(kept.id)
     assert scrape()["risk_sac_episodes_total", "low", "random"] == 7
