@@ -26,7 +26,7 @@ def test_a_database_that_cannot_grow_pauses_the_campaign_until_it_can(serve):
     # To a process that may not let any file grow, every write looks like one to a full disk.
     unlimited = resource.prlimit(service.process.pid, resource.RLIMIT_FSIZE, (1, resource.RLIM_INFINITY))
     campaign = service.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
-    assert campaign["reason"].startswith("storage failed while storing an episode: ")
+    assert campaign["reason"].startswith("storage failed while storing episodes: ")
     assert {run["state"] for run in campaign["runs"]} == {"paused"}
     service.wait_until(lambda: service.workers() == [])
     assert len(service.get(campaign_id, "/episodes")["items"]) > 3
