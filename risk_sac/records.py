@@ -94,8 +94,8 @@ class Judgement(Record):
     conflict_s: Real
     """When the conflict began; negative before the release."""
     noticed_s: float | None = None
-    """The same if whoever hangs over its line beside the ego is in conflict at once; `conflict_after_release` goes by
-    it. Null in what was judged before there was a difference."""
+    """The same for a wary driver, to whom whoever hangs over its line beside the ego is in conflict, and whoever could
+    not stop by braking gently; `conflict_after_release` goes by it. Null in what is older than the difference."""
     conflict_x_m: Real
     """Where the striker was then, on the map."""
     conflict_y_m: Real

@@ -20,10 +20,11 @@ class Along(NamedTuple):
     across_m: float  # of its centre from the ego's path, positive to the left
     turn_rad: float  # its heading relative to the path, full turns not taken off
     speed_mps: float  # along the path
+    aside_s: float  # until the sides touch, as the two move across now; inf if they do not come nearer
 
 
 @compiled
-def along(path: Path, first: int, s: float, speed: float, half_length: float, other: Body) -> Along:
+def along(path: Path, first: int, s: float, speed: float, half_length: float, half_width: float, other: Body) -> Along:
     """Places a body along the ego's path.
 
     Args:
@@ -32,6 +33,7 @@ def along(path: Path, first: int, s: float, speed: float, half_length: float, ot
       s: where on it the ego is.
       speed: of the ego.
       half_length: of the ego.
+      half_width: of the ego.
       other: the body.
     """
     other_s, across, heading = project(path, first, other.x, other.y)
@@ -41,7 +43,11 @@ def along(path: Path, first: int, s: float, speed: float, half_length: float, ot
     speed_along = other.vx * math.cos(heading) + other.vy * math.sin(heading)
     closing = speed - speed_along
     ttc = gap / closing if gap > 0.0 and closing > 0.0 else math.inf
-    return Along(gap, behind, ttc, across, turn, speed_along)
+    beside = half_width + abs(math.cos(turn)) * other.half_width + abs(math.sin(turn)) * other.half_length
+    room = max(abs(across) - beside, 0.0)
+    coming = math.copysign(1.0, across) * (other.vx * math.sin(heading) - other.vy * math.cos(heading))
+    aside = room / coming if coming > 0.0 else math.inf
+    return Along(gap, behind, ttc, across, turn, speed_along, aside)
 
 
 class AlongSeries(NamedTuple):
@@ -53,6 +59,7 @@ class AlongSeries(NamedTuple):
     across_m: Floats
     turn_rad: Floats
     speed_mps: Floats
+    aside_s: Floats
 
 
 @compiled
@@ -60,6 +67,7 @@ def along_series(
     path: Path,
     speed: Floats,
     half_length: float,
+    half_width: float,
     x: Floats,
     y: Floats,
     heading: Floats,
@@ -69,10 +77,10 @@ def along_series(
     other_half_width: float,
 ) -> AlongSeries:
     """Places a body along the ego's path frame by frame; the path has a point per frame."""
-    rows = np.empty((6, len(speed)))
+    rows = np.empty((7, len(speed)))
     for t in range(len(speed)):
         other = Body(x[t], y[t], heading[t], vx[t], vy[t], other_half_length, other_half_width)
-        seen = along(path, t, path.s[t], speed[t], half_length, other)
+        seen = along(path, t, path.s[t], speed[t], half_length, half_width, other)
         rows[0, t], rows[1, t], rows[2, t] = seen.gap_m, seen.behind_m, seen.ttc_s
-        rows[3, t], rows[4, t], rows[5, t] = seen.across_m, seen.turn_rad, seen.speed_mps
-    return AlongSeries(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
+        rows[3, t], rows[4, t], rows[5, t], rows[6, t] = seen.across_m, seen.turn_rad, seen.speed_mps, seen.aside_s
+    return AlongSeries(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])

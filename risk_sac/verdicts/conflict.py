@@ -21,6 +21,7 @@ from risk_sac.verdicts.path import Path, recorded_path
 
 KERB_S = 1.0  # a pedestrian this near to the carriageway is about to step onto it
 YIELDING_MPS2 = 3.4  # what a driver who means to stop brakes with
+FIRM_MPS2 = 6.0  # what one who brakes already can go up to, without an emergency
 SAME_WAY_COS = math.cos(math.radians(30.0))
 TURNING_COS = math.cos(math.radians(60.0))
 TURN_WINDOW_S = 3.0
@@ -37,7 +38,7 @@ class Conflict:
     type: ConflictType
     frame: int  # when it began for a driver who sees what the ego sees
     time_s: float  # t0, from the release
-    noticed_s: float  # the same if whoever hangs over beside the ego is in conflict at once; never later
+    noticed_s: float  # the same for a wary driver, who trusts nobody beside it and nobody who brakes; never later
     x_m: float  # where the striker was then
     y_m: float
     position: str  # ahead | alongside
@@ -56,17 +57,21 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     seen = seen_along(path, evidence, striker)
     course = _courses(path, evidence, striker)
     same_way = _drives_the_same_way(evidence, striker, seen.turn_rad)
-    if evidence.kind[striker] == Kind.PEDESTRIAN:
-        begins = lasts = course & _at_the_carriageway(evidence, striker)
-    elif same_way:
-        begins, lasts = _lane_conflicts(evidence, striker, seen, course)
-    else:
-        begins = lasts = course | _cannot_stop(path, evidence, striker)
-    frame = noticed = _since(begins & known, lasts & known)
-    if same_way:
-        begins_early, lasts_early = _lane_conflicts(evidence, striker, seen, np.ones_like(course))
-        noticed = _since(begins_early & known, lasts_early & known)
-    unseen = _since(begins, lasts)
+
+    def conflicts(*, wary: bool) -> tuple[Bools, Bools]:
+        """In which frames a conflict begins, and in which one goes on that has begun."""
+        if evidence.kind[striker] == Kind.PEDESTRIAN:
+            begins = lasts = course & _at_the_carriageway(evidence, striker)
+        elif same_way:
+            begins, lasts = _lane_conflicts(evidence, striker, seen, wary=wary)
+        else:
+            begins = lasts = course | _cannot_stop(path, evidence, striker, wary=wary)
+        return begins, lasts
+
+    begins, lasts = conflicts(wary=False)
+    frame, unseen = _since(begins & known, lasts & known), _since(begins, lasts)
+    begins, lasts = conflicts(wary=True)
+    noticed = _since(begins & known, lasts & known)
     course_from = _since(course & known, course & known)
     if same_way and unseen == len(course) - 1:  # neither led nor cut in: the ego itself came over
         frame, unseen = course_from, _since(course, course)
@@ -83,10 +88,10 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     )
 
 
-def _lane_conflicts(evidence: Evidence, striker: int, seen: AlongSeries, meets: Bools) -> tuple[Bools, Bools]:
+def _lane_conflicts(evidence: Evidence, striker: int, seen: AlongSeries, *, wary: bool) -> tuple[Bools, Bools]:
     e = evidence
     offset, accel = column(e.lane_offset_m, striker), column(e.accel_mps2, striker)
-    return lane_conflicts(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, meets)
+    return lane_conflicts(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
 
 
 def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
@@ -188,6 +193,7 @@ def seen_along(path: Path, evidence: Evidence, striker: int) -> AlongSeries:
         path,
         column(e.speed_mps, 0),
         e.length_m[0] / 2,
+        e.width_m[0] / 2,
         column(e.x_m, striker),
         column(e.y_m, striker),
         column(e.heading_rad, striker),
@@ -203,10 +209,11 @@ def column(values: Floats, actor: int) -> Floats:
     return np.ascontiguousarray(values[:, actor])
 
 
-def _cannot_stop(path: Path, evidence: Evidence, striker: int) -> Bools:
+def _cannot_stop(path: Path, evidence: Evidence, striker: int, *, wary: bool) -> Bools:
     """Frames, 4 s before the contact at most, in which the striker could no longer stop before the ego's corridor.
 
-    Both paths are on record, so where they meet is known, and that both come there too.
+    Both paths are on record, so where they meet is known, and that both come there too. Choice: whoever brakes already
+    is taken to yield as long as firm braking suffices, but by a wary driver.
     """
     e, first = evidence, evidence.since(HORIZON_S)
     x, y = column(e.x_m, striker)[first:], column(e.y_m, striker)[first:]
@@ -223,8 +230,10 @@ def _cannot_stop(path: Path, evidence: Evidence, striker: int) -> Bools:
         e.width_m[striker] / 2,
     )
     gone = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
+    yielding = (e.accel_mps2[first:, striker] <= -BRAKES_MPS2) & (not wary)
+    braking_mps2 = np.where(yielding, FIRM_MPS2, YIELDING_MPS2)
     found = np.zeros(len(e.time_s), dtype=np.bool_)
-    found[first:] = distance - gone <= e.speed_mps[first:, striker] ** 2 / (2 * YIELDING_MPS2)
+    found[first:] = distance - gone <= e.speed_mps[first:, striker] ** 2 / (2 * braking_mps2)
     return found
 
 

@@ -2,7 +2,7 @@
 
 Source: UN Regulation 157, Annex 3 (guidance on traffic disturbance critical scenarios): a cut-in is perceived 0.375 m
 off the lane's centre, a leader's braking from 5 m/s² on, and both are a danger below 2 s to collision. One beside the
-ego has no time to collision; it counts as crossing traffic does, while the two would meet.
+ego has no time to collision along the lane.
 """
 
 import math
@@ -40,15 +40,16 @@ def towards(across: float, offset: float, lane_width: float) -> float:
 
 @compiled
 def lane_conflict(
-    other: Along, speed: float, offset: float, accel: float, lane_width: float, meets: bool
+    other: Along, speed: float, offset: float, accel: float, lane_width: float, wary: bool
 ) -> tuple[bool, bool]:
     """Whether a conflict begins with a vehicle that drives the ego's way, and whether one goes on that had begun.
 
     A cut-in begins when the vehicle is more than 0.375 m off its lane's centre towards the ego, and less than 2 s
-    ahead, or alongside and about to meet it; a conflict with a leader when it brakes harder than 5 m/s², or is less
-    than 2 s ahead.
+    ahead, or alongside and coming nearer; a conflict with a leader when it brakes harder than 5 m/s², or is less than
+    2 s ahead.
     Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s; who is
-    alongside and half in the ego's lane counts in any case, and who merely hangs over its line does not.
+    alongside comes nearer if the sides would touch within 4 s, or it is half in the ego's lane. Who merely hangs over
+    the line does not.
 
     Args:
       other: the vehicle along the ego's path.
@@ -56,11 +57,11 @@ def lane_conflict(
       offset: see `towards`.
       accel: of the vehicle.
       lane_width: of the lanes.
-      meets: whether the two touch if both go on as they are.
+      wary: whether whoever is alongside counts, if it comes nearer or not.
     """
     in_lane = abs(other.across_m) <= lane_width / 2
     coming = in_lane or towards(other.across_m, offset, lane_width) > WANDER_M
-    alongside = other.gap_m <= 0.0 and other.behind_m <= 0.0 and (in_lane or meets)
+    alongside = other.gap_m <= 0.0 and other.behind_m <= 0.0 and (wary or in_lane or other.aside_s < HORIZON_S)
     brakes = in_lane and 0.0 < other.gap_m <= HORIZON_S * speed and accel < -LEADER_BRAKES_MPS2
     begins = brakes or (coming and (alongside or other.ttc_s < DANGER_TTC_S))
     return begins, begins or (coming and other.ttc_s < HORIZON_S)
@@ -68,7 +69,7 @@ def lane_conflict(
 
 @compiled
 def lane_conflicts(
-    others: AlongSeries, speed: Floats, offset: Floats, accel: Floats, lane_width: float, meets: Bools
+    others: AlongSeries, speed: Floats, offset: Floats, accel: Floats, lane_width: float, wary: bool
 ) -> tuple[Bools, Bools]:
     """`lane_conflict` of every frame, two arrays `T`."""
     count = len(speed)
@@ -81,6 +82,7 @@ def lane_conflicts(
             others.across_m[t],
             others.turn_rad[t],
             others.speed_mps[t],
+            others.aside_s[t],
         )
-        begins[t], lasts[t] = lane_conflict(other, speed[t], offset[t], accel[t], lane_width, meets[t])
+        begins[t], lasts[t] = lane_conflict(other, speed[t], offset[t], accel[t], lane_width, wary)
     return begins, lasts

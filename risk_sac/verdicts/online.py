@@ -34,7 +34,7 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, war
       path: the ego's path ahead, from its centre; see `risk_sac.verdicts.path.polyline`.
       known: `n`, whom the ego knows of.
       ground: where it takes place.
-      wary: whether who hangs over beside the ego counts even if the two would not meet.
+      wary: whether whoever hangs over beside the ego counts, if it comes nearer or not.
 
     Returns:
       `n`; False for the ego.
@@ -53,23 +53,22 @@ def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground, wary: bool) -
     other = Body(f.x_m[i], f.y_m[i], f.heading_rad[i], f.vx_mps[i], f.vy_mps[i], f.length_m[i] / 2, f.width_m[i] / 2)
     speed, half_length = f.ego_speed_mps, float(f.length_m[0]) / 2
     half_width = float(f.width_m[0]) / 2 + CORRIDOR_M
-    meets = time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S
     if f.kind[i] == Kind.PEDESTRIAN:
         here = slice(i, i + 1)
         areas = ground.roadway + ground.crossings
         if ground.roadway and not soon_inside(areas, f.x_m[here], f.y_m[here], f.vx_mps[here], f.vy_mps[here], KERB_S):
             return False
-        return meets
-    seen = along(path, 0, float(path.s[0]), speed, half_length, other)
+        return time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S
+    seen = along(path, 0, float(path.s[0]), speed, half_length, float(f.width_m[0]) / 2, other)
     if math.cos(seen.turn_rad) > SAME_WAY_COS:
         offset, accel = f.lane_offset_m[i], f.accel_mps2[i]
-        begins, _ = lane_conflict(seen, speed, offset, accel, ground.lane_width_m, meets or wary)
+        begins, _ = lane_conflict(seen, speed, offset, accel, ground.lane_width_m, wary)
         return begins
     entry_m, meets_m = _entry(path, speed, half_length, half_width, other, float(f.speed_mps[i]))
     stops = not math.isfinite(entry_m)
     if stops and int(f.link[i]) in YIELDS:
         return False
-    if meets:
+    if time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S:
         return True
     return not stops and _both_come(entry_m, meets_m - path.s[0], speed, half_length, other, float(f.speed_mps[i]))
 

@@ -176,7 +176,7 @@ def _wanted(
     """What a driver that goes by what it sees would brake with now."""
     other = Body(x, y, heading, moves[0], moves[1], track.half_length, track.half_width)
     first = max(int(np.searchsorted(path.s, s, side="right")) - 1, 0)
-    seen = along(path, first, s, speed, half_length, other)
+    seen = along(path, first, s, speed, half_length, half_width, other)
     direction = heading - seen.turn_rad
     across = moves[1] * math.cos(direction) - moves[0] * math.sin(direction)
     reach = abs(math.sin(seen.turn_rad)) * track.half_length + abs(math.cos(seen.turn_rad)) * track.half_width

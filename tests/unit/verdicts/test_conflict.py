@@ -188,3 +188,15 @@ def test_contact_in_the_only_frame(found: Staged) -> None:
 )
 def test_an_ego_that_never_brakes_for_what_it_sees_is_unresponsive(evidence: Evidence, smells: bool) -> None:
     assert unresponsive(evidence, find_conflict(evidence, 1)) is smells
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_crossing_vehicle_that_brakes_is_trusted_until_the_two_would_meet(found: Staged, side: int) -> None:
+    # From 12 m/s it brakes with 4 m/s² from 2 s to 3.8 s, and goes on with 4.8 m/s into the ego, 44.9 m from its start.
+    # At 2 s it could stop within 12²/12 = 12 m by braking firmly, within 21 m gently; the corridor is 17 m away.
+    # From 3 s and 8 m/s on the two would meet if both kept their speeds: it is 10.9 m from the ego's axis, 1.4 s.
+    crossing = straight(60.0, side * 44.9, -side * math.pi / 2, 12.0, (2.0, -4.0), (3.8, 0.0), start_s=0.0)
+    conflict = found(stage(straight(0.0, 0.0, 0.0, 12.0, start_s=0.0), crossing, from_s=0.0))
+    assert conflict.type is ConflictType.CROSSING
+    assert conflict.noticed_s == pytest.approx(1.7, abs=0.25)
+    assert conflict.time_s == pytest.approx(3.0, abs=0.15)

@@ -34,8 +34,8 @@ def test_a_wrapped_offset_says_what_the_place_says(across: float) -> None:
     assert towards(across, offset, LANE_M) == pytest.approx(towards(across, math.nan, LANE_M))
 
 
-def seen(gap: float, ttc: float = math.inf, across: float = 0.0) -> Along:
-    return Along(gap, -gap - 9.2, ttc, across, 0.0, 10.0)
+def seen(gap: float, ttc: float = math.inf, across: float = 0.0, aside: float = math.inf) -> Along:
+    return Along(gap, -gap - 9.2, ttc, across, 0.0, 10.0, aside)
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,8 @@ def seen(gap: float, ttc: float = math.inf, across: float = 0.0) -> Along:
         (seen(10.0, 1.0, 3.3), 0.0, 0.0, (False, False)),  # keeps to its lane
         (seen(10.0, 1.0, 2.9), 0.0, -0.4, (True, True)),
         (seen(10.0, 1.0, 2.95), 0.0, -0.35, (False, False)),
-        (seen(-1.0, math.inf, 2.9), 0.0, -0.4, (True, True)),  # alongside, and comes on
+        (seen(-1.0, math.inf, 2.9, 3.9), 0.0, -0.4, (True, True)),  # alongside, and comes nearer
+        (seen(-1.0, math.inf, 2.9, 4.1), 0.0, -0.4, (False, False)),  # slowly
         (seen(-9.3, math.inf, 2.9), 0.0, -0.4, (False, False)),  # behind
         (seen(10.0, 1.0, 3.7), 0.0, 0.4, (False, False)),  # moves away
     ],
@@ -58,15 +59,11 @@ def seen(gap: float, ttc: float = math.inf, across: float = 0.0) -> Along:
 def test_when_a_conflict_begins_and_when_it_goes_on(
     other: Along, accel: float, offset: float, expected: tuple[bool, bool]
 ) -> None:
-    assert lane_conflict(other, 10.0, offset, accel, LANE_M, meets=True) == expected
+    assert lane_conflict(other, 10.0, offset, accel, LANE_M, wary=False) == expected
 
 
 @pytest.mark.parametrize(("across", "counts"), [(2.9, False), (1.7, False), (1.6, True)])
 def test_who_is_alongside_and_stays_there_counts_from_half_way_into_the_lane_on(across: float, counts: bool) -> None:
     other = seen(-1.0, math.inf, across)
-    assert lane_conflict(other, 10.0, math.nan, 0.0, LANE_M, meets=False) == (counts, counts)
-
-
-def test_who_is_ahead_counts_by_the_time_to_it_alone() -> None:
-    other = seen(10.0, 1.0, 2.9)
-    assert lane_conflict(other, 10.0, -0.4, 0.0, LANE_M, meets=False) == (True, True)
+    assert lane_conflict(other, 10.0, math.nan, 0.0, LANE_M, wary=True) == (across < 2.95, across < 2.95)
+    assert lane_conflict(other, 10.0, math.nan, 0.0, LANE_M, wary=False) == (counts, counts)
