@@ -21,8 +21,10 @@ $(STAMP): pyproject.toml constraints.txt
 	if [ -z "$$python" ]; then echo "make: found neither python3.11 nor python3.12; install one of them" >&2; exit 1; fi; \
 	test -x $(PYTHON) || "$$python" -m venv .venv
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
-	@echo "compiling, once"; folder=$$(mktemp -d); $(PYTHON) -m risk_sac run --family mixed --method risk-sac \
-		--episodes 3 --out "$$folder/run" > /dev/null; status=$$?; rm -r "$$folder"; exit $$status
+	@echo "compiling, once: else it would be a part of the first searches' processor time"; set -e; \
+	folder=$$(mktemp -d); trap 'rm -r "$$folder"' EXIT; \
+	for run in "low --method archive --episodes 60" "mixed --method risk-sac --episodes 15"; do \
+		$(PYTHON) -m risk_sac run --family $$run --seed 1 --out "$$folder/$${run%% *}" > /dev/null; done
 	@touch $@
 
 demo: $(STAMP) ## start the service, run a campaign over REST, write results/demo.json
