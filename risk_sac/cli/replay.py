@@ -1,6 +1,7 @@
 """`risk-sac bundle` and `risk-sac replay`: a failure in one file, and played again from it."""
 
 import argparse
+import zipfile
 from contextlib import closing
 from pathlib import Path
 
@@ -31,7 +32,12 @@ def _bundle(options: argparse.Namespace) -> int:
     results = read_results(options.results)
     contact = results.contact(options.failure)
     folder = options.results if options.results.is_dir() else options.results.parent
-    recorded = read_series(folder / contact.series)
+    try:
+        recorded = read_series(folder / contact.series)
+    except (zipfile.BadZipFile, ValueError, EOFError) as error:
+        raise ConfigError(f"{folder / contact.series} is damaged: {error}", field="FAILURE") from error
+    if "released_s" not in recorded:
+        raise ConfigError(f"{folder / contact.series} is older than the release of adversaries", field="FAILURE")
     from risk_sac.env import RiskSacEnv  # here, because loading the simulator takes a second
     from risk_sac.failures.bundle import make_bundle, write_bundle
     from risk_sac.failures.replay import actions_of, replay, trajectory_digest

@@ -8,9 +8,11 @@ import tempfile
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from risk_sac.errors import ConfigError
+from risk_sac.failures.bundle import code_digest, versions
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import Repetition, Verified, distinct_failures, read_verified, write_verified
 
@@ -25,8 +27,8 @@ def verify(
 ) -> Mapping[Path, Verified]:
     """Replays the distinct failures of finished runs, each in `times` processes, and notes what came of it.
 
-    What was verified as often before is not replayed again. Of a run whose series cannot be read nothing is noted, and
-    of none whose replay was interrupted; the log says so.
+    What was verified as often before, by the same code, is not replayed again. Of a run whose series cannot be read
+    nothing is noted, and of none whose replay was interrupted; the log says so.
 
     Args:
       folders: of the runs.
@@ -43,18 +45,19 @@ def verify(
     """
     if times < 1:
         raise ConfigError(f"got {times}; wanted at least 1", field="times")
-    found: dict[Path, Verified] = {}
+    code, found = code_digest(), dict[Path, Verified]()
     missing: dict[Path, Verified] = {}  # with nothing replayed yet
     for folder in folders:
         results = read_results(folder)
         if results.digest is None:
             continue
         known = read_verified(folder, results.digest)
-        if known is not None and all(repetition.times >= times for repetition in known.episodes.values()):
+        enough = known is not None and all(repetition.times >= times for repetition in known.episodes.values())
+        if known is not None and enough and known.code == code and known.versions == versions():
             found[folder] = known
         else:
             episodes = {episode.index: Repetition(times=0, same=0) for episode in distinct_failures(results)}
-            missing[folder] = Verified(digest=results.digest, episodes=episodes)
+            missing[folder] = Verified(digest=results.digest, code=code, versions=versions(), episodes=episodes)
     failed = [folder for folder, verified in missing.items() if verified.episodes]
     with ThreadPoolExecutor(max(jobs, 1)) as threads:
         for same in threads.map(lambda _: _same(failed, stopping), range(times if failed else 0)):
@@ -74,7 +77,7 @@ def _counted(verified: Verified, same: Collection[int]) -> Verified:
         index: Repetition(times=before.times + 1, same=before.same + (index in same))
         for index, before in verified.episodes.items()
     }
-    return Verified(digest=verified.digest, episodes=episodes)
+    return replace(verified, episodes=episodes)
 
 
 def _same(folders: Sequence[Path], stopping: Callable[[], bool]) -> Mapping[Path, Collection[int]]:

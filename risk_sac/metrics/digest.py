@@ -20,11 +20,14 @@ def results_digest(records: Sequence[EpisodeRecord]) -> str:
     return digest.hexdigest()
 
 
+# Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
+YOUNGER = frozenset({"judgement", "noticed_s"})
+
+
 def _plain(value: object) -> dict[str, Any]:
     """Records and mappings as dicts, shallowly; `json` comes back for what they contain."""
     if isinstance(value, Record):
-        # Records from before contacts were judged keep the digest they had.
-        return {name: each for name, each in value if (name, each) != ("judgement", None)}
+        return {name: each for name, each in value if each is not None or name not in YOUNGER}
     if isinstance(value, Mapping):
         return dict(value)
     raise TypeError(f"{value!r} of {type(value).__name__} has no canonical JSON; wanted a record of plain values")

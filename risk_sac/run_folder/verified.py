@@ -38,6 +38,8 @@ class Verified:
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # see `unseal`
 
     digest: str  # of the results
+    code: str  # SHA-256 over the sources that replayed them
+    versions: Mapping[str, str]  # of the packages that did
     episodes: Mapping[int, Repetition]  # by index
 
     @property

@@ -71,9 +71,9 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     begins, lasts = conflicts(wary=False)
     frame, unseen = _since(begins & known, lasts & known), _since(begins, lasts)
     begins, lasts = conflicts(wary=True)
-    noticed = _since(begins & known, lasts & known)
+    noticed, unseen_if_wary = _since(begins & known, lasts & known), _since(begins, lasts)
     course_from = _since(course & known, course & known)
-    if same_way and unseen == len(course) - 1:  # neither led nor cut in: the ego itself came over
+    if same_way and unseen_if_wary == len(course) - 1:  # neither led nor cut in: the ego itself came over
         frame, unseen = course_from, _since(course, course)
     return Conflict(
         type=_type(evidence, striker, frame, same_way, seen.across_m),

@@ -11,7 +11,7 @@ import numpy as np
 from risk_sac.types import Bools, Frame, Kind
 from risk_sac.verdicts.along import along
 from risk_sac.verdicts.areas import soon_inside
-from risk_sac.verdicts.conflict import KERB_S, SAME_WAY_COS, YIELDING_MPS2
+from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_COS, YIELDING_MPS2
 from risk_sac.verdicts.course import CORRIDOR_M, HORIZON_S, Body, entry_distance, time_to_touch
 from risk_sac.verdicts.evidence import Ground
 from risk_sac.verdicts.lane_conflict import lane_conflict
@@ -34,7 +34,7 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, war
       path: the ego's path ahead, from its centre; see `risk_sac.verdicts.path.polyline`.
       known: `n`, whom the ego knows of.
       ground: where it takes place.
-      wary: whether whoever hangs over beside the ego counts, if it comes nearer or not.
+      wary: whether whoever hangs over beside the ego counts, if it comes nearer or not, and who brakes is not trusted.
 
     Returns:
       `n`; False for the ego.
@@ -64,7 +64,9 @@ def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground, wary: bool) -
         offset, accel = f.lane_offset_m[i], f.accel_mps2[i]
         begins, _ = lane_conflict(seen, speed, offset, accel, ground.lane_width_m, wary)
         return begins
-    entry_m, meets_m = _entry(path, speed, half_length, half_width, other, float(f.speed_mps[i]))
+    yields = not wary and f.accel_mps2[i] <= -BRAKES_MPS2
+    braking_mps2 = FIRM_MPS2 if yields else YIELDING_MPS2
+    entry_m, meets_m = _entry(path, speed, half_length, half_width, other, float(f.speed_mps[i]), braking_mps2)
     stops = not math.isfinite(entry_m)
     if stops and int(f.link[i]) in YIELDS:
         return False
@@ -74,10 +76,16 @@ def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground, wary: bool) -
 
 
 def _entry(
-    path: Path, speed: float, half_length: float, half_width: float, other: Body, other_speed: float
+    path: Path,
+    speed: float,
+    half_length: float,
+    half_width: float,
+    other: Body,
+    other_speed: float,
+    braking_mps2: float,
 ) -> tuple[float, float]:
     """`entry_distance` of who goes on straight, as far as it needs to stop; infinite if it can stop before."""
-    stopping_m = other_speed**2 / (2 * YIELDING_MPS2)
+    stopping_m = other_speed**2 / (2 * braking_mps2)
     ahead = np.linspace(0.0, stopping_m, math.ceil(stopping_m / AHEAD_M) + 1)
     cos, sin = (other.vx / other_speed, other.vy / other_speed) if other_speed > STANDING_MPS else (0.0, 0.0)
     return entry_distance(

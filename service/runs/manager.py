@@ -26,6 +26,7 @@ logger = logging.getLogger(__name__)
 
 TICK_S = 1.0
 GATHER_S = 0.5  # clients ask once a second
+MOST_AT_ONCE = 500  # messages; meanwhile nobody can post or cancel, and a statement has 32,000 parameters at most
 UNKILLABLE_S = 3.0  # how long after SIGKILL a worker may take to vanish
 
 
@@ -168,8 +169,10 @@ class Manager:
     def _work(self) -> None:
         while True:
             heard = self._hear()
+            for first in range(0, len(heard), MOST_AT_ONCE):  # a run that was resumed tells all that it has again
+                with self._lock:
+                    self._take_in(heard[first : first + MOST_AT_ONCE])
             with self._lock:
-                self._take_in(heard)
                 if self._stopping:
                     if not self._active:
                         return
@@ -180,13 +183,12 @@ class Manager:
 
     def _hear(self) -> list[tuple[int, Event | Exited]]:
         """What workers say. Episodes are gathered for a moment: written together they cost less, and show at once."""
-        heard = self._executor.events(TICK_S)
+        heard = more = self._executor.events(TICK_S)
         until = time.monotonic() + GATHER_S
-        while heard and all(isinstance(message, EpisodeDone) for _, message in heard):
-            more = self._executor.events(max(until - time.monotonic(), 0.0))
-            if not more:
-                break
-            heard += more
+        while more and all(isinstance(message, EpisodeDone) for _, message in more) and len(heard) < MOST_AT_ONCE:
+            left_s = until - time.monotonic()
+            more = self._executor.events(left_s) if left_s > 0.0 else []
+            heard = heard + more
         return heard
 
     def _tend(self) -> None:

@@ -111,11 +111,12 @@ class Ledger:
                 run = runs[number]
                 campaign = campaigns[run.campaign_number]
                 tally(run)
-                busy_s = self._repeated_s.pop(number)
-                run.busy_s += busy_s
-                add_usage(session, campaign.project, busy_s)
+                run.busy_s += self._repeated_s[number]
+                add_usage(session, campaign.project, self._repeated_s[number])
                 campaign.revision += 1  # its state follows those of its runs, which an episode leaves alone
-            return grown
+        for number in changed:
+            del self._repeated_s[number]
+        return grown
 
     def end_run(self, number: int, state: State, reason: str | None = None, result: Finished | None = None) -> None:
         """A run reached its end; its campaign ends with the last one."""

@@ -26,6 +26,14 @@ def test_records_from_before_contacts_were_judged_keep_their_digest():
     assert results_digest([judged]) != results_digest([RUN[0]])
 
 
+def test_records_that_are_judged_without_the_moment_of_notice_keep_their_digest():
+    judged = RUN[0].model_copy(update={"collision": RUN[0].collision.model_copy(update={"judgement": judgement()})})
+    old = json.loads(json.dumps(judged.model_dump(mode="json", by_alias=False)))
+    del old["collision"]["judgement"]["noticed_s"]
+    line = json.dumps(old, sort_keys=True, separators=(",", ":")).encode() + b"\n"
+    assert results_digest([judged]) == hashlib.sha256(line).hexdigest()
+
+
 def test_digest_does_not_depend_on_the_order_or_kind_of_mappings():
     scene = {"gap_m": 10.0, "speed_mps": 12.5}
     turned = MappingProxyType(dict(reversed(scene.items())))
