@@ -40,8 +40,9 @@ class Curve:
     def over(self, runs: Sequence[FinishedRun]) -> tuple[Floats, Floats]:
         """Where it is drawn, `n`, and the runs' values there, `runs x n`; no further than all runs came."""
         if not self.timed:
-            values = np.array([self.values(run) for run in runs])
-            return np.arange(1.0, values.shape[1] + 1), values
+            each = [self.values(run) for run in runs]
+            shortest = min(map(len, each))  # in processor time, runs play as many episodes as they can
+            return np.arange(1.0, shortest + 1), np.array([values[:shortest] for values in each])
         at = np.linspace(0.0, TIMED_S, TIMES)
         at = at[at <= min(max(cpu_s(run), default=0.0) for run in runs)]
         over = [np.searchsorted(cpu_s(run), at, side="right") for run in runs]  # episodes that are over by then

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.report import FinishedRun, compare, table_markdown
+from risk_sac.report import FinishedRun, compare, figure_bytes, table_markdown
 from risk_sac.report.budgets import Limit, cpu_s, episodes, found_within
 from risk_sac.report.figures import CURVES
 
@@ -74,3 +74,14 @@ def test_our_own_search_is_tested_against_the_others_on_what_a_user_pays_for(
     assert (against["risk-sac"].difference, against["random"].difference) == (1.0, 0.0)
     assert against["risk-sac"].p == pytest.approx(2 / 2**6)
     assert against["risk-sac"].p_holm == pytest.approx(2 * 2 / 2**6)  # of two hypotheses, whatever else is tested
+
+
+def test_runs_of_unequal_length_are_drawn_as_far_as_all_came(
+    spec: CampaignSpec, finished: Callable[..., FinishedRun]
+) -> None:
+    runs = [finished(run, "..f.f" if run.seed else "..f", ".") for run in spec.runs()]
+    comparison = compare(spec, runs, "")
+    (curve,) = [curve for curve in CURVES if curve.name == "ecr"]
+    at, values = curve.over([runs[0], next(run for run in runs if run.spec.seed)])
+    assert (at.tolist(), values.shape) == ([1.0, 2.0, 3.0], (2, 3))
+    assert figure_bytes(comparison, "ecr_low", "svg").startswith(b"<?xml")
