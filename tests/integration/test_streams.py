@@ -84,7 +84,7 @@ def test_a_stream_taken_up_after_any_event_tells_exactly_the_rest(shared):
 def test_what_was_told_first_is_told_again_in_its_order_from_every_id(serve):
     """Followed as it happens, through a server that stops amid it and through two runs that wait and go on."""
     service = serve("striking_worker")
-    campaign_id = service.post(seeds=[0, 1], methods=["random", "sac"], budget={"episodes": 25})
+    campaign_id = service.post(seeds=[0, 1], methods=["random", "sac"], budget={"episodes": 60})
     first = []
     while not (first and told(first[-1]) == ("state", None, "succeeded")):
         for event in events(service.client, campaign_id, first[-1]["id"] if first else None):
