@@ -46,14 +46,7 @@ class _Given(NamedTuple):
 class Sb3Agent:
     """`stable_baselines3.SAC`, which is handed its batches; it weights no transition, and measures no TD error."""
 
-    def __init__(
-        self,
-        observation_size: int,
-        action_size: int,
-        config: AgentConfig,
-        sac: SacConfig,
-        seed: int,
-    ) -> None:
+    def __init__(self, observation_size: int, action_size: int, config: AgentConfig, sac: SacConfig, seed: int) -> None:
         self._generator = torch.Generator().manual_seed(seed).get_state()
         with self._noise():
             self._model = SAC(

@@ -12,6 +12,7 @@ from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, compl
 from risk_sac.cli.text import counted
 from risk_sac.config import METHODS, FamilyName
 from risk_sac.config.spec_file import read_campaign
+from risk_sac.run_folder.verified import TIMES
 
 if TYPE_CHECKING:
     from risk_sac.execution.processes import Job
@@ -28,7 +29,11 @@ def add_evaluate(commands: Commands) -> None:
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
     evaluate.add_argument("--jobs", type=int, metavar="N", help="runs at a time (default: one per core)")
     evaluate.add_argument(
-        "--verify", type=int, default=3, metavar="N", help="how often each distinct failure is replayed (default: 3)"
+        "--verify",
+        type=int,
+        default=TIMES,
+        metavar="N",
+        help=f"how often each distinct failure is replayed (default: {TIMES})",
     )
     evaluate.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of runs, tables and figures")
 

@@ -1,7 +1,6 @@
 """`risk-sac bundle` and `risk-sac replay`: a failure in one file, and played again from it."""
 
 import argparse
-import zipfile
 from contextlib import closing
 from pathlib import Path
 
@@ -32,10 +31,7 @@ def _bundle(options: argparse.Namespace) -> int:
     results = read_results(options.results)
     contact = results.contact(options.failure)
     folder = options.results if options.results.is_dir() else options.results.parent
-    try:
-        recorded = read_series(folder / contact.series)
-    except (zipfile.BadZipFile, ValueError, EOFError) as error:
-        raise ConfigError(f"{folder / contact.series} is damaged: {error}", field="FAILURE") from error
+    recorded = read_series(folder / contact.series)
     if "released_s" not in recorded:
         raise ConfigError(f"{folder / contact.series} is older than the release of adversaries", field="FAILURE")
     from risk_sac.env import RiskSacEnv  # here, because loading the simulator takes a second

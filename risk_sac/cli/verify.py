@@ -8,6 +8,7 @@ from risk_sac.cli.console import FAILED, OK, Commands, console
 from risk_sac.cli.text import counted
 from risk_sac.errors import SimulationError
 from risk_sac.run_folder.results import read_results
+from risk_sac.run_folder.verified import TIMES
 
 
 def add_verify(commands: Commands) -> None:
@@ -15,7 +16,8 @@ def add_verify(commands: Commands) -> None:
     verify = commands.add_parser("verify", help="replay the distinct failures of runs in fresh processes")
     verify.set_defaults(command=_verify)
     verify.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a finished run")
-    verify.add_argument("--times", type=int, default=3, metavar="N", help="how often each is replayed (default: 3)")
+    times = f"how often each is replayed (default: {TIMES})"
+    verify.add_argument("--times", type=int, default=TIMES, metavar="N", help=times)
 
 
 def _verify(options: argparse.Namespace) -> int:

@@ -18,9 +18,10 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executors import executor_named
 from risk_sac.execution.processes import Job, Progress, Queue, program
 from risk_sac.execution.stopping import STOPPING, stop_signal
-from risk_sac.failures.verify import TIMES, verify
+from risk_sac.failures.verify import verify
 from risk_sac.problem import check_campaign
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
+from risk_sac.run_folder.verified import TIMES
 
 SPEC, RUNS, LOCK = "spec.yaml", "runs", ".lock"
 

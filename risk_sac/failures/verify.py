@@ -14,11 +14,10 @@ from pathlib import Path
 from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import code_digest, versions
 from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.verified import Repetition, Verified, distinct_failures, read_verified, write_verified
+from risk_sac.run_folder.verified import TIMES, Repetition, Verified, distinct_failures, read_verified, write_verified
 
 logger = logging.getLogger(__name__)
 
-TIMES = 3  # by default
 POLL_S = 0.05
 
 

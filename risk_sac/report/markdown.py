@@ -108,6 +108,8 @@ def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
 
 def _verified(runs: Sequence[FinishedRun], phase: Phase) -> str:
     """How many of the distinct failures that were replayed were the same each time."""
+    if not all(run.verified for run in runs):
+        return DASH
     repetitions = [
         run.verified.episodes[record.index]
         for run in runs
@@ -115,8 +117,6 @@ def _verified(runs: Sequence[FinishedRun], phase: Phase) -> str:
         for record in run.phase(phase)
         if record.index in run.verified.episodes
     ]
-    if not all(run.verified for run in runs):
-        return DASH
     return f"{sum(repetition.verified for repetition in repetitions)} of {len(repetitions)}"
 
 

@@ -3,6 +3,8 @@
 import hashlib
 import io
 import math
+import zipfile
+import zlib
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.errors import DamagedError
 from risk_sac.records import SeriesFile
 from risk_sac.risk.measures import Measures
 from risk_sac.risk.publish import AHEAD, GAP, SEEN, Assessment
@@ -132,6 +135,14 @@ def write_series(path: Path, series: dict[str, NDArray[np.generic]]) -> SeriesFi
 
 
 def read_series(path: Path) -> dict[str, NDArray[np.generic]]:
-    """Reads what `write_series` wrote."""
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
+    """Reads what `write_series` wrote.
+
+    Raises:
+      DamagedError: it is not as it was written.
+      OSError: it is gone.
+    """
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError) as error:
+        raise DamagedError(f"{path} is damaged: {error}") from error

@@ -16,6 +16,7 @@ from risk_sac.run_folder.seal import seal, unseal
 from risk_sac.verdicts.distinct import DistinctFailures
 
 VERIFIED = "verified.json"
+TIMES = 3  # that a failure is replayed, if nobody says otherwise
 
 
 class Repetition(Record):

@@ -57,21 +57,18 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     seen = seen_along(path, evidence, striker)
     course = _courses(path, evidence, striker)
     same_way = _drives_the_same_way(evidence, striker, seen.turn_rad)
-
-    def conflicts(*, wary: bool) -> tuple[Bools, Bools]:
-        """In which frames a conflict begins, and in which one goes on that has begun."""
-        if evidence.kind[striker] == Kind.PEDESTRIAN:
-            begins = lasts = course & _at_the_carriageway(evidence, striker)
-        elif same_way:
-            begins, lasts = _lane_conflicts(evidence, striker, seen, wary=wary)
-        else:
-            begins = lasts = course | _cannot_stop(path, evidence, striker, wary=wary)
-        return begins, lasts
-
-    begins, lasts = conflicts(wary=False)
+    if evidence.kind[striker] == Kind.PEDESTRIAN:
+        begins = lasts = begins_if_wary = lasts_if_wary = course & _at_the_carriageway(evidence, striker)
+    elif same_way:
+        begins, lasts = _lane_conflicts(evidence, striker, seen, wary=False)
+        begins_if_wary, lasts_if_wary = _lane_conflicts(evidence, striker, seen, wary=True)
+    else:
+        to_go_m = _way_to_corridor(path, evidence, striker)
+        begins = lasts = course | _cannot_stop(to_go_m, evidence, striker, wary=False)
+        begins_if_wary = lasts_if_wary = course | _cannot_stop(to_go_m, evidence, striker, wary=True)
     frame, unseen = _since(begins & known, lasts & known), _since(begins, lasts)
-    begins, lasts = conflicts(wary=True)
-    noticed, unseen_if_wary = _since(begins & known, lasts & known), _since(begins, lasts)
+    noticed = _since(begins_if_wary & known, lasts_if_wary & known)
+    unseen_if_wary = _since(begins_if_wary, lasts_if_wary)
     course_from = _since(course & known, course & known)
     if same_way and unseen_if_wary == len(course) - 1:  # neither led nor cut in: the ego itself came over
         frame, unseen = course_from, _since(course, course)
@@ -209,11 +206,10 @@ def column(values: Floats, actor: int) -> Floats:
     return np.ascontiguousarray(values[:, actor])
 
 
-def _cannot_stop(path: Path, evidence: Evidence, striker: int, *, wary: bool) -> Bools:
-    """Frames, 4 s before the contact at most, in which the striker could no longer stop before the ego's corridor.
+def _way_to_corridor(path: Path, evidence: Evidence, striker: int) -> Floats:
+    """Metres that the striker still had to go to the ego's corridor, `T`; inf earlier than 4 s before the contact.
 
-    Both paths are on record, so where they meet is known, and that both come there too. Choice: whoever brakes already
-    is taken to yield as long as firm braking suffices, but by a wary driver.
+    Both paths are on record, so where they meet is known, and that both come there too.
     """
     e, first = evidence, evidence.since(HORIZON_S)
     x, y = column(e.x_m, striker)[first:], column(e.y_m, striker)[first:]
@@ -230,10 +226,17 @@ def _cannot_stop(path: Path, evidence: Evidence, striker: int, *, wary: bool) ->
         e.width_m[striker] / 2,
     )
     gone = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
-    yielding = (e.accel_mps2[first:, striker] <= -BRAKES_MPS2) & (not wary)
+    return np.concatenate((np.full(first, np.inf), distance - gone))
+
+
+def _cannot_stop(to_go_m: Floats, evidence: Evidence, striker: int, *, wary: bool) -> Bools:
+    """Frames in which the striker could no longer stop before the ego's corridor, `T`.
+
+    Choice: whoever brakes already is taken to yield as long as firm braking suffices, but by a wary driver.
+    """
+    yielding = (evidence.accel_mps2[:, striker] <= -BRAKES_MPS2) & (not wary)
     braking_mps2 = np.where(yielding, FIRM_MPS2, YIELDING_MPS2)
-    found = np.zeros(len(e.time_s), dtype=np.bool_)
-    found[first:] = distance - gone <= e.speed_mps[first:, striker] ** 2 / (2 * braking_mps2)
+    found: Bools = to_go_m <= evidence.speed_mps[:, striker] ** 2 / (2 * braking_mps2)
     return found
 
 
