@@ -210,6 +210,8 @@ class EpisodeRecord(Record):
     """α after the episode."""
     environment_steps: int
     """Of the run, up to and including this episode."""
+    script: tuple[float, ...] | None = None
+    """Genes of the scripts that the adversaries followed, see `risk_sac.scripts`; null where a policy drove them."""
     collision: Collision | None = None
 
     def id_in(self, run_id: str) -> str:

@@ -126,7 +126,8 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
     collision = info.get("collision")
     encounter = Encounter(collision=collision, nearest_m=env.trace.nearest_m(run.problem.family.adversaries))
     objective = run.searchers.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
-    return _record(run, seed, scene.values, tally, objective=objective, collision=collision)
+    script = tuple(genes.tolist()) or None
+    return _record(run, seed, scene.values, tally, objective=objective, script=script, collision=collision)
 
 
 @dataclass(slots=True)
@@ -154,6 +155,7 @@ def _record(
     *,
     objective: float | None = None,
     rejected: str = "",
+    script: tuple[float, ...] | None = None,
     collision: Collision | None = None,
 ) -> EpisodeRecord:
     outcome, reason = _outcome(rejected, collision)
@@ -175,6 +177,7 @@ def _record(
         dual_variable=run.searchers.agent.dual_variable,
         temperature=run.searchers.agent.temperature,
         environment_steps=run.environment_steps + tally.steps,
+        script=script,
         collision=collision,
     )
 

@@ -11,10 +11,12 @@ from risk_sac.cli.campaigns import add_campaigns
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
 from risk_sac.cli.evaluate import add_evaluate
 from risk_sac.cli.keys import add_keys
+from risk_sac.cli.regress import add_regress
 from risk_sac.cli.replay import add_bundle, add_replay
 from risk_sac.cli.run import add_run
 from risk_sac.cli.serve import add_serve
 from risk_sac.cli.show import add_show
+from risk_sac.cli.understand import add_clusters, add_minimise, add_region
 from risk_sac.cli.verify import add_verify
 from risk_sac.errors import ConfigError, RiskSacError
 
@@ -24,8 +26,12 @@ COMMANDS = (
     add_audit,
     add_show,
     add_verify,
+    add_clusters,
     add_bundle,
     add_replay,
+    add_minimise,
+    add_region,
+    add_regress,
     add_serve,
     add_campaigns,
     add_keys,

@@ -1,23 +1,27 @@
-"""`risk-sac bundle` and `risk-sac replay`: a failure in one file, and played again from it."""
+"""`risk-sac bundle` and `risk-sac replay`: failures in files that stand alone, and played again from them."""
 
 import argparse
 from contextlib import closing
 from pathlib import Path
 
 from risk_sac.cli.console import FAILED, OK, Commands, complain, console
-from risk_sac.cli.text import printable
-from risk_sac.errors import ConfigError, SimulationError
+from risk_sac.cli.text import counted, printable
+from risk_sac.errors import ConfigError
 from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.series import read_series
+from risk_sac.run_folder.verified import distinct_failures
+from risk_sac.types import Scene
 
 
 def add_bundle(commands: Commands) -> None:
     """Adds the command."""
-    bundle = commands.add_parser("bundle", help="write a contact into one file that stands alone")
+    bundle = commands.add_parser("bundle", help="write failures into files that stand alone")
     bundle.set_defaults(command=_bundle)
     bundle.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
-    bundle.add_argument("failure", metavar="FAILURE", help="id of a contact, or its number")
-    bundle.add_argument("--out", type=Path, required=True, metavar="FILE", help="the bundle")
+    bundle.add_argument(
+        "failure", nargs="?", metavar="FAILURE", help="id of a contact, or its number; default: every distinct failure"
+    )
+    out = "the bundle; of every distinct failure: the folder for them"
+    bundle.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
 
 
 def add_replay(commands: Commands) -> None:
@@ -29,28 +33,27 @@ def add_replay(commands: Commands) -> None:
 
 def _bundle(options: argparse.Namespace) -> int:
     results = read_results(options.results)
-    contact = results.contact(options.failure)
     folder = options.results if options.results.is_dir() else options.results.parent
-    recorded = read_series(folder / contact.series)
-    if "released_s" not in recorded:
-        raise ConfigError(f"{folder / contact.series} is older than the release of adversaries", field="FAILURE")
-    from risk_sac.env import RiskSacEnv  # here, because loading the simulator takes a second
-    from risk_sac.failures.bundle import make_bundle, write_bundle
-    from risk_sac.failures.replay import actions_of, replay, trajectory_digest
+    one = None if options.failure is None else results.contact(options.failure).episode
+    from risk_sac.failures.bundle import write_bundle  # here, because loading the simulator takes a second
+    from risk_sac.failures.collect import bundles
 
-    with closing(RiskSacEnv.of(results.spec)) as env:
-        played = replay(env, contact.episode, actions_of(recorded))
-    if trajectory_digest(played.series) != trajectory_digest(recorded):
-        raise SimulationError(f"{contact.id} does not repeat here, so no bundle was written")
-    write_bundle(options.out, make_bundle(results.spec, contact.episode, recorded, played.signal_heads))
-    console.print(f"Bundle: {options.out}")
+    if one is not None:
+        write_bundle(options.out, next(bundles(folder, results, [one])))
+        console.print(f"Bundle: {options.out}", soft_wrap=True)
+        return OK
+    episodes = distinct_failures(results)
+    for bundle in bundles(folder, results, episodes):
+        write_bundle(options.out / f"{bundle.manifest.id}.npz", bundle)
+    console.print(f"{counted(len(episodes), 'bundle')}: {options.out}", soft_wrap=True)
     return OK
 
 
 def _replay(options: argparse.Namespace) -> int:
     from risk_sac.env import RiskSacEnv
     from risk_sac.failures.bundle import code_digest, read_bundle, versions, world_of
-    from risk_sac.failures.replay import actions_of, replay, trajectory_digest
+    from risk_sac.failures.play import play
+    from risk_sac.failures.trajectory import actions_of, trajectory_digest
 
     bundle = read_bundle(options.bundle)
     manifest = bundle.manifest
@@ -60,7 +63,8 @@ def _replay(options: argparse.Namespace) -> int:
     if (manifest.code, manifest.versions) != (code_digest(), versions()):
         complain(f"the code, or {' or '.join(versions())}, has changed since the bundle was written")
     with closing(RiskSacEnv.of(manifest.spec)) as env:
-        played = replay(env, manifest.episode, actions_of(bundle.series))
+        scene = Scene(manifest.spec.family, manifest.episode.scene)
+        played = play(env, scene, manifest.episode.seed, actions_of(bundle.series))
     same = trajectory_digest(played.series) == manifest.digest
     same &= played.signal_heads.tobytes() == bundle.signal_heads.tobytes()
     found = played.collision

@@ -1,6 +1,7 @@
 """`risk-sac show`: the contacts of a run, and pictures of them."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
@@ -8,8 +9,13 @@ from rich.table import Table
 
 from risk_sac.cli.console import OK, Commands, console
 from risk_sac.cli.text import in_words
+from risk_sac.config import RunSpec
+from risk_sac.config.spec_file import read_ego
+from risk_sac.failures.recording import Recording
+from risk_sac.failures.trajectory import actions_of
 from risk_sac.records import Judgement
 from risk_sac.run_folder.results import Results, read_results
+from risk_sac.run_folder.series import read_series
 
 
 def add_show(commands: Commands) -> None:
@@ -20,6 +26,8 @@ def add_show(commands: Commands) -> None:
     show.add_argument(
         "failure", nargs="?", metavar="FAILURE", help="id of a contact, or its number; default: list them"
     )
+    twin = "draw beside it the same scene with nobody attacking (idle), or with this ego: default, perfect, careful, "
+    show.add_argument("--twin", metavar="TWIN", help=f"{twin}or a YAML file with the fields of a campaign's ego")
     show.add_argument("--out", type=Path, metavar="FILE.png", help="(default: failures/FAILURE.png beside RESULTS)")
 
 
@@ -32,10 +40,26 @@ def _show(options: argparse.Namespace) -> int:
     folder = options.results if options.results.is_dir() else options.results.parent
     from risk_sac.failures.show import draw  # here, because loading matplotlib takes a second
 
-    picture = options.out or (folder / contact.series).with_suffix(".png")
-    draw(results.spec.family, contact, folder, picture)
-    console.print(f"Drawn: {picture}")
+    recording = Recording(contact, read_series(folder / contact.series))
+    twin = None if options.twin is None else _twin(results.spec, recording, options.twin)
+    stem = Path(contact.series).stem + ("" if options.twin is None else f"-{Path(options.twin).stem}")
+    picture = options.out or (folder / contact.series).with_name(f"{stem}.png")
+    draw(results.spec.family, recording, picture, twin)
+    console.print(f"Drawn: {picture}", soft_wrap=True)
     return OK
+
+
+def _twin(spec: RunSpec, recording: Recording, name: str) -> Recording:
+    """The same scene with what the command line names changed."""
+    from risk_sac.failures.twin import IDLE, twin
+
+    ego = None if name == IDLE else read_ego(name)
+    episode = recording.contact.episode
+    played = twin(spec, episode, actions_of(recording.series), ego)
+    changed = "nobody attacks" if ego is None else f"ego: {name}"
+    found = played.collision
+    outcome = f"touches {found.other_id} at {found.ego_speed_mps:.1f} m/s" if found else "touches nobody"
+    return replace(recording, series=played.series, twin=f"{changed}: {outcome}")
 
 
 def _contacts(results: Results) -> Table:

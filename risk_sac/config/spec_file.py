@@ -3,15 +3,15 @@
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import ValidationError
 
-from risk_sac.config import Budget, CampaignSpec, RunSpec
+from risk_sac.config import Budget, CampaignSpec, EgoConfig, RunSpec
 from risk_sac.errors import ConfigError
 
-T = TypeVar("T", RunSpec, CampaignSpec)
+T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)
 CAMPAIGN_ONLY = {"family": "families", "method": "methods", "seed": "seeds"}  # a run's field -> a campaign's
 
 
@@ -46,6 +46,17 @@ def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping
     given = {name: value for name, value in flags.items() if value is not None}
     data = _with_budget({} if file is None else _read_yaml(file), given)
     return _validate(CampaignSpec, {**defaults, **data, **given})
+
+
+def read_ego(text: str) -> EgoConfig:
+    """The ego that a command line names: a profile, or a file with its fields.
+
+    Raises:
+      ConfigError: it is neither.
+    """
+    if text in get_args(EgoConfig.model_fields["profile"].annotation):
+        return _validate(EgoConfig, {"profile": text})
+    return _validate(EgoConfig, _read_yaml(Path(text)))
 
 
 def campaign_yaml(spec: CampaignSpec) -> str:

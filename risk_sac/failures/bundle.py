@@ -21,10 +21,12 @@ from pydantic import ValidationError
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, RiskSacError
-from risk_sac.failures.replay import Series, actions_of, trajectory_digest
+from risk_sac.failures.core import Core
+from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, Record
 from risk_sac.run_folder.durable import replace_file
+from risk_sac.scripts.motions import SIZE
 from risk_sac.types import Scene
 
 PACKAGES = ("libsumo", "numpy")  # that decide how an episode goes, its scene and its actions given
@@ -49,7 +51,9 @@ class Manifest(Record):
     world: Mapping[str, str]
     """File of the road network or of the vehicle types → its SHA-256."""
     digest: str
-    """Of the series, see `risk_sac.failures.replay.trajectory_digest`."""
+    """Of the series, see `risk_sac.failures.trajectory.trajectory_digest`."""
+    core: Core | None = None
+    """Of what was minimised."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +65,9 @@ class Bundle:
     signal_heads: NDArray[np.uint8]  # T since the release x heads, SUMO's letters
 
 
-def make_bundle(spec: RunSpec, episode: EpisodeRecord, series: Series, signal_heads: NDArray[np.uint8]) -> Bundle:
+def make_bundle(
+    spec: RunSpec, episode: EpisodeRecord, series: Series, signal_heads: NDArray[np.uint8], core: Core | None = None
+) -> Bundle:
     """A bundle of what was just played here."""
     manifest = Manifest(
         id=episode.id_in(spec.id),
@@ -71,6 +77,7 @@ def make_bundle(spec: RunSpec, episode: EpisodeRecord, series: Series, signal_he
         code=code_digest(),
         world=world_of(spec, episode),
         digest=trajectory_digest(series),
+        core=core,
     )
     return Bundle(manifest=manifest, series=series, signal_heads=signal_heads)
 
@@ -180,6 +187,9 @@ def _check_playable(manifest: Manifest, series: Series) -> None:
     problem.space.check(Scene(problem.family.name, episode.scene))
     if episode.seed < 0:
         raise ValueError(f"seed {episode.seed}")
+    genes = SIZE * len(problem.family.adversaries)
+    if episode.script is not None and (len(episode.script) != genes or not all(0 <= g <= 1 for g in episode.script)):
+        raise ValueError(f"a script of {len(episode.script)} genes; wanted {genes} in [0, 1]")
     for name in ("time_s", "released_s", "actions"):
         if name not in series or series[name].dtype.kind != "f":
             raise ValueError(f"{name} is missing, or holds no numbers")

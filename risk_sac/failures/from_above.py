@@ -42,14 +42,15 @@ def draw_from_above(axis: Axes, family: FamilyName, recording: Recording, apart_
         for times_s in _ghosts(recording, actor, apart_m):
             _draw_body(axis, recording, actor, -times_s[0], **OUTLINE | {"edgecolor": colour})
             _label_body(axis, recording, actor, times_s, colour)
-    _draw_contact_point(axis, recording)
+    if not recording.twin:
+        _draw_contact_point(axis, recording)
     _draw_conflict(axis, recording)
     axis.set(xlabel="x, m", ylabel="y, m")
     axis.add_patch(Polygon(np.empty((0, 2)), label="earlier", **OUTLINE))  # for the legend alone
     if len(recording.series["ids"]) > 2:
         grey: dict[str, Any] = {"facecolor": BYSTANDER_COLOUR, "edgecolor": BYSTANDER_COLOUR, "alpha": 0.2}
         axis.add_patch(Polygon(np.empty((0, 2)), label="others", **grey))
-    legend(axis, title="filled: at the contact")
+    legend(axis, title="filled: at the contact" + (" of the failure" if recording.twin else ""))
 
 
 def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float]]:

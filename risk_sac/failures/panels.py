@@ -90,8 +90,8 @@ def name_instants(axis: Axes, recording: Recording) -> None:
 
 def _instants(recording: Recording) -> Iterator[tuple[float, str, str]]:
     """What there is to mark: when, its name, and its colour."""
-    yield 0.0, "contact", "black"
-    if recording.collision.visible_for_s > 0:
+    yield 0.0, "contact of the failure" if recording.twin else "contact", "black"
+    if recording.collision.visible_for_s > 0 and not recording.twin:
         yield recording.time_s[-1] - recording.collision.visible_for_s, "in the ego's view from here", SEEN_COLOUR
     yield recording.released_s, "adversaries released", RELEASE_COLOUR
     if recording.conflict_s is not None:

@@ -1,6 +1,6 @@
 """A contact and its time series, with time counted from the contact."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,10 +14,11 @@ from risk_sac.types import Floats
 
 @dataclass(frozen=True)
 class Recording:
-    """A contact's time series with time counted from the contact."""
+    """A contact's time series, or its twin's, with time counted from the contact."""
 
     contact: Contact
-    series: dict[str, NDArray[np.generic]]
+    series: Mapping[str, NDArray[np.generic]]
+    twin: str = ""  # what is different, where the series is not the contact's own but that of its episode's twin
 
     @property
     def collision(self) -> Collision:
@@ -43,8 +44,8 @@ class Recording:
 
     @property
     def conflict_s(self) -> float | None:
-        """When the conflict began; None if nobody judged the contact, or if it was before the recording."""
-        if self.collision.judgement is None:
+        """When the conflict began; None in a twin, if nobody judged the contact, or if it was before the recording."""
+        if self.twin or self.collision.judgement is None:
             return None
         began_s = self.collision.judgement.conflict_s - self.collision.time_s
         return began_s if began_s >= self.time_s[0] else None

@@ -16,8 +16,6 @@ from risk_sac.failures.caption import caption
 from risk_sac.failures.from_above import draw_from_above
 from risk_sac.failures.panels import PANELS, mark_instants, name_instants
 from risk_sac.failures.recording import Recording
-from risk_sac.run_folder.results import Contact
-from risk_sac.run_folder.series import read_series
 from risk_sac.types import Floats
 
 VIEW_S, PANELS_S = 3.0, 8.0  # before the contact: what the view from above holds, and the panels
@@ -28,50 +26,62 @@ LABEL_IN = 0.25  # what a label needs on the page
 VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
 
 
-def draw(family: FamilyName, contact: Contact, folder: Path, file: Path) -> None:
+def draw(family: FamilyName, recording: Recording, file: Path, twin: Recording | None = None) -> None:
     """Draws a contact into a file.
 
     Args:
       family: of the run.
-      contact: of the run's results.
-      folder: where results.json lies.
+      recording: of the contact.
       file: its suffix names the format: png, pdf or svg.
+      twin: is drawn beside it.
 
     Raises:
       ConfigError: the format is none of these.
-      OSError: the time series is gone or the picture cannot be written.
+      OSError: the picture cannot be written.
     """
     if file.suffix not in (".png", ".pdf", ".svg"):
         raise ConfigError(f"got {str(file)!r}; wanted a name that ends in .png, .pdf or .svg", field="out")
-    recording = Recording(contact, read_series(folder / contact.series))
-    content = recording_bytes(family, recording, file.suffix.removeprefix("."))
+    content = recording_bytes(family, recording, file.suffix.removeprefix("."), twin)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(content)
 
 
-def recording_bytes(family: FamilyName, recording: Recording, format_: str) -> bytes:
+def recording_bytes(family: FamilyName, recording: Recording, format_: str, twin: Recording | None = None) -> bytes:
     """The picture of a contact as a file: png, pdf or svg."""
-    return picture(partial(draw_recording, family, recording), [format_], DPI, {})[0]
+    return picture(partial(draw_recording, family, recording, twin), [format_], DPI, {})[0]
 
 
-def draw_recording(family: FamilyName, recording: Recording) -> Figure:
-    """The whole figure: the view from above, and one panel per kind of measurement over a common time axis."""
+def draw_recording(family: FamilyName, recording: Recording, twin: Recording | None = None) -> Figure:
+    """The whole figure: the view from above, and one panel per kind of measurement over a common time axis.
+
+    Args:
+      family: of the run.
+      recording: of the contact.
+      twin: is drawn beside it, on the same ground, clock and scales.
+    """
+    columns = [recording] if twin is None else [recording, twin]
     low, high = _extent(recording)
     view_in = PANEL_WIDTH_IN * (high - low)[1] / (high - low)[0]
     heights = (view_in, *(PANEL_IN for _ in PANELS))
-    figure = canvas((WIDTH_IN, sum(heights) + 1.2))
-    view, *axes = figure.subplots(len(heights), 1, height_ratios=heights)
+    figure = canvas((WIDTH_IN * len(columns), sum(heights) + 1.2))
+    grid = figure.subplots(len(heights), len(columns), height_ratios=heights, squeeze=False)
     figure.suptitle(caption(family, recording), fontsize=11)
-    draw_from_above(view, family, recording, apart_m=LABEL_IN * (high - low)[0] / PANEL_WIDTH_IN)
-    view.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    for axis, panel in zip(axes, PANELS, strict=True):
-        panel(axis, recording)
-        mark_instants(axis, recording)
-        axis.sharex(axes[0])
-        axis.label_outer()
-    name_instants(axes[0], recording)
-    axes[0].set_xlim(max(recording.time_s[0], -PANELS_S), 0.15)
-    axes[-1].set_xlabel("time before the contact, s")
+    for each, (view, *axes) in zip(columns, grid.T, strict=True):
+        draw_from_above(view, family, each, apart_m=LABEL_IN * (high - low)[0] / PANEL_WIDTH_IN)
+        view.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        if twin is not None:
+            view.set_title(each.twin or "the failure", fontsize=10)
+        for axis, panel, first in zip(axes, PANELS, grid[1:, 0], strict=True):
+            axis.sharex(grid[1, 0])
+            if axis is not first:
+                axis.sharey(first)  # before anything is drawn, so that there is room for both
+            panel(axis, each)
+            mark_instants(axis, each)
+            axis.label_outer()
+        name_instants(axes[0], each)
+        axes[-1].set_xlabel("time before the contact, s")
+    after_s = 0.15 if twin is None else max(0.15, twin.time_s[-1])
+    grid[1, 0].set_xlim(max(recording.time_s[0], -PANELS_S), after_s)
     return figure
 
 

@@ -21,7 +21,7 @@ def results_digest(records: Sequence[EpisodeRecord]) -> str:
 
 
 # Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
-YOUNGER = frozenset({"judgement", "noticed_s"})
+YOUNGER = frozenset({"judgement", "noticed_s", "script"})
 
 
 def _plain(value: object) -> dict[str, Any]:

@@ -17,7 +17,7 @@ import pytest
 from risk_sac.cli import main
 from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import MANIFEST, MOST_ARRAYS, MOST_FILE_BYTES, read_bundle
-from risk_sac.failures.replay import trajectory_digest
+from risk_sac.failures.trajectory import trajectory_digest
 from risk_sac.run_folder.results import read_results
 
 RUN = ["--family", "dense", "--method", "random", "--seed", "1", "--episodes", "20"]
@@ -105,6 +105,7 @@ def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, capsys: pytest.
         (lambda arrays: manifest(arrays, world={}), "was found on another dense/dense.net.xml"),
         (lambda arrays: arrays.pop(MANIFEST), "is no bundle of a failure, or is damaged"),
         (lambda arrays: episode(arrays, seed=-1), "holds no episode that can be played: seed -1"),
+        (lambda arrays: episode(arrays, script=[0.5] * 3), "holds no episode that can be played: a script of 3 genes"),
         (lambda arrays: episode(arrays, scene={"friction": 1.0}), "holds no episode that can be played: scene"),
         (lambda arrays: series(arrays, actions=None), "holds no episode that can be played: actions is missing"),
         (
@@ -116,7 +117,16 @@ def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, capsys: pytest.
         (lambda arrays: arrays.update({f"a{i}": np.zeros(1) for i in range(MOST_ARRAYS)}), "arrays; wanted at most"),
     ],
     ids=[
-        *("damaged", "newer", "another spec", "another net", "no manifest", "another seed", "another scene"),
+        *(
+            "damaged",
+            "newer",
+            "another spec",
+            "another net",
+            "no manifest",
+            "another seed",
+            "another script",
+            "another scene",
+        ),
         *("no actions", "wide actions", "no numbers", "times in a square", "many arrays"),
     ],
 )
@@ -224,7 +234,7 @@ def test_a_failure_that_does_not_repeat_gets_no_bundle(
 ) -> None:
     run = bundle.parent / "elsewhere"
     contact = read_results(run).contacts[0]
-    monkeypatch.setattr("risk_sac.failures.replay.actions_of", lambda series: series["actions"][-3:])
+    monkeypatch.setattr("risk_sac.failures.collect.actions_of", lambda series: series["actions"][-3:])
     assert main(["bundle", str(run), contact.id, "--out", str(tmp_path / "a.npz")]) == 1
     assert "does not repeat here" in capsys.readouterr().err.replace("\n", " ")
     assert not (tmp_path / "a.npz").exists()

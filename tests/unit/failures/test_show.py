@@ -12,7 +12,7 @@ from risk_sac.failures.recording import Recording
 from risk_sac.failures.show import draw, draw_recording
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import Contact
-from risk_sac.run_folder.series import write_series
+from risk_sac.run_folder.series import read_series
 from risk_sac.train import train
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 
@@ -102,10 +102,24 @@ def test_both_bodies_and_both_paths_are_drawn() -> None:
     assert len(paths) == 3
 
 
+def test_a_twin_is_drawn_beside_the_failure_on_the_same_ground_clock_and_scales() -> None:
+    failure = Recording(synthetic_contact(), with_release())
+    later = {name: values + 2.0 if name == "time_s" else values for name, values in with_release().items()}
+    twin = Recording(failure.contact, later, "nobody attacks")
+    axes = draw_recording("mixed", failure, twin).axes
+    rows = list(zip(axes[::2], axes[1::2], strict=True))
+    assert [view.get_title() for view in rows[0]] == ["the failure", "nobody attacks"]
+    for left, right in rows:
+        assert left.get_xlim() == right.get_xlim()
+        assert left.get_ylim() == right.get_ylim()
+    assert rows[1][0].get_xlim()[1] >= twin.time_s[-1] > 0.0
+    of_the_twin = [text.get_text() for text in rows[1][1].texts]
+    assert of_the_twin == ["contact of the failure", "adversaries released"]
+    assert "touched here" not in [text.get_text() for text in rows[0][1].get_legend().get_texts()]
+
+
 def test_drawing_writes_a_picture_of_sensible_size(tmp_path: Path) -> None:
-    contact = synthetic_contact()
-    write_series(tmp_path / contact.series, synthetic_series())
-    draw("mixed", contact, tmp_path, tmp_path / "new" / "contact.png")
+    draw("mixed", Recording(synthetic_contact(), synthetic_series()), tmp_path / "new" / "contact.png")
     width, height = png_size(tmp_path / "new" / "contact.png")
     assert 800 <= width <= 2000
     assert 800 <= height <= 2500
@@ -113,7 +127,7 @@ def test_drawing_writes_a_picture_of_sensible_size(tmp_path: Path) -> None:
 
 def test_picture_of_an_unknown_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"contact.doc'; wanted a name that ends in .png"):
-        draw("mixed", synthetic_contact(), tmp_path, tmp_path / "contact.doc")
+        draw("mixed", Recording(synthetic_contact(), synthetic_series()), tmp_path / "contact.doc")
 
 
 class UntilContact:
@@ -133,5 +147,6 @@ def test_contact_of_a_real_run_can_be_drawn(tmp_path: Path) -> None:
     observer = UntilContact()
     train(RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=200)), tmp_path, observer)
     assert observer.contact is not None
-    draw("low", observer.contact, tmp_path, tmp_path / "contact.png")
+    series = read_series(tmp_path / observer.contact.series)
+    draw("low", Recording(observer.contact, series), tmp_path / "contact.png")
     assert min(png_size(tmp_path / "contact.png")) >= 800

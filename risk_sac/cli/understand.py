@@ -1,0 +1,106 @@
+"""What failures come to: the core of one (`minimise`), what is near it (`region`), and which there are (`clusters`)."""
+
+import argparse
+from pathlib import Path
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from risk_sac.cli.console import OK, Commands, console
+from risk_sac.cli.text import counted, printable
+from risk_sac.errors import ConfigError
+from risk_sac.run_folder.durable import replace_file
+from risk_sac.run_folder.results import read_results
+
+
+def add_minimise(commands: Commands) -> None:
+    """Adds the command."""
+    minimise = commands.add_parser("minimise", help="find the core of a failure: the least that makes the ego fail")
+    minimise.set_defaults(command=_minimise)
+    minimise.add_argument("bundle", type=Path, metavar="BUNDLE", help="what `risk-sac bundle` wrote")
+    minimise.add_argument("--out", type=Path, required=True, metavar="FILE", help="bundle of the core")
+
+
+def add_region(commands: Commands) -> None:
+    """Adds the command."""
+    region = commands.add_parser("region", help="how many of the neighbours of a failure fail too")
+    region.set_defaults(command=_region)
+    region.add_argument("bundle", type=Path, metavar="BUNDLE", help="what `risk-sac bundle` or `minimise` wrote")
+    region.add_argument("--out", type=Path, metavar="FILE.json", help="write the shares there too")
+
+
+def add_clusters(commands: Commands) -> None:
+    """Adds the command."""
+    clusters = commands.add_parser("clusters", help="which different failures runs have found, and one of each")
+    clusters.set_defaults(command=_clusters)
+    clusters.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a run, or its results.json")
+    clusters.add_argument("--out", type=Path, metavar="FILE.json", help="write them there too")
+
+
+def _minimise(options: argparse.Namespace) -> int:
+    from risk_sac.failures.bundle import read_bundle, write_bundle  # here, for the simulator takes a second to load
+    from risk_sac.failures.minimise import minimise
+
+    try:
+        minimal = minimise(read_bundle(options.bundle))
+    except ValueError as error:
+        raise ConfigError(str(error), field="BUNDLE") from error
+    core = minimal.manifest.core
+    assert core is not None  # that is what `minimise` makes
+    write_bundle(options.out, minimal)
+    before, after = core.before, core.after
+    lines = (
+        core.sentence,
+        f"adversaries that act: {after.adversaries} of {before.adversaries}",
+        f"segments of 0.5 s: {after.segments} of {before.segments}; drive and steering apart: "
+        f"{after.channels} of {before.channels}",
+        f"parameters of the scene in the middle of their ranges: {core.plain_parameters} of {core.parameters}",
+        f"copies, perturbed by 1 %, that fail as well: {core.held} of {core.copies}",
+        f"played: {counted(core.episodes, 'episode')}",
+        f"Bundle: {options.out}",
+    )
+    console.print(printable("\n".join(lines)), markup=False, soft_wrap=True)
+    return OK
+
+
+def _region(options: argparse.Namespace) -> int:
+    from risk_sac.failures.bundle import read_bundle
+    from risk_sac.failures.region import region
+
+    bundle = read_bundle(options.bundle)
+    try:
+        found = region(bundle)
+    except ValueError as error:
+        raise ConfigError(str(error), field="BUNDLE") from error
+    table = Table(title=printable(bundle.manifest.id), box=SIMPLE_HEAD, padding=0)
+    for name in ("changed", "fail", "of", "share", "95 % interval"):
+        table.add_column(name, no_wrap=True)
+    for share in found.shares:
+        rate, interval = f"{share.failed / share.played:.2f}", f"{share.low:.2f} - {share.high:.2f}"
+        table.add_row(share.what, str(share.failed), str(share.played), rate, interval)
+    console.print(table)
+    console.print("a needle: most scenes right beside it do not fail" if found.needle else "no needle")
+    if options.out is not None:
+        replace_file(options.out, found.model_dump_json(indent=2).encode())
+    return OK
+
+
+def _clusters(options: argparse.Namespace) -> int:
+    from risk_sac.failures.clusters import overview
+
+    found = overview([(contact.id, contact.episode) for run in options.runs for contact in read_results(run).contacts])
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    for name in ("failures", "distinct", "preventable", "kind; look first at"):
+        table.add_column(name, no_wrap=name != "kind; look first at")
+    for cluster in found.clusters:
+        first = f"{cluster.name}\n  {cluster.representative} ({cluster.grade})"
+        table.add_row(str(cluster.failures), str(cluster.distinct), str(cluster.preventable), printable(first))
+    console.print(table)
+    console.print(
+        f"{counted(len(found.clusters), 'kind')}, as various as {found.vendi:.1f} that have nothing in common (Vendi "
+        f"score); {found.covered} of {found.cells} cells of the taxonomy",
+        soft_wrap=True,
+    )
+    if options.out is not None:
+        replace_file(options.out, found.model_dump_json(indent=2).encode())
+    return OK

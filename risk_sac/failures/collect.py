@@ -1,0 +1,58 @@
+"""The failures of a run as bundles, and the policy that found them."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+
+from risk_sac.config import METHODS
+from risk_sac.env import RiskSacEnv
+from risk_sac.errors import ConfigError, SimulationError
+from risk_sac.failures.bundle import Bundle, make_bundle
+from risk_sac.failures.play import Policy, play
+from risk_sac.failures.trajectory import actions_of, trajectory_digest
+from risk_sac.records import EpisodeRecord
+from risk_sac.run import RunState
+from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
+from risk_sac.run_folder.series import read_series
+from risk_sac.types import Scene, Vector
+
+
+def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -> Iterator[Bundle]:
+    """Bundles of contacts of a run, each after it was played again.
+
+    Raises:
+      SimulationError: a contact does not repeat.
+      ConfigError: its series is from before there was a release.
+      DamagedError, OSError: its series cannot be read.
+    """
+    spec = results.spec
+    with closing(RiskSacEnv.of(spec)) as env:
+        for episode in episodes:
+            file = folder / FAILURES / series_name(episode.index)
+            recorded = read_series(file)
+            if "released_s" not in recorded:
+                raise ConfigError(f"{file} is older than the release of adversaries", field="FAILURE")
+            played = play(env, Scene(spec.family, episode.scene), episode.seed, actions_of(recorded))
+            if trajectory_digest(played.series) != trajectory_digest(recorded):
+                raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here, so no bundle is made of it")
+            yield make_bundle(spec, episode, recorded, played.signal_heads)
+
+
+def policy_of(folder: Path) -> Policy | None:
+    """The policy that a run came to, as it is frozen; None of a method that learns none.
+
+    Raises:
+      ConfigError: the folder holds no run.
+      CheckpointError: its checkpoint is of another run.
+    """
+    spec = read_results(folder).spec
+    if not METHODS[spec.method].learns:
+        return None
+    run = RunState(spec, folder)
+    run.resume()
+    agent = run.searchers.agent
+
+    def act(observation: Vector) -> Vector:
+        return agent.act(observation, explore=False)
+
+    return act

@@ -1,0 +1,235 @@
+"""The core of a failure: the least that adversaries have to do, in the plainest scene, for the ego to fail as it did.
+
+Source: delta debugging, Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input" (IEEE TSE 28, 2002).
+"""
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import replace
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+
+from risk_sac.failures.bundle import Bundle, make_bundle
+from risk_sac.failures.core import Core, Extent
+from risk_sac.failures.play import play
+from risk_sac.failures.sentence import sentence
+from risk_sac.failures.variants import Stage, Variant, alike
+from risk_sac.records import Collision, Grade
+from risk_sac.types import STEP_S, Floats
+
+MOST = 150  # episodes that are played for one failure
+COPIES, HELD, SHARE = 10, 8, 0.01  # a reduction counts if so many copies, perturbed by that much, still fail
+SEGMENT = round(0.5 / STEP_S)  # steps
+AMPLITUDES = (0.5, 0.7, 0.85)  # of what is left, the least first
+
+Unit = TypeVar("Unit")
+Segment = tuple[int, int]  # an adversary, and a segment of its actions
+Channel = tuple[int, int]  # a column of the actions, and a segment
+
+
+def minimise(bundle: Bundle, most: int = MOST) -> Bundle:
+    """Takes away what the failure does not need: adversaries, segments of 0.5 s, drive or steer, strength, scene.
+
+    Its `manifest.core` says what is left and how surely it fails. Where nothing can be taken away, it is the failure
+    itself.
+
+    Args:
+      bundle: of the failure.
+      most: episodes to play.
+
+    Raises:
+      ConfigError: the bundle's spec poses no problem that can be run.
+      ValueError: what it holds ended without a contact that was judged.
+    """
+    search = _Search(bundle, most)
+    with closing(search.stage.env):
+        for reduce in (_adversaries, _columns, _segments, _channels, _amplitude, _scene):
+            reduce(search)
+        return search.bundle(bundle)
+
+
+class _Search:
+    """What is left of a failure, and what its parts cost."""
+
+    def __init__(self, bundle: Bundle, most: int) -> None:
+        self.stage = Stage(bundle)
+        self.left = self.stage.original
+        self._most = most
+
+    @property
+    def neutral(self) -> Floats:
+        """The middle of the space; where a parameter stands for one of two categories, that is not touched."""
+        space = self.stage.space
+        middle = (space.low + space.high) / 2
+        kept = np.array([bool(parameter.categories) for parameter in space.parameters])
+        return np.where(kept, self.left.scene, middle)
+
+    def take(self, variant: Variant) -> bool:
+        """Goes on with a variant if it fails in the same way and not on a knife's edge."""
+        if self.stage.played + 1 + 2 * COPIES > self._most:  # it is counted once more in the end
+            return False
+        found = self.stage.play(variant)
+        if not alike(found, self.stage.collision) or found is None or _grade(found) != _grade(self.stage.collision):
+            return False
+        if not self._holds(variant):
+            return False
+        self.left = variant
+        return True
+
+    def _holds(self, variant: Variant) -> bool:
+        """Whether enough of its copies fail; played no further than it takes to know."""
+        failed = 0
+        for played, copy in enumerate(self.stage.copies(variant, SHARE, COPIES), 1):
+            failed += self.stage.fails(copy)
+            if failed == HELD or played - failed > COPIES - HELD:
+                break
+        return failed == HELD
+
+    def bundle(self, origin: Bundle) -> Bundle:
+        """What is left, as a failure of its own."""
+        stage, left = self.stage, self.left
+        held = sum(stage.fails(copy) for copy in stage.copies(left, SHARE, COPIES))
+        played = play(stage.env, stage.scene(left), left.seed, left.actions)
+        assert played.collision is not None  # of its own, or it would not have been taken
+        episode = origin.manifest.episode.model_copy(
+            update={
+                "scene": dict(stage.scene(left).values),
+                "reason": "",
+                "steps": len(played.signal_heads) - 1,
+                "risk_return": played.risk_return,
+                "shaped_return": played.risk_return,  # nobody was trained on it
+                "mean_cost": played.mean_cost,
+                "min_ttc_s": stage.env.trace.min_ttc_s,
+                "min_robustness": stage.env.trace.min_robustness,
+                "objective": None,
+                "collision": played.collision,
+            }
+        )
+        core = Core(
+            before=_extent(stage.original),
+            after=_extent(replace(left, actions=left.actions[: episode.steps])),
+            plain_parameters=int(np.isclose(left.scene, self.neutral).sum()),
+            parameters=len(left.scene),
+            episodes=stage.played,
+            held=held,
+            copies=COPIES,
+            sentence=sentence(played.series, played.collision),
+        )
+        return make_bundle(origin.manifest.spec, episode, played.series, played.signal_heads, core)
+
+
+def _grade(collision: Collision) -> Grade | None:
+    return collision.judgement.grade if collision.judgement else None
+
+
+def _adversaries(search: _Search) -> None:
+    """Leaves adversaries to SUMO: who struck comes last."""
+    names = search.stage.env.problem.family.adversaries
+    active = [k for k in range(len(names)) if search.left.actions[:, 2 * k : 2 * k + 2].any()]
+    active.sort(key=lambda k: names[k] == search.stage.collision.other_id)
+
+    def unneeded(chunk: Sequence[int]) -> bool:
+        columns = [column for k in chunk for column in (2 * k, 2 * k + 1)]
+        return search.take(_zeroed(search.left, [(slice(None), column) for column in columns]))
+
+    without(active, unneeded)
+
+
+def _columns(search: _Search) -> None:
+    """Takes all the drive or all the steering out of an adversary."""
+
+    def unneeded(chunk: Sequence[int]) -> bool:
+        return search.take(_zeroed(search.left, [(slice(None), column) for column in chunk]))
+
+    without(np.flatnonzero(search.left.actions.any(axis=0)).tolist(), unneeded)
+
+
+def _segments(search: _Search) -> None:
+    """Leaves an adversary to SUMO for 0.5 s at a time."""
+
+    def unneeded(chunk: Sequence[Segment]) -> bool:
+        cells = [(_rows(segment), slice(2 * k, 2 * k + 2)) for k, segment in chunk]
+        return search.take(_zeroed(search.left, cells))
+
+    without(_segments_of(search.left), unneeded)
+
+
+def _channels(search: _Search) -> None:
+    """Takes the drive or the steering out of a segment."""
+
+    def unneeded(chunk: Sequence[Channel]) -> bool:
+        return search.take(_zeroed(search.left, [(_rows(segment), column) for column, segment in chunk]))
+
+    without(_channels_of(search.left), unneeded)
+
+
+def _amplitude(search: _Search) -> None:
+    """Does all of it less, as long as that is possible."""
+    while any(search.take(_weaker(search.left, factor)) for factor in AMPLITUDES):
+        pass
+
+
+def _scene(search: _Search) -> None:
+    """Moves parameters to the middle of their ranges, and those that cannot be moved there half the way."""
+
+    def unneeded(share: float, chunk: Sequence[int]) -> bool:
+        scene = search.left.scene.copy()
+        chosen = list(chunk)
+        scene[chosen] += share * (search.neutral[chosen] - scene[chosen])
+        return search.take(replace(search.left, scene=scene))
+
+    for share in (1.0, 0.5):
+        odd = np.flatnonzero(~np.isclose(search.left.scene, search.neutral))
+        without(odd.tolist(), partial(unneeded, share))
+
+
+def without(units: Sequence[Unit], unneeded: Callable[[Sequence[Unit]], bool]) -> None:
+    """Tries to do without units: without all of them, then halves, quarters and so on of what is left, then each.
+
+    Args:
+      units: that are there.
+      unneeded: tries to do without some, from now on; whether that is possible.
+    """
+    left, size = list(units), len(units)
+    while size:
+        chunks = [left[first : first + size] for first in range(0, len(left), size)]
+        left = [unit for chunk in chunks if not unneeded(chunk) for unit in chunk]
+        size //= 2
+
+
+def _zeroed(variant: Variant, cells: Sequence[tuple[slice, slice | int]]) -> Variant:
+    actions = variant.actions.copy()
+    for cell in cells:
+        actions[cell] = 0.0
+    return replace(variant, actions=actions)
+
+
+def _weaker(variant: Variant, factor: float) -> Variant:
+    return replace(variant, actions=(factor * variant.actions).astype(variant.actions.dtype))
+
+
+def _rows(segment: int) -> slice:
+    return slice(segment * SEGMENT, (segment + 1) * SEGMENT)
+
+
+def _channels_of(variant: Variant) -> list[Channel]:
+    """Those in which something is done, the earliest first."""
+    count = -(-len(variant.actions) // SEGMENT)
+    columns = range(variant.actions.shape[1])
+    return [(c, s) for s in range(count) for c in columns if variant.actions[_rows(s), c].any()]
+
+
+def _segments_of(variant: Variant) -> list[Segment]:
+    return list(dict.fromkeys((column // 2, segment) for column, segment in _channels_of(variant)))
+
+
+def _extent(variant: Variant) -> Extent:
+    segments = _segments_of(variant)
+    return Extent(
+        adversaries=len({k for k, _ in segments}),
+        segments=len(segments),
+        channels=len(_channels_of(variant)),
+        strongest=float(np.abs(variant.actions).max(initial=0.0)),
+    )

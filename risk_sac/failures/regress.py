@@ -1,0 +1,161 @@
+"""Old failures against another ego: which are fixed, and which are not.
+
+Each is first played with its own ego, so that nothing counts as fixed that would not have failed here anyway. Then the
+other ego meets the recorded actions; after them the policy that found the failure acts on, where there is one, or else
+nobody: a contact that was put off is none that was avoided. Where scripts found it, they are followed once more as
+well: they go by where the ego is, and recorded actions miss one that drives a little faster or slower.
+"""
+
+from contextlib import closing
+from enum import StrEnum
+from functools import partial
+
+import numpy as np
+
+from risk_sac.agents.follower import ScriptFollower
+from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.env import RiskSacEnv
+from risk_sac.errors import InfeasibleScene, RiskSacError
+from risk_sac.failures.bundle import Bundle, code_digest, versions, world_of
+from risk_sac.failures.play import Played, Policy, play
+from risk_sac.failures.trajectory import actions_of, trajectory_digest
+from risk_sac.failures.variants import alike
+from risk_sac.problem import Problem
+from risk_sac.records import Collision, Grade, Record
+from risk_sac.types import Floats, Scene
+from risk_sac.verdicts.distinct import signature_of
+
+
+class Verdict(StrEnum):
+    """What became of a failure."""
+
+    FIXED = "fixed"
+    STILL_FAILING = "still_failing"
+    NEW_KIND = "new_kind"  # another striker, or another type of conflict
+    FLAKY = "flaky"  # not the same twice
+    NOT_COMPARABLE = "not_comparable"
+
+
+WORSE = (Verdict.FIXED, Verdict.NEW_KIND, Verdict.STILL_FAILING)
+
+
+class Case(Record):
+    """One failure, against the other ego."""
+
+    id: str
+    name: str
+    """Its signature, in words."""
+    grade: Grade | None
+    verdict: Verdict
+    reason: str
+    """In words: what happened instead, or why it cannot be compared."""
+    known: bool = False
+    """Whether a baseline has it with the same verdict."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it keeps nobody from going on."""
+        return self.known or self.verdict is Verdict.FIXED
+
+
+class Regression(Record):
+    """All cases, in the order of the failures."""
+
+    ego: EgoConfig
+    cases: tuple[Case, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether all of them are fixed or known."""
+        return all(case.passed for case in self.cases)
+
+    def beside(self, baseline: "Regression") -> "Regression":
+        """With the cases marked as known that the baseline has with the same verdict."""
+        known = {(case.id, case.verdict) for case in baseline.cases}
+        cases = (case.model_copy(update={"known": (case.id, case.verdict) in known}) for case in self.cases)
+        return self.model_copy(update={"cases": tuple(cases)})
+
+
+def regress(bundle: Bundle, ego: EgoConfig, policy: Policy | None = None) -> Case:
+    """Plays one failure against another ego.
+
+    Args:
+      bundle: of the failure.
+      ego: the other one.
+      policy: that acts once the recorded actions have ended.
+    """
+    manifest = bundle.manifest
+    collision = manifest.episode.collision
+    name = signature_of(collision) if collision else "no contact"
+    grade = collision.judgement.grade if collision and collision.judgement else None
+    verdict, reason = _judge(bundle, collision, ego, policy)
+    return Case(id=manifest.id, name=name, grade=grade, verdict=verdict, reason=reason)
+
+
+def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig, policy: Policy | None) -> tuple[Verdict, str]:
+    manifest = bundle.manifest
+    if wanted is None or not wanted.valid:
+        return Verdict.NOT_COMPARABLE, "it is no valid failure"
+    try:
+        here = world_of(manifest.spec, manifest.episode)
+        changed = [name for name, digest in here.items() if manifest.world.get(name) != digest]
+        if changed:
+            return Verdict.NOT_COMPARABLE, f"it was found on another {changed[0]}"
+        own = _play(manifest.spec, bundle, None)
+        if trajectory_digest(own.series) != manifest.digest:
+            if (manifest.code, manifest.versions) == (code_digest(), versions()):
+                return Verdict.FLAKY, "with its own ego it goes another way than recorded"
+            if not alike(own.collision, wanted):
+                return Verdict.NOT_COMPARABLE, "with its own ego it does not happen under this code and these packages"
+        other = manifest.spec.model_copy(update={"ego": ego})
+        attacks = {"recorded actions": partial(_play, other, bundle, policy)}
+        if manifest.episode.script is not None:
+            attacks["its scripts"] = partial(_follow, other, bundle)
+        found = {}
+        for name, attack in attacks.items():
+            first, second = attack(), attack()
+            if trajectory_digest(first.series) != trajectory_digest(second.series):
+                return Verdict.FLAKY, f"with {name} this ego went another way the second time"
+            found[name] = _compared(first.collision, wanted)
+    except InfeasibleScene as error:
+        return Verdict.NOT_COMPARABLE, f"its scene is refused with this ego: {error.reason}"
+    except RiskSacError as error:
+        return Verdict.NOT_COMPARABLE, str(error)
+    worst = max((verdict for verdict, _ in found.values()), key=WORSE.index)
+    reasons = [f"with {name} {reason}" for name, (verdict, reason) in found.items() if verdict is worst]
+    return worst, "; ".join(reasons)
+
+
+def _compared(found: Collision | None, wanted: Collision) -> tuple[Verdict, str]:
+    if found is None:
+        return Verdict.FIXED, "nobody is touched"
+    touched = f"touches {found.other_id} at {found.ego_speed_mps:.1f} m/s"
+    if not found.valid:
+        broken = ", ".join(rule for rule, passed in found.verdicts.items() if not passed)
+        return Verdict.FIXED, f"{touched}, which is not its failure: {broken}"
+    if alike(found, wanted):
+        return Verdict.STILL_FAILING, touched
+    return Verdict.NEW_KIND, f"{touched}: {signature_of(found)}"
+
+
+def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:
+    """The recorded actions, and the rest of the horizon."""
+    problem, actions = Problem.from_spec(spec), actions_of(bundle.series)
+    if policy is None:
+        rest = problem.family.horizon_steps - len(actions)
+        actions = np.vstack((actions, np.zeros((rest, actions.shape[1]), dtype=actions.dtype)))
+    return _played(spec, problem, bundle, actions, policy)
+
+
+def _follow(spec: RunSpec, bundle: Bundle) -> Played:
+    """The scripts that found the failure, from the release on."""
+    problem = Problem.from_spec(spec)
+    follower = ScriptFollower(problem.family)
+    follower.begin(np.array(bundle.manifest.episode.script))
+    return _played(spec, problem, bundle, np.empty((0, 2 * len(problem.family.adversaries))), follower.act)
+
+
+def _played(spec: RunSpec, problem: Problem, bundle: Bundle, actions: Floats, policy: Policy | None) -> Played:
+    episode = bundle.manifest.episode
+    with closing(RiskSacEnv(problem, spec.learner.reward)) as env:
+        return play(env, Scene(spec.family, episode.scene), episode.seed, actions, policy)

@@ -1,0 +1,101 @@
+"""What happens in a failure, in one sentence: where the striker was, what it did, and what the ego did about it."""
+
+import math
+
+import numpy as np
+
+from risk_sac.failures.trajectory import Series
+from risk_sac.records import Collision
+from risk_sac.types import STEP_S, Floats, Kind
+from risk_sac.verdicts.conflict import BRAKES_MPS2
+from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
+
+IN_LANE_M = 1.5  # who is nearer to the ego's axis leads it, or follows
+SAME_WAY_COS, ONCOMING_COS = math.cos(math.radians(30.0)), math.cos(math.radians(135.0))
+ACROSS_MPS = 0.2  # slower than that nobody changes its place in a lane
+ACTS_MPS2 = 1.5
+
+
+def sentence(series: Series, collision: Collision) -> str:
+    """Such as "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.5 s late".
+
+    Args:
+      series: of the episode, up to the contact.
+      collision: that it ended in, judged.
+    """
+    assert collision.judgement is not None
+    since = series["time_s"] - series["released_s"]
+    striker = [str(name) for name in series["ids"]].index(collision.other_id)
+    began = min(int(np.searchsorted(since, collision.judgement.conflict_s - 1e-6)), len(since) - 1)
+    begins = int(np.searchsorted(since, -1e-6))
+    does = _does(series, striker, begins)
+    first = min(began, does[0]) if does else began
+    who = _who(series, striker, first)
+    what = does[1] if does else f"goes on at {series['speed_mps'][first, striker]:.0f} m/s"
+    return f"{who}, {what}; ego at {series['speed_mps'][began, 0]:.0f} m/s {_response(series, began)}"
+
+
+def _who(series: Series, striker: int, at: int) -> str:
+    """Who and where it is in the ego's frame."""
+    x, y = (series[name][at, striker] - series[name][at, 0] for name in ("x_m", "y_m"))
+    heading = series["heading_rad"][at, 0]
+    turn = series["heading_rad"][at, striker] - heading
+    ahead_m, left_m = x * math.cos(heading) + y * math.sin(heading), y * math.cos(heading) - x * math.sin(heading)
+    side = "left" if left_m > 0.0 else "right"
+    if series["kind"][striker] == Kind.PEDESTRIAN:
+        name = f"pedestrian on the {side}"
+    elif math.cos(turn) > SAME_WAY_COS:
+        name = f"{side} neighbour" if abs(left_m) > IN_LANE_M else "leader" if ahead_m > 0.0 else "follower"
+    elif math.cos(turn) < ONCOMING_COS:
+        name = "oncoming vehicle"
+    else:
+        name = f"vehicle from the {side}"
+    if abs(ahead_m) < 1.0:
+        return f"{name}, level with it"
+    return f"{name}, {abs(ahead_m):.0f} m {'ahead' if ahead_m > 0.0 else 'behind'}"
+
+
+def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
+    """Since which frame, and what, a striker does of its own; None if it drives or walks on as it did."""
+    parts: list[tuple[int, str]] = []
+    accel, across = series["accel_mps2"][begins:, striker], series["lateral_mps"][begins:, striker]
+    if series["kind"][striker] == Kind.VEHICLE:
+        for way, sign in (("left", 1.0), ("right", -1.0)):
+            if frames := _lasting(sign * across, ACROSS_MPS):
+                peak = float((sign * across[frames]).max())
+                parts.append((frames[0], f"moves {way} at {peak:.1f} m/s for {len(frames) * STEP_S:.1f} s"))
+        limit = ACTS_MPS2
+    else:
+        limit = ACTS_MPS2 / 3
+    for verb, sign in (("brakes", -1.0), ("speeds up", 1.0)):
+        if frames := _lasting(sign * accel, limit):
+            peak = float((sign * accel[frames]).max())
+            parts.append((frames[0], f"{verb} at {peak:.1f} m/s² for {len(frames) * STEP_S:.1f} s"))
+    if not parts:
+        return None
+    parts.sort()
+    return begins + parts[0][0], ", then ".join(text for _, text in parts)
+
+
+def _lasting(values: Floats, limit: float) -> list[int]:
+    """The last stretch of frames above a limit that lasts two frames or more."""
+    frames: list[int] = []
+    for t in range(len(values) - 1, -1, -1):
+        if values[t] > limit:
+            frames.insert(0, t)
+        elif len(frames) >= 2:
+            break
+        else:
+            frames = []
+    return frames if len(frames) >= 2 else []
+
+
+def _response(series: Series, began: int) -> str:
+    speed, accel = series["speed_mps"][began:, 0], series["accel_mps2"][began:, 0]
+    if speed.max() < 0.5:
+        return "stands"
+    braked = np.flatnonzero(accel <= -BRAKES_MPS2)
+    if len(braked) == 0:
+        return "does not brake"
+    late_s = braked[0] * STEP_S - CAREFUL_PERCEIVES_S - CAREFUL_DELAY_S
+    return f"brakes {late_s:.1f} s late" if late_s > STEP_S / 2 else "brakes, and touches it still"

@@ -1,0 +1,104 @@
+"""A failure's episode as it might have been: in another scene, with other actions, in other traffic."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from risk_sac.env import RiskSacEnv
+from risk_sac.errors import InfeasibleScene, SimulationError
+from risk_sac.failures.bundle import Bundle
+from risk_sac.failures.trajectory import actions_of
+from risk_sac.records import Collision
+from risk_sac.scenario.space import SceneSpace
+from risk_sac.types import STEP_S, Floats, Scene
+
+TAIL_S = 3.0  # that is played on without any action: what is done less, or elsewhere, takes longer to end in a contact
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Variant:
+    """What an episode is determined by."""
+
+    scene: Floats  # in the order of the space's parameters, d
+    actions: Floats  # from the release on, T x two for each adversary; 0 is what SUMO's driver would do anyway
+    seed: int
+
+    def perturbed(self, space: SceneSpace, scene: float, actions: float, random: np.random.Generator) -> "Variant":
+        """A copy moved by up to a share of each parameter's range, and of each action."""
+        shift = random.uniform(-scene, scene, len(self.scene)) * (space.high - space.low)
+        factors = 1.0 + random.uniform(-actions, actions, self.actions.shape)
+        return replace(
+            self,
+            scene=np.clip(self.scene + shift, space.low, space.high),
+            actions=(self.actions * factors).clip(-1.0, 1.0).astype(self.actions.dtype),
+        )
+
+
+class Stage:
+    """Plays variants of one failure.
+
+    Attributes:
+      original: the failure as it was, and a tail of no action.
+      played: episodes so far.
+    """
+
+    def __init__(self, bundle: Bundle) -> None:
+        """Starts no simulation.
+
+        Raises:
+          ValueError: what the bundle holds ended without a contact.
+        """
+        episode = bundle.manifest.episode
+        if episode.collision is None or episode.collision.judgement is None:
+            raise ValueError(f"{bundle.manifest.id} ended without a contact that was judged")
+        self.env = RiskSacEnv.of(bundle.manifest.spec)
+        self.space = self.env.problem.space
+        self.collision: Collision = episode.collision
+        self.original = Variant(
+            scene=np.array([episode.scene[name] for name in self.space.names]),
+            actions=_with_tail(actions_of(bundle.series), self.env.problem.family.horizon_steps),
+            seed=episode.seed,
+        )
+        self.played = 0
+
+    def scene(self, variant: Variant) -> Scene:
+        """As the environment takes it."""
+        return Scene(self.space.family, dict(zip(self.space.names, variant.scene.tolist(), strict=True)))
+
+    def play(self, variant: Variant) -> Collision | None:
+        """The contact that a variant ends in; None without one, or if its scene is infeasible."""
+        self.played += 1
+        try:
+            self.env.reset(seed=variant.seed, options={"scene": self.scene(variant)})
+            for action in variant.actions:
+                *_, touched, _, info = self.env.step(action)
+                if touched:
+                    collision: Collision = info["collision"]
+                    return collision
+        except (InfeasibleScene, SimulationError):
+            pass
+        return None
+
+    def fails(self, variant: Variant) -> bool:
+        """Whether the ego fails as it did: a valid contact with the same striker, in the same type of conflict."""
+        return alike(self.play(variant), self.collision)
+
+    def copies(self, variant: Variant, share: float, count: int, seed: int = 0) -> Iterator[Variant]:
+        """Copies whose scene and actions are perturbed by up to a share; the same seed draws the same."""
+        random = np.random.default_rng(seed)
+        for _ in range(count):
+            yield variant.perturbed(self.space, share, share, random)
+
+
+def alike(found: Collision | None, wanted: Collision) -> bool:
+    """Whether a contact is valid, with the same striker, and came about in the same type of conflict."""
+    if found is None or not found.valid or found.judgement is None or wanted.judgement is None:
+        return False
+    same_type = found.judgement.conflict_type is wanted.judgement.conflict_type
+    return same_type and found.other_id == wanted.other_id
+
+
+def _with_tail(actions: Floats, horizon_steps: int) -> Floats:
+    steps = min(round(TAIL_S / STEP_S), horizon_steps - len(actions))
+    return np.vstack((actions, np.zeros((steps, actions.shape[1]), dtype=actions.dtype)))

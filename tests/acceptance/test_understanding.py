@@ -1,0 +1,240 @@
+"""Real failures: bundled, minimised, their regions, their twins, and played against other egos."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from risk_sac.cli import main
+from risk_sac.env import RiskSacEnv
+from risk_sac.failures.bundle import Bundle, read_bundle
+from risk_sac.failures.collect import policy_of
+from risk_sac.failures.minimise import COPIES, HELD, MOST, SHARE
+from risk_sac.failures.play import play
+from risk_sac.failures.regress import Regression, Verdict
+from risk_sac.failures.trajectory import actions_of
+from risk_sac.failures.variants import Stage
+from risk_sac.run_folder.results import read_results
+from risk_sac.run_folder.verified import distinct_failures
+from tests.acceptance.test_bundle import changed, manifest, series
+
+RUN = ["--family", "low", "--method", "archive", "--seed", "3", "--episodes", "60"]
+Told = tuple[int, str, str]
+Tell = Callable[..., Told]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("understood") / "run"
+    assert main(["run", *RUN, "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def failures(run: Path) -> Path:
+    """A bundle of every distinct failure."""
+    folder = run.parent / "failures"
+    assert main(["bundle", str(run), "--out", str(folder)]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def failure(failures: Path) -> Path:
+    """The first that is no needle: of one that is, hardly anything can be taken away."""
+    for file in sorted(failures.iterdir()):
+        stage = Stage(read_bundle(file))
+        with closing(stage.env):
+            if all(stage.fails(copy) for copy in stage.copies(stage.original, SHARE, COPIES)):
+                return file
+    raise AssertionError("all of them are needles")
+
+
+@pytest.fixture
+def tell(capsys: pytest.CaptureFixture[str]) -> Tell:
+    def told(*arguments: object) -> Told:
+        capsys.readouterr()
+        status = main([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        return status, " ".join(printed.out.split()), " ".join(printed.err.split())
+
+    return told
+
+
+def struck(bundle: Bundle) -> tuple[object, ...]:
+    collision = bundle.manifest.episode.collision
+    assert collision is not None
+    assert collision.judgement is not None
+    return collision.valid, collision.other_id, collision.judgement.conflict_type, collision.judgement.grade
+
+
+def test_every_distinct_failure_has_a_bundle(run: Path, failures: Path) -> None:
+    spec = read_results(run).spec
+    expected = {episode.id_in(spec.id) for episode in distinct_failures(read_results(run))}
+    assert len(expected) >= 2
+    assert {file.stem for file in failures.iterdir()} == expected
+
+
+def test_a_core_does_less_and_fails_in_the_same_way_as_surely(failure: Path, tmp_path: Path, tell: Tell) -> None:
+    status, out, _ = tell("minimise", failure, "--out", tmp_path / "core.npz")
+    assert status == 0
+    origin, minimal = read_bundle(failure), read_bundle(tmp_path / "core.npz")
+    core = minimal.manifest.core
+    assert core is not None
+    assert core.sentence in out
+    assert struck(minimal) == struck(origin)
+    assert core.held >= HELD
+    assert core.episodes <= MOST
+    assert core.after.segments < core.before.segments
+    assert core.after.adversaries <= core.before.adversaries
+    done = np.count_nonzero(np.nan_to_num(minimal.series["actions"]))
+    assert 0 < done < np.count_nonzero(np.nan_to_num(origin.series["actions"]))
+    assert tell("replay", tmp_path / "core.npz")[0] == 0
+
+
+def test_a_region_is_told_with_its_intervals(failure: Path, tmp_path: Path, tell: Tell) -> None:
+    status, out, _ = tell("region", failure, "--out", tmp_path / "region.json")
+    assert status == 0
+    shares = json.loads((tmp_path / "region.json").read_bytes())["shares"]
+    assert [(share["what"], share["played"]) for share in shares] == [
+        ("scene by 1%", 40),
+        ("scene by 2%", 40),
+        ("scene by 5%", 40),
+        ("other traffic", 10),
+        ("actions by 5%", 40),
+    ]
+    assert all(share["low"] <= share["failed"] / share["played"] <= share["high"] for share in shares)
+    assert ("no needle" in out) == (shares[0]["failed"] >= 20)
+
+
+def test_clusters_name_every_distinct_failure_once(run: Path, tmp_path: Path, tell: Tell) -> None:
+    status, out, _ = tell("clusters", run, "--out", tmp_path / "clusters.json")
+    assert status == 0
+    found = json.loads((tmp_path / "clusters.json").read_bytes())
+    metrics = read_results(run).metrics
+    assert metrics is not None
+    assert sum(cluster["distinct"] for cluster in found["clusters"]) == metrics.distinct_failures
+    assert {cluster["name"]: cluster["failures"] for cluster in found["clusters"]} == metrics.signatures
+    assert found["covered"] == metrics.covered
+    assert f"{len(found['clusters'])} kind" in out
+
+
+@pytest.mark.parametrize("twin", ["idle", "careful"])
+def test_a_twin_is_drawn_beside_a_failure(twin: str, run: Path, tell: Tell) -> None:
+    status, out, _ = tell("show", run, distinct_failures(read_results(run))[0].index, "--twin", twin)
+    assert status == 0
+    (picture,) = (run / "failures").glob(f"*-{twin}.png")
+    assert str(picture) in out.replace(" ", "")
+    picture.unlink()
+
+
+def regressed(tell, tmp_path: Path, *arguments: object) -> tuple[int, list[Verdict]]:
+    status, *_ = tell("regress", *arguments, "--out", tmp_path / "cases.json")
+    return status, [
+        case.verdict for case in Regression.model_validate_json((tmp_path / "cases.json").read_bytes()).cases
+    ]
+
+
+def test_with_its_own_ego_every_failure_still_fails_and_a_baseline_accepts_that(
+    failures: Path,
+    tmp_path: Path,
+    tell,
+) -> None:
+    status, verdicts = regressed(tell, tmp_path, "--failures", failures, "--ego", "default")
+    assert status == 1
+    assert set(verdicts) == {Verdict.STILL_FAILING}
+    (tmp_path / "cases.json").rename(tmp_path / "known.json")
+    again = ("--failures", failures, "--ego", "default", "--baseline", tmp_path / "known.json")
+    assert regressed(tell, tmp_path, *again)[0] == 0
+
+
+def test_a_better_ego_fixes_more_than_a_worse_one(failures: Path, tmp_path: Path, tell: Tell) -> None:
+    (tmp_path / "slow.yaml").write_text("reaction_time_s: 1.0\n")
+    fixed = {}
+    for ego in ("perfect", tmp_path / "slow.yaml"):
+        _, verdicts = regressed(tell, tmp_path, "--failures", failures, "--ego", ego)
+        fixed[str(ego)] = verdicts.count(Verdict.FIXED)
+    better, worse = fixed.values()
+    assert better > worse
+
+
+def test_what_is_flaky_or_of_another_net_never_counts_as_fixed(failure: Path, tmp_path: Path, tell: Tell) -> None:
+    def tamper(arrays: dict[str, np.ndarray]) -> None:
+        series(arrays, actions=np.where(np.isnan(arrays["actions"]), np.nan, -arrays["actions"]))
+
+    sets = tmp_path / "set"
+    sets.mkdir()
+    changed(failure, sets / "flaky.npz", tamper)
+    changed(failure, sets / "net.npz", lambda arrays: manifest(arrays, world={}))
+    status, verdicts = regressed(tell, tmp_path, "--failures", sets, "--ego", "careful", "--junit", tmp_path / "j.xml")
+    assert status == 1
+    assert verdicts == [Verdict.FLAKY, Verdict.NOT_COMPARABLE]
+    assert (tmp_path / "j.xml").read_text().count("<error") == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--ego", "nobody.yaml"], "nobody.yaml cannot be read"),
+        (["--ego", "default", "--baseline", "nothing.json"], "there is no nothing.json"),
+    ],
+    ids=["no ego", "no baseline"],
+)
+def test_what_is_missing_is_said_before_anything_is_played(
+    arguments: list[str],
+    complaint: str,
+    failures: Path,
+    tmp_path: Path,
+    tell,
+) -> None:
+    status, _, err = tell("regress", "--failures", failures, *arguments, "--out", tmp_path / "cases.json")
+    assert status == 2
+    assert complaint in err
+    assert not (tmp_path / "cases.json").exists()
+
+
+def test_an_empty_set_is_refused(tmp_path: Path, tell: Tell) -> None:
+    status, _, err = tell("regress", "--failures", tmp_path, "--ego", "default")
+    assert status == 2
+    assert "there is no failure in" in err
+
+
+class Sharp:
+    """A policy that drives as hard as it can, and counts."""
+
+    def __init__(self, size: int) -> None:
+        self.size, self.asked = size, 0
+
+    def __call__(self, observation: np.ndarray) -> np.ndarray:
+        self.asked += 1
+        return np.ones(self.size, np.float32)
+
+
+def test_a_policy_acts_on_when_the_recorded_actions_have_ended(failure: Path) -> None:
+    stage = Stage(read_bundle(failure))
+    with closing(stage.env):
+        sharp = Sharp(stage.env.action_size)
+        early = stage.original.actions[:5]
+        played = play(stage.env, stage.scene(stage.original), stage.original.seed, early, sharp)
+    acted = actions_of(played.series)
+    assert sharp.asked == len(acted) - 5 > 0
+    np.testing.assert_array_equal(acted[:5], early)
+    assert (acted[5:] == 1.0).all()
+
+
+def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run: Path, tmp_path: Path) -> None:
+    learner = ["run", "--family", "low", "--method", "risk-sac", "--seed", "3", "--episodes", "3"]
+    subprocess.run([sys.executable, "-m", "risk_sac", *learner, "--out", tmp_path / "run"], check=True)
+    policy = policy_of(tmp_path / "run")
+    assert policy is not None
+    env = RiskSacEnv.of(read_results(tmp_path / "run").spec)
+    with closing(env):
+        observation, _ = env.reset(seed=1)
+        first, second = policy(observation), policy(observation)
+    assert first.shape == (env.action_size,)
+    np.testing.assert_array_equal(first, second)  # it does not explore
+    assert policy_of(run) is None

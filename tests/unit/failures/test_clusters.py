@@ -1,0 +1,42 @@
+import pytest
+
+from risk_sac.failures.clusters import overview, vendi
+from risk_sac.records import Collision, EpisodeRecord, Grade, Outcome
+from tests.builders import collision, episode_record, judgement
+
+
+def failure(signature: str, grade: Grade, **changes: float) -> Collision:
+    return collision(verdicts={"ego_moving": True}, judgement=judgement(grade, signature=signature), **changes)
+
+
+def found(*collisions: Collision) -> list[tuple[str, EpisodeRecord]]:
+    return [
+        (f"e{i}", episode_record(i, Outcome.FAILURE, steps=90 - i, collision=each)) for i, each in enumerate(collisions)
+    ]
+
+
+def test_failures_of_a_signature_are_a_cluster_with_the_most_preventable_and_shortest_first() -> None:
+    cut_in = [failure("cut-in", grade) for grade in (Grade.UNAVOIDABLE, Grade.CAREFUL, Grade.IDEAL, Grade.CAREFUL)]
+    overviewed = overview(found(*cut_in, *[failure("leader", Grade.IDEAL)] * 9))
+    first, second = overviewed.clusters
+    assert (first.name, first.failures, first.preventable, first.distinct) == ("cut-in", 4, 2, 1)
+    assert (first.representative, first.grade) == ("e3", Grade.CAREFUL)
+    assert (second.name, second.failures, second.preventable) == ("leader", 9, 0)
+    assert overviewed.covered == 1  # the signature is no part of the taxonomy
+    assert overviewed.cells == 1440
+
+
+def test_contacts_that_are_no_failures_are_left_out() -> None:
+    invalid = collision(verdicts={"ego_moving": False}, judgement=judgement(None))
+    unjudged = collision(verdicts={"ego_moving": True})
+    nothing = overview([*found(invalid, unjudged), ("e9", episode_record(9, Outcome.SAFE))])
+    assert (nothing.clusters, nothing.vendi, nothing.covered) == ((), 0.0, 0)
+
+
+def test_the_vendi_score_counts_what_has_nothing_in_common() -> None:
+    one = failure("cut-in", Grade.CAREFUL)
+    assert vendi([]) == 0.0
+    assert vendi([[one] * 7]) == pytest.approx(1.0)
+    assert vendi([[one], [one], [one]]) == pytest.approx(3.0)
+    near, far = (failure("cut-in", Grade.CAREFUL, relative_speed_mps=speed) for speed in (7.5, 20.0))
+    assert 1.0 < vendi([[one, near]]) < vendi([[one, far]]) < 2.0

@@ -1,0 +1,39 @@
+from collections.abc import Sequence
+
+import pytest
+
+from risk_sac.failures.minimise import without
+
+
+class Needs:
+    """A failure that needs some of its units; counts what is tried."""
+
+    def __init__(self, units: Sequence[int], needed: set[int]) -> None:
+        self.left, self.needed, self.tried = set(units), needed, 0
+
+    def unneeded(self, chunk: Sequence[int]) -> bool:
+        self.tried += 1
+        assert set(chunk) <= self.left, "tried again what is gone already"
+        if self.needed & set(chunk):
+            return False
+        self.left -= set(chunk)
+        return True
+
+
+@pytest.mark.parametrize("needed", [set(), {0}, {11}, {3, 4}, {0, 5, 11}, set(range(12))])
+def test_what_is_not_needed_goes(needed: set[int]) -> None:
+    failure = Needs(range(12), needed)
+    without(range(12), failure.unneeded)
+    assert failure.left == needed
+
+
+def test_what_is_not_needed_together_costs_one_try() -> None:
+    failure = Needs(range(32), set())
+    without(range(32), failure.unneeded)
+    assert failure.tried == 1
+
+
+def test_nothing_at_all_is_not_tried() -> None:
+    failure = Needs((), set())
+    without((), failure.unneeded)
+    assert failure.tried == 0
