@@ -31,8 +31,9 @@ from service.settings import ServiceSettings
 from service.store.database import READERS, held
 from service.store.reading import Store
 from service.store.server import cursor_secret
-from service.views.pictures import Pictures
+from service.views.pictures import pictures as pictures_of_contacts
 from service.views.reports import Reports
+from service.views.studies import studies
 from service.workers.messages import Event
 from service.workers.program import program
 
@@ -106,7 +107,8 @@ def _context(settings: ServiceSettings, store: Store, manager: Manager, latencie
         store,
         manager,
         Reports(settings),
-        Pictures(settings),
+        pictures_of_contacts(settings),
+        studies(settings),
         Shelf(settings.networks_dir),
         Streams(store),
         Cursors(cursor_secret(store.engine)),

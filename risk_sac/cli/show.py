@@ -1,7 +1,6 @@
 """`risk-sac show`: the contacts of a run, and pictures of them."""
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
@@ -12,7 +11,6 @@ from risk_sac.cli.text import in_words
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.trajectory import actions_of
 from risk_sac.records import Judgement
 from risk_sac.run_folder.results import Results, read_results
 from risk_sac.run_folder.series import read_series
@@ -51,15 +49,9 @@ def _show(options: argparse.Namespace) -> int:
 
 def _twin(spec: RunSpec, recording: Recording, name: str) -> Recording:
     """The same scene with what the command line names changed."""
-    from risk_sac.failures.twin import IDLE, twin
+    from risk_sac.failures.twin import IDLE, twin_recording
 
-    ego = None if name == IDLE else read_ego(name)
-    episode = recording.contact.episode
-    played = twin(spec, episode, actions_of(recording.series), ego)
-    changed = "nobody attacks" if ego is None else f"ego: {name}"
-    found = played.collision
-    outcome = f"touches {found.other_id} at {found.ego_speed_mps:.1f} m/s" if found else "touches nobody"
-    return replace(recording, series=played.series, twin=f"{changed}: {outcome}")
+    return twin_recording(spec, recording, None if name == IDLE else read_ego(name), name)
 
 
 def _contacts(results: Results) -> Table:

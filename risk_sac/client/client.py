@@ -28,8 +28,9 @@ from risk_sac.records import Grade
 
 TIMEOUT_S = 30.0  # of silence within one answer
 PATIENCE_S = 10.0  # with a service that does not answer
+MAKING_S = 300.0  # with one that has something to play for its answer
 PAGE = 100  # items that are asked for at a time
-PNG = "image/png"
+PNG, BUNDLE = "image/png", "application/zip"
 RECONNECT_S = 1.0  # between two streams of events
 
 Query = dict[str, str | int | None]
@@ -148,12 +149,25 @@ class Client:
         """One collision with its full time series."""
         return self._get(Failure, f"{_path(campaign_id)}/failures/{_part(failure_id)}")
 
-    def picture(self, campaign_id: str, failure_id: str) -> bytes:
-        """One collision as a picture, PNG: both paths from above, and what was measured along the way."""
-        path = f"{_path(campaign_id)}/failures/{_part(failure_id)}/picture.png"
-        response = self._transport.ask("GET", path, patience_s=self._patience_s)
-        if response.headers.get("content-type") != PNG:
-            raise UnexpectedAnswer(response, PNG)
+    def picture(self, campaign_id: str, failure_id: str, twin: str | None = None) -> bytes:
+        """One collision as a picture, PNG: both paths from above, and what was measured along the way.
+
+        Args:
+          campaign_id: of the campaign.
+          failure_id: of the collision.
+          twin: draws beside it the same scene with nobody attacking (idle), or with this ego.
+        """
+        return self._made(campaign_id, failure_id, "picture.png" if twin is None else f"twins/{_part(twin)}.png", PNG)
+
+    def bundle(self, campaign_id: str, failure_id: str, *, core: bool = False) -> bytes:
+        """One collision in a file that stands alone, or its core, which takes some ten seconds."""
+        return self._made(campaign_id, failure_id, "core.npz" if core else "bundle.npz", BUNDLE)
+
+    def _made(self, campaign_id: str, failure_id: str, what: str, wanted: str) -> bytes:
+        path = f"{_path(campaign_id)}/failures/{_part(failure_id)}/{what}"
+        response = self._transport.ask("GET", path, patience_s=MAKING_S)
+        if response.headers.get("content-type") != wanted:
+            raise UnexpectedAnswer(response, wanted)
         return response.content
 
     def table(self, campaign_id: str, format_: Literal["json", "md", "csv"] = "md") -> str:

@@ -101,17 +101,22 @@ def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
     return {name: hashlib.sha256((files(WORLD) / name).read_bytes()).hexdigest() for name in (net, "vtypes.add.xml")}
 
 
+def bundle_bytes(bundle: Bundle) -> bytes:
+    """The content of its file."""
+    content = io.BytesIO()
+    arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
+    np.savez_compressed(content, allow_pickle=False, **arrays)
+    return content.getvalue()
+
+
 def write_bundle(file: Path, bundle: Bundle) -> None:
     """Writes the whole file or none.
 
     Raises:
       OSError: the disk refuses it.
     """
-    content = io.BytesIO()
-    arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
-    np.savez_compressed(content, allow_pickle=False, **arrays)
     file.parent.mkdir(parents=True, exist_ok=True)
-    replace_file(file, content.getbuffer())
+    replace_file(file, bundle_bytes(bundle))
 
 
 def read_bundle(file: Path) -> Bundle:

@@ -2,13 +2,13 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from risk_sac.metrics.features import outcome_features
 from risk_sac.records import Collision, EpisodeRecord, Grade, Record
-from risk_sac.verdicts.distinct import DistinctFailures, signature_of
+from risk_sac.verdicts.distinct import distinct_failures, signature_of
 from risk_sac.verdicts.taxonomy import CELLS, kind_of
 
 WIDTH = 0.25  # of the outcome features' ranges: failures farther apart than that are not much alike
@@ -34,14 +34,14 @@ class Overview(Record):
 
     clusters: tuple[Cluster, ...]
     vendi: float
-    """Vendi score: how many failures that have nothing in common would be as various; 0 without any."""
+    """Vendi score of the distinct failures: as many that have nothing in common would be as various; 0 without any."""
     covered: int
     """Cells of the taxonomy with a failure in them."""
     cells: int
     """Of the taxonomy; most of them hold what no ego and no road allows."""
 
 
-def overview(episodes: Sequence[tuple[str, EpisodeRecord]]) -> Overview:
+def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:
     """Sorts failures into clusters.
 
     Args:
@@ -55,25 +55,27 @@ def overview(episodes: Sequence[tuple[str, EpisodeRecord]]) -> Overview:
             continue
         found[signature_of(collision)].append((name, episode, collision))
         kinds.add(kind_of(collision, collision.judgement))
-    clusters = [_cluster(name, members) for name, members in found.items()]
+    distinct = {name: _distinct([collision for *_, collision in members]) for name, members in found.items()}
+    clusters = [_cluster(name, members, len(distinct[name])) for name, members in found.items()]
     clusters.sort(key=lambda cluster: (-cluster.preventable, -cluster.failures, cluster.name))
     return Overview(
         clusters=tuple(clusters),
-        vendi=vendi([[collision for *_, collision in members] for members in found.values()]),
+        vendi=vendi(list(distinct.values())),
         covered=len(kinds),
         cells=CELLS,
     )
 
 
-def _cluster(name: str, members: Sequence[tuple[str, EpisodeRecord, Collision]]) -> Cluster:
-    distinct = DistinctFailures()
-    for *_, collision in members:
-        distinct.add(collision)
+def _distinct(collisions: Sequence[Collision]) -> list[Collision]:
+    return [collisions[position] for position in distinct_failures(collisions)]
+
+
+def _cluster(name: str, members: Sequence[tuple[str, EpisodeRecord, Collision]], distinct: int) -> Cluster:
     first, _, collision = min(members, key=lambda member: _rank(member[1], member[2]))
     return Cluster(
         name=name,
         failures=len(members),
-        distinct=distinct.count,
+        distinct=distinct,
         preventable=sum(collision.preventable for *_, collision in members),
         representative=first,
         grade=collision.judgement.grade if collision.judgement else None,

@@ -4,12 +4,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 
-from risk_sac.config import METHODS
+from risk_sac.config import METHODS, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, SimulationError
 from risk_sac.failures.bundle import Bundle, make_bundle
-from risk_sac.failures.play import Policy, play
-from risk_sac.failures.trajectory import actions_of, trajectory_digest
+from risk_sac.failures.play import Played, Policy, play
+from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
 from risk_sac.records import EpisodeRecord
 from risk_sac.run import RunState
 from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
@@ -28,14 +28,24 @@ def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -
     spec = results.spec
     with closing(RiskSacEnv.of(spec)) as env:
         for episode in episodes:
-            file = folder / FAILURES / series_name(episode.index)
-            recorded = read_series(file)
-            if "released_s" not in recorded:
-                raise ConfigError(f"{file} is older than the release of adversaries", field="FAILURE")
-            played = play(env, Scene(spec.family, episode.scene), episode.seed, actions_of(recorded))
-            if trajectory_digest(played.series) != trajectory_digest(recorded):
-                raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here, so no bundle is made of it")
-            yield make_bundle(spec, episode, recorded, played.signal_heads)
+            recorded = read_series(folder / FAILURES / series_name(episode.index))
+            yield make_bundle(spec, episode, recorded, repeated(env, spec, episode, recorded).signal_heads)
+
+
+def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> Played:
+    """A contact played again, the same to the bit.
+
+    Raises:
+      SimulationError: it does not repeat.
+      ConfigError: its series is from before there was a release.
+    """
+    id_ = episode.id_in(spec.id)
+    if "released_s" not in recorded:
+        raise ConfigError(f"the series of {id_} is older than the release of adversaries", field="FAILURE")
+    played = play(env, Scene(spec.family, episode.scene), episode.seed, actions_of(recorded))
+    if trajectory_digest(played.series) != trajectory_digest(recorded):
+        raise SimulationError(f"{id_} does not repeat here, so no bundle is made of it")
+    return played
 
 
 def policy_of(folder: Path) -> Policy | None:

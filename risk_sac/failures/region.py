@@ -7,44 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from risk_sac.failures.bundle import Bundle
+from risk_sac.failures.surroundings import Region, Share
 from risk_sac.failures.variants import Stage, Variant
-from risk_sac.metrics import wilson_interval
-from risk_sac.records import Record
 
 SCENES, COPIES = (0.01, 0.02, 0.05), 40  # shares of the ranges of a scene's parameters, and copies at each
 SEEDS = 10  # of the traffic
 ACTIONS = 0.05
-NEEDLE = 0.5
-
-
-class Share(Record):
-    """Of the copies that differ from a failure in one way, those that fail as it does."""
-
-    what: str
-    """In which way they differ."""
-    failed: int
-    played: int
-    low: float
-    """Wilson's 95 % interval of the share."""
-    high: float
-
-    @classmethod
-    def of(cls, what: str, failed: int, played: int) -> "Share":
-        """With its interval."""
-        low, high = wilson_interval(failed, played)
-        return cls(what=what, failed=failed, played=played, low=low, high=high)
-
-
-class Region(Record):
-    """What surrounds a failure; the shares in the order of `region`."""
-
-    shares: tuple[Share, ...]
-
-    @property
-    def needle(self) -> bool:
-        """Whether fewer than half of the nearest scenes fail: a failure that one would hardly meet again."""
-        nearest = self.shares[0]
-        return nearest.failed < NEEDLE * nearest.played
 
 
 def region(bundle: Bundle) -> Region:

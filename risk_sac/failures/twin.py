@@ -1,18 +1,37 @@
 """The same scene with one thing changed: what was critical beside what is not, as in the paper's Fig. 2."""
 
 from contextlib import closing
+from dataclasses import replace
 
 import numpy as np
 
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.failures.play import Played, play
+from risk_sac.failures.recording import Recording
+from risk_sac.failures.trajectory import actions_of
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord
 from risk_sac.types import STEP_S, Floats, Scene
 
 IDLE = "idle"
 AFTER_S = 3.0  # how long a twin goes on after the contact that it is compared with
+
+
+def twin_recording(spec: RunSpec, recording: Recording, changed: EgoConfig | None, name: str = "") -> Recording:
+    """The twin of a recorded failure, to be drawn beside it; see `twin`.
+
+    Args:
+      spec: of the run that found it.
+      recording: of the failure.
+      changed: the other ego, or None.
+      name: of the other ego; its profile if not given.
+    """
+    played = twin(spec, recording.contact.episode, actions_of(recording.series), changed)
+    what = "nobody attacks" if changed is None else f"ego: {name or changed.profile}"
+    found = played.collision
+    outcome = f"touches {found.other_id} at {found.ego_speed_mps:.1f} m/s" if found else "touches nobody"
+    return replace(recording, series=played.series, twin=f"{what}: {outcome}")
 
 
 def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoConfig | None) -> Played:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunSpec
-from risk_sac.records import RECORDED, Phase
+from risk_sac.failures.clusters import Overview, overview
+from risk_sac.records import RECORDED, EpisodeRecord, Phase
 from risk_sac.report.budgets import HEADLINE, PAID_FOR, found_within
 from risk_sac.report.cells import Cell, cell_of, metrics_of
 from risk_sac.report.paired import PairedTest, corrected, paired_tests
@@ -36,6 +37,7 @@ class Comparison:
     missing: tuple[MissingRun, ...]
     cells: tuple[Cell, ...]  # by family, phase and method
     tests: tuple[PairedTest, ...]
+    overviews: Mapping[FamilyName, Overview]  # of the failures of all methods that repeat; families with runs alone
     headline: tuple[PairedTest, ...]  # what a user pays for, by family; declared before any run, so corrected by itself
 
     @property
@@ -93,6 +95,7 @@ def compare(
         for run in wanted
         if run.digest not in found
     )
+    families = dict.fromkeys(run.spec.family for run in kept)
     return Comparison(
         spec=spec,
         command=command,
@@ -103,8 +106,16 @@ def compare(
         missing=missing,
         cells=tuple(_cells(kept)),
         tests=tuple(_tests(spec, methods, kept)),
+        overviews={family: overview(_failures(family, kept)) for family in families},
         headline=tuple(_headline(spec, methods, kept)),
     )
+
+
+def _failures(family: FamilyName, runs: Sequence[FinishedRun]) -> Iterator[tuple[str, EpisodeRecord]]:
+    for run in runs:
+        flaky = run.verified.flaky if run.verified else frozenset[int]()
+        if run.spec.family == family:
+            yield from ((each.id_in(run.spec.id), each) for each in run.records if each.index not in flaky)
 
 
 def _reference_first(methods: Sequence[MethodName]) -> tuple[MethodName, ...]:

@@ -34,6 +34,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
         "cells": [asdict(cell) for cell in comparison.cells],
         "tests": [asdict(test) for test in comparison.tests],
         "headline": [asdict(test) for test in comparison.headline],
+        "failures": {family: each.model_dump(mode="json") for family, each in comparison.overviews.items()},
         "runs": [_row(run) for run in comparison.runs],
     }
 

@@ -1,8 +1,7 @@
 """The comparison as a page to read: tables, tests, and everything needed to judge and repeat them."""
 
 import shlex
-from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from statistics import median
 
 from risk_sac.config import FamilyName, RunSpec
@@ -12,12 +11,13 @@ from risk_sac.report.budgets import HEADLINE, LIMITS, found_within
 from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.definitions import ROWS, definitions, symbol
+from risk_sac.report.kinds import clusters, signatures
+from risk_sac.report.page import DASH, interval, number, percent, table
 from risk_sac.report.paired import LEVEL, PairedTest
 from risk_sac.report.provenance import this_platform
 from risk_sac.report.runs import FinishedRun
 from risk_sac.report.statistics import pairs_needed, smallest_p
 
-DASH = "–"
 CONTROL = "no-adversary"
 SHARES = ("artefact_rate", "degenerate_rate", "rejected_rate")  # the last columns of the table of methods
 # RISK-SAC's row of the paper's Table I, by family.
@@ -39,9 +39,10 @@ def table_markdown(comparison: Comparison) -> str:
                 _funnel(comparison, family, phase),
                 _budgets(comparison, family) if phase == "search" else "",
                 _times(comparison, family, phase),
-                _signatures(comparison, family, phase),
+                signatures(comparison, family, phase),
                 _tests(comparison, family, phase),
             ]
+        sections.append(clusters(comparison, family))
     sections += [_control(comparison), _paper(comparison), definitions(), _repeat(comparison)]
     return "\n".join(section for section in sections if section)
 
@@ -67,7 +68,7 @@ def _missing(comparison: Comparison) -> str:
         return ""
     rows = ([run.spec.family, run.spec.method, str(run.spec.seed), run.reason] for run in comparison.missing)
     title = f"## Missing: {len(comparison.missing)} runs\n\nThe tables hold only what has finished.\n\n"
-    return title + _table(["family", "method", "seed", "why"], rows, left=4)
+    return title + table(["family", "method", "seed", "why"], rows, left=4)
 
 
 def _cells(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
@@ -76,17 +77,17 @@ def _cells(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     columns += [symbol("steps_per_distinct_failure"), *(["CPU s / distinct"] if phase == "search" else [])]
     columns += map(symbol, SHARES)
     rows = [_cell(cell, seeds) for cell in comparison.group(family, phase)]
-    return f"## {family}, {phase}\n\n" + _table(columns, rows) if rows else ""
+    return f"## {family}, {phase}\n\n" + table(columns, rows) if rows else ""
 
 
 def _cell(cell: Cell, seeds: int) -> list[str]:
     runs = len(cell.seeds)
     row = [cell.method, str(runs) if runs == seeds else f"{runs} of {seeds}"]
     row += [_estimate(cell.estimates[metric.name], runs) for metric in metrics_of(cell.phase) if metric.tabled]
-    row.append(_number(cell.steps_per_distinct_failure, ",.0f"))
+    row.append(number(cell.steps_per_distinct_failure, ",.0f"))
     if cell.phase == "search":
-        row.append(_number(cell.cpu_s_per_distinct_failure, ",.1f"))
-    return row + [_percent(getattr(cell, name)) for name in SHARES]
+        row.append(number(cell.cpu_s_per_distinct_failure, ",.1f"))
+    return row + [percent(getattr(cell, name)) for name in SHARES]
 
 
 def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
@@ -99,11 +100,11 @@ def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
             *map(str, (cell.episodes, cell.raw_collisions, cell.failures)),
             *map(str, (cell.distinct_failures, cell.distinct_preventable)),
             _verified(comparison.of_cell(family, cell.method), phase),
-            DASH if cell.unresponsive_share is None else _percent(cell.unresponsive_share),
+            DASH if cell.unresponsive_share is None else percent(cell.unresponsive_share),
         ]
         for cell in comparison.group(family, phase)
     )
-    return f"### The funnel: {family}, {phase}\n\n" + _table(columns, rows)
+    return f"### The funnel: {family}, {phase}\n\n" + table(columns, rows)
 
 
 def _verified(runs: Sequence[FinishedRun], phase: Phase) -> str:
@@ -132,12 +133,12 @@ def _budgets(comparison: Comparison, family: FamilyName) -> str:
     if not rows:
         return ""
     columns = ["method", "within", "runs", "preventable", "distinct", symbol("covered")]
-    table = f"### What a budget finds: {family}\n\n" + _table(columns, rows, left=2)
+    page = f"### What a budget finds: {family}\n\n" + table(columns, rows, left=2)
     tests = [test for test in comparison.headline if test.family == family]
     if not tests:
-        return table
+        return page
     title = f"Distinct preventable failures within {HEADLINE.name}, {tests[0].reference} against the others:\n\n"
-    return f"{table}\n{title}" + _tested(tests)
+    return f"{page}\n{title}" + _tested(tests)
 
 
 def _spread(values: Sequence[int]) -> str:
@@ -156,30 +157,17 @@ def _times(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
         for cell in cells
         for until, bins in zip(("conflict", "contact"), _both(cell), strict=True)
     )
-    return f"### Valid failures by the time since the release: {family}, {phase}\n\n" + _table(columns, rows, left=2)
+    return f"### Valid failures by the time since the release: {family}, {phase}\n\n" + table(columns, rows, left=2)
 
 
 def _both(cell: Cell) -> tuple[tuple[int, ...], tuple[int, ...]]:
     return cell.conflicts_by_second, cell.contacts_by_second
 
 
-def _signatures(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
-    """How often each class of failures was found, the most frequent first."""
-    cells = [cell for cell in comparison.group(family, phase) if cell.signatures]
-    total: Counter[str] = Counter()
-    for cell in cells:
-        total.update(cell.signatures)
-    if not total:
-        return ""
-    columns = ["signature", *(cell.method for cell in cells)]
-    rows = ([name, *(str(cell.signatures.get(name, 0)) for cell in cells)] for name, _ in total.most_common())
-    return f"### Valid failures by signature: {family}, {phase}\n\n" + _table(columns, rows)
-
-
 def _estimate(estimate: Estimate, runs: int) -> str:
     if estimate.mean is None:
         return DASH
-    text = f"{estimate.mean:.3f}" + _interval(estimate.low, estimate.high)
+    text = f"{estimate.mean:.3f}" + interval(estimate.low, estimate.high)
     return text if estimate.runs == runs else f"{text} ({estimate.runs} of {runs} seeds)"
 
 
@@ -192,7 +180,7 @@ def _tests(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
 
 def _tested(tests: Sequence[PairedTest]) -> str:
     columns = ["metric", "against", "pairs", "difference (95 %)", "A12", "p", "p (Holm)"]
-    return _table(columns, map(_test, tests), left=2) + "\n" + "".join(_power(tests)) + "\n"
+    return table(columns, map(_test, tests), left=2) + "\n" + "".join(_power(tests)) + "\n"
 
 
 def _test(test: PairedTest) -> list[str]:
@@ -201,8 +189,8 @@ def _test(test: PairedTest) -> list[str]:
         symbol(test.metric) if test.metric in ROWS else test.metric,
         test.method,
         str(test.pairs),
-        _number(test.difference, "+.3f") + _interval(test.low, test.high, "+.3f"),
-        _number(test.a12, ".2f"),
+        number(test.difference, "+.3f") + interval(test.low, test.high, "+.3f"),
+        number(test.a12, ".2f"),
         _p(test.p),
         f"**{p_holm}**" if test.significant else p_holm,
     ]
@@ -230,9 +218,9 @@ def _control(comparison: Comparison) -> str:
     cells = [cell for cell in comparison.cells if cell.method == CONTROL]
     if not cells:
         return ""
-    rows = ([cell.family, cell.phase, str(cell.episodes), _percent(cell.raw_rate)] for cell in cells)
+    rows = ([cell.family, cell.phase, str(cell.episodes), percent(cell.raw_rate)] for cell in cells)
     title = "## The simulator's own artefacts\n\nContacts of any kind with `no-adversary`, where nobody attacks.\n\n"
-    return title + _table(["family", "phase", "episodes", symbol("raw_rate")], rows, left=2)
+    return title + table(["family", "phase", "episodes", symbol("raw_rate")], rows, left=2)
 
 
 def _paper(comparison: Comparison) -> str:
@@ -245,7 +233,7 @@ def _paper(comparison: Comparison) -> str:
         rows.append([cell.family, cell.phase])
         for name, paper in PAPER.items():
             mean = cell.estimates[name].mean
-            rows[-1] += [_number(mean, ".2f"), f"{'≤ ' if name == 'rho_c' else ''}{paper[cell.family]:.2f}"]
+            rows[-1] += [number(mean, ".2f"), f"{'≤ ' if name == 'rho_c' else ''}{paper[cell.family]:.2f}"]
     columns = ["family", "phase"]
     for heading in map(symbol, PAPER):
         columns += [heading, f"{heading} paper"]
@@ -253,7 +241,7 @@ def _paper(comparison: Comparison) -> str:
         "## Beside the paper\n\nThe paper's RISK-SAC was measured in CARLA, against another ego and with other "
         "definitions of a failure, of realism and of outcome features; the numbers are no target.\n\n"
     )
-    return title + _table(columns, rows, left=2)
+    return title + table(columns, rows, left=2)
 
 
 def _repeat(comparison: Comparison) -> str:
@@ -277,28 +265,5 @@ def run_command(spec: RunSpec, spec_file: str, out: str) -> str:
     return shlex.join(["risk-sac", "run", "--spec", spec_file, *picked, "--out", out])
 
 
-def _table(columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
-    """The first columns hold words, the others numbers."""
-    rule = ["---" if place < left else "---:" for place in range(len(columns))]
-    lines = [columns, rule, *rows]
-    return "\n".join(f"| {' | '.join(_escaped(cell) for cell in line)} |" for line in lines) + "\n"
-
-
-def _escaped(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")
-
-
-def _interval(low: float | None, high: float | None, format_: str = ".3f") -> str:
-    return "" if low is None or high is None else f" [{low:{format_}}, {high:{format_}}]"
-
-
-def _number(value: float | None, format_: str) -> str:
-    return DASH if value is None else format(value, format_)
-
-
-def _percent(rate: float) -> str:
-    return f"{100 * rate:.1f} %"
-
-
 def _p(value: float | None) -> str:
-    return _number(value, ".3g")
+    return number(value, ".3g")

@@ -12,8 +12,10 @@ from service.networks.shelf import Shelf
 from service.runs.manager import Manager
 from service.settings import ServiceSettings
 from service.store.reading import Store
-from service.views.pictures import Pictures
+from service.views.pictures import ContactOfARun
+from service.views.products import Products
 from service.views.reports import Reports
+from service.views.studies import Study
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +26,8 @@ class Context:
     store: Store
     manager: Manager
     reports: Reports
-    pictures: Pictures
+    pictures: Products[ContactOfARun]
+    studies: Products[Study]
     networks: Shelf
     streams: Streams
     cursors: Cursors

@@ -25,6 +25,7 @@ class Reason(StrEnum):
     UPLOADS_BUSY = "uploads_busy"
     PICTURES_BUSY = "pictures_busy"
     SERIES_LOST = "series_lost"
+    NOT_PLAYABLE = "not_playable"
     TOO_MANY_NETWORKS = "too_many_networks"
     UNSUPPORTED_MEDIA_TYPE = "unsupported_media_type"
     INVALID_FIELD = "invalid_field"

@@ -6,11 +6,21 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
+from risk_sac.failures.clusters import Overview
 from risk_sac.records import Phase
 from risk_sac.report import PairedTest
 from risk_sac.report.cells import Cell
 from service.schemas.base import Body
 from service.schemas.campaigns import Metrics
+
+
+class Clusters(Body):
+    """The failures of the finished runs, sorted into kinds; flaky ones are left out."""
+
+    complete: bool
+    """Whether all runs are in them."""
+    families: Mapping[FamilyName, Overview]
+    """Those with a finished run."""
 
 
 class MissingRun(Body):
@@ -69,6 +79,8 @@ class Table(Body):
     headline: list[PairedTest]
     """Of distinct preventable failures within 30 processor seconds: risk-sac-diverse, or the first method, against the
     others; declared before any run, so corrected by themselves."""
+    failures: Mapping[FamilyName, Overview]
+    """The kinds of failures that all methods have found together."""
     runs: list[ReportedRun]
 
 

@@ -65,6 +65,7 @@ ASKED = {
     "table_markdown": ("GET", f"{ENDED}/table?format=md"),
     "table_csv": ("GET", f"{ENDED}/table?format=csv"),
     "table_live": ("GET", f"{LIVE}/table"),
+    "clusters": ("GET", f"{ENDED}/clusters"),
     "figures": ("GET", f"{ENDED}/figures"),
     "figure_unknown": ("GET", f"{ENDED}/figures/pie.png"),
     "spec": ("GET", f"{ENDED}/spec"),

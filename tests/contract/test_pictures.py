@@ -17,7 +17,7 @@ from risk_sac.failures import show
 from risk_sac.run_folder.results import FAILURES, series_name
 from service.settings import ServiceSettings
 from service.store.database import READERS
-from service.views import pictures
+from service.views import products
 from tests.contract.recorded_campaigns import ENDED_ID, Recorded, known_times_and_ids
 from tests.contract.serving import serving
 
@@ -130,7 +130,7 @@ def test_a_picture_is_drawn_once_for_all_who_ask_for_it_and_holds_up_nothing_els
 
 def test_no_more_than_a_bounded_number_waits_and_others_are_told_when_to_come_back(fresh, drawn, monkeypatch):
     client = fresh
-    monkeypatch.setattr(pictures, "MOST_WAITING", 1)
+    monkeypatch.setattr(products, "MOST_WAITING", 1)
     first, *others = (f"{FOLDER}/{failure}/picture.png" for failure in ids(client)[:3])
     with ThreadPoolExecutor(3) as askers:
         answers = [askers.submit(client.get, first)]
@@ -142,6 +142,17 @@ def test_no_more_than_a_bounded_number_waits_and_others_are_told_when_to_come_ba
         drawn.gate.set()
         assert sorted(answer.result().status_code for answer in answers) == [200, 200, 503]
     assert client.get(refused.url.path).status_code == 200
+
+
+def test_what_does_not_repeat_can_be_drawn_but_not_played(client, tmp_path):
+    for what in ("bundle.npz", "core.npz", "region", "twins/idle.png"):
+        answer = client.get(f"{FOLDER}/{RUN}-train-1/{what}")
+        assert (answer.status_code, answer.json()["reason"]) == (409, "not_playable")
+        assert "/" not in answer.json()["detail"]
+    for failure, status, reason in ((f"{RUN}-train-0", 404, "unknown_id"), ("x", 404, "unknown_id")):
+        answer = client.get(f"{FOLDER}/{failure}/bundle.npz")
+        assert (answer.status_code, answer.json()["reason"]) == (status, reason)
+    assert client.get(f"{FOLDER}/{RUN}-train-1/twins/nobody.png").status_code == 422
 
 
 def test_the_client_has_the_picture_and_the_series_as_arrays_with_units(client):

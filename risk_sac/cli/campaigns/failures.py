@@ -1,4 +1,4 @@
-"""`risk-sac campaigns failures list` and `show`: what a campaign found, one by one, without the server's folder."""
+"""`risk-sac campaigns failures`: what a campaign found, one by one, without the server's folder."""
 
 import argparse
 import itertools
@@ -15,6 +15,7 @@ from risk_sac.cli.text import in_words, printable
 from risk_sac.client import Client, Collision, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.records import Grade
+from risk_sac.run_folder.durable import replace_file
 
 LISTED = 20
 FILTERS = {
@@ -44,7 +45,21 @@ def add_show_failure(failures: Commands) -> None:
     parser.set_defaults(command=_show)
     parser.add_argument("id", metavar="ID", help="of the campaign")
     parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
+    twin = "draw beside it the same scene with nobody attacking (idle), or with another ego"
+    parser.add_argument("--twin", choices=("idle", "default", "perfect", "careful"), help=twin)
     parser.add_argument("--out", type=Path, metavar="FILE.png", help="the picture (default: FAILURE.png)")
+
+
+def add_bundle_failure(failures: Commands) -> None:
+    """Adds the command."""
+    parser = failures.add_parser("bundle", help="fetch one failure as a file that stands alone")
+    parser.set_defaults(command=_bundle)
+    parser.add_argument("id", metavar="ID", help="of the campaign")
+    parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
+    parser.add_argument(
+        "--core", action="store_true", help="only what makes the ego fail, which takes the service 10 s"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE.npz", help="(default: FAILURE.npz)")
 
 
 def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:
@@ -63,6 +78,16 @@ def _list(options: argparse.Namespace) -> int:
     return OK
 
 
+def _bundle(options: argparse.Namespace) -> int:
+    file = options.out or Path(f"{options.failure}.npz")
+    with Client.from_environment(options.url) as client:
+        content = client.bundle(options.id, options.failure, core=options.core)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(file, content)
+    notes.print(f"Bundle: {file}", markup=False, soft_wrap=True)
+    return OK
+
+
 def _show(options: argparse.Namespace) -> int:
     picture = options.out or Path(f"{options.failure}.png")
     if picture.suffix != ".png":
@@ -70,7 +95,7 @@ def _show(options: argparse.Namespace) -> int:
     picture.parent.mkdir(parents=True, exist_ok=True)
     with Client.from_environment(options.url) as client:
         failure = client.failure(options.id, options.failure)
-        picture.write_bytes(client.picture(options.id, options.failure))
+        picture.write_bytes(client.picture(options.id, options.failure, options.twin))
     print_answer(options, failure, "\n".join(_lines(failure)))
     notes.print(f"Drawn: {picture}", markup=False, soft_wrap=True)
     return OK

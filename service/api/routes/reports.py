@@ -18,7 +18,7 @@ from service.api.access import CurrentCaller
 from service.api.answers.representations import accepted, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses
 from service.api.context import Context, Service
-from service.schemas.reports import Figure, FigureFile, Figures, Table
+from service.schemas.reports import Clusters, Figure, FigureFile, Figures, Table
 from service.store.stored import StoredCampaign
 from service.views.reports import CampaignReport, edition
 
@@ -89,6 +89,18 @@ def get_table(
         return TABLES[name](replace(report.comparison, command=command, spec_command=spec_command))
 
     return _shown(request, service, campaign, (name,), table, MEDIA_TYPES[name], vary="Accept")
+
+
+@router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED)
+def get_clusters(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+    """Which different failures the finished runs have found, named in words, and one of each to look at first."""
+    campaign = service.store.campaign(campaign_id, caller.sees)
+
+    def clusters(report: CampaignReport) -> str:
+        comparison = report.comparison
+        return Clusters(complete=not comparison.missing, families=comparison.overviews).model_dump_json()
+
+    return _shown(request, service, campaign, ("clusters",), clusters, MEDIA_TYPES["json"])
 
 
 @router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)

@@ -1,0 +1,43 @@
+"""Sections of the page on which failures were found."""
+
+from collections import Counter
+
+from risk_sac.config import FamilyName
+from risk_sac.records import Phase
+from risk_sac.report.comparison import Comparison
+from risk_sac.report.page import table
+
+MOST = 12  # rows of the table of clusters
+
+
+def clusters(comparison: Comparison, family: FamilyName) -> str:
+    """The kinds of failures that all methods have found together, and one of each to look at."""
+    found = comparison.overviews.get(family)
+    if found is None or not found.clusters:
+        return ""
+    rows = (
+        [each.name, str(each.failures), str(each.distinct), str(each.preventable), f"`{each.representative}`"]
+        for each in found.clusters[:MOST]
+    )
+    left_out = len(found.clusters) - MOST
+    rest = f"\n{left_out} rarer kinds are in `table.json`.\n" if left_out > 0 else ""
+    return (
+        f"### Which failures there are: {family}\n\n{len(found.clusters)} kinds by all methods together. The distinct "
+        f"ones are as various as {found.vendi:.1f} that have nothing in common (Vendi score); {found.covered} of the "
+        f"{found.cells} cells of the taxonomy hold one.\n\n"
+        + table(["kind", "failures", "distinct", "preventable", "look first at"], rows)
+        + rest
+    )
+
+
+def signatures(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
+    """How often each class of failures was found, the most frequent first."""
+    cells = [cell for cell in comparison.group(family, phase) if cell.signatures]
+    total: Counter[str] = Counter()
+    for cell in cells:
+        total.update(cell.signatures)
+    if not total:
+        return ""
+    columns = ["signature", *(cell.method for cell in cells)]
+    rows = ([name, *(str(cell.signatures.get(name, 0)) for cell in cells)] for name, _ in total.most_common())
+    return f"### Valid failures by signature: {family}, {phase}\n\n" + table(columns, rows)

@@ -1,0 +1,31 @@
+"""What the sections of a page share: tables and numbers in Markdown."""
+
+from collections.abc import Iterable, Sequence
+
+DASH = "–"
+
+
+def table(columns: Sequence[str], rows: Iterable[Sequence[str]], left: int = 1) -> str:
+    """The first columns hold words, the others numbers."""
+    rule = ["---" if place < left else "---:" for place in range(len(columns))]
+    lines = [columns, rule, *rows]
+    return "\n".join(f"| {' | '.join(_escaped(cell) for cell in line)} |" for line in lines) + "\n"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")
+
+
+def interval(low: float | None, high: float | None, format_: str = ".3f") -> str:
+    """Behind a number; nothing where there is none."""
+    return "" if low is None or high is None else f" [{low:{format_}}, {high:{format_}}]"
+
+
+def number(value: float | None, format_: str) -> str:
+    """A number, or a dash."""
+    return DASH if value is None else format(value, format_)
+
+
+def percent(rate: float) -> str:
+    """Of a rate."""
+    return f"{100 * rate:.1f} %"

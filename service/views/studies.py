@@ -1,0 +1,80 @@
+"""What takes the simulator to say of a failure: asked of a process of its own, see `risk_sac.failures.study`."""
+
+import logging
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from risk_sac.config import EgoConfig
+from risk_sac.execution.postmortem import without_folders
+from risk_sac.failures.question import REFUSED, Question, Subject
+from service.errors import ServiceError, StorageError
+from service.settings import ServiceSettings
+from service.views.bodies import series_file
+from service.views.pictures import ContactOfARun
+from service.views.products import Products
+from service.views.series import load_arrays
+
+logger = logging.getLogger(__name__)
+
+WALL_S = 300.0  # a minimisation takes ten on a machine with nothing else to do
+
+
+class CannotBePlayed(ServiceError):
+    """The failure does not repeat here, or cannot be played as was asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """What is asked of which contact."""
+
+    contact: ContactOfARun
+    subject: Subject
+    twin: str = ""
+    """idle, or the profile of another ego."""
+
+
+def studies(settings: ServiceSettings) -> Products[Study]:
+    """Answers; StorageError where the time series is lost, CannotBePlayed where nothing can be said."""
+
+    def answer(study: Study) -> bytes:
+        contact = study.contact
+        path, sha256 = series_file(contact.campaign_id, contact.episode, settings)
+        load_arrays(path, sha256)  # else it is lost or damaged, and that is to be said
+        question = Question(
+            subject=study.subject,
+            spec=contact.spec,
+            episode=contact.episode.record,
+            series=path,
+            twin=EgoConfig.model_validate({"profile": study.twin}) if study.twin not in ("", "idle") else None,
+        )
+        return _ask(question, settings.worker_niceness)
+
+    return Products(answer, "failures")
+
+
+def _ask(question: Question, niceness: int) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "answer"
+        command = [sys.executable, "-m", "risk_sac.failures.study", str(niceness), str(file)]
+        try:
+            done = subprocess.run(
+                command,
+                input=question.model_dump_json().encode() + b"\n",
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                timeout=WALL_S,
+            )
+            said = file.read_bytes() if file.exists() else b""
+        except subprocess.TimeoutExpired as error:
+            raise CannotBePlayed(f"it takes more than {WALL_S:g} s here") from error
+        except OSError as error:
+            raise StorageError(f"it cannot be played ({error.strerror})") from error
+    if done.returncode == REFUSED:
+        raise CannotBePlayed(without_folders(said.decode(errors="replace"), question.series.parent))
+    if done.returncode != 0:
+        logger.error("a study ended with status %d: %s", done.returncode, done.stderr[-2000:].decode(errors="replace"))
+        raise CannotBePlayed("its process was lost; the log has the reason")
+    return said
