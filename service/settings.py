@@ -9,6 +9,7 @@ from pydantic_core import from_json
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from risk_sac.execution.executors import ExecutorName
+from risk_sac.run_folder.verified import TIMES
 
 SECRETS = os.environ.get("RISK_SAC_SECRETS_DIR")
 
@@ -65,6 +66,9 @@ class ServiceSettings(BaseSettings):
     """A worker that finishes no episode for so long is killed and its run resumed, s."""
     attempts: Annotated[int, Field(ge=1, le=100)] = 5
     """Workers of one run that may die in a row without finishing an episode, before the run fails."""
+
+    replays: Annotated[int, Field(ge=0, le=100)] = TIMES
+    """How often each distinct failure of a finished run is replayed, in fresh processes; 0 leaves it out."""
 
     retention_days: Annotated[float, Field(gt=0)] | None = None
     """Campaigns that ended so many days ago are deleted with their files; by default none is."""

@@ -1,4 +1,6 @@
-"""`python -m service.worker FOLDER NICENESS MEMORY_BYTES`: execute one run in a process of its own.
+"""`python -m service.worker FOLDER NICENESS MEMORY_BYTES REPLAYS`: execute one run in a process of its own.
+
+A finished run's distinct failures are then replayed, each so often, in fresh processes.
 
 The run is one line of JSON on stdin, events are lines of JSON on stdout, everything else a library
 prints goes to stderr. SIGTERM stops the run at the next episode boundary, with a checkpoint; before the first
@@ -109,7 +111,7 @@ class LossyLog(io.FileIO):
 
 def main() -> int:
     """Execute the run; returns the exit status."""
-    folder, niceness, memory_bytes = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+    folder, (niceness, memory_bytes, replays) = Path(sys.argv[1]), map(int, sys.argv[2:5])
     os.nice(niceness)
     limit_memory(memory_bytes)
     reporter = Reporter(_take_stdout())
@@ -118,15 +120,15 @@ def main() -> int:
     threading.Thread(target=_leave_with_server, daemon=True).start()
     reporter.send(Started(pid=os.getpid()))
     with reporter.beating():
-        last = _run(spec, folder, reporter, memory_bytes)
+        last = _run(spec, folder, reporter, memory_bytes, replays)
     reporter.send(last)
     return 1 if isinstance(last, Failed) else 0
 
 
-def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int) -> Finished | Failed:
+def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, replays: int) -> Finished | Failed:
     try:
         with take_over(folder):
-            return _execute(spec, folder, reporter)
+            return _execute(spec, folder, reporter, replays)
     except Exception as error:
         if out_of_memory(error):  # as it would be for the next worker
             logger.exception("the run needs more memory than there is")
@@ -140,16 +142,18 @@ def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int) -> 
         raise
 
 
-def _execute(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished:
+def _execute(spec: RunSpec, folder: Path, reporter: Reporter, replays: int) -> Finished:
     import torch  # noqa: F401 - before libsumo: if memory ends while torch is loaded after it, the process crashes
 
     from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
+    from risk_sac.failures.verify import verify
     from risk_sac.train import train
 
     with Recorder(spec, folder, reporter) as recorder:
         summary = train(spec, folder, recorder)
         recorder.finish(summary)
     versions: Mapping[str, str] = summary.versions
+    found = verify([folder], replays, stopping=reporter.should_stop) if summary.finished and replays else {}
     return Finished(
         finished=summary.finished,
         metrics=summary.metrics,
@@ -157,6 +161,7 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter) -> Finished:
         digest=summary.digest,
         versions=versions,
         wall_s=summary.wall_s,
+        repetitions=found[folder].episodes if folder in found else {},
     )
 
 

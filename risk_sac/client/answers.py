@@ -118,6 +118,8 @@ class RunResult(Record):
     digest: str | None  # of the results; None until the run succeeded
     versions: Mapping[str, str]
     busy_s: float
+    verified: int = 0  # distinct failures that were the same each time they were replayed
+    flaky: int = 0
 
 
 class Total(Record):
@@ -196,6 +198,7 @@ class Episode(Record):
     steps: int
     collision: Collision | None
     funnel: dict[str, int] | None  # of the run's phase, this episode included
+    repetition: dict[str, int] | None = None  # times and same: how often it was replayed, and came to the same
 
 
 class Series(series.Series, Record):

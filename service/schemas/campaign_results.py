@@ -27,6 +27,10 @@ class RunResult(Body):
     """SHA-256 of the results; null until the run succeeded."""
     versions: Mapping[str, str]
     """Software that produced the results."""
+    verified: int
+    """Distinct failures that were the same each time they were replayed; none before the run has ended."""
+    flaky: int
+    """Those that were not."""
     busy_s: float
     """Wall time spent, interrupted attempts included."""
 

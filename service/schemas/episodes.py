@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from risk_sac import records
 from risk_sac.metrics import Funnel
+from risk_sac.run_folder import verified
 from service.schemas.base import Body, Shown
 
 
@@ -25,6 +26,10 @@ class Collision(records.Collision, Shown):
     """Null in what was stored before contacts were judged."""
 
 
+class Repetition(verified.Repetition, Shown):
+    """How often an episode was played again, in a fresh process each time, and what came of it."""
+
+
 class _OfARun(Shown):
     id: str
     run_id: str
@@ -37,6 +42,8 @@ class Episode(records.EpisodeRecord, _OfARun):
     wall_s: float
     funnel: Funnel | None
     """What the run's phase has found up to and including this episode; null in what is older."""
+    repetition: Repetition | None
+    """Of the first failure of its kind, once the run has ended; a failure that was not the same each time is flaky."""
 
 
 class EpisodePage(Body):

@@ -5,12 +5,13 @@ from dataclasses import dataclass, fields, replace
 from functools import cache, lru_cache
 from typing import Any, Generic, Self, TypeVar
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, FamilyName, RunSpec
 from risk_sac.metrics import Funnel
 from risk_sac.records import EpisodeRecord, RunMetrics
+from risk_sac.run_folder.verified import Repetition
 from service.errors import OutdatedError
 from service.store.states import State
 from service.store.tables import Base, CampaignRow, ChangeRow, EpisodeRow, RunRow
@@ -45,6 +46,7 @@ class StoredRun:
     evaluation: RunMetrics | None
     digest: str | None  # of the results; None until it succeeded
     versions: Mapping[str, str]
+    repetitions: Mapping[int, Repetition]  # of its distinct failures, by index of the episode; none if not replayed
 
     @classmethod
     def from_row(cls, row: RunRow, campaign_id: str) -> Self:
@@ -55,8 +57,19 @@ class StoredRun:
             "metrics": None if row.metrics is None else RunMetrics.model_validate_json(row.metrics),
             "evaluation": None if row.evaluation is None else RunMetrics.model_validate_json(row.evaluation),
             "versions": from_json(row.versions),
+            "repetitions": _repetitions(row),
         }
         return cls(**_columns(cls, row) | read)
+
+    @property
+    def verified(self) -> int:
+        """Distinct failures that repeat."""
+        return sum(repetition.verified for repetition in self.repetitions.values())
+
+    @property
+    def flaky(self) -> int:
+        """Distinct failures that do not."""
+        return len(self.repetitions) - self.verified
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,6 +122,11 @@ class StoredCampaign:
         return replace(self, state=State.PAUSED, reason=reason, runs=runs)
 
 
+def _repetitions(row: RunRow) -> Mapping[int, Repetition]:
+    return _read_repetitions(row.repetitions) if row.repetitions else {}
+
+
+_read_repetitions = lru_cache(maxsize=256)(TypeAdapter(dict[int, Repetition]).validate_json)
 _read_spec = lru_cache(maxsize=64)(CampaignSpec.model_validate_json)
 
 
@@ -128,6 +146,7 @@ class StoredEpisode:
     wall_s: float
     funnel: Funnel | None  # of the run's phase, this episode included; None if it is older than that
     sequence: int  # among all events of the campaign, from 1
+    repetition: Repetition | None  # of a distinct failure that was replayed
 
     @classmethod
     def from_row(cls, row: EpisodeRow) -> Self:
@@ -136,6 +155,7 @@ class StoredEpisode:
             "run_id": row.run.id,
             "record": EpisodeRecord.model_validate_json(row.record),
             "funnel": None if row.funnel is None else Funnel.model_validate_json(row.funnel),
+            "repetition": _repetitions(row.run).get(row.index),
         }
         return cls(**_columns(cls, row) | read)
 

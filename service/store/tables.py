@@ -115,6 +115,7 @@ class RunRow(Checked, Base):
     evaluation: Mapped[str | None] = mapped_column(Text)
     digest: Mapped[str | None]
     versions: Mapped[str] = mapped_column(Text, default="{}")
+    repetitions: Mapped[str | None] = mapped_column(Text, info=LATER)  # of its distinct failures, by episode's index
     campaign: Mapped[CampaignRow] = relationship(back_populates="runs")
 
 
@@ -191,10 +192,13 @@ class ServerRow(Checked, Base):
 def checksum(row: Checked) -> int:
     """CRC-32 of a row's columns but its own and the number that the database gives.
 
-    A row from before a column was added keeps its checksum: such columns count only where one of them holds something.
+    A row from before a column was added keeps its checksum: such columns count only where one of them holds something,
+    and the last ones only up to the last that is not null.
     """
     mapper = inspect(type(row))
     values, added = _summed(mapper)(row), _added(mapper)(row)
+    while added and added[-1] is None:
+        added = added[:-1]
     return zlib.crc32(to_json((*values, *added) if any(added) else values, inf_nan_mode="strings"))
 
 

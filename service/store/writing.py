@@ -129,6 +129,7 @@ class Ledger:
                 tally(row)
                 row.digest = result.digest
                 row.versions = to_text(dict(result.versions))
+                row.repetitions = to_text(dict(result.repetitions)) if result.repetitions else None
 
     def requeue_run(self, number: int, reason: str | None = None) -> None:
         """A run lost its worker; it will resume from its checkpoint."""

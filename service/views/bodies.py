@@ -56,5 +56,5 @@ def series_file(campaign_id: str, episode: StoredEpisode, settings: ServiceSetti
 
 
 def _fields(episode: StoredEpisode) -> dict[str, Any]:
-    added = {name: getattr(episode, name) for name in ("id", "run_id", "wall_s", "funnel")}
+    added = {name: getattr(episode, name) for name in ("id", "run_id", "wall_s", "funnel", "repetition")}
     return episode.record.model_dump() | added

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, TypeAdapter
 
 from risk_sac.records import EpisodeRecord, Record, RunMetrics
+from risk_sac.run_folder.verified import Repetition
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}$")]
@@ -59,6 +60,8 @@ class Finished(Message):
     digest: str
     versions: Mapping[str, str]
     wall_s: float
+    repetitions: Mapping[int, Repetition] = {}
+    """Of the distinct failures, by index of the episode; none where nothing was replayed."""
 
 
 class Failed(Message):

@@ -15,8 +15,8 @@ def program(settings: ServiceSettings) -> Program[Event]:
     """The worker that the settings name."""
 
     def arguments(spec: RunSpec, folder: Path) -> Sequence[str]:
-        limits = settings.worker_niceness, settings.worker_memory_bytes
-        return ["-m", settings.worker_module, str(folder), *map(str, limits)]
+        numbers = settings.worker_niceness, settings.worker_memory_bytes, settings.replays
+        return ["-m", settings.worker_module, str(folder), *map(str, numbers)]
 
     return Program(
         arguments=arguments,

@@ -13,6 +13,8 @@ import pytest
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunSpec, SceneOptimizerConfig, WarmStartConfig
 from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.local import LocalExecutor
+from risk_sac.run_folder.results import read_results
+from risk_sac.run_folder.verified import Repetition, distinct_failures
 from service.settings import ServiceSettings
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
 from service.workers.program import program
@@ -40,7 +42,7 @@ class Launcher:
     def __init__(self, folder: Path, spec: RunSpec = SPEC, settings: ServiceSettings | None = None) -> None:
         self.folder = folder
         self.spec = spec
-        self.executor = LocalExecutor(program(settings or ServiceSettings()))
+        self.executor = LocalExecutor(program(settings or ServiceSettings(replays=0)))
         self.attempts = 0
 
     def submit(self) -> None:
@@ -89,6 +91,15 @@ def digest(launcher: Launcher) -> str:
     assert said[-1].finished
     assert [word.record.index for word in said if isinstance(word, EpisodeDone)] == list(range(EPISODES + 2))
     return said[-1].digest
+
+
+def test_a_finished_run_s_distinct_failures_are_replayed_before_it_is_told(tmp_path: Path) -> None:
+    spec = RunSpec(family="low", method="archive", seed=3, budget=Budget(episodes=20))
+    said, exited, _ = Launcher(tmp_path / "run", spec, ServiceSettings(replays=2)).work()
+    assert exited == Exited(None, Cause.ENDED, 0), exited
+    assert isinstance(said[-1], Finished)
+    found = {episode.index for episode in distinct_failures(read_results(tmp_path / "run"))}
+    assert said[-1].repetitions == dict.fromkeys(found, Repetition(times=2, same=2)) != {}
 
 
 def test_a_worker_told_to_stop_leaves_a_checkpoint_and_goes_on_from_there(launcher: Launcher, undisturbed: str) -> None:
@@ -140,7 +151,7 @@ def test_a_disk_that_is_full_is_told_and_leaves_a_run_that_goes_on(
 
 def test_a_run_that_needs_too_much_memory_says_so_and_nothing_else(tmp_path: Path) -> None:
     learner = SPEC.learner.model_copy(update={"agent": AgentConfig(hidden_sizes=(2048, 2048))})
-    settings = ServiceSettings(worker_memory_bytes=1 << 29)
+    settings = ServiceSettings(worker_memory_bytes=1 << 29, replays=0)
     said, exited, _ = Launcher(tmp_path / "run", SPEC.model_copy(update={"learner": learner}), settings).work()
     assert exited.cause is Cause.ENDED, "it would be no better with another worker"
     assert isinstance(said[-1], Failed)

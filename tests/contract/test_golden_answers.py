@@ -59,6 +59,10 @@ ASKED = {
     "failure_of_the_failed_run": ("GET", f"{ENDED}/failures/low-random-3-train-1"),
     "failure_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0"),
     "picture_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/picture.png"),
+    "bundle_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/bundle.npz"),
+    "core_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/core.npz"),
+    "region_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/region"),
+    "twin_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/twins/idle.png"),
     "events": ("GET", f"{ENDED}/events"),
     "events_cancelled": ("GET", f"{CANCELLED}/events"),
     "table": ("GET", f"{ENDED}/table"),
@@ -113,7 +117,7 @@ def test_every_documented_route_that_is_read_is_asked_for(client):
     """But for the pictures, which matplotlib draws as its version does."""
     paths = client.get("/openapi.json").json()["paths"]
     known = {ENDED_ID: "{campaign_id}", "low-risk-sac-3-train-1": "{failure_id}", "n0": "{network_id}"}
-    known |= {"low-risk-sac-3-train-0": "{failure_id}", "pie.png": "{name}.{format}"}
+    known |= {"low-risk-sac-3-train-0": "{failure_id}", "pie.png": "{name}.{format}", "idle.png": "{twin}.png"}
     parts = [path.partition("?")[0].split("/") for _, path in ASKED.values()]
     asked = {"/".join(known.get(part, part) for part in each) for each in parts}
     assert {path for path, operations in paths.items() if "get" in operations} <= asked

@@ -13,7 +13,7 @@ SPEC = {"families": ["low"], "methods": ["archive"], "seeds": [3], "budget": {"e
 @pytest.fixture
 def campaign(serve):
     """A server, the id of a campaign that has ended, and that of one of its failures."""
-    service = serve("service.worker", grace_s=30)
+    service = serve("service.worker", grace_s=30, replays=2)
     campaign_id = service.post(**SPEC)
     ended = service.wait(campaign_id)
     assert ended["state"] == "succeeded", ended["reason"]
@@ -43,6 +43,12 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
         with pytest.raises(Refused) as refused:
             client.picture(campaign_id, id_, "nobody")
         assert refused.value.status == 422
+
+    replayed = [each for each in service.get(campaign_id, "/failures", limit=100)["items"] if each["repetition"]]
+    assert all(each["repetition"] == {"times": 2, "same": 2} for each in replayed)
+    (run,) = service.get(campaign_id, "/results")["runs"]
+    assert run["metrics"]["distinct_failures"] <= len(replayed) == run["verified"]
+    assert run["flaky"] == 0
 
     clusters = service.get(campaign_id, "/clusters")
     assert clusters["complete"]

@@ -13,9 +13,9 @@ SPEC = RunSpec(family="low", method="random", seed=0)
 
 
 def test_the_worker_is_the_one_of_the_settings_and_hears_its_folder_and_its_limits():
-    settings = ServiceSettings(worker_module="other", worker_niceness=7, grace_s=1, lease_s=2, stall_s=3)
+    settings = ServiceSettings(worker_module="other", worker_niceness=7, grace_s=1, lease_s=2, stall_s=3, replays=2)
     started = program(settings)
-    assert started.arguments(SPEC, Path("/data/run")) == ["-m", "other", "/data/run", "7", str(4 << 30)]
+    assert started.arguments(SPEC, Path("/data/run")) == ["-m", "other", "/data/run", "7", str(4 << 30), "2"]
     assert (started.linger_s, started.lease_s, started.stall_s) == (1, 2, 3)
     assert started.log == "worker.log"
 
