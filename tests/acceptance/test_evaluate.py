@@ -31,7 +31,7 @@ learner:
   scenes: {initial_scenes: 2, candidates: 32}
   checkpoint_every: 2
 """
-FLAGS = ["--spec", "spec.yaml", "--families", "low", "--episodes", "6", "--jobs", "2", "--out", "out"]
+FLAGS = ["--spec", "spec.yaml", "--families", "low", "--episodes", "6", "--jobs", "2", "--verify", "1", "--out", "out"]
 RUNS = 6
 
 

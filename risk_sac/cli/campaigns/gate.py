@@ -2,9 +2,12 @@
 
 import argparse
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, get_args
+
+from pydantic import ValidationError
 
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, OK
 from risk_sac.cli.text import counted
@@ -31,6 +34,8 @@ class Bounds:
 
     ecr: float | None = None
     pcr: float | None = None
+    preventable: int | None = None  # distinct ones
+    known: Mapping[str, frozenset[str]] | None = None  # family → signatures of failures that are no news
     judged_by: JudgedBy = "interval"
 
     @classmethod
@@ -38,16 +43,25 @@ class Bounds:
         """Those of the command line.
 
         Raises:
-          ConfigError: nothing could ever keep one.
+          ConfigError: nothing could ever keep one, or the file of known failures cannot be read.
         """
-        bounds = cls(ecr=options.max_ecr, pcr=options.max_pcr, judged_by=options.judge_by)
-        for name, bound in bounds.items():
+        bounds = cls(
+            ecr=options.max_ecr,
+            pcr=options.max_pcr,
+            preventable=options.max_preventable,
+            known=None if options.no_new_failures is None else _read_known(options.no_new_failures),
+            judged_by=options.judge_by,
+        )
+        for name, bound in bounds.rates():
             if bound == 0 and bounds.judged_by == "interval":
                 message = "got 0, and the interval of no rate ends there; wanted more, or --judge-by rate as well"
                 raise ConfigError(message, field=f"--max-{name.lower()}")
         return bounds
 
-    def items(self) -> tuple[tuple[str, float], ...]:
+    def __bool__(self) -> bool:
+        return any(bound is not None for bound in (self.ecr, self.pcr, self.preventable, self.known))
+
+    def rates(self) -> tuple[tuple[str, float], ...]:
         """Rate -> its bound, for those that have one."""
         both = (("ECR", self.ecr), ("PCR", self.pcr))
         return tuple((name, bound) for name, bound in both if bound is not None)
@@ -84,7 +98,7 @@ def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
         "ECR": (total.ecr, total.ecr_high, total.failures),
         "PCR": (total.pcr, total.pcr_high, total.preventable),
     }
-    for name, bound in bounds.items():
+    for name, bound in bounds.rates():
         found, high, failures = measured[name]
         if found is None:
             continue
@@ -101,6 +115,16 @@ def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
         )
 
 
+def excesses(total: Total, bounds: Bounds) -> Iterator[str]:
+    """In words, what a family and method has found more of than it may, as it was counted."""
+    if bounds.preventable is not None and total.distinct_preventable > bounds.preventable:
+        found = counted(total.distinct_preventable, "distinct preventable failure")
+        yield f"{found}, where {bounds.preventable} may be"
+    if bounds.known is not None:
+        for signature in sorted(total.signatures.keys() - bounds.known.get(total.family, frozenset())):
+            yield f"a new kind of failure: {signature}"
+
+
 def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
     """The exit status, and why.
 
@@ -110,10 +134,10 @@ def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
     """
     if results.complete and results.state != "succeeded":
         return COULD_NOT_RUN, f"the campaign {_WORDS.get(results.state, results.state)}: not all of it was measured"
-    if not bounds.items():
+    if not bounds:
         return OK, ""
     if not results.complete:
-        return COULD_NOT_RUN, f"the campaign is {results.state}, and its rates can still change; wait with `watch`"
+        return COULD_NOT_RUN, f"the campaign is {results.state}, and what it finds can still change; wait with `watch`"
     reasons: dict[str, list[str]] = {}
     for total in results.totals:
         for each in comparisons(total, bounds):
@@ -121,9 +145,28 @@ def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
             reasons.setdefault(said, []).append(f"{total.family} {total.method} {each}")
     passed = all(each.verdict == "within" for total in results.totals for each in comparisons(total, bounds))
     lines = [f"{said}: {', '.join(whose)}" for said, whose in reasons.items()]
+    exceeded = [
+        f"{total.family} {total.method}: {said}" for total in results.totals for said in excesses(total, bounds)
+    ]
+    lines += exceeded
     if any("may be above" in said for said in reasons):
         lines.append("More episodes narrow an interval; --judge-by rate ignores it.")
-    return (OK if passed else ABOVE), "\n".join(lines)
+    return (OK if passed and not exceeded else ABOVE), "\n".join(lines)
+
+
+def _read_known(file: Path) -> Mapping[str, frozenset[str]]:
+    """The kinds of failures of an earlier campaign, by family."""
+    try:
+        earlier = Results.model_validate_json(file.read_bytes())
+    except OSError as error:
+        raise ConfigError(f"{file} cannot be read: {error.strerror}", field="--no-new-failures") from error
+    except ValidationError as error:
+        message = f"{file} is none; wanted what `risk-sac campaigns results ID --json` printed of an earlier campaign"
+        raise ConfigError(message, field="--no-new-failures") from error
+    known: dict[str, frozenset[str]] = {}
+    for total in earlier.totals:
+        known[total.family] = known.get(total.family, frozenset()) | total.signatures.keys()
+    return known
 
 
 _WORDS = {"failed": "failed", "cancelled": "was cancelled"}

@@ -10,7 +10,7 @@ from junitparser.junitparser import FinalResult
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
 from risk_sac.cli.campaigns.failures import look_command
-from risk_sac.cli.campaigns.gate import Bounds, comparisons
+from risk_sac.cli.campaigns.gate import Bounds, comparisons, excesses
 from risk_sac.cli.text import counted, printable
 from risk_sac.client import Episode, Metrics, Results, RunResult, Total
 
@@ -40,7 +40,7 @@ def junit(
         for name, value in properties.items():
             suite.add_property(printable(name), printable(value))
         suite.add_testcases([_case(run, named[run.id]) for run in runs])
-        if bounds.items():
+        if bounds:
             totals = [total for total in results.totals if total.family == family]
             suite.add_testcases([_gate(total, results, bounds, named) for total in totals])
         report.add_testsuite(suite)
@@ -75,11 +75,14 @@ def _gate(total: Total, results: Results, bounds: Bounds, named: Mapping[str, st
     case = TestCase("all seeds", printable(f"{total.family}.{total.method}"))
     found = list(comparisons(total, bounds))
     broken = [each for each in found if each.verdict != "within"]
-    said = "; ".join(f"{each.name} {each.verdict} {each.bound:g}: {each}" for each in broken or found)
+    exceeded = list(excesses(total, bounds))
+    said = "; ".join([*(f"{each.name} {each.verdict} {each.bound:g}: {each}" for each in broken or found), *exceeded])
     if results.state != "succeeded":
         case.append(Skipped(f"the campaign is {results.state}: not all of it was measured"))
-    elif broken:
-        failure = Failure(said, " ".join(each.name for each in broken).lower())
+    elif broken or exceeded:
+        failure = Failure(
+            said, " ".join([*(each.name for each in broken), *(["failures"] if exceeded else [])]).lower()
+        )
         runs = (run for run in results.runs if (run.family, run.method) == (total.family, total.method))
         failure.text = "\n\n".join(named[run.id] for run in runs if named[run.id])
         case.append(failure)

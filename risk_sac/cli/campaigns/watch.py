@@ -112,6 +112,18 @@ def _add_gate_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-ecr", type=rate, metavar="X", help="exit with 1 unless every ECR is within it")
     parser.add_argument("--max-pcr", type=rate, metavar="X", help="exit with 1 unless every PCR is within it")
     parser.add_argument(
+        "--max-preventable",
+        type=at_least_none,
+        metavar="N",
+        help="exit with 1 if a family and method has found more distinct preventable failures",
+    )
+    parser.add_argument(
+        "--no-new-failures",
+        type=Path,
+        metavar="KNOWN.json",
+        help="exit with 1 if a kind of failure is not in what `results --json` printed of an earlier campaign",
+    )
+    parser.add_argument(
         "--judge-by",
         choices=JUDGED_BY,
         default=JUDGED_BY[0],
@@ -123,6 +135,14 @@ def _add_gate_flags(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.xml",
         help="report for CI: a suite per family, a case per run and per method, failures named",
     )
+
+
+def at_least_none(text: str) -> int:
+    """A count, from the command line."""
+    count = int(text)
+    if count < 0:
+        raise argparse.ArgumentTypeError(f"got {text}; wanted 0 or more")
+    return count
 
 
 def _seconds(text: str) -> float:

@@ -1,4 +1,5 @@
 import argparse
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -43,6 +44,16 @@ def results(state: str, *totals: dict[str, Any]) -> Results:
     return Results.model_validate(
         {"campaign_id": "c1", "state": state, "complete": complete, "runs": [], "totals": found}
     )
+
+
+UNBOUND: dict[str, Any] = {
+    "max_ecr": None,
+    "max_pcr": None,
+    "max_preventable": None,
+    "no_new_failures": None,
+    "judge_by": "interval",
+}
+LEADER, CUT_IN = "leader, ahead; ego brakes late", "cut-in, alongside; ego does not brake"
 
 
 def by_rate(**bounds: float) -> Bounds:
@@ -110,12 +121,49 @@ def test_few_short_runs_without_a_failure_prove_nothing() -> None:
 
 @pytest.mark.parametrize(("field", "bounds"), [("--max-ecr", {"max_ecr": 0.0}), ("--max-pcr", {"max_pcr": 0.0})])
 def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field: str, bounds: dict[str, float]) -> None:
-    options = argparse.Namespace(**{"max_ecr": None, "max_pcr": None, "judge_by": "interval"} | bounds)
+    options = argparse.Namespace(**UNBOUND | bounds)
     with pytest.raises(ConfigError, match="wanted more, or --judge-by rate") as error:
         Bounds.of(options)
     assert error.value.field == field
     options.judge_by = "rate"
-    assert Bounds.of(options).items() == ((field.removeprefix("--max-").upper(), 0.0),)
+    assert Bounds.of(options).rates() == ((field.removeprefix("--max-").upper(), 0.0),)
+
+
+@pytest.mark.parametrize(("bound", "status"), [(0, 1), (1, 0), (2, 0)])
+def test_more_distinct_preventable_failures_than_may_be_are_named(bound: int, status: int) -> None:
+    found, reason = verdict(
+        results("succeeded", {}, {"method": "random", "distinct_preventable": 0}), Bounds(preventable=bound)
+    )
+    assert found == status
+    assert ("low sac: 1 distinct preventable failure, where 0 may be" in reason) == bool(status)
+    assert "random" not in reason
+
+
+def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_found_it_in_that_family(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "known.json"
+    earlier = results("succeeded", {"signatures": {LEADER: 2}}, {"method": "random", "signatures": {CUT_IN: 1}})
+    file.write_text(earlier.model_dump_json())
+    bounds = Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file}))
+    assert verdict(results("succeeded", {"signatures": {LEADER: 9, CUT_IN: 1}}), bounds)[0] == 0
+    status, reason = verdict(results("succeeded", {"family": "dense", "signatures": {LEADER: 1}}), bounds)
+    assert (status, reason) == (1, f"dense sac: a new kind of failure: {LEADER}")
+    assert verdict(results("running", {"signatures": {}}), bounds)[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"), [(None, "cannot be read"), ("{}", "wanted what `risk-sac campaigns")]
+)
+def test_a_file_that_is_no_earlier_campaign_is_refused_beforehand(
+    content: str | None, complaint: str, tmp_path: Path
+) -> None:
+    file = tmp_path / "known.json"
+    if content is not None:
+        file.write_text(content)
+    with pytest.raises(ConfigError, match=complaint) as error:
+        Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file}))
+    assert error.value.field == "--no-new-failures"
 
 
 def test_controls_count_like_any_other_method() -> None:

@@ -116,6 +116,14 @@ def test_every_family_is_a_suite_and_every_run_a_case() -> None:
     }
 
 
+def test_a_method_with_more_preventable_failures_than_may_be_fails_and_names_them() -> None:
+    root = report({}, bounds=Bounds(preventable=0), totals=[{}], failures=FAILURES)
+    (failure,) = root.iter("failure")
+    assert failure.attrib["message"] == "1 distinct preventable failure, where 0 may be"
+    assert "low-sac-0-train-3" in (failure.text or "")
+    assert not list(report({}, bounds=Bounds(preventable=1), totals=[{}]).iter("failure"))
+
+
 def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_does() -> None:
     root = report({}, {"seed": 1, "id": "low-sac-1"}, totals=[{"runs": 2, "ecr": 0.25, "failures": 250}])
     cases = [(case.attrib["classname"], case.attrib["name"]) for case in root.iter("testcase")]
