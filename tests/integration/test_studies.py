@@ -37,9 +37,7 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
     region = service.get(campaign_id, f"/failures/{id_}/region")
     assert [share["played"] for share in region["shares"]] == [40, 40, 40, 10, 40]
     with Client(url) as client:
-        twins = [client.picture(campaign_id, id_, twin) for twin in ("idle", "perfect")]
-        assert all(picture.startswith(b"\x89PNG") for picture in twins)
-        assert twins[0] != twins[1]
+        assert client.picture(campaign_id, id_, "perfect").startswith(b"\x89PNG")
         with pytest.raises(Refused) as refused:
             client.picture(campaign_id, id_, "nobody")
         assert refused.value.status == 422
