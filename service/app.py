@@ -17,7 +17,18 @@ from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
 from service.api.guards import add_guards
 from service.api.head import Head
-from service.api.routes import campaigns, catalogue, docs, episodes, events, networks, operations, pictures, reports
+from service.api.routes import (
+    campaigns,
+    catalogue,
+    docs,
+    episodes,
+    events,
+    networks,
+    operations,
+    pictures,
+    regressions,
+    reports,
+)
 from service.api.stream import Streams
 from service.api.telemetry.metrics import registry, request_latencies
 from service.api.telemetry.requests import Observe
@@ -27,6 +38,7 @@ from service.keys.file import KeyFile
 from service.keys.made import KeysMade
 from service.networks.shelf import Shelf
 from service.runs.manager import Manager
+from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
 from service.store.database import READERS, held
 from service.store.reading import Store
@@ -64,7 +76,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
         docs_url=None,  # the routes have pages that need no network
         redoc_url=None,
     )
-    for routes in (campaigns, episodes, pictures, events, reports, networks, catalogue, operations, docs):
+    for routes in (campaigns, episodes, pictures, events, reports, regressions, networks, catalogue, operations, docs):
         app.include_router(routes.router)
     add_problem_handlers(app)
     app.add_middleware(AnswerCache)
@@ -95,13 +107,18 @@ def opened(
     ):
         manager = Manager(settings, store, executor)
         manager.start()
+        gate = Regressions(settings)
+        gate.start()
         try:
-            yield _context(settings, store, manager, latencies)
+            yield _context(settings, store, manager, gate, latencies)
         finally:
+            gate.stop()
             manager.stop()
 
 
-def _context(settings: ServiceSettings, store: Store, manager: Manager, latencies: Histogram) -> Context:
+def _context(
+    settings: ServiceSettings, store: Store, manager: Manager, gate: Regressions, latencies: Histogram
+) -> Context:
     return Context(
         settings,
         store,
@@ -109,6 +126,7 @@ def _context(settings: ServiceSettings, store: Store, manager: Manager, latencie
         Reports(settings),
         pictures_of_contacts(settings),
         studies(settings),
+        gate,
         Shelf(settings.networks_dir),
         Streams(store),
         Cursors(cursor_secret(store.engine)),

@@ -1,26 +1,25 @@
 """`risk-sac regress`: old failures against another ego."""
 
 import argparse
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
+from rich.text import Text
 
 from risk_sac.cli.console import FAILED, OK, Commands, console
 from risk_sac.cli.text import counted, printable
+from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
+from risk_sac.failures.cases import Case, Regression
+from risk_sac.failures.regress_junit import junit
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import RESULTS, read_results
 from risk_sac.run_folder.verified import distinct_failures
-
-if TYPE_CHECKING:
-    from risk_sac.failures.bundle import Bundle
-    from risk_sac.failures.play import Policy
-    from risk_sac.failures.regress import Regression
 
 
 def add_regress(commands: Commands) -> None:
@@ -46,24 +45,11 @@ def add_regress(commands: Commands) -> None:
 
 def _regress(options: argparse.Namespace) -> int:
     ego = read_ego(options.ego)
-    from risk_sac.failures.regress import Regression, regress  # here, for the simulator takes a second to load
-    from risk_sac.failures.regress_junit import junit
-
     baseline = _read_baseline(options.baseline) if options.baseline else None
-    cases = tuple(regress(bundle, ego, policy) for bundle, policy in _failures(options.failures))
-    found = Regression(ego=ego, cases=cases)
+    found = Regression(ego=ego, cases=tuple(_cases(options.failures, ego)))
     if baseline is not None:
         found = found.beside(baseline)
-    table = Table(box=SIMPLE_HEAD, padding=0)
-    for name in ("verdict", "failure, and what happens now"):
-        table.add_column(name, no_wrap=name == "verdict")
-    for case in found.cases:
-        verdict = f"{case.verdict.replace('_', ' ')}{', known' if case.known else ''}"
-        table.add_row(verdict, printable(f"{case.id}: {case.name}\n  {case.reason}"))
-    console.print(table)
-    counts = {verdict: sum(case.verdict is verdict for case in found.cases) for verdict in _order(found)}
-    said = ", ".join(f"{count} {verdict.replace('_', ' ')}" for verdict, count in counts.items())
-    console.print(f"{counted(len(found.cases), 'failure')}: {said}", soft_wrap=True)
+    console.print(cases_table(found))
     if options.out is not None:
         replace_file(options.out, found.model_dump_json(indent=2).encode())
     if options.junit is not None:
@@ -71,14 +57,24 @@ def _regress(options: argparse.Namespace) -> int:
     return OK if found.passed else FAILED
 
 
-def _order(found: "Regression") -> dict[str, None]:
-    return dict.fromkeys(sorted(case.verdict for case in found.cases))
+def cases_table(found: Regression) -> Table:
+    """The cases, and below them how many there are of each verdict."""
+    counts = Counter(case.verdict.replace("_", " ") for case in found.cases)
+    said = ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items()))
+    table = Table(box=SIMPLE_HEAD, padding=0, caption=f"{counted(len(found.cases), 'failure')}: {said}")
+    table.caption_justify = "left"
+    for name in ("verdict", "failure, and what happens now"):
+        table.add_column(name, no_wrap=name == "verdict")
+    for case in found.cases:
+        verdict = f"{case.verdict.replace('_', ' ')}{', known' if case.known else ''}"
+        table.add_row(verdict, Text(printable(f"{case.id}: {case.name}\n  {case.reason}")))
+    return table
 
 
-def _failures(paths: list[Path]) -> "Iterator[tuple[Bundle, Policy | None]]":
-    """All of a set, read before the first is played, so that nothing is half done."""
-    from risk_sac.failures.bundle import read_bundle
-    from risk_sac.failures.collect import bundles, policy_of
+def _cases(paths: list[Path], ego: EgoConfig) -> Iterator[Case]:
+    """Of a whole set, all of which is read before the first is played, so that nothing is half done."""
+    from risk_sac.failures.bundle import read_bundle  # here, for the simulator takes a second to load
+    from risk_sac.failures.regress import regress, regress_run
 
     files: list[Path] = []
     runs: list[Path] = []
@@ -87,19 +83,15 @@ def _failures(paths: list[Path]) -> "Iterator[tuple[Bundle, Policy | None]]":
             runs.append(path)
         else:
             files += sorted(path.glob("*.npz")) if path.is_dir() else [path]
-    found = [read_bundle(file) for file in files]
-    results = {run: read_results(run) for run in runs}
-    if not found and not any(distinct_failures(each) for each in results.values()):
+    bundles = [read_bundle(file) for file in files]
+    if not bundles and not any(distinct_failures(read_results(run)) for run in runs):
         raise ConfigError(f"there is no failure in {', '.join(map(str, paths))}", field="--failures")
-    yield from ((bundle, None) for bundle in found)
-    for run, each in results.items():
-        policy = policy_of(run)
-        yield from ((bundle, policy) for bundle in bundles(run, each, distinct_failures(each)))
+    yield from (regress(bundle, ego) for bundle in bundles)
+    for run in runs:
+        yield from regress_run(run, ego)
 
 
-def _read_baseline(file: Path) -> "Regression":
-    from risk_sac.failures.regress import Regression
-
+def _read_baseline(file: Path) -> Regression:
     try:
         return Regression.model_validate_json(file.read_bytes())
     except FileNotFoundError as error:

@@ -10,6 +10,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from risk_sac import series
 from risk_sac.client.errors import UnexpectedAnswer
+from risk_sac.config import EgoConfig
+from risk_sac.failures.cases import Case
 
 FINAL = frozenset({"succeeded", "failed", "cancelled"})  # states that nothing follows
 
@@ -210,6 +212,18 @@ class Failure(Episode):
 
     series: Series | None
     series_problem: str | None  # why there is none
+
+
+class Regression(Record):
+    """The distinct failures of a campaign against another ego."""
+
+    id: str
+    campaign_id: str
+    ego: EgoConfig
+    state: str  # queued | succeeded | failed
+    reason: str | None  # why it failed
+    passed: bool | None  # whether all are fixed
+    cases: tuple[Case, ...]
 
 
 T = TypeVar("T")

@@ -18,12 +18,13 @@ from risk_sac.client.answers import (
     Failure,
     Page,
     Record,
+    Regression,
     Results,
 )
 from risk_sac.client.errors import StreamLost, UnexpectedAnswer
 from risk_sac.client.follow import AWAY_S, SILENCE_S, Follower
 from risk_sac.client.transport import Transport
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.records import Grade
 
 TIMEOUT_S = 30.0  # of silence within one answer
@@ -162,6 +163,17 @@ class Client:
     def bundle(self, campaign_id: str, failure_id: str, *, core: bool = False) -> bytes:
         """One collision in a file that stands alone, or its core, which takes some ten seconds."""
         return self._made(campaign_id, failure_id, "core.npz" if core else "bundle.npz", BUNDLE)
+
+    def regress(self, campaign_id: str, ego: EgoConfig) -> Regression:
+        """Has the distinct failures of a campaign played against another ego; the same again gives the one there is."""
+        body = json.dumps({"campaign_id": campaign_id, "ego": ego.model_dump(mode="json", exclude_unset=True)})
+        headers = {"Content-Type": "application/json"}
+        answer = self._transport.ask("POST", "v1/regressions", patience_s=self._patience_s, headers=headers, body=body)
+        return Regression.of(answer)
+
+    def regression(self, regression_id: str) -> Regression:
+        """What became of the failures, as far as it is known."""
+        return self._get(Regression, f"v1/regressions/{_part(regression_id)}")
 
     def _made(self, campaign_id: str, failure_id: str, what: str, wanted: str) -> bytes:
         path = f"{_path(campaign_id)}/failures/{_part(failure_id)}/{what}"

@@ -6,74 +6,31 @@ nobody: a contact that was put off is none that was avoided. Where scripts found
 well: they go by where the ego is, and recorded actions miss one that drives a little faster or slower.
 """
 
+from collections.abc import Iterator
 from contextlib import closing
-from enum import StrEnum
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import InfeasibleScene, RiskSacError
+from risk_sac.errors import InfeasibleScene, RiskSacError, SimulationError
 from risk_sac.failures.bundle import Bundle, code_digest, versions, world_of
+from risk_sac.failures.cases import Case, Verdict
+from risk_sac.failures.collect import bundles, policy_of
 from risk_sac.failures.play import Played, Policy, play
 from risk_sac.failures.trajectory import actions_of, trajectory_digest
 from risk_sac.failures.variants import alike
 from risk_sac.problem import Problem
-from risk_sac.records import Collision, Grade, Record
+from risk_sac.records import Collision
+from risk_sac.run_folder.results import read_results
+from risk_sac.run_folder.verified import distinct_failures
 from risk_sac.types import Floats, Scene
 from risk_sac.verdicts.distinct import signature_of
 
-
-class Verdict(StrEnum):
-    """What became of a failure."""
-
-    FIXED = "fixed"
-    STILL_FAILING = "still_failing"
-    NEW_KIND = "new_kind"  # another striker, or another type of conflict
-    FLAKY = "flaky"  # not the same twice
-    NOT_COMPARABLE = "not_comparable"
-
-
 WORSE = (Verdict.FIXED, Verdict.NEW_KIND, Verdict.STILL_FAILING)
-
-
-class Case(Record):
-    """One failure, against the other ego."""
-
-    id: str
-    name: str
-    """Its signature, in words."""
-    grade: Grade | None
-    verdict: Verdict
-    reason: str
-    """In words: what happened instead, or why it cannot be compared."""
-    known: bool = False
-    """Whether a baseline has it with the same verdict."""
-
-    @property
-    def passed(self) -> bool:
-        """Whether it keeps nobody from going on."""
-        return self.known or self.verdict is Verdict.FIXED
-
-
-class Regression(Record):
-    """All cases, in the order of the failures."""
-
-    ego: EgoConfig
-    cases: tuple[Case, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Whether all of them are fixed or known."""
-        return all(case.passed for case in self.cases)
-
-    def beside(self, baseline: "Regression") -> "Regression":
-        """With the cases marked as known that the baseline has with the same verdict."""
-        known = {(case.id, case.verdict) for case in baseline.cases}
-        cases = (case.model_copy(update={"known": (case.id, case.verdict) in known}) for case in self.cases)
-        return self.model_copy(update={"cases": tuple(cases)})
 
 
 def regress(bundle: Bundle, ego: EgoConfig, policy: Policy | None = None) -> Case:
@@ -85,11 +42,32 @@ def regress(bundle: Bundle, ego: EgoConfig, policy: Policy | None = None) -> Cas
       policy: that acts once the recorded actions have ended.
     """
     manifest = bundle.manifest
-    collision = manifest.episode.collision
+    return _case(manifest.id, manifest.episode.collision, *_judge(bundle, manifest.episode.collision, ego, policy))
+
+
+def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Case]:
+    """Plays the distinct failures of a run against another ego, with the run's policy where it has one.
+
+    Raises:
+      ConfigError: the folder holds no run.
+      CheckpointError: its checkpoint is of another run.
+    """
+    results, policy = read_results(folder), policy_of(folder)
+    for episode in distinct_failures(results):
+        try:
+            bundle = next(bundles(folder, results, [episode]))
+        except (InfeasibleScene, SimulationError) as error:
+            yield _case(episode.id_in(results.spec.id), episode.collision, Verdict.FLAKY, str(error))
+        except (RiskSacError, OSError) as error:
+            yield _case(episode.id_in(results.spec.id), episode.collision, Verdict.NOT_COMPARABLE, str(error))
+        else:
+            yield regress(bundle, ego, policy)
+
+
+def _case(id_: str, collision: Collision | None, verdict: Verdict, reason: str) -> Case:
     name = signature_of(collision) if collision else "no contact"
     grade = collision.judgement.grade if collision and collision.judgement else None
-    verdict, reason = _judge(bundle, collision, ego, policy)
-    return Case(id=manifest.id, name=name, grade=grade, verdict=verdict, reason=reason)
+    return Case(id=id_, name=name, grade=grade, verdict=verdict, reason=reason)
 
 
 def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig, policy: Policy | None) -> tuple[Verdict, str]:

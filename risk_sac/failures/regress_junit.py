@@ -3,7 +3,7 @@
 from junitparser import Error, Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
-from risk_sac.failures.regress import Case, Regression, Verdict
+from risk_sac.failures.cases import Case, Regression, Verdict
 
 FAILS = (Verdict.STILL_FAILING, Verdict.NEW_KIND)
 

@@ -10,6 +10,7 @@ from service.api.answers.pages import Cursors
 from service.api.stream import Streams
 from service.networks.shelf import Shelf
 from service.runs.manager import Manager
+from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.views.pictures import ContactOfARun
@@ -28,6 +29,7 @@ class Context:
     reports: Reports
     pictures: Products[ContactOfARun]
     studies: Products[Study]
+    regressions: Regressions
     networks: Shelf
     streams: Streams
     cursors: Cursors

@@ -6,9 +6,11 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
+from risk_sac.config import CampaignSpec
 from service.api.guards.description import describe_guards
-from service.api.posted_campaign import body_schemas
+from service.api.posted import input_schemas
 from service.schemas.changes import StateChange
+from service.schemas.regressions import PostedRegression
 
 DESCRIPTION = """Finds scenarios in which an automated driving system fails.
 
@@ -25,7 +27,9 @@ def openapi(app: FastAPI) -> dict[str, Any]:
 
 def _document(app: FastAPI) -> dict[str, Any]:
     document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
-    document["components"]["schemas"] |= body_schemas() | _event_schemas()
+    document["components"]["schemas"] |= (
+        input_schemas(CampaignSpec) | input_schemas(PostedRegression) | _event_schemas()
+    )
     for operations in document["paths"].values():
         for operation in operations.values():
             for status, response in operation["responses"].items():

@@ -13,10 +13,10 @@ import pytest
 from risk_sac.cli import main
 from risk_sac.env import RiskSacEnv
 from risk_sac.failures.bundle import Bundle, read_bundle
+from risk_sac.failures.cases import Regression, Verdict
 from risk_sac.failures.collect import policy_of
 from risk_sac.failures.minimise import COPIES, HELD, MOST, SHARE
 from risk_sac.failures.play import play
-from risk_sac.failures.regress import Regression, Verdict
 from risk_sac.failures.trajectory import actions_of
 from risk_sac.failures.variants import Stage
 from risk_sac.run_folder.results import read_results

@@ -1,5 +1,7 @@
 """What is made of a failure by playing it again, over REST: a real campaign of a real server."""
 
+import signal
+
 import pytest
 
 from risk_sac import cli
@@ -10,10 +12,10 @@ from risk_sac.failures.minimise import HELD
 SPEC = {"families": ["low"], "methods": ["archive"], "seeds": [3], "budget": {"episodes": 40}}
 
 
-@pytest.fixture
-def campaign(serve):
+@pytest.fixture(scope="module")
+def campaign(serve_shared):
     """A server, the id of a campaign that has ended, and that of one of its failures."""
-    service = serve("service.worker", grace_s=30, replays=2)
+    service = serve_shared("service.worker", grace_s=30, replays=2)
     campaign_id = service.post(**SPEC)
     ended = service.wait(campaign_id)
     assert ended["state"] == "succeeded", ended["reason"]
@@ -48,6 +50,11 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
     assert run["metrics"]["distinct_failures"] <= len(replayed) == run["verified"]
     assert run["flaky"] == 0
 
+    report = tmp_path / "gate.xml"
+    asked = ["campaigns", "regress", campaign_id, "--ego", "default", "--junit", str(report)]
+    assert cli.main(asked) == 1  # with its own ego, all of them still fail
+    assert report.read_text().count("<failure") == len(replayed)
+
     clusters = service.get(campaign_id, "/clusters")
     assert clusters["complete"]
     found = clusters["families"]["low"]["clusters"]
@@ -55,3 +62,40 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
     assert {cluster["name"]: cluster["failures"] for cluster in found} == metrics["signatures"]
     ids = {each["id"] for each in service.get(campaign_id, "/failures", limit=100)["items"]}
     assert {cluster["representative"] for cluster in found} <= ids
+
+
+def test_what_cannot_be_regressed_is_refused(campaign):
+    service, *_ = campaign
+
+    def refused(status, reason, **body):
+        answer = service.client.post("/v1/regressions", json=body)
+        assert (answer.status_code, answer.json()["reason"]) == (status, reason)
+
+    refused(404, "unknown_id", campaign_id="c0", ego={})
+    refused(422, "invalid_field", campaign_id="c0", ego={"profile": "nobody"})
+    refused(422, "invalid_field", campaign_id="../c0", ego={})
+    refused(422, "invalid_field", campaign_id="c0", ego={"reaction_time_s": "1"})
+    running = service.post(budget={"episodes": 5000})
+    refused(409, "not_ended", campaign_id=running, ego={})
+    for unknown in ("x", f"{running}-{'0' * 16}", f"{running}-..%2F..%2Fa"):
+        assert service.client.get(f"/v1/regressions/{unknown}").status_code == 404
+    service.client.post(f"/v1/campaigns/{running}/cancel")
+
+
+def test_a_regression_outlives_the_server_that_took_it_and_goes_with_its_campaign(campaign):
+    service, campaign_id, _ = campaign
+    asked = {"campaign_id": campaign_id, "ego": {"profile": "perfect"}}
+    posted = service.client.post("/v1/regressions", json=asked)
+    assert (posted.status_code, posted.json()["state"]) == (202, "queued")
+    path = posted.headers["location"]
+    service.stop(signal.SIGKILL)
+    service.start()
+    service.wait_until(lambda: service.client.get(path).json()["state"] != "queued")
+    done = service.client.get(path).json()
+    assert done["state"] == "succeeded", done["reason"]
+    assert done["passed"] == all(case["verdict"] == "fixed" for case in done["cases"])
+    assert len(done["cases"]) == service.get(campaign_id, "/results")["runs"][0]["verified"]
+    again = service.client.post("/v1/regressions", json=asked)
+    assert (again.status_code, again.json()) == (202, done)
+    assert service.client.delete(f"/v1/campaigns/{campaign_id}").status_code == 204
+    assert service.client.get(path).status_code == 404

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Request, Response
 
 from risk_sac import __version__
-from risk_sac.config import FamilyName, MethodName
+from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from service.api.access import Caller, CurrentCaller
 from service.api.answer_cache import keep
 from service.api.answers.pages import Cursor, Limit
@@ -25,7 +25,8 @@ from service.api.answers.responses import (
     UNKNOWN,
 )
 from service.api.context import Context, Service
-from service.api.posted_campaign import DOCUMENTED_BODY, PostedCampaign
+from service.api.posted import documented
+from service.api.posted_campaign import PostedCampaign
 from service.schemas.base import Body
 from service.schemas.campaign_results import Results
 from service.schemas.campaigns import Campaign, CampaignPage
@@ -52,7 +53,7 @@ IdempotencyKey = Annotated[
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
 
 
-@router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=DOCUMENTED_BODY)
+@router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=documented(CampaignSpec))
 def post_campaign(
     spec: PostedCampaign, service: Service, caller: CurrentCaller, idempotency_key: IdempotencyKey = None
 ) -> Response:

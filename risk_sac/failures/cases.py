@@ -1,0 +1,53 @@
+"""What became of old failures with another ego; see `risk_sac.failures.regress`."""
+
+from enum import StrEnum
+
+from risk_sac.config import EgoConfig
+from risk_sac.records import Grade, Record
+
+
+class Verdict(StrEnum):
+    """What became of a failure."""
+
+    FIXED = "fixed"
+    STILL_FAILING = "still_failing"
+    NEW_KIND = "new_kind"  # another striker, or another type of conflict
+    FLAKY = "flaky"  # not the same twice
+    NOT_COMPARABLE = "not_comparable"
+
+
+class Case(Record):
+    """One failure, against the other ego."""
+
+    id: str
+    name: str
+    """Its signature, in words."""
+    grade: Grade | None
+    verdict: Verdict
+    reason: str
+    """In words: what happened instead, or why it cannot be compared."""
+    known: bool = False
+    """Whether a baseline has it with the same verdict."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it keeps nobody from going on."""
+        return self.known or self.verdict is Verdict.FIXED
+
+
+class Regression(Record):
+    """All cases, in the order of the failures."""
+
+    ego: EgoConfig
+    cases: tuple[Case, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether all of them are fixed or known."""
+        return all(case.passed for case in self.cases)
+
+    def beside(self, baseline: "Regression") -> "Regression":
+        """With the cases marked as known that the baseline has with the same verdict."""
+        known = {(case.id, case.verdict) for case in baseline.cases}
+        cases = (case.model_copy(update={"known": (case.id, case.verdict) in known}) for case in self.cases)
+        return self.model_copy(update={"cases": tuple(cases)})

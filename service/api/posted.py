@@ -1,0 +1,61 @@
+"""Posted JSON, read strictly: `"3"` and `true` are no numbers, as the API's description says."""
+
+import json
+from http import HTTPStatus
+from typing import Any, TypeVar
+
+from fastapi import Request
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, ValidationError
+
+from service.api.answers.problems import ProblemError
+from service.api.media_types import media_type
+from service.schemas.problems import Reason
+
+MOST_MISTAKES = 50  # that a refusal names one by one
+REFERENCE = "#/components/schemas/{model}-Input"
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+async def read_posted(request: Request, model: type[Model]) -> Model:
+    """The body of a request.
+
+    Not a body parameter: FastAPI validates the parsed JSON, where strictness would refuse arrays for tuples.
+
+    Raises:
+      ProblemError, RequestValidationError: it is no JSON, or something in it is wrong.
+    """
+    media_type(request, ["application/json"])
+    content = await request.body()
+    try:
+        posted = model.model_validate_json(content, strict=True)
+    except ValidationError as error:
+        if error.error_count() > MOST_MISTAKES:  # naming a million of them would keep the server busy for minutes
+            detail = f"the body has {error.error_count()} mistakes; wanted none. Up to {MOST_MISTAKES} would be named"
+            raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail) from error
+        raise RequestValidationError([item | {"loc": ("body", *item["loc"])} for item in error.errors()]) from error
+    json.loads(content, object_pairs_hook=_without_repeats)
+    return posted
+
+
+def documented(model: type[BaseModel]) -> dict[str, Any]:
+    """How a route says that it takes such a body."""
+    schema = {"$ref": REFERENCE.format(model=model.__name__)}
+    return {"requestBody": {"required": True, "content": {"application/json": {"schema": schema}}}}
+
+
+def input_schemas(model: type[BaseModel]) -> dict[str, Any]:
+    """JSON schemas of the body and its parts, as components of the API's description."""
+    schema = model.model_json_schema(ref_template=REFERENCE)
+    parts = schema.pop("$defs", {}) | {model.__name__: schema}
+    return {f"{name}-Input": part for name, part in parts.items()}
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> None:
+    """Refuse an object that has a field twice: of the two, readers differ in which one counts."""
+    names = [name for name, _ in pairs]
+    for name in names:
+        if names.count(name) > 1:  # no object of a campaign that passed has many fields
+            detail = f"the body has the field {name!r} twice in one object; wanted it once"
+            raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail)

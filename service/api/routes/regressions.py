@@ -1,0 +1,45 @@
+"""/v1/regressions: a campaign's failures against another ego."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Depends, Request, Response
+from fastapi.concurrency import run_in_threadpool
+
+from service.api.access import CurrentCaller
+from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses, header, problem
+from service.api.context import Service
+from service.api.posted import documented, read_posted
+from service.runs.regressions import campaign_of
+from service.schemas.regressions import PostedRegression, Regression
+
+POSTING: Responses = (
+    {202: {"headers": {"Location": header("Where to follow it.")}}}
+    | MALFORMED
+    | NOT_JSON
+    | UNKNOWN
+    | problem(409, "The campaign has not ended, or none of its runs has succeeded")
+)
+
+router = APIRouter(prefix="/v1/regressions", tags=["regressions"], responses=STORAGE | INVALID)
+
+
+async def _posted(request: Request) -> PostedRegression:
+    return await read_posted(request, PostedRegression)
+
+
+@router.post("", status_code=202, responses=POSTING, openapi_extra=documented(PostedRegression))
+async def post_regression(
+    posted: Annotated[PostedRegression, Depends(_posted)], response: Response, service: Service, caller: CurrentCaller
+) -> Regression:
+    """Play the distinct failures of a campaign against another ego; posting the same again gives the one there is."""
+    campaign = await run_in_threadpool(service.store.campaign, posted.campaign_id, caller.sees)
+    regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego)
+    response.headers["Location"] = f"/v1/regressions/{regression.id}"
+    return Regression.model_validate(regression)
+
+
+@router.get("/{regression_id}", responses=UNKNOWN)
+def get_regression(regression_id: str, service: Service, caller: CurrentCaller) -> Regression:
+    """What became of each failure: fixed, still failing, a new kind, flaky, or not comparable, and why."""
+    service.store.campaign(campaign_of(regression_id), caller.sees)  # which another project's caller does not see
+    return Regression.model_validate(service.regressions.get(regression_id))

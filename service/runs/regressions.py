@@ -1,0 +1,192 @@
+"""Campaigns' failures against other egos: queued in the campaigns' folders, played one after the other.
+
+A regression is a file below its campaign's folder, and goes with it. One that was queued when the server died is played
+by the next one. Its id names what is played, so that posting the same again gives the one that there is.
+"""
+
+import hashlib
+import logging
+import os
+import queue
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from risk_sac.config import EgoConfig
+from risk_sac.execution.postmortem import without_folders
+from risk_sac.failures.cases import Case
+from risk_sac.failures.cases import Regression as Cases
+from risk_sac.records import Record
+from risk_sac.run_folder.durable import replace_file
+from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
+from service.settings import ServiceSettings
+from service.store.states import State
+from service.store.stored import StoredCampaign
+
+logger = logging.getLogger(__name__)
+
+FOLDER = "regressions"
+MOST_WAITING, RETRY_S = 16, 10.0
+POLL_S = 0.1
+_ID = re.compile(r"([A-Za-z0-9]{1,100})-([0-9a-f]{16})", re.ASCII)
+
+
+class StoredRegression(Record):
+    """One regression. Times are seconds since the epoch."""
+
+    id: str
+    campaign_id: str
+    runs: tuple[str, ...]
+    ego: EgoConfig
+    state: State = State.QUEUED
+    reason: str | None = None
+    created_at: float
+    finished_at: float | None = None
+    cases: tuple[Case, ...] = ()
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether all failures are fixed; None until that is known."""
+        return Cases(ego=self.ego, cases=self.cases).passed if self.state is State.SUCCEEDED else None
+
+
+def campaign_of(regression_id: str) -> str:
+    """Id of the campaign that a regression is of.
+
+    Raises:
+      NotFoundError: no regression has such an id.
+    """
+    found = _ID.fullmatch(regression_id)
+    if found is None:
+        raise _unknown(regression_id)
+    return found[1]
+
+
+class Regressions:
+    """Plays regressions, in a thread and a process of its own."""
+
+    def __init__(self, settings: ServiceSettings) -> None:
+        """Plays nothing yet; see `start`."""
+        self._settings = settings
+        self._queue: queue.Queue[Path | None] = queue.Queue()
+        self._stopping = threading.Event()
+        self._posting = threading.Lock()
+        self._thread = threading.Thread(target=self._work, name="regressions", daemon=True)
+
+    def start(self) -> None:
+        """Takes up what an earlier server left."""
+        for file in sorted((self._settings.data_dir / "campaigns").glob(f"*/{FOLDER}/*.json")):
+            try:
+                waits = _read(file).state is State.QUEUED
+            except StorageError as error:
+                logger.warning("%s", error)
+                continue
+            if waits:
+                self._queue.put(file)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Leaves what waits to the next server."""
+        self._stopping.set()
+        self._queue.put(None)
+        self._thread.join()
+
+    def post(self, campaign: StoredCampaign, ego: EgoConfig) -> StoredRegression:
+        """Queues a regression, unless there is the same already.
+
+        Raises:
+          ConflictError: the campaign has not ended, or none of its runs has succeeded.
+          QuotaError: too many wait.
+          StorageError: it cannot be written down.
+        """
+        runs = tuple(run.id for run in campaign.runs if run.state is State.SUCCEEDED)
+        if not campaign.state.final or not runs:
+            message = (
+                f"campaign {campaign.id} is {campaign.state}; wanted one that has ended, with a run that succeeded"
+            )
+            raise ConflictError(message, reason="not_ended")
+        named = "\n".join((*(f"{run.id} {run.digest}" for run in campaign.runs), ego.model_dump_json()))
+        id_ = f"{campaign.id}-{hashlib.sha256(named.encode()).hexdigest()[:16]}"
+        file = self._file(id_)
+        with self._posting:
+            if file.exists() and (known := _read(file)).state is not State.FAILED:
+                return known
+            if self._queue.qsize() >= MOST_WAITING:
+                raise QuotaError(f"{MOST_WAITING} regressions wait; wanted fewer", RETRY_S)
+            posted = StoredRegression(id=id_, campaign_id=campaign.id, runs=runs, ego=ego, created_at=time.time())
+            _write(file, posted)
+            self._queue.put(file)
+        return posted
+
+    def get(self, regression_id: str) -> StoredRegression:
+        """The regression with this id; whether the caller may see its campaign has been asked.
+
+        Raises:
+          NotFoundError: there is none.
+          StorageError: it cannot be read.
+        """
+        file = self._file(regression_id)
+        if not file.exists():
+            raise _unknown(regression_id)
+        return _read(file)
+
+    def _file(self, regression_id: str) -> Path:
+        return self._settings.campaign_folder(campaign_of(regression_id)) / FOLDER / f"{regression_id}.json"
+
+    def _work(self) -> None:
+        while (file := self._queue.get()) is not None and not self._stopping.is_set():
+            try:
+                self._play(file)
+            except (OSError, StorageError) as error:  # the campaign may have been deleted meanwhile
+                logger.warning("the regression %s is left as it is: %s", file.stem, error)
+
+    def _play(self, file: Path) -> None:
+        asked = _read(file)
+        with tempfile.TemporaryDirectory() as folder:
+            ego, told, log = (Path(folder) / name for name in ("ego.yaml", "cases.json", "log"))
+            ego.write_text(asked.ego.model_dump_json())  # JSON is YAML
+            runs = [str(self._settings.run_folder(asked.campaign_id, run)) for run in asked.runs]
+            arguments = ["regress", "--failures", *runs, "--ego", str(ego), "--out", str(told)]
+            with log.open("wb") as errors:
+                command = [sys.executable, "-m", "risk_sac", *arguments]
+                with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors) as process:
+                    os.setpriority(os.PRIO_PROCESS, process.pid, self._settings.worker_niceness)
+                    while process.poll() is None:
+                        if self._stopping.wait(POLL_S):
+                            process.terminate()
+                            return
+            played = {"finished_at": time.time()}
+            if told.exists():
+                cases = Cases.model_validate_json(told.read_bytes()).cases
+                done = asked.model_copy(update=played | {"state": State.SUCCEEDED, "cases": cases})
+            else:
+                said = without_folders(log.read_text(errors="replace").strip()[-500:])
+                reason = said or f"its process ended with status {process.returncode}"
+                done = asked.model_copy(update=played | {"state": State.FAILED, "reason": reason})
+        _write(file, done)
+
+
+def _read(file: Path) -> StoredRegression:
+    try:
+        return StoredRegression.model_validate_json(file.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise StorageError(f"the regression {file.stem} is damaged or gone") from error
+
+
+def _write(file: Path, regression: StoredRegression) -> None:
+    """Into its campaign's folder, which must be there: a campaign that was deleted stays so."""
+    try:
+        file.parent.mkdir(exist_ok=True)
+        replace_file(file, regression.model_dump_json(indent=2).encode())
+    except OSError as error:
+        raise StorageError(f"the regression {file.stem} cannot be written ({error.strerror})") from error
+
+
+def _unknown(regression_id: str) -> NotFoundError:
+    return NotFoundError(f"there is no regression {regression_id!r}", field="regression_id", got=regression_id)
