@@ -1,10 +1,12 @@
 """`python -m risk_sac.failures.study NICENESS FILE`: what takes the simulator to say of a failure.
 
 The question is a line of JSON on stdin, the answer is written into the file. For whoever must not load the simulator.
+The end of stdin means that nobody waits for the answer any more.
 """
 
 import os
 import sys
+import threading
 from contextlib import closing
 from pathlib import Path
 
@@ -53,12 +55,19 @@ def _beside_twin(question: Question) -> bytes:
 
 def _main(file: Path) -> int:
     question = Question.model_validate_json(sys.stdin.buffer.readline())
+    threading.Thread(target=_leave_with_asker, daemon=True).start()
     try:
         file.write_bytes(answer(question))
     except (RiskSacError, ValueError) as error:
         file.write_text(str(error))
         return REFUSED
     return 0
+
+
+def _leave_with_asker() -> None:
+    while os.read(0, 4096):
+        pass
+    os._exit(1)
 
 
 if __name__ == "__main__":

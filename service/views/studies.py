@@ -56,25 +56,28 @@ def studies(settings: ServiceSettings) -> Products[Study]:
 
 
 def _ask(question: Question, niceness: int) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as log:
         file = Path(folder) / "answer"
         command = [sys.executable, "-m", "risk_sac.failures.study", str(niceness), str(file)]
         try:
-            done = subprocess.run(
-                command,
-                input=question.model_dump_json().encode() + b"\n",
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-                timeout=WALL_S,
-            )
+            # Its stdin stays open until it has ended: it leaves with this server, however that ends.
+            with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log) as process:
+                assert process.stdin is not None
+                process.stdin.write(question.model_dump_json().encode() + b"\n")
+                process.stdin.flush()
+                try:
+                    status = process.wait(WALL_S)
+                except subprocess.TimeoutExpired as error:
+                    process.kill()
+                    raise CannotBePlayed(f"it takes more than {WALL_S:g} s here") from error
             said = file.read_bytes() if file.exists() else b""
-        except subprocess.TimeoutExpired as error:
-            raise CannotBePlayed(f"it takes more than {WALL_S:g} s here") from error
         except OSError as error:
             raise StorageError(f"it cannot be played ({error.strerror})") from error
-    if done.returncode == REFUSED:
+        log.seek(0)
+        tail = log.read()[-2000:].decode(errors="replace")
+    if status == REFUSED:
         raise CannotBePlayed(without_folders(said.decode(errors="replace"), question.series.parent))
-    if done.returncode != 0:
-        logger.error("a study ended with status %d: %s", done.returncode, done.stderr[-2000:].decode(errors="replace"))
+    if status != 0:
+        logger.error("a study ended with status %d: %s", status, tail)
         raise CannotBePlayed("its process was lost; the log has the reason")
     return said
