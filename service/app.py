@@ -45,7 +45,7 @@ from service.store.reading import Store
 from service.store.server import cursor_secret
 from service.views.pictures import pictures as pictures_of_contacts
 from service.views.reports import Reports
-from service.views.studies import studies
+from service.views.studies import Studies
 from service.workers.messages import Event
 from service.workers.program import program
 
@@ -107,17 +107,23 @@ def opened(
     ):
         manager = Manager(settings, store, executor)
         manager.start()
-        gate = Regressions(settings)
+        gate, studies = Regressions(settings), Studies(settings)
         gate.start()
         try:
-            yield _context(settings, store, manager, gate, latencies)
+            yield _context(settings, store, manager, gate, studies, latencies)
         finally:
+            studies.stop()
             gate.stop()
             manager.stop()
 
 
 def _context(
-    settings: ServiceSettings, store: Store, manager: Manager, gate: Regressions, latencies: Histogram
+    settings: ServiceSettings,
+    store: Store,
+    manager: Manager,
+    gate: Regressions,
+    studies: Studies,
+    latencies: Histogram,
 ) -> Context:
     return Context(
         settings,
@@ -125,7 +131,7 @@ def _context(
         manager,
         Reports(settings),
         pictures_of_contacts(settings),
-        studies(settings),
+        studies,
         gate,
         Shelf(settings.networks_dir),
         Streams(store),

@@ -67,7 +67,7 @@ class ServiceSettings(BaseSettings):
     attempts: Annotated[int, Field(ge=1, le=100)] = 5
     """Workers of one run that may die in a row without finishing an episode, before the run fails."""
 
-    replays: Annotated[int, Field(ge=0, le=100)] = TIMES
+    replays: Annotated[int, Field(ge=0, le=10)] = TIMES
     """How often each distinct failure of a finished run is replayed, in fresh processes; 0 leaves it out."""
 
     retention_days: Annotated[float, Field(gt=0)] | None = None

@@ -45,7 +45,7 @@ class Reporter:
         self._stream = stream
         self._sending = threading.Lock()
         self._asked = 0
-        self._stopping = False
+        self.stopping = False
         self._since = time.monotonic()
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
@@ -64,11 +64,15 @@ class Reporter:
         """
         self._asked += 1
         if self._asked == 2:
-            signal.signal(signal.SIGTERM, self._stop)
-        return self._stopping
+            self.keep_going()
+        return self.stopping
+
+    def keep_going(self) -> None:
+        """From now on SIGTERM is a wish to stop, and no end; for the main thread to say."""
+        signal.signal(signal.SIGTERM, self._stop)
 
     def _stop(self, signal_number: int, frame: FrameType | None) -> None:
-        self._stopping = True
+        self.stopping = True
 
     def send(self, word: Event | Heartbeat) -> None:
         """Write one line at once."""
@@ -147,15 +151,20 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, replays: int) -> F
 
     from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
     from risk_sac.failures.verify import verify
+    from risk_sac.run_folder.verified import Verified
     from risk_sac.train import train
 
     with Recorder(spec, folder, reporter) as recorder:
         summary = train(spec, folder, recorder)
         recorder.finish(summary)
     versions: Mapping[str, str] = summary.versions
-    found = verify([folder], replays, stopping=reporter.should_stop) if summary.finished and replays else {}
+    found, finished = dict[Path, Verified](), summary.finished
+    if finished and replays:
+        reporter.keep_going()
+        found |= verify([folder], replays, stopping=lambda: reporter.stopping)
+        finished = not reporter.stopping or folder in found  # else the next worker finds all played, and replays it
     return Finished(
-        finished=summary.finished,
+        finished=finished,
         metrics=summary.metrics,
         evaluation=summary.evaluation,
         digest=summary.digest,

@@ -11,12 +11,12 @@ from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.console import FAILED, OK, Commands, console
+from risk_sac.cli.regress_junit import junit
 from risk_sac.cli.text import counted, printable
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression
-from risk_sac.failures.regress_junit import junit
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import RESULTS, read_results
 from risk_sac.run_folder.verified import distinct_failures
@@ -45,6 +45,8 @@ def add_regress(commands: Commands) -> None:
 
 def _regress(options: argparse.Namespace) -> int:
     ego = read_ego(options.ego)
+    for file in filter(None, (options.out, options.junit)):
+        file.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
     baseline = _read_baseline(options.baseline) if options.baseline else None
     found = Regression(ego=ego, cases=tuple(_cases(options.failures, ego)))
     if baseline is not None:

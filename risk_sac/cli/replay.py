@@ -6,7 +6,6 @@ from pathlib import Path
 
 from risk_sac.cli.console import FAILED, OK, Commands, complain, console
 from risk_sac.cli.text import counted, printable
-from risk_sac.errors import ConfigError
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import distinct_failures
 from risk_sac.types import Scene
@@ -44,22 +43,21 @@ def _bundle(options: argparse.Namespace) -> int:
         return OK
     episodes = distinct_failures(results)
     for bundle in bundles(folder, results, episodes):
-        write_bundle(options.out / f"{bundle.manifest.id}.npz", bundle)
+        # Runs of two campaigns may have one id: the digest keeps their failures apart.
+        write_bundle(options.out / f"{bundle.manifest.id}-{bundle.manifest.digest[:8]}.npz", bundle)
     console.print(f"{counted(len(episodes), 'bundle')}: {options.out}", soft_wrap=True)
     return OK
 
 
 def _replay(options: argparse.Namespace) -> int:
     from risk_sac.env import RiskSacEnv
-    from risk_sac.failures.bundle import code_digest, read_bundle, versions, world_of
+    from risk_sac.failures.bundle import check_world, code_digest, read_bundle, versions
     from risk_sac.failures.play import play
     from risk_sac.failures.trajectory import actions_of, trajectory_digest
 
     bundle = read_bundle(options.bundle)
     manifest = bundle.manifest
-    for name, digest in world_of(manifest.spec, manifest.episode).items():
-        if manifest.world.get(name) != digest:
-            raise ConfigError(f"{manifest.id} was found on another {name}, so it cannot be replayed", field="BUNDLE")
+    check_world(manifest)
     if (manifest.code, manifest.versions) != (code_digest(), versions()):
         complain(f"the code, or {' or '.join(versions())}, has changed since the bundle was written")
     with closing(RiskSacEnv.of(manifest.spec)) as env:

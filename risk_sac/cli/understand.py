@@ -1,16 +1,19 @@
 """What failures come to: the core of one (`minimise`), what is near it (`region`), and which there are (`clusters`)."""
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
+from rich.text import Text
 
 from risk_sac.cli.console import OK, Commands, console
 from risk_sac.cli.text import counted, printable
-from risk_sac.errors import ConfigError
+from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import read_results
+from risk_sac.run_folder.verified import read_verified
 
 
 def add_minimise(commands: Commands) -> None:
@@ -41,10 +44,7 @@ def _minimise(options: argparse.Namespace) -> int:
     from risk_sac.failures.bundle import read_bundle, write_bundle  # here, for the simulator takes a second to load
     from risk_sac.failures.minimise import minimise
 
-    try:
-        minimal = minimise(read_bundle(options.bundle))
-    except ValueError as error:
-        raise ConfigError(str(error), field="BUNDLE") from error
+    minimal = minimise(read_bundle(options.bundle))
     core = minimal.manifest.core
     assert core is not None  # that is what `minimise` makes
     write_bundle(options.out, minimal)
@@ -68,11 +68,10 @@ def _region(options: argparse.Namespace) -> int:
     from risk_sac.failures.region import region
 
     bundle = read_bundle(options.bundle)
-    try:
-        found = region(bundle)
-    except ValueError as error:
-        raise ConfigError(str(error), field="BUNDLE") from error
-    table = Table(title=printable(bundle.manifest.id), box=SIMPLE_HEAD, padding=0)
+    if options.out is not None:
+        options.out.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
+    found = region(bundle)
+    table = Table(title=Text(printable(bundle.manifest.id)), box=SIMPLE_HEAD, padding=0)
     for name in ("changed", "fail", "of", "share", "95 % interval"):
         table.add_column(name, no_wrap=True)
     for share in found.shares:
@@ -85,10 +84,19 @@ def _region(options: argparse.Namespace) -> int:
     return OK
 
 
+def _failures(path: Path) -> Iterator[tuple[str, EpisodeRecord]]:
+    """The contacts of a run with their ids, but for flaky ones and their like."""
+    results = read_results(path)
+    verified = read_verified(path if path.is_dir() else path.parent, results.digest or "")
+    episodes = [contact.episode for contact in results.contacts]
+    for episode in verified.repeating(episodes) if verified else episodes:
+        yield episode.id_in(results.spec.id), episode
+
+
 def _clusters(options: argparse.Namespace) -> int:
     from risk_sac.failures.clusters import overview
 
-    found = overview([(contact.id, contact.episode) for run in options.runs for contact in read_results(run).contacts])
+    found = overview(episode for run in options.runs for episode in _failures(run))
     table = Table(box=SIMPLE_HEAD, padding=0)
     for name in ("failures", "distinct", "preventable", "kind; look first at"):
         table.add_column(name, no_wrap=name != "kind; look first at")

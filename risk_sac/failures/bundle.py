@@ -109,6 +109,17 @@ def bundle_bytes(bundle: Bundle) -> bytes:
     return content.getvalue()
 
 
+def check_world(manifest: Manifest) -> None:
+    """Refuses a failure that was found on another net, or with other vehicle types.
+
+    Raises:
+      ConfigError: naming the file.
+    """
+    for name, digest in world_of(manifest.spec, manifest.episode).items():
+        if manifest.world.get(name) != digest:
+            raise ConfigError(f"{manifest.id} was found on another {name}, so it cannot be replayed", field="BUNDLE")
+
+
 def write_bundle(file: Path, bundle: Bundle) -> None:
     """Writes the whole file or none.
 

@@ -20,14 +20,18 @@ class Case(Record):
     """One failure, against the other ego."""
 
     id: str
+    digest: str
+    """Of its trajectory: failures of different campaigns, and a failure and its core, share an id."""
     name: str
     """Its signature, in words."""
     grade: Grade | None
     verdict: Verdict
     reason: str
     """In words: what happened instead, or why it cannot be compared."""
+    found: str = ""
+    """Signature of the failure that happens instead; empty where none does."""
     known: bool = False
-    """Whether a baseline has it with the same verdict."""
+    """Whether a baseline has it with the same verdict and the same failure instead."""
 
     @property
     def passed(self) -> bool:
@@ -47,7 +51,9 @@ class Regression(Record):
         return all(case.passed for case in self.cases)
 
     def beside(self, baseline: "Regression") -> "Regression":
-        """With the cases marked as known that the baseline has with the same verdict."""
-        known = {(case.id, case.verdict) for case in baseline.cases}
-        cases = (case.model_copy(update={"known": (case.id, case.verdict) in known}) for case in self.cases)
+        """With the cases marked as known that the baseline has, with the same verdict and the same failure instead."""
+        known = {(case.digest, case.verdict, case.found) for case in baseline.cases}
+        cases = (
+            case.model_copy(update={"known": (case.digest, case.verdict, case.found) in known}) for case in self.cases
+        )
         return self.model_copy(update={"cases": tuple(cases)})

@@ -2,7 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.env import RiskSacEnv
@@ -14,6 +17,7 @@ from risk_sac.records import EpisodeRecord
 from risk_sac.run import RunState
 from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
 from risk_sac.run_folder.series import read_series
+from risk_sac.run_folder.verified import read_verified
 from risk_sac.types import Scene, Vector
 
 
@@ -28,8 +32,42 @@ def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -
     spec = results.spec
     with closing(RiskSacEnv.of(spec)) as env:
         for episode in episodes:
-            recorded = read_series(folder / FAILURES / series_name(episode.index))
+            recorded = _series(folder, spec, episode)
             yield make_bundle(spec, episode, recorded, repeated(env, spec, episode, recorded).signal_heads)
+
+
+def recorded_bundle(folder: Path, results: Results, episode: EpisodeRecord) -> Bundle:
+    """A bundle of a contact as it was recorded, whether or not it repeats; without signal heads.
+
+    By which code it was recorded is known of runs that were verified.
+
+    Raises:
+      ConfigError: its series is from before there was a release.
+      DamagedError, OSError: its series cannot be read.
+    """
+    recorded = _series(folder, results.spec, episode)
+    made = make_bundle(results.spec, episode, recorded, np.empty((0, 0), dtype=np.uint8))
+    verified = read_verified(folder, results.digest or "")
+    packages = {name: version for name, version in (results.versions or {}).items() if name in made.manifest.versions}
+    by = {"code": verified.code if verified else "", "versions": packages}
+    return replace(made, manifest=made.manifest.model_copy(update=by))
+
+
+def _series(folder: Path, spec: RunSpec, episode: EpisodeRecord) -> Series:
+    recorded = read_series(folder / FAILURES / series_name(episode.index))
+    check_release(spec, episode, recorded)
+    return recorded
+
+
+def check_release(spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> None:
+    """Refuses what was recorded before there was a release.
+
+    Raises:
+      ConfigError: it was.
+    """
+    if "released_s" not in recorded:
+        message = f"the series of {episode.id_in(spec.id)} is older than the release of adversaries"
+        raise ConfigError(message, field="FAILURE")
 
 
 def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> Played:
@@ -39,12 +77,10 @@ def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: S
       SimulationError: it does not repeat.
       ConfigError: its series is from before there was a release.
     """
-    id_ = episode.id_in(spec.id)
-    if "released_s" not in recorded:
-        raise ConfigError(f"the series of {id_} is older than the release of adversaries", field="FAILURE")
+    check_release(spec, episode, recorded)
     played = play(env, Scene(spec.family, episode.scene), episode.seed, actions_of(recorded))
     if trajectory_digest(played.series) != trajectory_digest(recorded):
-        raise SimulationError(f"{id_} does not repeat here, so no bundle is made of it")
+        raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here, so no bundle is made of it")
     return played
 
 
@@ -52,14 +88,15 @@ def policy_of(folder: Path) -> Policy | None:
     """The policy that a run came to, as it is frozen; None of a method that learns none.
 
     Raises:
-      ConfigError: the folder holds no run.
+      ConfigError: the folder holds no run, or no checkpoint.
       CheckpointError: its checkpoint is of another run.
     """
     spec = read_results(folder).spec
     if not METHODS[spec.method].learns:
         return None
     run = RunState(spec, folder)
-    run.resume()
+    if not run.resume():
+        raise ConfigError(f"{folder} has no checkpoint, so its policy cannot act on; make bundles", field="--failures")
     agent = run.searchers.agent
 
     def act(observation: Vector) -> Vector:

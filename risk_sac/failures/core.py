@@ -24,10 +24,11 @@ class Core(Record):
     plain_parameters: int
     """Of the scene, in the middle of their ranges."""
     parameters: int
+    """Without those that stand for one of two categories."""
     episodes: int
     """That were played to find it."""
     held: int
-    """Copies, perturbed by up to 1 %, that still fail."""
+    """Copies, perturbed by up to 1 %, that still fail; other ones than those that the reductions were chosen by."""
     copies: int
     sentence: str
     """What happens, in words."""

@@ -17,7 +17,7 @@ from risk_sac.failures.play import play
 from risk_sac.failures.sentence import sentence
 from risk_sac.failures.variants import Stage, Variant, alike
 from risk_sac.records import Collision, Grade
-from risk_sac.types import STEP_S, Floats
+from risk_sac.types import STEP_S, Bools, Floats
 
 MOST = 150  # episodes that are played for one failure
 COPIES, HELD, SHARE = 10, 8, 0.01  # a reduction counts if so many copies, perturbed by that much, still fail
@@ -40,8 +40,8 @@ def minimise(bundle: Bundle, most: int = MOST) -> Bundle:
       most: episodes to play.
 
     Raises:
-      ConfigError: the bundle's spec poses no problem that can be run.
-      ValueError: what it holds ended without a contact that was judged.
+      ConfigError: the bundle holds no valid failure that can be played here.
+      SimulationError: it does not happen here.
     """
     search = _Search(bundle, most)
     with closing(search.stage.env):
@@ -62,13 +62,15 @@ class _Search:
     def neutral(self) -> Floats:
         """The middle of the space; where a parameter stands for one of two categories, that is not touched."""
         space = self.stage.space
-        middle = (space.low + space.high) / 2
-        kept = np.array([bool(parameter.categories) for parameter in space.parameters])
-        return np.where(kept, self.left.scene, middle)
+        return np.where(self._categories, self.left.scene, (space.low + space.high) / 2)
+
+    @property
+    def _categories(self) -> Bools:
+        return np.array([bool(parameter.categories) for parameter in self.stage.space.parameters])
 
     def take(self, variant: Variant) -> bool:
         """Goes on with a variant if it fails in the same way and not on a knife's edge."""
-        if self.stage.played + 1 + 2 * COPIES > self._most:  # it is counted once more in the end
+        if self.stage.played + 1 + COPIES > self._most - COPIES - 1:  # as many are counted afresh in the end
             return False
         found = self.stage.play(variant)
         if not alike(found, self.stage.collision) or found is None or _grade(found) != _grade(self.stage.collision):
@@ -90,7 +92,8 @@ class _Search:
     def bundle(self, origin: Bundle) -> Bundle:
         """What is left, as a failure of its own."""
         stage, left = self.stage, self.left
-        held = sum(stage.fails(copy) for copy in stage.copies(left, SHARE, COPIES))
+        # Other copies than those that it was chosen by.
+        held = sum(stage.fails(copy) for copy in stage.copies(left, SHARE, COPIES, seed=1))
         played = play(stage.env, stage.scene(left), left.seed, left.actions)
         assert played.collision is not None  # of its own, or it would not have been taken
         episode = origin.manifest.episode.model_copy(
@@ -104,15 +107,16 @@ class _Search:
                 "min_ttc_s": stage.env.trace.min_ttc_s,
                 "min_robustness": stage.env.trace.min_robustness,
                 "objective": None,
+                "script": None,  # which would do all that was taken away
                 "collision": played.collision,
             }
         )
         core = Core(
             before=_extent(stage.original),
             after=_extent(replace(left, actions=left.actions[: episode.steps])),
-            plain_parameters=int(np.isclose(left.scene, self.neutral).sum()),
-            parameters=len(left.scene),
-            episodes=stage.played,
+            plain_parameters=int(np.isclose(left.scene, self.neutral)[~self._categories].sum()),
+            parameters=int((~self._categories).sum()),
+            episodes=stage.played + 1,
             held=held,
             copies=COPIES,
             sentence=sentence(played.series, played.collision),

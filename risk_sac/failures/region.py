@@ -21,8 +21,8 @@ def region(bundle: Bundle) -> Region:
     An episode fails as it did if it ends in a valid contact with the same striker, in the same type of conflict.
 
     Raises:
-      ConfigError: the bundle's spec poses no problem that can be run.
-      ValueError: what it holds ended without a contact that was judged.
+      ConfigError: the bundle holds no valid failure that can be played here.
+      SimulationError: it does not happen here.
     """
     stage = Stage(bundle)
     with closing(stage.env):

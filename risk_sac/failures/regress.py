@@ -10,16 +10,17 @@ from collections.abc import Iterator
 from contextlib import closing
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import InfeasibleScene, RiskSacError, SimulationError
-from risk_sac.failures.bundle import Bundle, code_digest, versions, world_of
+from risk_sac.errors import InfeasibleScene, RiskSacError
+from risk_sac.failures.bundle import Bundle, check_world, code_digest, versions
 from risk_sac.failures.cases import Case, Verdict
-from risk_sac.failures.collect import bundles, policy_of
+from risk_sac.failures.collect import policy_of, recorded_bundle
 from risk_sac.failures.play import Played, Policy, play
 from risk_sac.failures.trajectory import actions_of, trajectory_digest
 from risk_sac.failures.variants import alike
@@ -30,7 +31,16 @@ from risk_sac.run_folder.verified import distinct_failures
 from risk_sac.types import Floats, Scene
 from risk_sac.verdicts.distinct import signature_of
 
-WORSE = (Verdict.FIXED, Verdict.NEW_KIND, Verdict.STILL_FAILING)
+WORSE = (Verdict.FIXED, Verdict.NOT_COMPARABLE, Verdict.NEW_KIND, Verdict.STILL_FAILING)
+BLIND = "seen_before"  # the rule that an ego breaks by seeing nothing: no way to be fixed
+
+
+class _Ending(NamedTuple):
+    """How one attack on the other ego went."""
+
+    verdict: Verdict
+    reason: str
+    found: str = ""  # signature of what happened instead
 
 
 def regress(bundle: Bundle, ego: EgoConfig, policy: Policy | None = None) -> Case:
@@ -42,78 +52,80 @@ def regress(bundle: Bundle, ego: EgoConfig, policy: Policy | None = None) -> Cas
       policy: that acts once the recorded actions have ended.
     """
     manifest = bundle.manifest
-    return _case(manifest.id, manifest.episode.collision, *_judge(bundle, manifest.episode.collision, ego, policy))
+    collision = manifest.episode.collision
+    ending = _judge(bundle, collision, ego, policy)
+    return Case(
+        id=manifest.id,
+        digest=manifest.digest,
+        name=signature_of(collision) if collision else "no contact",
+        grade=collision.judgement.grade if collision and collision.judgement else None,
+        verdict=ending.verdict,
+        reason=ending.reason,
+        found=ending.found,
+    )
 
 
 def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Case]:
     """Plays the distinct failures of a run against another ego, with the run's policy where it has one.
 
     Raises:
-      ConfigError: the folder holds no run.
+      ConfigError: the folder holds no run, or none whose policy can act on.
       CheckpointError: its checkpoint is of another run.
+      DamagedError, OSError: a series cannot be read.
     """
     results, policy = read_results(folder), policy_of(folder)
     for episode in distinct_failures(results):
-        try:
-            bundle = next(bundles(folder, results, [episode]))
-        except (InfeasibleScene, SimulationError) as error:
-            yield _case(episode.id_in(results.spec.id), episode.collision, Verdict.FLAKY, str(error))
-        except (RiskSacError, OSError) as error:
-            yield _case(episode.id_in(results.spec.id), episode.collision, Verdict.NOT_COMPARABLE, str(error))
-        else:
-            yield regress(bundle, ego, policy)
+        yield regress(recorded_bundle(folder, results, episode), ego, policy)
 
 
-def _case(id_: str, collision: Collision | None, verdict: Verdict, reason: str) -> Case:
-    name = signature_of(collision) if collision else "no contact"
-    grade = collision.judgement.grade if collision and collision.judgement else None
-    return Case(id=id_, name=name, grade=grade, verdict=verdict, reason=reason)
-
-
-def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig, policy: Policy | None) -> tuple[Verdict, str]:
+def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig, policy: Policy | None) -> _Ending:
     manifest = bundle.manifest
     if wanted is None or not wanted.valid:
-        return Verdict.NOT_COMPARABLE, "it is no valid failure"
+        return _Ending(Verdict.NOT_COMPARABLE, "it is no valid failure")
     try:
-        here = world_of(manifest.spec, manifest.episode)
-        changed = [name for name, digest in here.items() if manifest.world.get(name) != digest]
-        if changed:
-            return Verdict.NOT_COMPARABLE, f"it was found on another {changed[0]}"
+        check_world(manifest)
         own = _play(manifest.spec, bundle, None)
         if trajectory_digest(own.series) != manifest.digest:
             if (manifest.code, manifest.versions) == (code_digest(), versions()):
-                return Verdict.FLAKY, "with its own ego it goes another way than recorded"
+                return _Ending(Verdict.FLAKY, "with its own ego it goes another way than recorded")
             if not alike(own.collision, wanted):
-                return Verdict.NOT_COMPARABLE, "with its own ego it does not happen under this code and these packages"
+                why = "with its own ego it does not happen under this code and these packages"
+                return _Ending(Verdict.NOT_COMPARABLE, why)
         other = manifest.spec.model_copy(update={"ego": ego})
         attacks = {"recorded actions": partial(_play, other, bundle, policy)}
         if manifest.episode.script is not None:
             attacks["its scripts"] = partial(_follow, other, bundle)
-        found = {}
+        endings = {}
         for name, attack in attacks.items():
             first, second = attack(), attack()
             if trajectory_digest(first.series) != trajectory_digest(second.series):
-                return Verdict.FLAKY, f"with {name} this ego went another way the second time"
-            found[name] = _compared(first.collision, wanted)
+                return _Ending(Verdict.FLAKY, f"with {name} this ego went another way the second time")
+            endings[name] = _compared(first.collision, wanted)
     except InfeasibleScene as error:
-        return Verdict.NOT_COMPARABLE, f"its scene is refused with this ego: {error.reason}"
+        return _Ending(Verdict.NOT_COMPARABLE, f"its scene is refused with this ego: {error.reason}")
     except RiskSacError as error:
-        return Verdict.NOT_COMPARABLE, str(error)
-    worst = max((verdict for verdict, _ in found.values()), key=WORSE.index)
-    reasons = [f"with {name} {reason}" for name, (verdict, reason) in found.items() if verdict is worst]
-    return worst, "; ".join(reasons)
+        return _Ending(Verdict.NOT_COMPARABLE, str(error))
+    worst = max(endings.values(), key=lambda ending: WORSE.index(ending.verdict))
+    reasons = [f"with {name} {each.reason}" for name, each in endings.items() if each.verdict is worst.verdict]
+    return worst._replace(reason="; ".join(reasons))
 
 
-def _compared(found: Collision | None, wanted: Collision) -> tuple[Verdict, str]:
+def _compared(found: Collision | None, wanted: Collision) -> _Ending:
     if found is None:
-        return Verdict.FIXED, "nobody is touched"
+        return _Ending(Verdict.FIXED, "nobody is touched")
     touched = f"touches {found.other_id} at {found.ego_speed_mps:.1f} m/s"
-    if not found.valid:
-        broken = ", ".join(rule for rule, passed in found.verdicts.items() if not passed)
-        return Verdict.FIXED, f"{touched}, which is not its failure: {broken}"
+    kind = signature_of(found)
     if alike(found, wanted):
-        return Verdict.STILL_FAILING, touched
-    return Verdict.NEW_KIND, f"{touched}: {signature_of(found)}"
+        return _Ending(Verdict.STILL_FAILING, touched, kind)
+    if found.valid:
+        return _Ending(Verdict.NEW_KIND, f"{touched}: {kind}", kind)
+    broken = [rule for rule, passed in found.verdicts.items() if not passed]
+    said = f"{touched}, which is not its failure: {', '.join(broken)}"
+    if found.artefact:  # and it may have ended the episode before the failure
+        return _Ending(Verdict.NOT_COMPARABLE, said)
+    if BLIND in broken:
+        return _Ending(Verdict.NEW_KIND, f"{touched}, which it never saw", kind)
+    return _Ending(Verdict.FIXED, said)
 
 
 def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:
@@ -135,5 +147,5 @@ def _follow(spec: RunSpec, bundle: Bundle) -> Played:
 
 def _played(spec: RunSpec, problem: Problem, bundle: Bundle, actions: Floats, policy: Policy | None) -> Played:
     episode = bundle.manifest.episode
-    with closing(RiskSacEnv(problem, spec.learner.reward)) as env:
+    with closing(RiskSacEnv.of(spec)) as env:
         return play(env, Scene(spec.family, episode.scene), episode.seed, actions, policy)

@@ -48,7 +48,10 @@ def _bundle(question: Question) -> Bundle:
 
 def _beside_twin(question: Question) -> bytes:
     contact = Contact.of(question.spec.id, question.episode)
-    recording = Recording(contact, read_series(question.series))
+    recorded = read_series(question.series)
+    with closing(RiskSacEnv.of(question.spec)) as env:
+        repeated(env, question.spec, question.episode, recorded)
+    recording = Recording(contact, recorded)
     twin = twin_recording(question.spec, recording, question.twin)
     return recording_bytes(question.spec.family, recording, "png", twin)
 

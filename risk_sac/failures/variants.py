@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import InfeasibleScene, SimulationError
-from risk_sac.failures.bundle import Bundle
+from risk_sac.errors import ConfigError, InfeasibleScene, SimulationError
+from risk_sac.failures.bundle import Bundle, check_world
 from risk_sac.failures.trajectory import actions_of
 from risk_sac.records import Collision
 from risk_sac.scenario.space import SceneSpace
@@ -44,14 +44,16 @@ class Stage:
     """
 
     def __init__(self, bundle: Bundle) -> None:
-        """Starts no simulation.
+        """Plays the failure once more.
 
         Raises:
-          ValueError: what the bundle holds ended without a contact.
+          ConfigError: the bundle holds no valid failure, or one of another net.
+          SimulationError: it does not happen here.
         """
         episode = bundle.manifest.episode
-        if episode.collision is None or episode.collision.judgement is None:
-            raise ValueError(f"{bundle.manifest.id} ended without a contact that was judged")
+        if episode.collision is None or not episode.collision.valid or episode.collision.judgement is None:
+            raise ConfigError(f"{bundle.manifest.id} is no valid failure", field="BUNDLE")
+        check_world(bundle.manifest)
         self.env = RiskSacEnv.of(bundle.manifest.spec)
         self.space = self.env.problem.space
         self.collision: Collision = episode.collision
@@ -61,6 +63,9 @@ class Stage:
             seed=episode.seed,
         )
         self.played = 0
+        if not self.fails(self.original):
+            self.env.close()
+            raise SimulationError(f"{bundle.manifest.id} does not happen here")
 
     def scene(self, variant: Variant) -> Scene:
         """As the environment takes it."""

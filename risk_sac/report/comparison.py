@@ -113,9 +113,8 @@ def compare(
 
 def _failures(family: FamilyName, runs: Sequence[FinishedRun]) -> Iterator[tuple[str, EpisodeRecord]]:
     for run in runs:
-        flaky = run.verified.flaky if run.verified else frozenset[int]()
         if run.spec.family == family:
-            yield from ((each.id_in(run.spec.id), each) for each in run.records if each.index not in flaky)
+            yield from ((each.id_in(run.spec.id), each) for each in run.repeating)
 
 
 def _reference_first(methods: Sequence[MethodName]) -> tuple[MethodName, ...]:

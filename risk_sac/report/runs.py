@@ -16,7 +16,6 @@ from risk_sac.run_folder.episode_json import records_from_lines
 from risk_sac.run_folder.results import EPISODES, Results, read_results
 from risk_sac.run_folder.verified import Verified, read_verified
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.verdicts.distinct import niche_of
 
 
 class Found(NamedTuple):
@@ -63,13 +62,17 @@ class FinishedRun:
         return found
 
     @cached_property
+    def repeating(self) -> tuple[EpisodeRecord, ...]:
+        """Its episodes without the failures of a kind whose first one does not repeat."""
+        return self.verified.repeating(self.records) if self.verified else self.records
+
+    @cached_property
     def found(self) -> tuple[Found, ...]:
         """What the search had found after each of its episodes; of no niche whose first failure does not repeat."""
         tally, found = Tally(horizon_steps=FAMILIES[self.spec.family].horizon_steps), []
-        indices = self.verified.flaky if self.verified else frozenset()
-        flaky = {niche_of(record.collision) for record in self.records if record.index in indices and record.collision}
+        repeating = {record.index for record in self.repeating}
         for record in self.phase("search"):
-            if not flaky or record.collision is None or niche_of(record.collision) not in flaky:
+            if record.index in repeating:
                 tally.add(record)
             found.append(Found(tally.distinct_preventable, tally.distinct_failures, len(tally.kinds)))
         return tuple(found)

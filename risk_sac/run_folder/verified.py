@@ -1,7 +1,7 @@
 """Which failures of a run repeat: `verified.json` in its folder, beside the results that it speaks of."""
 
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -13,7 +13,7 @@ from risk_sac.records import EpisodeRecord, Record
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import Results
 from risk_sac.run_folder.seal import seal, unseal
-from risk_sac.verdicts.distinct import DistinctFailures
+from risk_sac.verdicts.distinct import DistinctFailures, niche_of
 
 VERIFIED = "verified.json"
 TIMES = 3  # that a failure is replayed, if nobody says otherwise
@@ -47,6 +47,13 @@ class Verified:
     def flaky(self) -> frozenset[int]:
         """The episodes that were not the same each time."""
         return frozenset(index for index, repetition in self.episodes.items() if not repetition.verified)
+
+    def repeating(self, records: Sequence[EpisodeRecord]) -> tuple[EpisodeRecord, ...]:
+        """A run's episodes without the failures of a kind whose first one does not repeat."""
+        flaky = {niche_of(record.collision) for record in records if record.index in self.flaky and record.collision}
+        if not flaky:
+            return tuple(records)
+        return tuple(each for each in records if each.collision is None or niche_of(each.collision) not in flaky)
 
 
 _VERIFIED = TypeAdapter(Verified)

@@ -16,7 +16,7 @@ from service.store.reading import Store
 from service.views.pictures import ContactOfARun
 from service.views.products import Products
 from service.views.reports import Reports
-from service.views.studies import Study
+from service.views.studies import Studies
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Context:
     manager: Manager
     reports: Reports
     pictures: Products[ContactOfARun]
-    studies: Products[Study]
+    studies: Studies
     regressions: Regressions
     networks: Shelf
     streams: Streams

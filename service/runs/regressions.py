@@ -20,6 +20,7 @@ from pydantic import ValidationError
 
 from risk_sac.config import EgoConfig
 from risk_sac.execution.postmortem import without_folders
+from risk_sac.failures.bundle import code_digest
 from risk_sac.failures.cases import Case
 from risk_sac.failures.cases import Regression as Cases
 from risk_sac.records import Record
@@ -111,7 +112,7 @@ class Regressions:
                 f"campaign {campaign.id} is {campaign.state}; wanted one that has ended, with a run that succeeded"
             )
             raise ConflictError(message, reason="not_ended")
-        named = "\n".join((*(f"{run.id} {run.digest}" for run in campaign.runs), ego.model_dump_json()))
+        named = "\n".join((*(f"{run.id} {run.digest}" for run in campaign.runs), ego.model_dump_json(), code_digest()))
         id_ = f"{campaign.id}-{hashlib.sha256(named.encode()).hexdigest()[:16]}"
         file = self._file(id_)
         with self._posting:

@@ -1,11 +1,13 @@
 """What takes the simulator to say of a failure: asked of a process of its own, see `risk_sac.failures.study`."""
 
+import contextlib
 import logging
 import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import IO
 
 from risk_sac.config import EgoConfig
 from risk_sac.execution.postmortem import without_folders
@@ -36,12 +38,22 @@ class Study:
     """idle, or the profile of another ego."""
 
 
-def studies(settings: ServiceSettings) -> Products[Study]:
-    """Answers; StorageError where the time series is lost, CannotBePlayed where nothing can be said."""
+class Studies(Products[Study]):
+    """Answers, one at a time; StorageError where the time series is lost, CannotBePlayed where nothing can be said."""
 
-    def answer(study: Study) -> bytes:
+    def __init__(self, settings: ServiceSettings) -> None:
+        super().__init__(self._answer, "failures")
+        self._settings = settings
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def stop(self) -> None:
+        """Ends what is being played: nobody waits for it any more."""
+        if (process := self._process) is not None:
+            process.kill()
+
+    def _answer(self, study: Study) -> bytes:
         contact = study.contact
-        path, sha256 = series_file(contact.campaign_id, contact.episode, settings)
+        path, sha256 = series_file(contact.campaign_id, contact.episode, self._settings)
         load_arrays(path, sha256)  # else it is lost or damaged, and that is to be said
         question = Question(
             subject=study.subject,
@@ -50,34 +62,36 @@ def studies(settings: ServiceSettings) -> Products[Study]:
             series=path,
             twin=EgoConfig.model_validate({"profile": study.twin}) if study.twin not in ("", "idle") else None,
         )
-        return _ask(question, settings.worker_niceness)
+        with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as log:
+            file = Path(folder) / "answer"
+            try:
+                status = self._ask(question, file, log)
+                said = file.read_bytes() if file.exists() else b""
+            except OSError as error:
+                raise StorageError(f"it cannot be played ({error.strerror})") from error
+            log.seek(0)
+            tail = log.read()[-2000:].decode(errors="replace")
+        if status == REFUSED:
+            raise CannotBePlayed(without_folders(said.decode(errors="replace"), path.parent))
+        if status != 0:
+            logger.error("a study ended with status %d: %s", status, tail)
+            raise CannotBePlayed("its process was lost; the log has the reason")
+        return said
 
-    return Products(answer, "failures")
-
-
-def _ask(question: Question, niceness: int) -> bytes:
-    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as log:
-        file = Path(folder) / "answer"
-        command = [sys.executable, "-m", "risk_sac.failures.study", str(niceness), str(file)]
-        try:
-            # Its stdin stays open until it has ended: it leaves with this server, however that ends.
-            with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log) as process:
+    def _ask(self, question: Question, file: Path, log: IO[bytes]) -> int:
+        """The exit status of a study. Its stdin stays open until then: it leaves with a server that is killed."""
+        niceness = str(self._settings.worker_niceness)
+        command = [sys.executable, "-m", "risk_sac.failures.study", niceness, str(file)]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log) as process:
+            self._process = process
+            try:
                 assert process.stdin is not None
-                process.stdin.write(question.model_dump_json().encode() + b"\n")
-                process.stdin.flush()
-                try:
-                    status = process.wait(WALL_S)
-                except subprocess.TimeoutExpired as error:
-                    process.kill()
-                    raise CannotBePlayed(f"it takes more than {WALL_S:g} s here") from error
-            said = file.read_bytes() if file.exists() else b""
-        except OSError as error:
-            raise StorageError(f"it cannot be played ({error.strerror})") from error
-        log.seek(0)
-        tail = log.read()[-2000:].decode(errors="replace")
-    if status == REFUSED:
-        raise CannotBePlayed(without_folders(said.decode(errors="replace"), question.series.parent))
-    if status != 0:
-        logger.error("a study ended with status %d: %s", status, tail)
-        raise CannotBePlayed("its process was lost; the log has the reason")
-    return said
+                with contextlib.suppress(BrokenPipeError):  # its status says more
+                    process.stdin.write(question.model_dump_json().encode() + b"\n")
+                    process.stdin.flush()
+                return process.wait(WALL_S)
+            except subprocess.TimeoutExpired as error:
+                process.kill()
+                raise CannotBePlayed(f"it takes more than {WALL_S:g} s here") from error
+            finally:
+                self._process = None

@@ -1,6 +1,7 @@
 """Real failures: bundled, minimised, their regions, their twins, and played against other egos."""
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,11 +16,12 @@ from risk_sac.env import RiskSacEnv
 from risk_sac.failures.bundle import Bundle, read_bundle
 from risk_sac.failures.cases import Regression, Verdict
 from risk_sac.failures.collect import policy_of
-from risk_sac.failures.minimise import COPIES, HELD, MOST, SHARE
+from risk_sac.failures.minimise import COPIES, MOST, SHARE
 from risk_sac.failures.play import play
 from risk_sac.failures.trajectory import actions_of
 from risk_sac.failures.variants import Stage
-from risk_sac.run_folder.results import read_results
+from risk_sac.run_folder.results import FAILURES, read_results, series_name
+from risk_sac.run_folder.series import read_series, write_series
 from risk_sac.run_folder.verified import distinct_failures
 from tests.acceptance.test_bundle import changed, manifest, series
 
@@ -76,7 +78,7 @@ def test_every_distinct_failure_has_a_bundle(run: Path, failures: Path) -> None:
     spec = read_results(run).spec
     expected = {episode.id_in(spec.id) for episode in distinct_failures(read_results(run))}
     assert len(expected) >= 2
-    assert {file.stem for file in failures.iterdir()} == expected
+    assert {file.stem.rpartition("-")[0] for file in failures.iterdir()} == expected
 
 
 def test_a_core_does_less_and_fails_in_the_same_way_as_surely(failure: Path, tmp_path: Path, tell: Tell) -> None:
@@ -87,7 +89,8 @@ def test_a_core_does_less_and_fails_in_the_same_way_as_surely(failure: Path, tmp
     assert core is not None
     assert core.sentence in out
     assert struck(minimal) == struck(origin)
-    assert core.held >= HELD
+    assert core.held >= COPIES // 2  # of copies that it was not chosen by
+    assert minimal.manifest.episode.script is None
     assert core.episodes <= MOST
     assert core.after.segments < core.before.segments
     assert core.after.adversaries <= core.before.adversaries
@@ -195,6 +198,43 @@ def test_what_is_missing_is_said_before_anything_is_played(
     assert status == 2
     assert complaint in err
     assert not (tmp_path / "cases.json").exists()
+
+
+def test_an_ego_that_sees_nothing_fixes_nothing(failures: Path, tmp_path: Path, tell: Tell) -> None:
+    (tmp_path / "blind.yaml").write_text("sensor: {range_m: 1, field_of_view_rad: 0.01, memory_s: 0}\n")
+    _, verdicts = regressed(tell, tmp_path, "--failures", failures, "--ego", tmp_path / "blind.yaml")
+    assert Verdict.NEW_KIND in verdicts
+
+
+@pytest.mark.parametrize("verb", ["minimise", "region"])
+def test_what_does_not_happen_here_has_neither_core_nor_region(
+    verb: str, failure: Path, tmp_path: Path, tell: Tell
+) -> None:
+    def still(arrays: dict[str, np.ndarray]) -> None:
+        series(arrays, actions=np.where(np.isnan(arrays["actions"]), np.nan, 0.0))
+
+    changed(failure, tmp_path / "still.npz", still)
+    status, _, err = tell(verb, tmp_path / "still.npz", "--out", tmp_path / "out")
+    assert status == 1
+    assert "does not happen here" in err
+    changed(failure, tmp_path / "net.npz", lambda arrays: manifest(arrays, world={}))
+    status, _, err = tell(verb, tmp_path / "net.npz", "--out", tmp_path / "out")
+    assert status == 2
+    assert "was found on another" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_run_whose_record_was_changed_has_a_flaky_case(run: Path, tmp_path: Path, tell: Tell) -> None:
+    shutil.copytree(run, tmp_path / "run")
+    assert main(["verify", str(tmp_path / "run"), "--times", "1"]) == 0  # so that it is known by which code
+    first = distinct_failures(read_results(tmp_path / "run"))[0]
+    file = tmp_path / "run" / FAILURES / series_name(first.index)
+    changed_series = read_series(file)
+    changed_series["actions"][-5:] *= -1.0
+    write_series(file, changed_series)
+    _, verdicts = regressed(tell, tmp_path, "--failures", tmp_path / "run", "--ego", "default")
+    assert verdicts[0] is Verdict.FLAKY
+    assert set(verdicts[1:]) == {Verdict.STILL_FAILING}
 
 
 def test_an_empty_set_is_refused(tmp_path: Path, tell: Tell) -> None:

@@ -102,6 +102,18 @@ def test_a_finished_run_s_distinct_failures_are_replayed_before_it_is_told(tmp_p
     assert said[-1].repetitions == dict.fromkeys(found, Repetition(times=2, same=2)) != {}
 
 
+def test_a_worker_that_finds_all_played_replays_what_nobody_has(tmp_path: Path) -> None:
+    spec = RunSpec(family="low", method="archive", seed=3, budget=Budget(episodes=20))
+    said, _, _ = Launcher(tmp_path / "run", spec).work()
+    assert isinstance(said[-1], Finished)
+    assert not said[-1].repetitions
+    said, exited, _ = Launcher(tmp_path / "run", spec, ServiceSettings(replays=1)).work()
+    assert exited == Exited(None, Cause.ENDED, 0), exited
+    assert isinstance(said[-1], Finished)
+    assert said[-1].finished
+    assert set(said[-1].repetitions.values()) == {Repetition(times=1, same=1)}
+
+
 def test_a_worker_told_to_stop_leaves_a_checkpoint_and_goes_on_from_there(launcher: Launcher, undisturbed: str) -> None:
     said, exited, left_after_s = launcher.work(5, lambda _: launcher.executor.cancel(1, 30))
     assert exited == Exited(None, Cause.ENDED, 0)

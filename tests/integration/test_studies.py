@@ -7,7 +7,6 @@ import pytest
 from risk_sac import cli
 from risk_sac.client import Client, Refused
 from risk_sac.failures.bundle import read_bundle
-from risk_sac.failures.minimise import HELD
 
 SPEC = {"families": ["low"], "methods": ["archive"], "seeds": [3], "budget": {"episodes": 40}}
 
@@ -34,7 +33,6 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
     core = read_bundle(tmp_path / "core.npz").manifest.core
     assert core is not None
     assert core.after.segments <= core.before.segments
-    assert core.held >= HELD or core.after == core.before  # of a needle, nothing is taken away
 
     region = service.get(campaign_id, f"/failures/{id_}/region")
     assert [share["played"] for share in region["shares"]] == [40, 40, 40, 10, 40]

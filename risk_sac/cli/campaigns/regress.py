@@ -7,10 +7,10 @@ from pathlib import Path
 from risk_sac.cli.campaigns.output import print_answer
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, OK, Commands, complain
 from risk_sac.cli.regress import cases_table
+from risk_sac.cli.regress_junit import junit
 from risk_sac.client import Client
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.cases import Regression
-from risk_sac.failures.regress_junit import junit
 from risk_sac.run_folder.durable import replace_file
 
 POLL_S = 0.5

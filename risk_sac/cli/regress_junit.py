@@ -3,6 +3,7 @@
 from junitparser import Error, Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
+from risk_sac.cli.text import printable
 from risk_sac.failures.cases import Case, Regression, Verdict
 
 FAILS = (Verdict.STILL_FAILING, Verdict.NEW_KIND)
@@ -21,10 +22,10 @@ def junit(regression: Regression) -> bytes:
 
 
 def _case(case: Case) -> TestCase:
-    found = TestCase(case.id, case.name)
+    found = TestCase(printable(case.id), printable(case.name))
     if case.grade is not None:
         found.add_property("grade", case.grade)
-    said = f"{case.verdict.replace('_', ' ')}: {case.reason}"
+    said = printable(f"{case.verdict.replace('_', ' ')}: {case.reason}")
     if case.verdict is Verdict.FIXED:
         found.system_out = said
     elif case.known:
