@@ -8,6 +8,12 @@ from risk_sac.report.comparison import Comparison
 from risk_sac.report.page import table
 
 MOST = 12  # rows of the table of clusters
+NEXT = """
+Of a failure in the folder of its run: `risk-sac show RUN ID --twin idle` draws it beside the same scene with nobody
+attacking, `risk-sac bundle RUN ID --out FILE` puts it into a file, of which `risk-sac minimise` and `risk-sac region`
+say the core and how many of its neighbours fail; `risk-sac regress --failures RUN... --ego EGO` plays all of them
+against another ego.
+"""
 
 
 def clusters(comparison: Comparison, family: FamilyName) -> str:
@@ -27,6 +33,7 @@ def clusters(comparison: Comparison, family: FamilyName) -> str:
         f"{found.cells} cells of the taxonomy hold one.\n\n"
         + table(["kind", "failures", "distinct", "preventable", "look first at"], rows)
         + rest
+        + NEXT
     )
 
 
