@@ -62,7 +62,7 @@ class Ended:
 
 @pytest.fixture(scope="session")
 def ended(base_url):
-    with httpx.Client(base_url=base_url) as client:
+    with httpx.Client(base_url=base_url, timeout=600) as client:
         yield Ended(client)
 
 

@@ -90,7 +90,7 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
     settings = ServiceSettings(data_dir=tmp_path_factory.mktemp("golden"), max_workers=2)
     with known_times_and_ids() as clock:
         Recorded(settings, clock).write()
-        with serving(settings) as url, httpx.Client(base_url=url, headers={"Host": "localhost"}) as client:
+        with serving(settings) as url, httpx.Client(base_url=url, headers={"Host": "localhost"}, timeout=600) as client:
             deadline = time.monotonic() + 30
             while any(run["state"] != "running" for run in client.get(LIVE).json()["runs"]):
                 assert time.monotonic() < deadline, "the live campaign does not run"

@@ -27,6 +27,7 @@ PROBLEM = "application/problem+json"
 FRIEND = "http://friend.example"
 ROADS = Path(__file__).parents[2] / "sumo_nets" / "low" / "low.net.xml"
 SPEC = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 4}}
+REGRESSIONS = "/v1/regressions"
 CAMPAIGN, NETWORK = "/v1/campaigns/{campaign_id}", "/v1/networks/{network_id}"
 
 # What each route wants, and what it answers the project's own key.
@@ -53,10 +54,17 @@ ROUTES = {
     ("GET", f"{CAMPAIGN}/failures"): ("read", 200),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}"): ("read", 200),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/picture.png"): ("read", 404),  # no time series was recorded
+    ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/bundle.npz"): ("read", 404),
+    ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/core.npz"): ("read", 404),
+    ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/region"): ("read", 404),
+    ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}.png"): ("read", 404),
+    ("GET", f"{CAMPAIGN}/clusters"): ("read", 200),
     ("GET", f"{CAMPAIGN}/table"): ("read", 200),
     ("GET", f"{CAMPAIGN}/figures"): ("read", 200),
     ("GET", f"{CAMPAIGN}/figures/{{name}}.{{format}}"): ("read", 404),  # no run has finished
     ("GET", f"{CAMPAIGN}/spec"): ("read", 200),
+    ("POST", REGRESSIONS): ("run", 409),  # the campaign runs
+    ("GET", f"{REGRESSIONS}/{{regression_id}}"): ("read", 404),
     ("GET", "/v1/networks"): ("read", 200),
     ("POST", "/v1/networks"): ("run", 422),  # what is uploaded is no network
     ("GET", NETWORK): ("read", 200),
@@ -107,12 +115,16 @@ def ask(world, method, path, key=None, known=True, **headers):
     """What a route answers whoever holds the key; of a stream, its beginning."""
     ids = (world.campaign, world.network) if known else (UNKNOWN, UNKNOWN)
     parts = {"campaign_id": ids[0], "network_id": ids[1], "failure_id": world.failure}
+    parts |= {"regression_id": f"{ids[0]}-{'0' * 16}", "twin": "idle"}
     url = path.format(**parts, name="ecr_low", format="png")
     if key is not None:
         headers["authorization"] = f"Bearer {world.tokens.get(key, key)}"
     content = b""
     if (method, path) == ("POST", "/v1/campaigns"):
         content, headers["content-type"] = json.dumps(SPEC).encode(), "application/json"
+    elif (method, path) == ("POST", REGRESSIONS):
+        content = json.dumps({"campaign_id": ids[0], "ego": {}}).encode()
+        headers["content-type"] = "application/json"
     elif (method, path) == ("POST", "/v1/networks"):
         content, headers["content-type"] = b"<roads/>", "application/xml"
     with world.nobody.stream(method, url, content=content, headers=headers) as response:
@@ -185,7 +197,7 @@ def test_another_project_finds_nothing(world, unchanged, method, path):
     answer = ask(world, method, path, "other")
     if wanted == "admin":
         assert_refused(answer, 403, "forbidden")
-    elif path.startswith((CAMPAIGN, NETWORK)):
+    elif path.startswith((CAMPAIGN, NETWORK, REGRESSIONS)):
         assert_refused(answer, 404, "unknown_id")
         assert_alike(world, answer, ask(world, method, path, "other", known=False))
     else:

@@ -108,7 +108,7 @@ def test_streams_through_killed_servers_tell_everything_once(serve, kills):
     seen = [[] for _ in range(4)]
 
     def follow(mine):
-        with httpx.Client(base_url=service.client.base_url) as client:
+        with httpx.Client(base_url=service.client.base_url, timeout=600) as client:
             while not (mine and told(mine[-1]) == ("state", None, "succeeded")):
                 with contextlib.suppress(httpx.TransportError):
                     for event in events(client, campaign_id, mine[-1]["id"] if mine else None):
@@ -153,7 +153,7 @@ def test_a_stream_ends_when_its_campaign_is_deleted(shared):
     campaign_id = shared.post(budget={"episodes": 10_000})
     stream = events(shared.client, campaign_id)
     next(stream)
-    with httpx.Client(base_url=shared.client.base_url) as other:
+    with httpx.Client(base_url=shared.client.base_url, timeout=600) as other:
         other.post(f"/v1/campaigns/{campaign_id}/cancel")
         assert told(list(stream)[-1]) == ("state", None, "cancelled")
         shared.wait_until(lambda: other.delete(f"/v1/campaigns/{campaign_id}").status_code == 204)

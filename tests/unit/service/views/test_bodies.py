@@ -9,7 +9,15 @@ from service.views.bodies import episode_body
 def shown(record, funnel=None):
     return episode_body(
         StoredEpisode(
-            number=1, sequence=1, run_id="r", record=record, series=None, series_sha256=None, wall_s=0.5, funnel=funnel
+            number=1,
+            sequence=1,
+            run_id="r",
+            record=record,
+            series=None,
+            series_sha256=None,
+            wall_s=0.5,
+            funnel=funnel,
+            repetition=None,
         )
     )
 

@@ -35,6 +35,7 @@ RUN = StoredRun(
     evaluation=None,
     digest=None,
     versions={},
+    repetitions={},
 )
 
 
