@@ -108,8 +108,8 @@ def opened(
         manager = Manager(settings, store, executor)
         manager.start()
         gate, studies = Regressions(settings), Studies(settings)
-        gate.start()
         try:
+            gate.start()
             yield _context(settings, store, manager, gate, studies, latencies)
         finally:
             studies.stop()

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from risk_sac.cli.console import FAILED, OK, Commands, console
 from risk_sac.cli.regress_junit import junit
-from risk_sac.cli.text import counted, printable
+from risk_sac.cli.text import EGO, counted, printable
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
@@ -36,8 +36,7 @@ def add_regress(commands: Commands) -> None:
         metavar="SET",
         help="bundles, folders of bundles, or folders of runs, whose policy acts on after the recorded actions",
     )
-    ego = "default, perfect, careful, or a YAML file with the fields of a campaign's ego"
-    regress.add_argument("--ego", required=True, metavar="EGO", help=ego)
+    regress.add_argument("--ego", required=True, metavar="EGO", help=EGO)
     regress.add_argument("--baseline", type=Path, metavar="FILE.json", help="known cases, as --out wrote them")
     regress.add_argument("--out", type=Path, metavar="FILE.json", help="write the cases there")
     regress.add_argument("--junit", type=Path, metavar="FILE.xml", help="write a JUnit report there")

@@ -7,9 +7,10 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.console import OK, Commands, console
-from risk_sac.cli.text import in_words
+from risk_sac.cli.text import EGO, in_words
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
+from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
 from risk_sac.records import Judgement
 from risk_sac.run_folder.results import Results, read_results
@@ -24,8 +25,8 @@ def add_show(commands: Commands) -> None:
     show.add_argument(
         "failure", nargs="?", metavar="FAILURE", help="id of a contact, or its number; default: list them"
     )
-    twin = "draw beside it the same scene with nobody attacking (idle), or with this ego: default, perfect, careful, "
-    show.add_argument("--twin", metavar="TWIN", help=f"{twin}or a YAML file with the fields of a campaign's ego")
+    twin = f"draw beside it the same scene with nobody attacking (idle), or with this ego: {EGO}"
+    show.add_argument("--twin", metavar="TWIN", help=twin)
     show.add_argument("--out", type=Path, metavar="FILE.png", help="(default: failures/FAILURE.png beside RESULTS)")
 
 
@@ -50,7 +51,7 @@ def _show(options: argparse.Namespace) -> int:
 def _twin(spec: RunSpec, recording: Recording, name: str) -> Recording:
     """The same scene with what the command line names changed."""
     from risk_sac.failures.collect import check_release
-    from risk_sac.failures.twin import IDLE, twin_recording
+    from risk_sac.failures.twin import twin_recording
 
     check_release(spec, recording.contact.episode, recording.series)
     return twin_recording(spec, recording, None if name == IDLE else read_ego(name), name)

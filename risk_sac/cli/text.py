@@ -7,6 +7,9 @@ from collections.abc import Iterable
 _UNPRINTABLE = re.compile("[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
+EGO = "default, perfect, careful, or a YAML file with the fields of a campaign's ego"  # what names one
+
+
 def printable(text: str) -> str:
     """The text without control characters, tabs and line breaks apart."""
     return _UNPRINTABLE.sub("", text)

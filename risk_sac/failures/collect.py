@@ -80,7 +80,7 @@ def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: S
     check_release(spec, episode, recorded)
     played = play(env, Scene(spec.family, episode.scene), episode.seed, actions_of(recorded))
     if trajectory_digest(played.series) != trajectory_digest(recorded):
-        raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here, so no bundle is made of it")
+        raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here")
     return played
 
 

@@ -6,6 +6,9 @@ from typing import Literal
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.records import EpisodeRecord, Record
 
+IDLE = "idle"
+Twin = Literal["idle", "default", "perfect", "careful"]
+"""What may be changed in a scene's twin: nobody attacks, or the profile of another ego."""
 Subject = Literal["bundle", "core", "region", "twin"]
 REFUSED = 3  # exit status; the answer is why, in words
 

@@ -24,7 +24,6 @@ from risk_sac.failures.collect import policy_of, recorded_bundle
 from risk_sac.failures.play import Played, Policy, play
 from risk_sac.failures.trajectory import actions_of, trajectory_digest
 from risk_sac.failures.variants import alike
-from risk_sac.problem import Problem
 from risk_sac.records import Collision
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import distinct_failures
@@ -130,22 +129,22 @@ def _compared(found: Collision | None, wanted: Collision) -> _Ending:
 
 def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:
     """The recorded actions, and the rest of the horizon."""
-    problem, actions = Problem.from_spec(spec), actions_of(bundle.series)
-    if policy is None:
-        rest = problem.family.horizon_steps - len(actions)
-        actions = np.vstack((actions, np.zeros((rest, actions.shape[1]), dtype=actions.dtype)))
-    return _played(spec, problem, bundle, actions, policy)
+    with closing(RiskSacEnv.of(spec)) as env:
+        actions = actions_of(bundle.series)
+        if policy is None:
+            rest = env.problem.family.horizon_steps - len(actions)
+            actions = np.vstack((actions, np.zeros((rest, actions.shape[1]), dtype=actions.dtype)))
+        return _played(env, bundle, actions, policy)
 
 
 def _follow(spec: RunSpec, bundle: Bundle) -> Played:
     """The scripts that found the failure, from the release on."""
-    problem = Problem.from_spec(spec)
-    follower = ScriptFollower(problem.family)
-    follower.begin(np.array(bundle.manifest.episode.script))
-    return _played(spec, problem, bundle, np.empty((0, 2 * len(problem.family.adversaries))), follower.act)
-
-
-def _played(spec: RunSpec, problem: Problem, bundle: Bundle, actions: Floats, policy: Policy | None) -> Played:
-    episode = bundle.manifest.episode
     with closing(RiskSacEnv.of(spec)) as env:
-        return play(env, Scene(spec.family, episode.scene), episode.seed, actions, policy)
+        follower = ScriptFollower(env.problem.family)
+        follower.begin(np.array(bundle.manifest.episode.script))
+        return _played(env, bundle, np.empty((0, env.action_size)), follower.act)
+
+
+def _played(env: RiskSacEnv, bundle: Bundle, actions: Floats, policy: Policy | None) -> Played:
+    episode = bundle.manifest.episode
+    return play(env, Scene(env.problem.family.name, episode.scene), episode.seed, actions, policy)

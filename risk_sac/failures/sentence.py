@@ -7,11 +7,12 @@ import numpy as np
 from risk_sac.failures.trajectory import Series
 from risk_sac.records import Collision
 from risk_sac.types import STEP_S, Floats, Kind
-from risk_sac.verdicts.conflict import BRAKES_MPS2
+from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
+from risk_sac.verdicts.ego import STANDING_MPS
+from risk_sac.verdicts.signature import ONCOMING_COS
 
 IN_LANE_M = 1.5  # who is nearer to the ego's axis leads it, or follows
-SAME_WAY_COS, ONCOMING_COS = math.cos(math.radians(30.0)), math.cos(math.radians(135.0))
 ACROSS_MPS = 0.2  # slower than that nobody changes its place in a lane
 ACTS_MPS2 = 1.5
 
@@ -49,7 +50,7 @@ def _who(series: Series, striker: int, at: int) -> str:
     elif math.cos(turn) < ONCOMING_COS:
         name = "oncoming vehicle"
     else:
-        name = f"vehicle from the {side}"
+        name = f"vehicle from the {'right' if math.sin(turn) > 0.0 else 'left'}"  # as its signature says it
     if abs(ahead_m) < 1.0:
         return f"{name}, level with it"
     return f"{name}, {abs(ahead_m):.0f} m {'ahead' if ahead_m > 0.0 else 'behind'}"
@@ -92,7 +93,7 @@ def _lasting(values: Floats, limit: float) -> list[int]:
 
 def _response(series: Series, began: int) -> str:
     speed, accel = series["speed_mps"][began:, 0], series["accel_mps2"][began:, 0]
-    if speed.max() < 0.5:
+    if speed.max() < STANDING_MPS:
         return "stands"
     braked = np.flatnonzero(accel <= -BRAKES_MPS2)
     if len(braked) == 0:

@@ -1,5 +1,7 @@
 """What is told of the neighbours of a failure; see `risk_sac.failures.region`."""
 
+from pydantic import computed_field
+
 from risk_sac.metrics import wilson_interval
 from risk_sac.records import Record
 
@@ -29,6 +31,7 @@ class Region(Record):
 
     shares: tuple[Share, ...]
 
+    @computed_field  # type: ignore[prop-decorator]
     @property
     def needle(self) -> bool:
         """Whether fewer than half of the nearest scenes fail: a failure that one would hardly meet again."""

@@ -14,7 +14,6 @@ from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord
 from risk_sac.types import STEP_S, Floats, Scene
 
-IDLE = "idle"
 AFTER_S = 3.0  # how long a twin goes on after the contact that it is compared with
 
 

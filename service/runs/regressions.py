@@ -96,7 +96,8 @@ class Regressions:
         """Leaves what waits to the next server."""
         self._stopping.set()
         self._queue.put(None)
-        self._thread.join()
+        if self._thread.is_alive():
+            self._thread.join()
 
     def post(self, campaign: StoredCampaign, ego: EgoConfig) -> StoredRegression:
         """Queues a regression, unless there is the same already.

@@ -4,11 +4,10 @@ import hashlib
 from dataclasses import dataclass, field
 
 from risk_sac import __version__
-from risk_sac.config import RunSpec
 from risk_sac.failures.recording import Recording
 from risk_sac.run_folder.results import Contact
 from service.settings import ServiceSettings
-from service.store.stored import StoredCampaign, StoredEpisode
+from service.store.stored import StoredCampaign, StoredEpisode, StoredRun
 from service.views.bodies import series_file
 from service.views.products import Products
 from service.views.series import load_arrays
@@ -19,17 +18,17 @@ class ContactOfARun:
     """A contact; two with the same edition look the same."""
 
     edition: str  # changes whenever what is told of it would
-    campaign_id: str = field(compare=False)
-    spec: RunSpec = field(compare=False)
+    campaign: StoredCampaign = field(compare=False)
+    run: StoredRun = field(compare=False)
     episode: StoredEpisode = field(compare=False)
 
     @classmethod
     def of(cls, campaign: StoredCampaign, episode: StoredEpisode) -> "ContactOfARun":
         """A contact of a campaign."""
-        spec = next(run for run in campaign.spec.runs() if run.id == episode.run_id)
+        run = next(run for run in campaign.runs if run.id == episode.run_id)
         parts = (__version__, campaign.id, episode.id, str(episode.series_sha256), episode.record.model_dump_json())
         edition = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
-        return cls(edition, campaign.id, spec, episode)
+        return cls(edition, campaign, run, episode)
 
 
 def pictures(settings: ServiceSettings) -> Products[ContactOfARun]:
@@ -39,9 +38,9 @@ def pictures(settings: ServiceSettings) -> Products[ContactOfARun]:
         from risk_sac.failures.show import recording_bytes  # here, because it loads matplotlib
 
         episode = contact.episode
-        path, sha256 = series_file(contact.campaign_id, episode, settings)
+        path, sha256 = series_file(contact.campaign.id, episode, settings)
         arrays = load_arrays(path, sha256)
         shown = Contact(id=episode.id, series=path.name, episode=episode.record)
-        return recording_bytes(contact.spec.family, Recording(shown, arrays), "png")
+        return recording_bytes(contact.run.family, Recording(shown, arrays), "png")
 
     return Products(draw, "pictures")

@@ -1,7 +1,7 @@
 """What takes seconds to make of a failure: made when it is asked for, one at a time, the newest kept."""
 
-from collections.abc import Callable
-from typing import Generic, Protocol, TypeVar
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
 
 import anyio
 from anyio import to_thread
@@ -18,14 +18,8 @@ class TooManyWaiting(ServiceError):
     """Asking again pays once others have theirs."""
 
 
-class Subject(Protocol):
-    """What a product is made of; two that are equal make the same product."""
-
-    def __hash__(self) -> int:
-        """Goes with equality."""
-
-
-S = TypeVar("S", bound=Subject)
+S = TypeVar("S", bound=Hashable)
+"""What a product is made of; two that are equal make the same product."""
 
 
 class Products(Generic[S]):

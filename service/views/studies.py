@@ -11,8 +11,8 @@ from typing import IO
 
 from risk_sac.config import EgoConfig
 from risk_sac.execution.postmortem import without_folders
-from risk_sac.failures.question import REFUSED, Question, Subject
-from service.errors import ServiceError, StorageError
+from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
+from service.errors import OutdatedError, ServiceError, StorageError
 from service.settings import ServiceSettings
 from service.views.bodies import series_file
 from service.views.pictures import ContactOfARun
@@ -34,8 +34,8 @@ class Study:
 
     contact: ContactOfARun
     subject: Subject
-    twin: str = ""
-    """idle, or the profile of another ego."""
+    twin: Twin | None = None
+    """Of a twin, which."""
 
 
 class Studies(Products[Study]):
@@ -53,14 +53,18 @@ class Studies(Products[Study]):
 
     def _answer(self, study: Study) -> bytes:
         contact = study.contact
-        path, sha256 = series_file(contact.campaign_id, contact.episode, self._settings)
+        path, sha256 = series_file(contact.campaign.id, contact.episode, self._settings)
         load_arrays(path, sha256)  # else it is lost or damaged, and that is to be said
+        try:
+            spec = contact.campaign.run_spec(contact.run)
+        except OutdatedError as error:
+            raise CannotBePlayed(str(error)) from error
         question = Question(
             subject=study.subject,
-            spec=contact.spec,
+            spec=spec,
             episode=contact.episode.record,
             series=path,
-            twin=EgoConfig.model_validate({"profile": study.twin}) if study.twin not in ("", "idle") else None,
+            twin=None if study.twin in (None, IDLE) else EgoConfig.model_validate({"profile": study.twin}),
         )
         with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as log:
             file = Path(folder) / "answer"

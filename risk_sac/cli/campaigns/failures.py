@@ -4,6 +4,7 @@ import argparse
 import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import get_args
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -14,6 +15,7 @@ from risk_sac.cli.console import OK, Commands, notes, or_dash
 from risk_sac.cli.text import in_words, printable
 from risk_sac.client import Client, Collision, Episode
 from risk_sac.errors import ConfigError
+from risk_sac.failures.question import Twin
 from risk_sac.records import Grade
 from risk_sac.run_folder.durable import replace_file
 
@@ -46,7 +48,7 @@ def add_show_failure(failures: Commands) -> None:
     parser.add_argument("id", metavar="ID", help="of the campaign")
     parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
     twin = "draw beside it the same scene with nobody attacking (idle), or with another ego"
-    parser.add_argument("--twin", choices=("idle", "default", "perfect", "careful"), help=twin)
+    parser.add_argument("--twin", choices=get_args(Twin), help=twin)
     parser.add_argument("--out", type=Path, metavar="FILE.png", help="the picture (default: FAILURE.png)")
 
 

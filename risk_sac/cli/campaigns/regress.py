@@ -8,6 +8,7 @@ from risk_sac.cli.campaigns.output import print_answer
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, OK, Commands, complain
 from risk_sac.cli.regress import cases_table
 from risk_sac.cli.regress_junit import junit
+from risk_sac.cli.text import EGO
 from risk_sac.client import Client
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.cases import Regression
@@ -21,8 +22,7 @@ def add_regress_campaign(campaigns: Commands) -> None:
     parser = campaigns.add_parser("regress", help="play a campaign's distinct failures against another ego")
     parser.set_defaults(command=_regress)
     parser.add_argument("id", metavar="ID", help="of the campaign, which has ended")
-    ego = "default, perfect, careful, or a YAML file with the fields of a campaign's ego"
-    parser.add_argument("--ego", required=True, metavar="EGO", help=ego)
+    parser.add_argument("--ego", required=True, metavar="EGO", help=EGO)
     parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="report for CI: a case per failure, named")
 
 

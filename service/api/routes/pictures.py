@@ -1,28 +1,26 @@
 """/v1/campaigns/{id}/failures/{id}/…: what takes seconds to make of a collision, made when it is asked for."""
 
-from collections.abc import Awaitable, Callable
 from http import HTTPStatus
-from typing import Any, Literal
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Depends, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.failures.question import Subject
+from risk_sac.failures.question import Twin
 from risk_sac.failures.surroundings import Region
-from service.api.access import Caller, CurrentCaller
+from service.api.access import CurrentCaller
 from service.api.answers.problems import ProblemError
 from service.api.answers.representations import caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, Responses, header, problem
-from service.api.context import Context, Service
+from service.api.context import Service
 from service.errors import StorageError
 from service.schemas.problems import Reason
 from service.views.pictures import ContactOfARun
-from service.views.products import TooManyWaiting
+from service.views.products import Products, S, TooManyWaiting
 from service.views.studies import CannotBePlayed, Study
 
 PNG, JSON, NPZ = "image/png", "application/json", "application/zip"
 RETRY_AFTER_S = 2  # in which some of those who wait get theirs
-Twin = Literal["idle", "default", "perfect", "careful"]
 
 
 def _made(media_type: str) -> Responses:
@@ -45,85 +43,59 @@ BUNDLE, TWIN, REGION = _made(NPZ) | PLAYED, _made(PNG) | PLAYED, _made(JSON) | P
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
 
 
+async def _contact(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> ContactOfARun:
+    campaign = await run_in_threadpool(service.store.campaign, campaign_id, caller.sees)
+    episode = await run_in_threadpool(service.store.failure, campaign_id, failure_id, caller.sees)
+    return ContactOfARun.of(campaign, episode)
+
+
+Asked = Annotated[ContactOfARun, Depends(_contact)]
+
+
 @router.get("/failures/{failure_id}/picture.png", response_class=Response, responses=PICTURE)
-async def get_picture(
-    campaign_id: str, failure_id: str, request: Request, service: Service, caller: CurrentCaller
-) -> Response:
+async def get_picture(contact: Asked, request: Request, service: Service) -> Response:
     """One collision, valid or not: both paths from above, and what was measured along the way."""
-    return await _answer(campaign_id, failure_id, request, service, caller, service.pictures.product, PNG)
+    return await _answer(contact, request, PNG, service.pictures, contact)
 
 
 @router.get("/failures/{failure_id}/bundle.npz", response_class=Response, responses=BUNDLE)
-async def get_bundle(
-    campaign_id: str, failure_id: str, request: Request, service: Service, caller: CurrentCaller
-) -> Response:
+async def get_bundle(contact: Asked, request: Request, service: Service) -> Response:
     """One collision in a file that stands alone, once it was played again; `risk-sac replay` plays it anywhere."""
-    return await _study("bundle", NPZ, campaign_id, failure_id, request, service, caller)
+    return await _answer(contact, request, NPZ, service.studies, Study(contact, "bundle"))
 
 
 @router.get("/failures/{failure_id}/core.npz", response_class=Response, responses=BUNDLE)
-async def get_core(
-    campaign_id: str, failure_id: str, request: Request, service: Service, caller: CurrentCaller
-) -> Response:
+async def get_core(contact: Asked, request: Request, service: Service) -> Response:
     """The same with all taken away that the failure does not need; takes up to 150 episodes, some 10 s."""
-    return await _study("core", NPZ, campaign_id, failure_id, request, service, caller)
+    return await _answer(contact, request, NPZ, service.studies, Study(contact, "core"))
 
 
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=REGION)
-async def get_region(
-    campaign_id: str, failure_id: str, request: Request, service: Service, caller: CurrentCaller
-) -> Response:
+async def get_region(contact: Asked, request: Request, service: Service) -> Response:
     """How many of its neighbours fail as it does: nearby scenes, other traffic, other actions; takes 170 episodes."""
-    return await _study("region", JSON, campaign_id, failure_id, request, service, caller)
+    return await _answer(contact, request, JSON, service.studies, Study(contact, "region"))
 
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=TWIN)
-async def get_twin(
-    campaign_id: str, failure_id: str, twin: Twin, request: Request, service: Service, caller: CurrentCaller
-) -> Response:
+async def get_twin(contact: Asked, twin: Twin, request: Request, service: Service) -> Response:
     """One collision beside the same scene with nobody attacking (`idle`), or with another ego, on one clock."""
-    return await _study("twin", PNG, campaign_id, failure_id, request, service, caller, twin)
-
-
-async def _study(
-    subject: Subject,
-    media_type: str,
-    campaign_id: str,
-    failure_id: str,
-    request: Request,
-    service: Context,
-    caller: Caller,
-    twin: str = "",
-) -> Response:
-    def made(contact: ContactOfARun) -> Awaitable[bytes]:
-        return service.studies.product(Study(contact, subject, twin))
-
-    return await _answer(campaign_id, failure_id, request, service, caller, made, media_type, subject, twin)
+    return await _answer(contact, request, PNG, service.studies, Study(contact, "twin", twin))
 
 
 async def _answer(
-    campaign_id: str,
-    failure_id: str,
-    request: Request,
-    service: Context,
-    caller: Caller,
-    make: Callable[[ContactOfARun], Awaitable[bytes]],
-    media_type: str,
-    *parts: str,
+    contact: ContactOfARun, request: Request, media_type: str, products: Products[S], subject: S
 ) -> Response:
-    """What is made of a collision, which the client may have already; `parts` tell it from what else is made of it."""
-    campaign = await run_in_threadpool(service.store.campaign, campaign_id, caller.sees)
-    episode = await run_in_threadpool(service.store.failure, campaign_id, failure_id, caller.sees)
-    contact = ContactOfARun.of(campaign, episode)
-    tag = entity_tag(contact.edition, *filter(None, parts))
+    """A product of a contact, unless the client has it: routes differ in their paths, so the edition is tag enough."""
+    tag = entity_tag(contact.edition)
     if has(request, tag):
         return not_modified(tag)
+    id_ = contact.episode.id
     try:
-        content = await make(contact)
+        content = await products.product(subject)
     except StorageError as error:
-        raise _problem(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, f"{failure_id!r} cannot be shown: {error}") from error
+        raise _problem(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, f"{id_!r} cannot be shown: {error}") from error
     except CannotBePlayed as error:
-        raise _problem(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, f"{failure_id!r}: {error}") from error
+        raise _problem(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, f"{id_!r}: {error}") from error
     except TooManyWaiting as error:
         wait = {"Retry-After": str(RETRY_AFTER_S)}
         raise _problem(HTTPStatus.SERVICE_UNAVAILABLE, Reason.PICTURES_BUSY, str(error), headers=wait) from error

@@ -58,6 +58,9 @@ def test_in_the_mirror_the_sides_are_exchanged() -> None:
         ("leader, 12 m ahead", {"x_m": 12.0, "y_m": 0.3}),
         ("oncoming vehicle, 30 m ahead", {"x_m": 30.0, "heading": math.pi}),
         ("vehicle from the right, 15 m ahead", {"x_m": 15.0, "y_m": -9.0, "heading": math.pi / 2}),
+        ("vehicle from the left, 15 m ahead", {"x_m": 15.0, "y_m": 9.0, "heading": -math.pi / 2}),
+        ("vehicle from the right, 15 m ahead", {"x_m": 15.0, "y_m": 2.0, "heading": math.pi / 2}),  # past the middle
+        ("pedestrian on the right, 9 m ahead", {"x_m": 9.0, "y_m": -3.2, "kind": 1, "heading": math.pi / 2}),
         ("pedestrian on the left, 9 m ahead", {"x_m": 9.0, "kind": 1, "heading": -math.pi / 2}),
         ("left neighbour, 2 m behind", {"x_m": -2.0}),
         ("left neighbour, level with it", {"x_m": 0.2}),
