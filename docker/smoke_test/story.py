@@ -140,13 +140,14 @@ class Story:
             raise SmokeError(f"campaign {campaign_id} has {len(after)} episodes; wanted {EPISODES}")
         lost = [each for each, episode in before.items() if after.get(each) != episode]
         if lost:
-            raise SmokeError(
-                f"campaign {campaign_id} no longer has the episodes {lost} from before the container was killed"
-            )
+            first = {"before": before[lost[0]], "after": after.get(lost[0])}
+            message = f"campaign {campaign_id} no longer has the episodes {lost} from before the container was killed"
+            raise SmokeError(f"{message}: {first}")
 
     def _episodes(self, campaign_id: str) -> dict[str, Any]:
+        """By id and without what only the end of their run adds to them."""
         found = self._api.all("/v1/campaigns/{campaign_id}/episodes", campaign_id=campaign_id)
-        return {each["id"]: each for each in found}
+        return {each["id"]: each | {"repetition": None} for each in found}
 
     def _gate(self) -> None:
         """The workflow's campaign below its threshold and above it, and what is kept of it."""
