@@ -18,9 +18,11 @@ class Outcome(StrEnum):
     FAILURE = "failure"  # valid collision
 
 
+REPEATS = "repeats"  # asked of a contact that was replayed and went another way, and of no other
 # The rules, among a collision's verdicts, that speak of the simulator or the control and not of who is to blame.
 ARTEFACT_RULES = frozenset(
     {
+        REPEATS,
         "no_teleport",
         "no_spawn_overlap",
         "conflict_after_release",
@@ -165,9 +167,14 @@ class Collision(Record):
         return all(self.verdicts.values())
 
     @property
+    def broken(self) -> tuple[str, ...]:
+        """The rules that it failed."""
+        return tuple(rule for rule, passed in self.verdicts.items() if not passed)
+
+    @property
     def artefact(self) -> bool:
         """Whether the simulator or the control made the contact, by one of `ARTEFACT_RULES`."""
-        return any(rule in ARTEFACT_RULES and not passed for rule, passed in self.verdicts.items())
+        return not ARTEFACT_RULES.isdisjoint(self.broken)
 
     @property
     def preventable(self) -> bool:
@@ -222,6 +229,14 @@ class EpisodeRecord(Record):
     def searching(self) -> bool:
         """Whether it belongs to the search, and not to the evaluation of the frozen policy."""
         return self.phase == RECORDED["search"]
+
+    def refused(self, rule: str) -> "EpisodeRecord":
+        """The same episode, whose contact fails one more rule; without a contact, the episode itself."""
+        if self.collision is None:
+            return self
+        collision = self.collision.model_copy(update={"verdicts": {**self.collision.verdicts, rule: False}})
+        ending = {"outcome": Outcome.DEGENERATE, "reason": ", ".join(collision.broken)}
+        return self.model_copy(update={"collision": collision} | ending)
 
 
 @dataclass(frozen=True, slots=True)

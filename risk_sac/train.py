@@ -188,8 +188,7 @@ def _outcome(rejected: str, collision: Collision | None) -> tuple[Outcome, str]:
         return Outcome.REJECTED, rejected
     if collision is None:
         return Outcome.SAFE, ""
-    failed = ", ".join(rule for rule, passed in collision.verdicts.items() if not passed)
-    return (Outcome.FAILURE if collision.valid else Outcome.DEGENERATE), failed
+    return (Outcome.FAILURE if collision.valid else Outcome.DEGENERATE), ", ".join(collision.broken)
 
 
 def episode_seed(run_seed: int, index: int) -> int:

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
 from risk_sac.execution.postmortem import without_folders
-from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile
 from service.workers.memory import limit_memory, out_of_memory
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
 from service.workers.takeover import take_over
@@ -151,6 +151,7 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, replays: int) -> F
 
     from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
     from risk_sac.failures.verify import verify
+    from risk_sac.report.runs import read_run
     from risk_sac.run_folder.verified import Verified
     from risk_sac.train import train
 
@@ -163,7 +164,7 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, replays: int) -> F
         reporter.keep_going()
         found |= verify([folder], replays, stopping=lambda: reporter.stopping)
         finished = not reporter.stopping or folder in found  # else the next worker finds all played, and replays it
-    return Finished(
+    last = Finished(
         finished=finished,
         metrics=summary.metrics,
         evaluation=summary.evaluation,
@@ -171,6 +172,13 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, replays: int) -> F
         versions=versions,
         wall_s=summary.wall_s,
         repetitions=found[folder].episodes if folder in found else {},
+    )
+    if folder not in found or not found[folder].flaky:
+        return last
+    judged = read_run(folder)
+    flaky = tuple(each.index for each in judged.records if each.collision and REPEATS in each.collision.broken)
+    return last.model_copy(
+        update={"metrics": judged.metrics["search"], "evaluation": judged.metrics.get("evaluation"), "flaky": flaky}
     )
 
 

@@ -97,7 +97,7 @@ def _quiet(families: Sequence[FamilyName], controls: Controls) -> str:
                 hit = played.collision
                 if hit is None or hit.judgement is None:
                     continue
-                failed = ", ".join(rule for rule, passed in hit.verdicts.items() if not passed)
+                failed = ", ".join(hit.broken)
                 rows.append(
                     [
                         family,
@@ -206,7 +206,7 @@ def _before_and_after(controls: Controls, runs: Sequence[Searched]) -> str:
 
 
 def _fails_only(hit: Collision, rule: str) -> bool:
-    return [name for name, passed in hit.verdicts.items() if not passed] == [rule]
+    return hit.broken == (rule,)
 
 
 def _unresponsive(hit: Collision) -> bool:

@@ -85,11 +85,11 @@ def _region(options: argparse.Namespace) -> int:
 
 
 def _failures(path: Path) -> Iterator[tuple[str, EpisodeRecord]]:
-    """The contacts of a run with their ids, but for flaky ones and their like."""
+    """The contacts of a run with their ids; flaky ones and their like are refused."""
     results = read_results(path)
     verified = read_verified(path if path.is_dir() else path.parent, results.digest or "")
     episodes = [contact.episode for contact in results.contacts]
-    for episode in verified.repeating(episodes) if verified else episodes:
+    for episode in verified.judged(episodes) if verified else episodes:
         yield episode.id_in(results.spec.id), episode
 
 

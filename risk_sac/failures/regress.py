@@ -118,11 +118,10 @@ def _compared(found: Collision | None, wanted: Collision) -> _Ending:
         return _Ending(Verdict.STILL_FAILING, touched, kind)
     if found.valid:
         return _Ending(Verdict.NEW_KIND, f"{touched}: {kind}", kind)
-    broken = [rule for rule, passed in found.verdicts.items() if not passed]
-    said = f"{touched}, which is not its failure: {', '.join(broken)}"
+    said = f"{touched}, which is not its failure: {', '.join(found.broken)}"
     if found.artefact:  # and it may have ended the episode before the failure
         return _Ending(Verdict.NOT_COMPARABLE, said)
-    if BLIND in broken:
+    if BLIND in found.broken:
         return _Ending(Verdict.NEW_KIND, f"{touched}, which it never saw", kind)
     return _Ending(Verdict.FIXED, said)
 

@@ -114,7 +114,7 @@ def compare(
 def _failures(family: FamilyName, runs: Sequence[FinishedRun]) -> Iterator[tuple[str, EpisodeRecord]]:
     for run in runs:
         if run.spec.family == family:
-            yield from ((each.id_in(run.spec.id), each) for each in run.repeating)
+            yield from ((each.id_in(run.spec.id), each) for each in run.records)
 
 
 def _reference_first(methods: Sequence[MethodName]) -> tuple[MethodName, ...]:

@@ -32,7 +32,7 @@ class FinishedRun:
 
     spec: RunSpec
     digest: str  # of the records
-    records: tuple[EpisodeRecord, ...]
+    records: tuple[EpisodeRecord, ...]  # failures of which the first of their kind does not repeat are refused
     versions: Mapping[str, str]
     wall_s: float
     cpu_s: float
@@ -62,18 +62,11 @@ class FinishedRun:
         return found
 
     @cached_property
-    def repeating(self) -> tuple[EpisodeRecord, ...]:
-        """Its episodes without the failures of a kind whose first one does not repeat."""
-        return self.verified.repeating(self.records) if self.verified else self.records
-
-    @cached_property
     def found(self) -> tuple[Found, ...]:
-        """What the search had found after each of its episodes; of no niche whose first failure does not repeat."""
+        """What the search had found after each of its episodes."""
         tally, found = Tally(horizon_steps=FAMILIES[self.spec.family].horizon_steps), []
-        repeating = {record.index for record in self.repeating}
         for record in self.phase("search"):
-            if record.index in repeating:
-                tally.add(record)
+            tally.add(record)
             found.append(Found(tally.distinct_preventable, tally.distinct_failures, len(tally.kinds)))
         return tuple(found)
 
@@ -94,7 +87,8 @@ def read_run(folder: Path) -> FinishedRun:
             f"{folder / EPISODES} does not hold the {len(results.contacts)} contacts and the other episodes that "
             f"digest {results.digest[:12]} was formed over; delete the folder and run it again"
         )
-    return replace(finished_run(results, records), verified=read_verified(folder, results.digest))
+    verified = read_verified(folder, results.digest)
+    return replace(finished_run(results, verified.judged(records) if verified else records), verified=verified)
 
 
 def read_records(file: Path) -> tuple[EpisodeRecord, ...]:

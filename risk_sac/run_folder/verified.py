@@ -9,7 +9,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
-from risk_sac.records import EpisodeRecord, Record
+from risk_sac.records import REPEATS, EpisodeRecord, Record
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import Results
 from risk_sac.run_folder.seal import seal, unseal
@@ -48,12 +48,15 @@ class Verified:
         """The episodes that were not the same each time."""
         return frozenset(index for index, repetition in self.episodes.items() if not repetition.verified)
 
-    def repeating(self, records: Sequence[EpisodeRecord]) -> tuple[EpisodeRecord, ...]:
-        """A run's episodes without the failures of a kind whose first one does not repeat."""
+    def judged(self, records: Sequence[EpisodeRecord]) -> tuple[EpisodeRecord, ...]:
+        """A run's episodes, those with a failure of a kind whose first one does not repeat refused by that rule."""
         flaky = {niche_of(record.collision) for record in records if record.index in self.flaky and record.collision}
-        if not flaky:
-            return tuple(records)
-        return tuple(each for each in records if each.collision is None or niche_of(each.collision) not in flaky)
+        return tuple(
+            each.refused(REPEATS)
+            if each.collision and each.collision.valid and niche_of(each.collision) in flaky
+            else each
+            for each in records
+        )
 
 
 _VERIFIED = TypeAdapter(Verified)

@@ -40,15 +40,19 @@ def tally(run: RunRow) -> None:
 
 def fill(row: EpisodeRow, event: EpisodeDone) -> None:
     """Write what a worker said of an episode into its row."""
-    record: EpisodeRecord = event.record
-    row.phase = record.phase
-    row.index = record.index
-    row.outcome = record.outcome
-    row.record = to_text(record)
+    fill_record(row, event.record)
     row.series = event.series
     row.series_sha256 = event.series_sha256
     row.wall_s = event.wall_s
     row.funnel = to_text(Funnel.of(event.metrics))
+
+
+def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
+    """Write an episode's record into its row, and what is searched for by columns."""
+    row.phase = record.phase
+    row.index = record.index
+    row.outcome = record.outcome
+    row.record = to_text(record)
     judgement = record.collision.judgement if record.collision is not None else None
     row.grade = judgement.grade if judgement is not None and record.outcome is Outcome.FAILURE else None
     row.signature = judgement.signature if judgement is not None else None

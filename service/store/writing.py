@@ -9,9 +9,9 @@ from sqlalchemy import delete, select, tuple_
 from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Outcome
+from risk_sac.records import REPEATS, EpisodeRecord, Outcome
 from service.errors import ConflictError
-from service.store.counting import add_usage, count, fill, tally, to_text
+from service.store.counting import add_usage, count, fill, fill_record, tally, to_text
 from service.store.database import WRITING, storage_errors
 from service.store.finding import find_campaign
 from service.store.reading import Store
@@ -129,6 +129,7 @@ class Ledger:
                 tally(row)
                 row.digest = result.digest
                 row.versions = to_text(dict(result.versions))
+                _refuse(session, row, result.flaky)
                 row.repetitions = to_text(dict(result.repetitions)) if result.repetitions else None
 
     def requeue_run(self, number: int, reason: str | None = None) -> None:
@@ -210,6 +211,15 @@ class Ledger:
             for row in session.identity_map.values():
                 if isinstance(row, CampaignRow):
                     self._store.revisions.note(row.id, row.project, row.revision)
+
+
+def _refuse(session: Session, run: RunRow, flaky: Collection[int]) -> None:
+    """Failures that do not repeat are none."""
+    rows = select(EpisodeRow).where(EpisodeRow.run_number == run.number, EpisodeRow.index.in_(flaky))
+    for row in session.scalars(rows) if flaky else ():
+        count(run, Outcome(row.outcome), -1)
+        fill_record(row, EpisodeRecord.model_validate_json(row.record).refused(REPEATS))
+        count(run, Outcome(row.outcome), +1)
 
 
 def _place(number: int, event: EpisodeDone) -> tuple[int, str, int]:

@@ -35,7 +35,7 @@ def test_every_distinct_failure_repeats_to_the_bit(run: Path, capsys: pytest.Cap
     assert (run / VERIFIED).stat().st_mtime_ns == noted
 
 
-def test_what_does_not_repeat_is_flaky_and_counts_in_no_budget(
+def test_what_does_not_repeat_is_flaky_and_counts_as_no_failure(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shutil.copytree(run, tmp_path / "run", ignore=shutil.ignore_patterns(VERIFIED))
@@ -50,6 +50,11 @@ def test_what_does_not_repeat_is_flaky_and_counts_in_no_budget(
     assert tampered.verified is not None
     assert tampered.verified.flaky == {first.index}
     assert tampered.found[first.index].distinct == whole.found[first.index].distinct - 1
+    refused = sum("repeats" in record.reason for record in tampered.records)
+    assert refused >= 1
+    assert tampered.metrics["search"].failures == whole.metrics["search"].failures - refused
+    assert tampered.metrics["search"].raw_collisions == whole.metrics["search"].raw_collisions
+    assert tampered.digest == whole.digest
 
 
 def test_verifying_other_results_does_not_count(run: Path) -> None:

@@ -13,7 +13,8 @@ import pytest
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunSpec, SceneOptimizerConfig, WarmStartConfig
 from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.local import LocalExecutor
-from risk_sac.run_folder.results import read_results
+from risk_sac.run_folder.results import FAILURES, read_results, series_name
+from risk_sac.run_folder.series import read_series, write_series
 from risk_sac.run_folder.verified import Repetition, distinct_failures
 from service.settings import ServiceSettings
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
@@ -102,16 +103,31 @@ def test_a_finished_run_s_distinct_failures_are_replayed_before_it_is_told(tmp_p
     assert said[-1].repetitions == dict.fromkeys(found, Repetition(times=2, same=2)) != {}
 
 
-def test_a_worker_that_finds_all_played_replays_what_nobody_has(tmp_path: Path) -> None:
+def test_a_worker_that_finds_all_played_replays_what_nobody_has_and_refuses_what_goes_another_way(
+    tmp_path: Path,
+) -> None:
     spec = RunSpec(family="low", method="archive", seed=3, budget=Budget(episodes=20))
     said, _, _ = Launcher(tmp_path / "run", spec).work()
-    assert isinstance(said[-1], Finished)
-    assert not said[-1].repetitions
+    before = said[-1]
+    assert isinstance(before, Finished)
+    assert not before.repetitions
+    first, *others = [episode.index for episode in distinct_failures(read_results(tmp_path / "run"))]
+    file = tmp_path / "run" / FAILURES / series_name(first)
+    series = read_series(file)
+    series["actions"][-5:] *= -1.0
+    write_series(file, series)
     said, exited, _ = Launcher(tmp_path / "run", spec, ServiceSettings(replays=1)).work()
     assert exited == Exited(None, Cause.ENDED, 0), exited
-    assert isinstance(said[-1], Finished)
-    assert said[-1].finished
-    assert set(said[-1].repetitions.values()) == {Repetition(times=1, same=1)}
+    after = said[-1]
+    assert isinstance(after, Finished)
+    assert after.finished
+    assert after.repetitions == {first: Repetition(times=1, same=0)} | dict.fromkeys(
+        others, Repetition(times=1, same=1)
+    )
+    assert first in after.flaky
+    assert after.metrics.failures == before.metrics.failures - len(after.flaky)
+    assert after.metrics.distinct_failures == before.metrics.distinct_failures - 1
+    assert after.metrics.raw_collisions == before.metrics.raw_collisions
 
 
 def test_a_worker_told_to_stop_leaves_a_checkpoint_and_goes_on_from_there(launcher: Launcher, undisturbed: str) -> None:

@@ -149,8 +149,6 @@ def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
         f"{total.family} {total.method}: {said}" for total in results.totals for said in excesses(total, bounds)
     ]
     lines += exceeded
-    if exceeded and (flaky := sum(run.flaky for run in results.runs)):
-        lines.append(f"{counted(flaky, 'kind')} of failures did not repeat, and may be among them.")
     if any("may be above" in said for said in reasons):
         lines.append("More episodes narrow an interval; --judge-by rate ignores it.")
     return (OK if passed and not exceeded else ABOVE), "\n".join(lines)

@@ -97,6 +97,22 @@ def test_a_campaign_succeeds_with_its_last_run(store, ledger, metrics):
     assert (campaign.runs[0].digest, campaign.runs[0].versions) == ("abc", {"sumo": "1"})
 
 
+def test_failures_that_did_not_repeat_are_refused_with_the_end_of_their_run(store, ledger, episode, metrics):
+    campaign = ledger.create(SPEC)
+    first, second = start(store, ledger), start(store, ledger)
+    ledger.add_episodes([(run, episode(index, Outcome.FAILURE)) for run in (first, second) for index in range(3)])
+    end = {"evaluation": None, "digest": "abc", "versions": {}, "wall_s": 1.0, "flaky": (0, 2)}
+    ledger.end_run(first, State.SUCCEEDED, result=Finished(finished=True, metrics=metrics, **end))
+    runs = store.campaign(campaign.id).runs
+    assert [(run.episodes_done, run.raw_collisions, run.failures) for run in runs[:2]] == [(3, 3, 1), (3, 3, 3)]
+    found = store.episodes(campaign.id, run_id="low-risk-sac-3", limit=9).items
+    assert [(each.record.outcome, each.record.reason) for each in found] == [
+        (Outcome.DEGENERATE, "repeats"),
+        (Outcome.FAILURE, ""),
+        (Outcome.DEGENERATE, "repeats"),
+    ]
+
+
 def test_one_failed_run_fails_the_campaign_once_the_others_have_ended(store, ledger):
     campaign = ledger.create(SPEC)
     ledger.end_run(start(store, ledger), State.FAILED, "worker was killed by SIGKILL")
