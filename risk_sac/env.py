@@ -66,7 +66,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, reward.softmin_sharpness)
         self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
         self.observation_size = self._encoder.size
-        self.action_size = 2 * len(problem.family.adversaries)
+        self.action_size = problem.action_size
         self.action_space = gym.spaces.Box(-1.0, 1.0, (self.action_size,), np.float32)
         self.observation_space = gym.spaces.Box(-LIMIT, LIMIT, (self.observation_size,), np.float32)
 

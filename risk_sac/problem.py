@@ -79,9 +79,17 @@ class Problem:
         Raises:
           ConfigError: naming the field that takes most of it.
         """
-        adversaries = len(self.family.adversaries)
-        observed = observation_size(adversaries, self.space.dimension, len(self.requirements))
-        check_demand(spec, observed, 2 * adversaries, self.family.horizon_steps)
+        check_demand(spec, self.observation_size, self.action_size, self.family.horizon_steps)
+
+    @property
+    def observation_size(self) -> int:
+        """Entries of an observation."""
+        return observation_size(len(self.family.adversaries), self.space.dimension, len(self.requirements))
+
+    @property
+    def action_size(self) -> int:
+        """Entries of a joint action: drive and steering of each adversary."""
+        return 2 * len(self.family.adversaries)
 
     @property
     def visibility_m(self) -> float:

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from risk_sac.agents.replay import Batch
 from risk_sac.errors import CheckpointError, NotFinite
+from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.types import Floats, Vector
 
 
@@ -38,6 +39,9 @@ class Agent(Protocol):
           observation: `observation_size`.
           explore: act as in training (Alg. 1, l. 7), or as the frozen policy does.
         """
+
+    def frozen(self) -> FrozenPolicy:
+        """What acts as this agent does without exploring, and learns no more."""
 
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """|δ| of transitions, `batch`, mean over the critics; arguments as for `update`."""

@@ -16,6 +16,7 @@ from risk_sac.agents.critics import Critics
 from risk_sac.agents.networks import Mlp
 from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import AgentConfig, DdpgConfig
+from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.types import Floats, Vector
 
 
@@ -76,6 +77,7 @@ class DdpgAgent:
     ) -> None:
         self._config = config
         self._ddpg = ddpg
+        self._action_size = action_size
         self._device = torch.device(device)
         self._generator = torch.Generator(self._device).manual_seed(seed)
         self._policy = Mlp((observation_size, *config.hidden_sizes, action_size), self._generator)
@@ -90,6 +92,10 @@ class DdpgAgent:
             noise = torch.randn(action.shape, generator=self._generator, device=self._device).cpu().numpy()
             action = np.clip(action + self._ddpg.exploration_deviation * noise, -1.0, 1.0)
         return action
+
+    def frozen(self) -> FrozenPolicy:
+        """See `Agent.frozen`."""
+        return self._policy.frozen(self._action_size)
 
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """See `Agent.td_errors`."""

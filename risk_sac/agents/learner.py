@@ -21,6 +21,7 @@ from risk_sac.agents.replay import Batch, Replay, RiskPrioritizedReplay, Transit
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
+from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.problem import check_installed
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.types import Floats, Vector
@@ -78,6 +79,10 @@ class Learner:
         if explore and self._steps < self._config.agent.warmup_steps:
             return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
         return self._agent.act(observation, explore)  # Alg. 1, l. 7
+
+    def frozen(self) -> FrozenPolicy:
+        """The policy as it is now, without exploration."""
+        return self._agent.frozen()
 
     def observe(self, transition: Transition, *, own: bool = True) -> None:
         """Store what a step has brought, and price its cost if it is the policy's; what the warm-up draws is not.

@@ -14,6 +14,7 @@ import torch
 import torch.nn.functional as F  # noqa: N812  # the name all of torch's users know
 from torch import Tensor
 
+from risk_sac.frozen_policy import FrozenPolicy, respond
 from risk_sac.types import Vector
 
 # Choice: log σ is squashed smoothly into these bounds; a hard clamp has no gradient outside them.
@@ -47,6 +48,7 @@ class Mlp:
         places = [(slice(*place), shape) for place, shape in zip(pairwise(ends), shapes, strict=True)]
         views = [self.parameters[place].view(shape) for place, shape in places]
         gradients = [self.parameters.grad[place].view(shape) for place, shape in places]
+        self._layers = views
         self._weights, self._biases = views[::2], views[1::2]  # in x out, out
         self._weight_gradients, self._bias_gradients = gradients[::2], gradients[1::2]
         for weight, bias in zip(self._weights, self._biases, strict=True):
@@ -84,11 +86,11 @@ class Mlp:
                 .cpu()
                 .numpy()
             )
-        weights, biases = ([each.numpy() for each in tensors] for tensors in (self._weights, self._biases))
-        activation = np.asarray(inputs, np.float32)
-        for weight, bias in zip(weights[:-1], biases[:-1], strict=True):
-            activation = np.maximum(activation @ weight + bias, 0.0)
-        return np.asarray(activation @ weights[-1] + biases[-1])
+        return respond([layer.numpy() for layer in self._layers], inputs)
+
+    def frozen(self, action_size: int) -> FrozenPolicy:
+        """A copy that acts; the first `action_size` outputs are its means."""
+        return FrozenPolicy(tuple(layer.cpu().numpy().copy() for layer in self._layers), action_size)
 
     def backward(self, activations: Sequence[Tensor], gradient: Tensor) -> None:
         """Writes the gradient of a loss in the parameters.

@@ -16,6 +16,7 @@ from risk_sac.agents.critics import Critics
 from risk_sac.agents.networks import Mlp, bounded_log_std, draw_action, tanh_gaussian, tanh_gaussian_gradient
 from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import AgentConfig, SacConfig
+from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.types import Floats, Vector
 
 
@@ -147,6 +148,10 @@ class SacAgent:
         if explore:
             noise = torch.randn(self._action_size, generator=self._generator, device=self._device).cpu()
         return draw_action(self._policy.respond(observation), noise.numpy())
+
+    def frozen(self) -> FrozenPolicy:
+        """See `Agent.frozen`."""
+        return self._policy.frozen(self._action_size)
 
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """See `Agent.td_errors`."""

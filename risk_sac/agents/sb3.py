@@ -18,11 +18,13 @@ from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.type_aliases import ReplayBufferSamples
 from torch import Tensor
+from torch.nn import Linear
 
 from risk_sac.agents.agent import UpdateResult, all_finite, loading
 from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import AgentConfig, SacConfig
 from risk_sac.errors import NotFinite
+from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.types import Floats, Vector
 
 
@@ -83,6 +85,12 @@ class Sb3Agent:
         with self._noise():
             action, _ = self._model.predict(observation, deterministic=not explore)
         return action
+
+    def frozen(self) -> FrozenPolicy:
+        """See `Agent.frozen`."""
+        *linear, _ = (layer for layer in self._model.policy.actor.modules() if isinstance(layer, Linear))  # log σ last
+        tensors = [tensor for layer in linear for tensor in (layer.weight.t(), layer.bias)]
+        return FrozenPolicy(tuple(tensor.detach().numpy().copy() for tensor in tensors), linear[-1].out_features)
 
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """Nothing is replayed by them."""

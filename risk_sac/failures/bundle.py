@@ -23,6 +23,7 @@ from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.failures.core import Core
 from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
+from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, Record
 from risk_sac.run_folder.durable import replace_file
@@ -33,13 +34,14 @@ PACKAGES = ("libsumo", "numpy")  # that decide how an episode goes, its scene an
 PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 CODE, WORLD = "risk_sac", "sumo_nets"
 MOST_ARRAYS, MOST_FILE_BYTES, MOST_BYTES = 64, 2**25, 2**28  # a full series of dense has 23 arrays and some 5 MB
-MANIFEST, HEADS = "manifest", "signal_heads"
+MANIFEST, HEADS, LAYER = "manifest", "signal_heads", "policy_layer_"  # the layers are numbered
 
 
 class Manifest(Record):
     """What a bundle says of its failure."""
 
-    format: Literal[1] = 1  # another one with whatever an older reader would misread
+    format: Literal[1, 2] = 1  # another one with whatever an older reader would misread
+    """2 of those that hold a policy."""
     id: str
     """The episode's, as the run that found it names it."""
     spec: RunSpec
@@ -63,13 +65,20 @@ class Bundle:
     manifest: Manifest
     series: Series
     signal_heads: NDArray[np.uint8]  # T since the release x heads, SUMO's letters
+    policy: FrozenPolicy | None = None  # that the run came to; None of a run that learned none
 
 
 def make_bundle(
-    spec: RunSpec, episode: EpisodeRecord, series: Series, signal_heads: NDArray[np.uint8], core: Core | None = None
+    spec: RunSpec,
+    episode: EpisodeRecord,
+    series: Series,
+    signal_heads: NDArray[np.uint8],
+    policy: FrozenPolicy | None,
+    core: Core | None = None,
 ) -> Bundle:
     """A bundle of what was just played here."""
     manifest = Manifest(
+        format=1 if policy is None else 2,
         id=episode.id_in(spec.id),
         spec=spec,
         episode=episode,
@@ -79,7 +88,7 @@ def make_bundle(
         digest=trajectory_digest(series),
         core=core,
     )
-    return Bundle(manifest=manifest, series=series, signal_heads=signal_heads)
+    return Bundle(manifest=manifest, series=series, signal_heads=signal_heads, policy=policy)
 
 
 def versions() -> dict[str, str]:
@@ -105,6 +114,8 @@ def bundle_bytes(bundle: Bundle) -> bytes:
     """The content of its file."""
     content = io.BytesIO()
     arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
+    if bundle.policy is not None:
+        arrays |= {f"{LAYER}{place}": layer for place, layer in enumerate(bundle.policy.layers)}
     np.savez_compressed(content, allow_pickle=False, **arrays)
     return content.getvalue()
 
@@ -142,6 +153,7 @@ def read_bundle(file: Path) -> Bundle:
         arrays = _arrays(content)
         text = str(arrays.pop(MANIFEST))
         heads = arrays.pop(HEADS)
+        layers = tuple(arrays.pop(f"{LAYER}{place}") for place in range(sum(name.startswith(LAYER) for name in arrays)))
     except Exception as error:  # what zipfile, zlib and numpy raise of bytes that mean nothing is an open set
         raise _refused(file, f"is no bundle of a failure, or is damaged: {error}") from error
     try:
@@ -153,10 +165,15 @@ def read_bundle(file: Path) -> Bundle:
     if trajectory_digest(arrays) != manifest.digest:
         raise _refused(file, "is damaged: its arrays do not have the digest in its manifest")
     try:
-        _check_playable(manifest, arrays)
+        problem = Problem.from_spec(manifest.spec)
+        _check_playable(problem, manifest, arrays)
+        policy = None
+        if layers:
+            policy = FrozenPolicy(layers, problem.action_size)
+            policy.check(problem.observation_size)
     except (RiskSacError, ValueError) as error:
         raise _refused(file, f"holds no episode that can be played: {error}") from error
-    return Bundle(manifest=manifest, series=arrays, signal_heads=heads)
+    return Bundle(manifest=manifest, series=arrays, signal_heads=heads, policy=policy)
 
 
 def _read(file: Path) -> bytes:
@@ -197,9 +214,9 @@ def _array(content: bytes) -> NDArray[Any]:
     return array
 
 
-def _check_playable(manifest: Manifest, series: Series) -> None:
+def _check_playable(problem: Problem, manifest: Manifest, series: Series) -> None:
     """Refuses what no run could have recorded, before anything of it reaches the simulator."""
-    problem, episode = Problem.from_spec(manifest.spec), manifest.episode
+    episode = manifest.episode
     problem.space.check(Scene(problem.family.name, episode.scene))
     if episode.seed < 0:
         raise ValueError(f"seed {episode.seed}")
@@ -212,7 +229,7 @@ def _check_playable(manifest: Manifest, series: Series) -> None:
     if series["time_s"].ndim != 1 or series["released_s"].ndim != 0 or series["actions"].ndim != 2:
         raise ValueError("times and actions of other dimensions")
     actions = actions_of(series)
-    most, size = problem.family.horizon_steps, 2 * len(problem.family.adversaries)
+    most, size = problem.family.horizon_steps, problem.action_size
     if not 0 < len(actions) <= most or actions.shape[1] != size or not np.isfinite(actions).all():
         raise ValueError(f"actions of shape {actions.shape}; wanted up to {most} x {size} finite numbers")
 

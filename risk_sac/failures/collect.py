@@ -7,18 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
+from risk_sac.agents.learner import Learner
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, SimulationError
 from risk_sac.failures.bundle import Bundle, make_bundle
-from risk_sac.failures.play import Played, Policy, play
+from risk_sac.failures.play import Played, play
 from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
+from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.records import EpisodeRecord
 from risk_sac.run import RunState
 from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
 from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import read_verified
-from risk_sac.types import Scene, Vector
+from risk_sac.types import Scene
 
 
 def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -> Iterator[Bundle]:
@@ -29,24 +31,30 @@ def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -
       ConfigError: its series is from before there was a release.
       DamagedError, OSError: its series cannot be read.
     """
-    spec = results.spec
+    spec, policy = results.spec, policy_of(folder)
     with closing(RiskSacEnv.of(spec)) as env:
         for episode in episodes:
             recorded = _series(folder, spec, episode)
-            yield make_bundle(spec, episode, recorded, repeated(env, spec, episode, recorded).signal_heads)
+            yield make_bundle(spec, episode, recorded, repeated(env, spec, episode, recorded).signal_heads, policy)
 
 
-def recorded_bundle(folder: Path, results: Results, episode: EpisodeRecord) -> Bundle:
+def recorded_bundle(folder: Path, results: Results, episode: EpisodeRecord, policy: FrozenPolicy | None) -> Bundle:
     """A bundle of a contact as it was recorded, whether or not it repeats; without signal heads.
 
     By which code it was recorded is known of runs that were verified.
+
+    Args:
+      folder: of the run.
+      results: of the run.
+      episode: with the contact.
+      policy: of the run.
 
     Raises:
       ConfigError: its series is from before there was a release.
       DamagedError, OSError: its series cannot be read.
     """
     recorded = _series(folder, results.spec, episode)
-    made = make_bundle(results.spec, episode, recorded, np.empty((0, 0), dtype=np.uint8))
+    made = make_bundle(results.spec, episode, recorded, np.empty((0, 0), dtype=np.uint8), policy)
     verified = read_verified(folder, results.digest or "")
     packages = {name: version for name, version in (results.versions or {}).items() if name in made.manifest.versions}
     by = {"code": verified.code if verified else "", "versions": packages}
@@ -84,22 +92,19 @@ def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: S
     return played
 
 
-def policy_of(folder: Path) -> Policy | None:
-    """The policy that a run came to, as it is frozen; None of a method that learns none.
+def policy_of(folder: Path) -> FrozenPolicy | None:
+    """The policy that a run came to; None of a method that learns none, or of a folder without a checkpoint.
 
     Raises:
-      ConfigError: the folder holds no run, or no checkpoint.
+      ConfigError: the folder holds no run.
       CheckpointError: its checkpoint is of another run.
     """
     spec = read_results(folder).spec
     if not METHODS[spec.method].learns:
         return None
-    run = RunState(spec, folder)
-    if not run.resume():
-        raise ConfigError(f"{folder} has no checkpoint, so its policy cannot act on; make bundles", field="--failures")
-    agent = run.searchers.agent
-
-    def act(observation: Vector) -> Vector:
-        return agent.act(observation, explore=False)
-
-    return act
+    with closing(RunState(spec, folder)) as run:
+        if not run.resume():
+            return None
+        learner = run.searchers.agent
+        assert isinstance(learner, Learner)  # since the method learns
+        return learner.frozen()

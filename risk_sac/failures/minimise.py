@@ -121,7 +121,7 @@ class _Search:
             copies=COPIES,
             sentence=sentence(played.series, played.collision),
         )
-        return make_bundle(origin.manifest.spec, episode, played.series, played.signal_heads, core)
+        return make_bundle(origin.manifest.spec, episode, played.series, played.signal_heads, origin.policy, core)
 
 
 def _grade(collision: Collision) -> Grade | None:

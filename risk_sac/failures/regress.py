@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.agents.follower import ScriptFollower
-from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.config import METHODS, EgoConfig, RunSpec
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import InfeasibleScene, RiskSacError
+from risk_sac.errors import ConfigError, InfeasibleScene, RiskSacError
 from risk_sac.failures.bundle import Bundle, check_world, code_digest, versions
 from risk_sac.failures.cases import Case, Verdict
 from risk_sac.failures.collect import policy_of, recorded_bundle
@@ -42,17 +42,16 @@ class _Ending(NamedTuple):
     found: str = ""  # signature of what happened instead
 
 
-def regress(bundle: Bundle, ego: EgoConfig, policy: Policy | None = None) -> Case:
+def regress(bundle: Bundle, ego: EgoConfig) -> Case:
     """Plays one failure against another ego.
 
     Args:
-      bundle: of the failure.
+      bundle: of the failure; its policy, if it has one, acts once the recorded actions have ended.
       ego: the other one.
-      policy: that acts once the recorded actions have ended.
     """
     manifest = bundle.manifest
     collision = manifest.episode.collision
-    ending = _judge(bundle, collision, ego, policy)
+    ending = _judge(bundle, collision, ego)
     return Case(
         id=manifest.id,
         digest=manifest.digest,
@@ -73,11 +72,13 @@ def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Case]:
       DamagedError, OSError: a series cannot be read.
     """
     results, policy = read_results(folder), policy_of(folder)
+    if policy is None and METHODS[results.spec.method].learns:
+        raise ConfigError(f"{folder} has no checkpoint, so its policy cannot act on; make bundles", field="--failures")
     for episode in distinct_failures(results):
-        yield regress(recorded_bundle(folder, results, episode), ego, policy)
+        yield regress(recorded_bundle(folder, results, episode, policy), ego)
 
 
-def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig, policy: Policy | None) -> _Ending:
+def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig) -> _Ending:
     manifest = bundle.manifest
     if wanted is None or not wanted.valid:
         return _Ending(Verdict.NOT_COMPARABLE, "it is no valid failure")
@@ -91,7 +92,7 @@ def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig, policy: Pol
                 why = "with its own ego it does not happen under this code and these packages"
                 return _Ending(Verdict.NOT_COMPARABLE, why)
         other = manifest.spec.model_copy(update={"ego": ego})
-        attacks = {"recorded actions": partial(_play, other, bundle, policy)}
+        attacks = {"recorded actions": partial(_play, other, bundle, bundle.policy)}
         if manifest.episode.script is not None:
             attacks["its scripts"] = partial(_follow, other, bundle)
         endings = {}

@@ -11,16 +11,17 @@ from contextlib import closing
 from pathlib import Path
 
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import RiskSacError
+from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.failures.bundle import Bundle, bundle_bytes, make_bundle
-from risk_sac.failures.collect import repeated
+from risk_sac.failures.collect import policy_of, repeated
 from risk_sac.failures.minimise import minimise
 from risk_sac.failures.question import REFUSED, Question
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.region import region
 from risk_sac.failures.show import recording_bytes
 from risk_sac.failures.twin import twin_recording
-from risk_sac.run_folder.results import Contact
+from risk_sac.frozen_policy import FrozenPolicy
+from risk_sac.run_folder.results import FAILURES, Contact, read_results
 from risk_sac.run_folder.series import read_series
 
 
@@ -43,7 +44,17 @@ def _bundle(question: Question) -> Bundle:
     recorded = read_series(question.series)
     with closing(RiskSacEnv.of(question.spec)) as env:
         played = repeated(env, question.spec, question.episode, recorded)
-    return make_bundle(question.spec, question.episode, recorded, played.signal_heads)
+    return make_bundle(question.spec, question.episode, recorded, played.signal_heads, _policy(question.series))
+
+
+def _policy(series: Path) -> FrozenPolicy | None:
+    """Of the run that the series is of, once that is over."""
+    folder = series.parents[len(Path(FAILURES).parts)]
+    try:
+        over = read_results(folder).finished
+    except ConfigError:
+        return None
+    return policy_of(folder) if over else None
 
 
 def _beside_twin(question: Question) -> bytes:

@@ -100,7 +100,7 @@ def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, capsys: pytest.
     ("change", "complaint"),
     [
         (lambda arrays: arrays["x_m"].__imul__(2.0), "is damaged: its arrays do not have the digest"),
-        (lambda arrays: manifest(arrays, format=2), "has a manifest of another version, or none: format"),
+        (lambda arrays: manifest(arrays, format=3), "has a manifest of another version, or none: format"),
         (lambda arrays: manifest(arrays, spec={"family": "low"}), "has a manifest of another version, or none: spec"),
         (lambda arrays: manifest(arrays, world={}), "was found on another dense/dense.net.xml"),
         (lambda arrays: arrays.pop(MANIFEST), "is no bundle of a failure, or is damaged"),
@@ -114,6 +114,8 @@ def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, capsys: pytest.
         ),
         (lambda arrays: series(arrays, actions=arrays["actions"] * np.nan), "holds no episode that can be played: act"),
         (lambda arrays: series(arrays, time_s=np.zeros((2, 2))), "holds no episode that can be played: times"),
+        (lambda arrays: arrays.update(policy_layer_0=np.zeros((2, 2))), "no episode that can be played: a policy of"),
+        (lambda arrays: arrays.update(policy_layer_7=np.zeros((2, 2))), "is no bundle of a failure, or is damaged"),
         (lambda arrays: arrays.update({f"a{i}": np.zeros(1) for i in range(MOST_ARRAYS)}), "arrays; wanted at most"),
     ],
     ids=[
@@ -127,7 +129,7 @@ def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, capsys: pytest.
             "another script",
             "another scene",
         ),
-        *("no actions", "wide actions", "no numbers", "times in a square", "many arrays"),
+        *("no actions", "wide actions", "no numbers", "times in a square", "no policy", "half a policy", "many arrays"),
     ],
 )
 def test_what_cannot_be_replayed_is_refused_in_one_line(

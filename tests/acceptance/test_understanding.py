@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 
 from risk_sac.cli import main
+from risk_sac.config import EgoConfig
 from risk_sac.env import RiskSacEnv
-from risk_sac.failures.bundle import Bundle, read_bundle
+from risk_sac.errors import ConfigError
+from risk_sac.failures.bundle import Bundle, read_bundle, write_bundle
 from risk_sac.failures.cases import Regression, Verdict
-from risk_sac.failures.collect import policy_of
+from risk_sac.failures.collect import bundles, policy_of
 from risk_sac.failures.minimise import COPIES, MOST, SHARE
 from risk_sac.failures.play import play
+from risk_sac.failures.regress import regress, regress_run
 from risk_sac.failures.trajectory import actions_of
 from risk_sac.failures.variants import Stage
 from risk_sac.run_folder.results import FAILURES, read_results, series_name
@@ -267,7 +270,7 @@ def test_a_policy_acts_on_when_the_recorded_actions_have_ended(failure: Path) ->
 
 
 def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run: Path, tmp_path: Path) -> None:
-    learner = ["run", "--family", "low", "--method", "risk-sac", "--seed", "3", "--episodes", "3"]
+    learner = ["run", "--family", "low", "--method", "risk-sac", "--seed", "3", "--episodes", "9"]
     subprocess.run([sys.executable, "-m", "risk_sac", *learner, "--out", tmp_path / "run"], check=True)
     policy = policy_of(tmp_path / "run")
     assert policy is not None
@@ -278,3 +281,17 @@ def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run: Path
     assert first.shape == (env.action_size,)
     np.testing.assert_array_equal(first, second)  # it does not explore
     assert policy_of(run) is None
+
+    results = read_results(tmp_path / "run")
+    (bundle,) = bundles(tmp_path / "run", results, distinct_failures(results))
+    write_bundle(tmp_path / "failure.npz", bundle)
+    kept = read_bundle(tmp_path / "failure.npz")
+    assert kept.policy is not None
+    np.testing.assert_array_equal(kept.policy(observation), first)
+    slower = EgoConfig(reaction_time_s=1.0)
+    (case,) = regress_run(tmp_path / "run", slower)
+    assert regress(kept, slower) == case  # the policy acts on from a file as it does from the run
+    (tmp_path / "run" / "checkpoint").unlink()
+    assert policy_of(tmp_path / "run") is None
+    with pytest.raises(ConfigError, match="has no checkpoint"):
+        list(regress_run(tmp_path / "run", slower))

@@ -56,6 +56,22 @@ def test_resumed_learner_equals_one_never_interrupted_bit_for_bit(method: Method
     assert traces[0] == traces[1]
 
 
+@pytest.mark.parametrize("method", LEARNING)
+def test_a_frozen_policy_acts_as_the_learner_does_without_exploring(
+    method: MethodName, random_transition: Make
+) -> None:
+    subject = learner(method)
+    live(subject, 40, random_transition, np.random.default_rng(0))
+    frozen = subject.frozen()
+    observations = np.random.default_rng(1).standard_normal((20, 3)).astype(np.float32)
+    before = [subject.act(each, explore=False) for each in observations]
+    live(subject, 20, random_transition, np.random.default_rng(2))
+    np.testing.assert_allclose([frozen(each) for each in observations], before, atol=1e-6)
+    frozen.check(3)
+    with pytest.raises(ValueError, match="wanted from 4 to 2"):
+        frozen.check(4)
+
+
 def test_same_seed_same_decisions(random_transition: Make) -> None:
     traces = [live(learner(seed=seed), 50, random_transition, np.random.default_rng(0)) for seed in (1, 1, 2)]
     assert traces[0] == traces[1]
