@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from risk_sac.config import METHODS, FamilyName, RewardConfig, RunSpec
 from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.geometry import overlapping_pairs, relative_view
-from risk_sac.observation import LIMIT, Encoder
+from risk_sac.observation import Encoder
+from risk_sac.observation_layout import LIMIT
 from risk_sac.problem import Problem
 from risk_sac.records import Collision
 from risk_sac.risk.measures import Gauge, Measures

@@ -18,6 +18,7 @@ COMPILED = (  # where compiled functions are, and the constants that are compile
     "geometry.py",
     "jit.py",
     "observation.py",
+    "observation_layout.py",
     "types.py",
     "agents/sum_tree.py",
     "risk/*.py",

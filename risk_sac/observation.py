@@ -9,21 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.jit import compiled
+from risk_sac.observation_layout import (
+    ACCEL_MPS2,
+    GAP_M,
+    LATERAL_MPS,
+    LIMIT,
+    PER_ADVERSARY,
+    PER_EGO,
+    SPEED_MPS,
+    X_M,
+    Y_M,
+    observation_size,
+)
 from risk_sac.risk.publish import AHEAD, ASIDE, CLOSING_X, CLOSING_Y, COS, GAP, SEEN, SIN, Assessment
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.scenario.family import Family
 from risk_sac.types import ACCEL, LATERAL, SPEED, Floats, Frame
-
-PER_ADVERSARY = 10
-PER_EGO = 8
-LIMIT = 5.0  # of every entry
-
-X_M, Y_M, SPEED_MPS, LATERAL_MPS, ACCEL_MPS2, GAP_M = 40.0, 8.0, 15.0, 4.0, 8.0, 20.0  # scales
-
-
-def observation_size(adversaries: int, scene_size: int, requirements: int) -> int:
-    """Entries of an observation."""
-    return PER_ADVERSARY * adversaries + PER_EGO + scene_size + requirements + 1
 
 
 class Encoder:

@@ -10,8 +10,8 @@ from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Odd, Requirement, 
 from risk_sac.config.demand import check_demand
 from risk_sac.config.methods import MethodName
 from risk_sac.errors import ConfigError, OddError
-from risk_sac.observation import observation_size
-from risk_sac.risk.rss import RssParameters
+from risk_sac.observation_layout import observation_size
+from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import check_requirements
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family

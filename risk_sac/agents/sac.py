@@ -15,7 +15,7 @@ from risk_sac.agents.agent import UpdateResult, all_finite, loading, mean_magnit
 from risk_sac.agents.critics import Critics
 from risk_sac.agents.networks import Mlp, bounded_log_std, draw_action, tanh_gaussian, tanh_gaussian_gradient
 from risk_sac.agents.replay import Batch
-from risk_sac.config.learner import AgentConfig, SacConfig
+from risk_sac.config.learner import MOST_TEMPERATURE, AgentConfig, SacConfig
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.types import Floats, Vector
 
@@ -177,6 +177,8 @@ class SacAgent:
         entropy = -own.log_prob.mean()
         _, self._log_temperature.grad = temperature_loss(temperature, entropy, self._target_entropy)
         self._actor_optimizer.step()
+        # Choice: α has a bound. An entropy that the policy cannot reach would have it grow without end.
+        self._log_temperature.clamp_(max=math.log(MOST_TEMPERATURE))
         self._critics.follow()
 
         figures = torch.stack((loss_q, loss_pi, self._log_temperature.exp()[0], entropy)).tolist()

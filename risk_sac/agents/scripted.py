@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from risk_sac.agents.replay import Transition
-from risk_sac.observation import PER_ADVERSARY, X_M, Y_M
+from risk_sac.observation_layout import PER_ADVERSARY, X_M, Y_M
 from risk_sac.types import Floats, Vector
 
 AHEAD_M = 5.0  # between the centres: the ego's length

@@ -11,6 +11,7 @@ from risk_sac.config.base import Fraction, Settings, Weight
 
 Width = Annotated[int, Field(ge=1, le=4096)]
 LearningRate = Annotated[float, Field(ge=1e-7, le=0.01)]
+MOST_TEMPERATURE = 100.0  # α
 
 
 class AgentConfig(Settings):
@@ -39,7 +40,7 @@ class SacConfig(Settings):
     """Soft Actor-Critic (Haarnoja et al. 2018), Eq. 4."""
 
     temperature_learning_rate: LearningRate = 3e-4
-    initial_temperature: Annotated[float, Field(ge=1e-6, le=100)] = 0.02
+    initial_temperature: Annotated[float, Field(ge=1e-6, le=MOST_TEMPERATURE)] = 0.02
     """α at the start."""
     target_entropy_per_action: Annotated[float, Field(ge=-10, le=0.5)] = -1.0
     """Target entropy divided by the action dimension, nats; uniform actions have log 2."""

@@ -5,8 +5,9 @@ from typing import NamedTuple
 
 from risk_sac.config import Requirement
 from risk_sac.risk.publish import Assessment, assess, publish
-from risk_sac.risk.rss import RssParameters
-from risk_sac.risk.stl import Monitor, soft_min
+from risk_sac.risk.rss_parameters import RssParameters
+from risk_sac.risk.soft_min import soft_min
+from risk_sac.risk.stl import Monitor
 from risk_sac.types import STEP_S, Bools, Floats, Frame
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from risk_sac.geometry import RelativeView
 from risk_sac.jit import compiled
+from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.types import Bools, Floats
 
 LONGITUDINAL_CAP_M = LATERAL_CAP_M = 50.0
@@ -27,20 +28,6 @@ LONGITUDINAL_SCALE_S = 0.85
 SLOW_MPS = 3.0  # who is slower counts as this fast: at standstill any margin would be endless in time
 LATERAL_SCALE_M = 1.1
 SCALED_LOW, SCALED_HIGH = -3.0, 2.0
-
-
-class RssParameters(NamedTuple):
-    """What RSS assumes of both parties. The ego is the one that responds."""
-
-    response_s: float = 0.5  # ρ
-    accel_mps2: float = 1.5  # a_max,accel during the response time; who follows or brakes has no foot on the pedal
-    brake_min_mps2: float = 6.0  # b_min: what the responding vehicle can be relied on to do
-    brake_max_mps2: float = 6.0  # b_max: the hardest braking of the vehicle ahead that is to be expected
-    lateral_accel_mps2: float = 0.5
-    lateral_brake_mps2: float = 2.0
-    fluctuation_m: float = 0.1  # μ, lateral noise that is no manoeuvre
-    walk_accel_mps2: float = 0.5  # a pedestrian's, in any direction
-    walk_brake_mps2: float = 2.0
 
 
 @compiled

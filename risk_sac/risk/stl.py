@@ -1,4 +1,4 @@
-"""Online monitoring of STL requirements by rtamt, and their soft minimum (7).
+"""Online monitoring of STL requirements by rtamt.
 
 rtamt parses each requirement and supplies every operator with its state. What is replaced is the walk
 over the tree: rtamt visits nodes by name and type in every step, and keys an operator's state by its text, so that
@@ -18,35 +18,12 @@ import rtamt
 
 from risk_sac.config import Requirement
 from risk_sac.errors import FormulaError, NotFinite
-from risk_sac.jit import compiled
 from risk_sac.risk.formula import Node, parse, signals_of
 from risk_sac.types import Floats
 
 ROBUSTNESS_CLIP = 3.0  # in scales; a margin beyond it is as good as any, and rtamt's warm-up is infinite
 
 Instruction = tuple[Callable[..., float], int, int, int]  # operator, its operands' slots (-1: none), its own slot
-
-
-@compiled
-def soft_min(robustness: Floats, beta: float) -> float:
-    """Soft minimum of the requirements' robustness, ρ(Φ, s).
-
-    ρ(Φ, s) = -(1/β) log Σ_i exp(-β ρ_i)                                             (7)
-
-    Args:
-      robustness: `M`, M ≥ 1, scaled; below 0 means violated.
-      beta: sharpness β > 0; larger is closer to the true minimum.
-
-    Returns:
-      A value in [min_i ρ_i - log(M)/β, min_i ρ_i].
-
-    Source: RISK-SAC, Sec. III-C.
-    """
-    least = robustness.min()  # taken out so that exp cannot overflow
-    summed = 0.0
-    for value in robustness:
-        summed += math.exp(beta * (least - value))
-    return float(least - math.log(summed) / beta)
 
 
 class Monitor:

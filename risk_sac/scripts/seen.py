@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.observation import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
+from risk_sac.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
 from risk_sac.types import STEP_S
 
 

@@ -10,7 +10,8 @@ import math
 from typing import NamedTuple
 
 from risk_sac.jit import compiled
-from risk_sac.risk.rss import RssParameters, lateral, opposite_direction, same_direction
+from risk_sac.risk.rss import lateral, opposite_direction, same_direction
+from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.verdicts.along import Along
 from risk_sac.verdicts.course import CORRIDOR_M

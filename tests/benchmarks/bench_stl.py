@@ -13,7 +13,8 @@ from risk_sac.errors import FormulaError
 from risk_sac.risk.formula import parse
 from risk_sac.risk.realism import soft_cost
 from risk_sac.risk.signals import SIGNALS
-from risk_sac.risk.stl import Monitor, soft_min
+from risk_sac.risk.soft_min import soft_min
+from risk_sac.risk.stl import Monitor
 from risk_sac.scenario.odd import requirements_from_odd
 from tests.hostile_formulas import formulas
 

@@ -8,7 +8,7 @@ from risk_sac import cli
 from risk_sac.client import Client, Refused
 from risk_sac.failures.bundle import read_bundle
 
-SPEC = {"families": ["low"], "methods": ["archive"], "seeds": [3], "budget": {"episodes": 40}}
+SPEC = {"families": ["low"], "methods": ["archive"], "seeds": [3], "budget": {"episodes": 16}}
 
 
 @pytest.fixture(scope="module")

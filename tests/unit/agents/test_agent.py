@@ -14,6 +14,7 @@ from risk_sac.agents.ddpg import DdpgAgent
 from risk_sac.agents.replay import Batch
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config import AgentConfig, DdpgConfig, SacConfig
+from risk_sac.config.learner import MOST_TEMPERATURE
 from risk_sac.errors import CheckpointError, NotFinite
 from tests.unit.agents.plain import PlainDdpg, PlainMlp, PlainSac
 
@@ -61,6 +62,15 @@ def test_actions_stay_in_the_unit_box_and_the_frozen_policy_is_deterministic(mak
     assert (np.abs(drawn) <= 1.0).all()
     assert len(np.unique(drawn, axis=0)) > 1
     assert np.array_equal(agent.act(observation, explore=False), agent.act(observation, explore=False))
+
+
+def test_the_temperature_has_a_bound_where_the_policy_cannot_reach_its_entropy() -> None:
+    hot = SacConfig(initial_temperature=99.9, temperature_learning_rate=0.01, target_entropy_per_action=0.5)
+    config = CONFIG.model_copy(update={"actor_learning_rate": 1e-7})
+    agent = SacAgent(OBSERVATIONS, ACTIONS, config, hot, 0)
+    batch = random_batch(np.random.default_rng(0))
+    found = [agent.update(batch, batch.risk_reward).temperature for _ in range(5)]
+    assert found == pytest.approx([MOST_TEMPERATURE] * 5)
 
 
 @both

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from risk_sac.agents.follower import BEHIND_STEPS, STANDING_STEPS, ScriptFollower
-from risk_sac.observation import PER_ADVERSARY, X_M, Y_M
+from risk_sac.observation_layout import PER_ADVERSARY, X_M, Y_M
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scripts.motions import SIZE, Genes
 

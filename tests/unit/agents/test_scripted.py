@@ -1,7 +1,7 @@
 import numpy as np
 
 from risk_sac.agents.scripted import ScriptedAgent
-from risk_sac.observation import PER_ADVERSARY, X_M, Y_M
+from risk_sac.observation_layout import PER_ADVERSARY, X_M, Y_M
 
 
 def seen(x_m: float, y_m: float, cos: float) -> list[float]:

@@ -21,7 +21,8 @@ from risk_sac.risk.publish import (
     red_light_braking,
     red_light_margin,
 )
-from risk_sac.risk.rss import SCALED_HIGH, SCALED_LOW, RssParameters
+from risk_sac.risk.rss import SCALED_HIGH, SCALED_LOW
+from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.types import Frame, Kind, Signal

@@ -13,7 +13,8 @@ from risk_sac.config import DynamicElements, Environment, Interval, Odd, Require
 from risk_sac.errors import FormulaError, NotFinite
 from risk_sac.risk.formula import parse
 from risk_sac.risk.signals import SIGNALS
-from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, check_requirements, soft_min
+from risk_sac.risk.soft_min import soft_min
+from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, check_requirements
 from risk_sac.scenario.odd import requirements_from_odd
 
 STEP_S, HORIZON = 0.1, 150

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.observation import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
+from risk_sac.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
 from risk_sac.scripts.motions import SIZE, Genes, act, cue, is_over
 from risk_sac.scripts.seen import Act, Seen, adversaries_seen
 

@@ -1,0 +1,12 @@
+"""How long an observation is, and how its entries are scaled; see `risk_sac.observation`."""
+
+PER_ADVERSARY = 10
+PER_EGO = 8
+LIMIT = 5.0  # of every entry
+
+X_M, Y_M, SPEED_MPS, LATERAL_MPS, ACCEL_MPS2, GAP_M = 40.0, 8.0, 15.0, 4.0, 8.0, 20.0  # scales
+
+
+def observation_size(adversaries: int, scene_size: int, requirements: int) -> int:
+    """Entries of an observation."""
+    return PER_ADVERSARY * adversaries + PER_EGO + scene_size + requirements + 1

@@ -1,0 +1,17 @@
+"""What `risk_sac.risk.rss` goes by; apart from it, for whoever needs nothing compiled."""
+
+from typing import NamedTuple
+
+
+class RssParameters(NamedTuple):
+    """What RSS assumes of both parties. The ego is the one that responds."""
+
+    response_s: float = 0.5  # ρ
+    accel_mps2: float = 1.5  # a_max,accel during the response time; who follows or brakes has no foot on the pedal
+    brake_min_mps2: float = 6.0  # b_min: what the responding vehicle can be relied on to do
+    brake_max_mps2: float = 6.0  # b_max: the hardest braking of the vehicle ahead that is to be expected
+    lateral_accel_mps2: float = 0.5
+    lateral_brake_mps2: float = 2.0
+    fluctuation_m: float = 0.1  # μ, lateral noise that is no manoeuvre
+    walk_accel_mps2: float = 0.5  # a pedestrian's, in any direction
+    walk_brake_mps2: float = 2.0
