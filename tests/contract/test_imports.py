@@ -17,7 +17,9 @@ def loaded() -> set[str]:
     return set(json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout))
 
 
-def test_the_server_process_loads_nothing_that_learns_compiles_or_simulates_and_matplotlib_only_once_it_draws(loaded: set[str]) -> None:
+def test_the_server_process_loads_nothing_that_learns_compiles_or_simulates_and_matplotlib_to_draw(
+    loaded: set[str],
+) -> None:
     assert "service.runs.manager" in loaded
     assert "risk_sac.report" in loaded
     assert not {"torch", "libsumo", "botorch", "gpytorch", "numba", "matplotlib", "service.worker"} & loaded
