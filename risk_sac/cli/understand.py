@@ -2,7 +2,9 @@
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -10,25 +12,30 @@ from rich.text import Text
 
 from risk_sac.cli.console import OK, Commands, console
 from risk_sac.cli.text import counted, printable
+from risk_sac.errors import ConfigError
+from risk_sac.failures.studied import Studied, note
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import read_verified
+
+if TYPE_CHECKING:
+    from risk_sac.failures.bundle import Bundle
 
 
 def add_minimise(commands: Commands) -> None:
     """Adds the command."""
     minimise = commands.add_parser("minimise", help="find the core of a failure: the least that makes the ego fail")
     minimise.set_defaults(command=_minimise)
-    minimise.add_argument("bundle", type=Path, metavar="BUNDLE", help="what `risk-sac bundle` wrote")
-    minimise.add_argument("--out", type=Path, required=True, metavar="FILE", help="bundle of the core")
+    _add_failure(minimise)
+    minimise.add_argument("--out", type=Path, metavar="FILE", help="write the core there, a bundle too")
 
 
 def add_region(commands: Commands) -> None:
     """Adds the command."""
     region = commands.add_parser("region", help="how many of the neighbours of a failure fail too")
     region.set_defaults(command=_region)
-    region.add_argument("bundle", type=Path, metavar="BUNDLE", help="what `risk-sac bundle` or `minimise` wrote")
+    _add_failure(region)
     region.add_argument("--out", type=Path, metavar="FILE.json", help="write the shares there too")
 
 
@@ -40,14 +47,57 @@ def add_clusters(commands: Commands) -> None:
     clusters.add_argument("--out", type=Path, metavar="FILE.json", help="write them there too")
 
 
+def _add_failure(parser: argparse.ArgumentParser) -> None:
+    what = (
+        "what `risk-sac bundle` or `minimise` wrote, or the folder of a finished run, in which the report finds it then"
+    )
+    parser.add_argument("path", type=Path, metavar="PATH", help=what)
+    parser.add_argument("failure", nargs="?", metavar="FAILURE", help="of a run: id of a contact, or its number")
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """The failure that the command line names."""
+
+    bundle: "Bundle"
+    folder: Path | None  # of its run; None of a bundle's
+    digest: str = ""  # of the run's results
+
+    def note(self, studied: Studied) -> None:
+        """Leaves beside the results what was found out."""
+        if self.folder is not None:
+            note(self.folder, self.digest, self.bundle.manifest.episode.index, studied)
+
+
+def _asked(options: argparse.Namespace) -> _Asked:
+    from risk_sac.failures.bundle import read_bundle  # here, for the simulator takes a second to load
+    from risk_sac.failures.collect import bundles
+
+    folder: Path = options.path
+    if options.failure is None:
+        if folder.is_dir():
+            raise ConfigError(f"{folder} is a folder; wanted a bundle, or a failure of its run too", field="FAILURE")
+        return _Asked(read_bundle(folder), None)
+    results = read_results(folder)
+    if results.digest is None:
+        raise ConfigError(f"the run in {folder} is not finished", field="PATH")
+    (bundle,) = bundles(folder, results, [results.contact(options.failure).episode])
+    return _Asked(bundle, folder, results.digest)
+
+
 def _minimise(options: argparse.Namespace) -> int:
-    from risk_sac.failures.bundle import read_bundle, write_bundle  # here, for the simulator takes a second to load
+    from risk_sac.failures.bundle import write_bundle
     from risk_sac.failures.minimise import minimise
 
-    minimal = minimise(read_bundle(options.bundle))
+    asked = _asked(options)
+    if asked.folder is None and options.out is None:
+        raise ConfigError("wanted a file for the core of a bundle", field="--out")
+    minimal = minimise(asked.bundle)
     core = minimal.manifest.core
     assert core is not None  # that is what `minimise` makes
-    write_bundle(options.out, minimal)
+    asked.note(Studied(core=core))
+    if options.out is not None:
+        write_bundle(options.out, minimal)
     before, after = core.before, core.after
     lines = (
         core.sentence,
@@ -57,21 +107,21 @@ def _minimise(options: argparse.Namespace) -> int:
         f"parameters of the scene in the middle of their ranges: {core.plain_parameters} of {core.parameters}",
         f"copies, perturbed by 1 %, that fail as well: {core.held} of {core.copies}",
         f"played: {counted(core.episodes, 'episode')}",
-        f"Bundle: {options.out}",
+        *([] if options.out is None else [f"Bundle: {options.out}"]),
     )
     console.print(printable("\n".join(lines)), markup=False, soft_wrap=True)
     return OK
 
 
 def _region(options: argparse.Namespace) -> int:
-    from risk_sac.failures.bundle import read_bundle
     from risk_sac.failures.region import region
 
-    bundle = read_bundle(options.bundle)
+    asked = _asked(options)
     if options.out is not None:
         options.out.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
-    found = region(bundle)
-    table = Table(title=Text(printable(bundle.manifest.id)), box=SIMPLE_HEAD, padding=0)
+    found = region(asked.bundle)
+    asked.note(Studied(region=found))
+    table = Table(title=Text(printable(asked.bundle.manifest.id)), box=SIMPLE_HEAD, padding=0)
     for name in ("changed", "fail", "of", "share", "95 % interval"):
         table.add_column(name, no_wrap=True)
     for share in found.shares:

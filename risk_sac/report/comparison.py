@@ -6,6 +6,7 @@ from itertools import groupby
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunSpec
 from risk_sac.failures.clusters import Overview, overview
+from risk_sac.failures.studied import Studied
 from risk_sac.records import RECORDED, EpisodeRecord, Phase
 from risk_sac.report.budgets import HEADLINE, PAID_FOR, found_within
 from risk_sac.report.cells import Cell, cell_of, metrics_of
@@ -53,6 +54,16 @@ class Comparison:
     def group(self, family: FamilyName, phase: Phase) -> tuple[Cell, ...]:
         """The cells of one table, the reference first."""
         return tuple(cell for cell in self.cells if (cell.family, cell.phase) == (family, phase))
+
+    def studies(self, family: FamilyName) -> Mapping[str, Studied]:
+        """What was told of failures that were played again, by id."""
+        return {
+            record.id_in(run.spec.id): run.studies[record.index]
+            for run in self.runs
+            if run.spec.family == family
+            for record in run.records
+            if record.index in run.studies
+        }
 
     def of_cell(self, family: FamilyName, method: MethodName) -> tuple[FinishedRun, ...]:
         """The runs of a method in a family."""

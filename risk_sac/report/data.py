@@ -35,6 +35,10 @@ def document(comparison: Comparison) -> dict[str, Any]:
         "tests": [asdict(test) for test in comparison.tests],
         "headline": [asdict(test) for test in comparison.headline],
         "failures": {family: each.model_dump(mode="json") for family, each in comparison.overviews.items()},
+        "studies": {
+            family: {id_: each.model_dump(mode="json") for id_, each in comparison.studies(family).items()}
+            for family in comparison.overviews
+        },
         "runs": [_row(run) for run in comparison.runs],
     }
 

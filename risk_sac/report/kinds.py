@@ -5,15 +5,16 @@ from collections import Counter
 from risk_sac.config import FamilyName
 from risk_sac.records import Phase
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.page import table
+from risk_sac.report.page import interval, table
 
 MOST = 12  # rows of the table of clusters
 NEXT = """
 Of a failure in the folder of its run: `risk-sac show RUN ID --twin idle` draws it beside the same scene with nobody
-attacking, `risk-sac bundle RUN ID --out FILE` puts it into a file, of which `risk-sac minimise` and `risk-sac region`
-say the core and how many of its neighbours fail; `risk-sac regress --failures RUN... --ego EGO` plays all of them
-against another ego.
+attacking; `risk-sac minimise RUN ID` finds its core and `risk-sac region RUN ID` how many of its neighbours fail, and
+the next report says both; `risk-sac bundle RUN ID --out FILE` puts it into a file; `risk-sac regress --failures RUN...
+--ego EGO` plays all of them against another ego.
 """
+CORES = ["failure", "what happens", "adversaries that act", "segments of 0.5 s", "copies of the core that fail"]
 
 
 def clusters(comparison: Comparison, family: FamilyName) -> str:
@@ -35,6 +36,41 @@ def clusters(comparison: Comparison, family: FamilyName) -> str:
         + rest
         + NEXT
     )
+
+
+def studies(comparison: Comparison, family: FamilyName) -> str:
+    """The cores and the regions of failures that somebody has asked for."""
+    found = comparison.studies(family)
+    cores = [(id_, each.core) for id_, each in found.items() if each.core]
+    regions = [(id_, each.region) for id_, each in found.items() if each.region]
+    text = ""
+    if cores:
+        rows = (
+            [
+                f"`{id_}`",
+                core.sentence,
+                f"{core.before.adversaries} → {core.after.adversaries}",
+                f"{core.before.segments} → {core.after.segments}",
+                f"{core.held} of {core.copies}",
+            ]
+            for id_, core in cores
+        )
+        text += f"### Cores of failures: {family}\n\n" + table(CORES, rows, left=2)
+    if regions:
+        columns = ["failure", *(share.what for share in regions[0][1].shares), "a needle"]
+        shares = (
+            [
+                f"`{id_}`",
+                *(
+                    f"{share.failed} of {share.played}{interval(share.low, share.high, '.2f')}"
+                    for share in region.shares
+                ),
+                "yes" if region.needle else "no",
+            ]
+            for id_, region in regions
+        )
+        text += f"\n### How many neighbours fail: {family}\n\n" + table(columns, shares)
+    return text
 
 
 def signatures(comparison: Comparison, family: FamilyName, phase: Phase) -> str:

@@ -11,7 +11,7 @@ from risk_sac.report.budgets import HEADLINE, LIMITS, found_within
 from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.definitions import ROWS, definitions, symbol
-from risk_sac.report.kinds import clusters, signatures
+from risk_sac.report.kinds import clusters, signatures, studies
 from risk_sac.report.page import DASH, interval, number, percent, table
 from risk_sac.report.paired import LEVEL, PairedTest
 from risk_sac.report.provenance import this_platform
@@ -43,6 +43,7 @@ def table_markdown(comparison: Comparison) -> str:
                 _tests(comparison, family, phase),
             ]
         sections.append(clusters(comparison, family))
+        sections.append(studies(comparison, family))
     sections += [_control(comparison), _paper(comparison), definitions(), _repeat(comparison)]
     return "\n".join(section for section in sections if section)
 

@@ -1,7 +1,7 @@
 """A finished run as the report reads it from its folder."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from risk_sac.config import FamilyName, MethodName, RunSpec
 from risk_sac.errors import ConfigError
+from risk_sac.failures.studied import Studied, read_studies
 from risk_sac.metrics import MetricsAccumulator, Tally, results_digest
 from risk_sac.records import RECORDED, EpisodeRecord, Phase, RunMetrics
 from risk_sac.run_folder.episode_json import records_from_lines
@@ -38,6 +39,7 @@ class FinishedRun:
     cpu_s: float
     episode_cpu_s: tuple[float, ...] = ()  # to the end of each episode; none where it was not measured
     verified: Verified | None = None  # None where nothing was replayed
+    studies: Mapping[int, Studied] = field(default_factory=dict)  # of its failures, by index of the episode
 
     @property
     def cell(self) -> tuple[FamilyName, MethodName]:
@@ -88,7 +90,8 @@ def read_run(folder: Path) -> FinishedRun:
             f"digest {results.digest[:12]} was formed over; delete the folder and run it again"
         )
     verified = read_verified(folder, results.digest)
-    return replace(finished_run(results, verified.judged(records) if verified else records), verified=verified)
+    run = finished_run(results, verified.judged(records) if verified else records)
+    return replace(run, verified=verified, studies=read_studies(folder, results.digest))
 
 
 def read_records(file: Path) -> tuple[EpisodeRecord, ...]:

@@ -23,6 +23,7 @@ from risk_sac.failures.play import play
 from risk_sac.failures.regress import regress, regress_run
 from risk_sac.failures.trajectory import actions_of
 from risk_sac.failures.variants import Stage
+from risk_sac.report import read_run
 from risk_sac.run_folder.results import FAILURES, read_results, series_name
 from risk_sac.run_folder.series import read_series, write_series
 from risk_sac.run_folder.verified import distinct_failures
@@ -84,13 +85,17 @@ def test_every_distinct_failure_has_a_bundle(run: Path, failures: Path) -> None:
     assert {file.stem.rpartition("-")[0] for file in failures.iterdir()} == expected
 
 
-def test_a_core_does_less_and_fails_in_the_same_way_as_surely(failure: Path, tmp_path: Path, tell: Tell) -> None:
-    status, out, _ = tell("minimise", failure, "--out", tmp_path / "core.npz")
+def test_a_core_does_less_and_fails_in_the_same_way_as_surely(
+    run: Path, failure: Path, tmp_path: Path, tell: Tell
+) -> None:
+    index = read_bundle(failure).manifest.episode.index
+    status, out, _ = tell("minimise", run, index, "--out", tmp_path / "core.npz")
     assert status == 0
     origin, minimal = read_bundle(failure), read_bundle(tmp_path / "core.npz")
     core = minimal.manifest.core
     assert core is not None
     assert core.sentence in out
+    assert read_run(run).studies[index].core == core  # where the report finds it
     assert struck(minimal) == struck(origin)
     assert core.held >= COPIES // 2  # of copies that it was not chosen by
     assert minimal.manifest.episode.script is None
@@ -102,9 +107,13 @@ def test_a_core_does_less_and_fails_in_the_same_way_as_surely(failure: Path, tmp
     assert tell("replay", tmp_path / "core.npz")[0] == 0
 
 
-def test_a_region_is_told_with_its_intervals(failure: Path, tmp_path: Path, tell: Tell) -> None:
-    status, out, _ = tell("region", failure, "--out", tmp_path / "region.json")
+def test_a_region_is_told_with_its_intervals(run: Path, failure: Path, tmp_path: Path, tell: Tell) -> None:
+    index = read_bundle(failure).manifest.episode.index
+    status, out, _ = tell("region", run, index, "--out", tmp_path / "region.json")
     assert status == 0
+    noted = read_run(run).studies[index].region
+    assert noted is not None
+    assert noted.model_dump_json(indent=2) == (tmp_path / "region.json").read_text()
     shares = json.loads((tmp_path / "region.json").read_bytes())["shares"]
     assert [(share["what"], share["played"]) for share in shares] == [
         ("scene by 1%", 40),
@@ -207,6 +216,17 @@ def test_an_ego_that_sees_nothing_fixes_nothing(failures: Path, tmp_path: Path, 
     (tmp_path / "blind.yaml").write_text("sensor: {range_m: 1, field_of_view_rad: 0.01, memory_s: 0}\n")
     _, verdicts = regressed(tell, tmp_path, "--failures", failures, "--ego", tmp_path / "blind.yaml")
     assert set(verdicts) == {Verdict.NEW_KIND}
+
+
+def test_what_is_asked_of_a_failure_names_one(run: Path, failure: Path, tell: Tell) -> None:
+    for asked, complaint in (
+        (("minimise", run, "--out", "x"), "is a folder; wanted a bundle, or a failure of its run too"),
+        (("minimise", failure), "--out: wanted a file for the core of a bundle"),
+        (("region", run, "nobody"), "got 'nobody'; wanted one of the contacts"),
+    ):
+        status, out, err = tell(*asked)
+        assert (status, out) == (2, "")
+        assert complaint in err
 
 
 @pytest.mark.parametrize("verb", ["minimise", "region"])

@@ -33,7 +33,7 @@ async def post_at_once(port, keys, spec=SPEC):
     return await asyncio.gather(*posts)
 
 
-@pytest.mark.parametrize(("posts", "keys"), [(1000, 1), (500, 50)])
+@pytest.mark.parametrize(("posts", "keys"), [pytest.param(1000, 1, marks=pytest.mark.torture), (500, 50)])
 def test_duplicates_at_once_make_one_campaign_for_each_key(serve, posts, keys):
     service = serve(rate_limit=100_000)
     answers = asyncio.run(post_at_once(service.port, [f"retry-{index % keys}" for index in range(posts)]))

@@ -9,6 +9,9 @@ import pytest
 
 from risk_sac.config import METHODS
 from risk_sac.errors import ConfigError
+from risk_sac.failures.core import Core, Extent
+from risk_sac.failures.studied import Studied
+from risk_sac.failures.surroundings import Region, Share
 from risk_sac.metrics import results_digest
 from risk_sac.report import (
     compare,
@@ -94,6 +97,30 @@ def test_page_of_runs_from_before_contacts_were_judged_has_no_empty_histograms(s
     assert "by the time since" not in page
     assert "by signature" not in page
     assert not [name for name in figure_names(compare(spec, old, "")) if name.startswith("times_")]
+
+
+def test_page_has_the_cores_and_the_regions_that_were_asked_for(spec, runs):
+    assert "Cores of failures" not in table_markdown(compare(spec, runs, ""))
+    first = next(run for run in runs if run.spec.method == "risk-sac")
+    extents = {
+        "before": Extent(adversaries=2, segments=9, channels=12, strongest=1.0),
+        "after": Extent(adversaries=1, segments=3, channels=4, strongest=0.5),
+    }
+    told = {"sentence": "The left neighbour cuts in", "plain_parameters": 5, "parameters": 9, "episodes": 100}
+    studied = Studied(
+        core=Core(held=9, copies=10, **extents, **told),
+        region=Region(shares=(Share.of("scene by 1%", 18, 40), Share.of("other traffic", 10, 10))),
+    )
+    noted = [replace(run, studies={0: studied}) if run is first else run for run in runs]
+    found = compare(spec, noted, "")
+    page, id_ = table_markdown(found), f"{first.spec.id}-train-0"
+    assert section(page, "### Cores of failures: low")[-1] == (
+        f"| `{id_}` | The left neighbour cuts in | 2 → 1 | 9 → 3 | 9 of 10 |"
+    )
+    assert section(page, "### How many neighbours fail: low")[-1] == (
+        f"| `{id_}` | 18 of 40 [0.31, 0.60] | 10 of 10 [0.72, 1.00] | yes |"
+    )
+    assert json.loads(table_json(found))["studies"]["low"][id_]["core"]["held"] == 9
 
 
 def test_page_names_the_rules_that_make_an_artefact(comparison):

@@ -1,0 +1,62 @@
+"""What playing failures of a run again has told of them: a file for each core and each region, beside the results."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from risk_sac.failures.core import Core
+from risk_sac.failures.surroundings import Region
+from risk_sac.records import Record
+from risk_sac.run_folder.durable import replace_file
+
+STUDIES = "studies"
+_NAME = re.compile(r"([0-9]{1,9})-(?:core|region)\.json", re.ASCII)
+
+
+class Studied(Record):
+    """Of one failure; what nobody asked for is null."""
+
+    core: Core | None = None
+    region: Region | None = None
+
+
+class _Note(Studied):
+    """A file."""
+
+    digest: str
+    """Of the results."""
+
+
+def note(folder: Path, digest: str, index: int, studied: Studied) -> None:
+    """Writes down what was told of an episode's failure, a core or a region.
+
+    Args:
+      folder: of the run.
+      digest: of its results.
+      index: of the episode.
+      studied: has one of the two.
+
+    Raises:
+      OSError: the folder cannot be written.
+    """
+    file = folder / STUDIES / f"{index:06d}-{'region' if studied.core is None else 'core'}.json"
+    file.parent.mkdir(exist_ok=True)
+    replace_file(file, _Note(digest=digest, **dict(studied)).model_dump_json(indent=2).encode())
+
+
+def read_studies(folder: Path, digest: str) -> Mapping[int, Studied]:
+    """What was told of the results with this digest, by index of the episode; what is damaged or of others is not."""
+    found: dict[int, Studied] = {}
+    for file in sorted((folder / STUDIES).glob("*.json")):
+        name = _NAME.fullmatch(file.name)
+        try:
+            noted = _Note.model_validate_json(file.read_bytes())
+        except (OSError, ValidationError):
+            continue
+        if name is None or noted.digest != digest:
+            continue
+        before = found.get(int(name[1]), Studied())
+        found[int(name[1])] = Studied(core=noted.core or before.core, region=noted.region or before.region)
+    return found

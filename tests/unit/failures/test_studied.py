@@ -1,0 +1,45 @@
+"""What was told of a run's failures, beside its results."""
+
+from pathlib import Path
+
+import pytest
+
+from risk_sac.failures.core import Core, Extent
+from risk_sac.failures.studied import STUDIES, Studied, note, read_studies
+from risk_sac.failures.surroundings import Region, Share
+
+CORE = Core(
+    before=Extent(adversaries=2, segments=9, channels=12, strongest=1.0),
+    after=Extent(adversaries=1, segments=3, channels=4, strongest=0.5),
+    plain_parameters=5,
+    parameters=9,
+    episodes=100,
+    held=9,
+    copies=10,
+    sentence="A walker steps out",
+)
+REGION = Region(shares=(Share.of("scene by 1%", 18, 40),))
+
+
+def test_a_core_and_a_region_come_back_together(tmp_path: Path) -> None:
+    note(tmp_path, "d", 3, Studied(core=CORE))
+    note(tmp_path, "d", 3, Studied(region=REGION))
+    note(tmp_path, "d", 12, Studied(region=REGION))
+    assert read_studies(tmp_path, "d") == {3: Studied(core=CORE, region=REGION), 12: Studied(region=REGION)}
+
+
+def test_of_other_results_or_damaged_nothing_is_told(tmp_path: Path) -> None:
+    assert read_studies(tmp_path, "d") == {}
+    note(tmp_path, "other", 3, Studied(core=CORE))
+    note(tmp_path, "d", 4, Studied(core=CORE))
+    for name, content in (("000005-core.json", "{"), ("5.json", "[]"), ("000006-twin.json", "{}")):
+        (tmp_path / STUDIES / name).write_text(content)
+    (tmp_path / STUDIES / "000004-core.json").rename(tmp_path / STUDIES / "4-x.json")
+    assert read_studies(tmp_path, "d") == {}
+
+
+@pytest.mark.parametrize("studied", [Studied(core=CORE), Studied(region=REGION)])
+def test_the_last_word_counts(tmp_path: Path, studied: Studied) -> None:
+    for _ in range(2):
+        note(tmp_path, "d", 3, studied)
+    assert read_studies(tmp_path, "d") == {3: studied}
