@@ -34,6 +34,7 @@ PACKAGES = ("libsumo", "numpy")  # that decide how an episode goes, its scene an
 PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 CODE, WORLD = "risk_sac", "sumo_nets"
 MOST_ARRAYS, MOST_FILE_BYTES, MOST_BYTES = 64, 2**25, 2**28  # a full series of dense has 23 arrays and some 5 MB
+MOST_POLICY_BYTES = 2**23  # a larger one stays out of the file
 MANIFEST, HEADS, LAYER = "manifest", "signal_heads", "policy_layer_"  # the layers are numbered
 
 
@@ -114,7 +115,7 @@ def bundle_bytes(bundle: Bundle) -> bytes:
     """The content of its file."""
     content = io.BytesIO()
     arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
-    if bundle.policy is not None:
+    if bundle.policy is not None and sum(layer.nbytes for layer in bundle.policy.layers) <= MOST_POLICY_BYTES:
         arrays |= {f"{LAYER}{place}": layer for place, layer in enumerate(bundle.policy.layers)}
     np.savez_compressed(content, allow_pickle=False, **arrays)
     return content.getvalue()

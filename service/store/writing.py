@@ -216,7 +216,7 @@ class Ledger:
 def _refuse(session: Session, run: RunRow, flaky: Collection[int]) -> None:
     """Failures that do not repeat are none."""
     rows = select(EpisodeRow).where(EpisodeRow.run_number == run.number, EpisodeRow.index.in_(flaky))
-    for row in session.scalars(rows) if flaky else ():
+    for row in session.scalars(rows):
         count(run, Outcome(row.outcome), -1)
         fill_record(row, EpisodeRecord.model_validate_json(row.record).refused(REPEATS))
         count(run, Outcome(row.outcome), +1)

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from risk_sac.cli import main
 from risk_sac.config import EgoConfig
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError
-from risk_sac.failures.bundle import Bundle, read_bundle, write_bundle
+from risk_sac.failures.bundle import MOST_POLICY_BYTES, Bundle, read_bundle, write_bundle
 from risk_sac.failures.cases import Regression, Verdict
 from risk_sac.failures.collect import bundles, policy_of
 from risk_sac.failures.minimise import COPIES, MOST, SHARE
@@ -23,6 +24,7 @@ from risk_sac.failures.play import play
 from risk_sac.failures.regress import regress, regress_run
 from risk_sac.failures.trajectory import actions_of
 from risk_sac.failures.variants import Stage
+from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.report import read_run
 from risk_sac.run_folder.results import FAILURES, read_results, series_name
 from risk_sac.run_folder.series import read_series, write_series
@@ -308,6 +310,9 @@ def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run: Path
     kept = read_bundle(tmp_path / "failure.npz")
     assert kept.policy is not None
     np.testing.assert_array_equal(kept.policy(observation), first)
+    large = FrozenPolicy((np.zeros(MOST_POLICY_BYTES // 4 + 1, np.float32),), 2)
+    write_bundle(tmp_path / "large.npz", replace(bundle, policy=large))
+    assert read_bundle(tmp_path / "large.npz").policy is None
     slower = EgoConfig(reaction_time_s=1.0)
     (case,) = regress_run(tmp_path / "run", slower)
     assert regress(kept, slower) == case  # the policy acts on from a file as it does from the run
