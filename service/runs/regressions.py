@@ -1,7 +1,7 @@
 """Campaigns' failures against other egos: queued in the campaigns' folders, played one after the other.
 
-A regression is a file below its campaign's folder, and goes with it. One that was queued when the server died is played
-by the next one. Its id names what is played, so that posting the same again gives the one that there is.
+A regression is a file below its campaign's folder, and goes with it. One that had not ended when the server died is
+played by the next one. Its id names what is played, so that posting the same again gives the one that there is.
 """
 
 import hashlib
@@ -84,7 +84,7 @@ class Regressions:
         """Takes up what an earlier server left."""
         for file in sorted((self._settings.data_dir / "campaigns").glob(f"*/{FOLDER}/*.json")):
             try:
-                waits = _read(file).state is State.QUEUED
+                waits = not _read(file).state.final
             except StorageError as error:
                 logger.warning("%s", error)
                 continue
@@ -149,7 +149,8 @@ class Regressions:
                 logger.warning("the regression %s is left as it is: %s", file.stem, error)
 
     def _play(self, file: Path) -> None:
-        asked = _read(file)
+        asked = _read(file).model_copy(update={"state": State.RUNNING})
+        _write(file, asked)
         with tempfile.TemporaryDirectory() as folder:
             ego, told, log = (Path(folder) / name for name in ("ego.yaml", "cases.json", "log"))
             ego.write_text(asked.ego.model_dump_json())  # JSON is YAML

@@ -26,7 +26,7 @@ class Regression(Body):
     id: str
     campaign_id: str
     ego: EgoConfig
-    state: Literal["queued", "succeeded", "failed"]
+    state: Literal["queued", "running", "succeeded", "failed"]
     reason: str | None
     """Why it failed."""
     created_at: datetime

@@ -30,7 +30,7 @@ def _regress(options: argparse.Namespace) -> int:
     ego = read_ego(options.ego)
     with Client.from_environment(options.url) as client:
         regression = client.regress(options.id, ego)
-        while regression.state == "queued":
+        while regression.state in ("queued", "running"):
             time.sleep(POLL_S)
             regression = client.regression(regression.id)
     if regression.state != "succeeded":
