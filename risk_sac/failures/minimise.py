@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
-from itertools import islice
 from typing import TypeVar
 
 import numpy as np
@@ -22,7 +21,6 @@ from risk_sac.types import STEP_S, Bools, Floats
 
 MOST = 150  # episodes that are played for one failure
 COPIES, HELD, SHARE = 10, 8, 0.01  # a reduction counts if so many copies, perturbed by that much, still fail
-FIRST = 2  # of them, that are played at once
 SEGMENT = round(0.5 / STEP_S)  # steps
 AMPLITUDES = (0.5, 0.7, 0.85)  # of what is left, the least first
 
@@ -49,26 +47,16 @@ def minimise(bundle: Bundle, most: int = MOST) -> Bundle:
     with closing(search.stage.env):
         for reduce in (_adversaries, _columns, _segments, _channels, _amplitude, _scene):
             reduce(search)
-            search.settle()
         return search.bundle(bundle)
 
 
 class _Search:
-    """What is left of a failure.
-
-    Most reductions that the failure itself and a first few copies survive, the others survive as well. So it is not
-    before some of them have been made that all copies are played, and what they do not survive is taken back.
-    """
+    """What is left of a failure, and what its parts cost."""
 
     def __init__(self, bundle: Bundle, most: int) -> None:
         self.stage = Stage(bundle)
+        self.left = self.stage.original
         self._most = most
-        self._chain = [self.stage.original]  # each a reduction of the one before; of the first it is known how it holds
-
-    @property
-    def left(self) -> Variant:
-        """What is gone on with."""
-        return self._chain[-1]
 
     @property
     def neutral(self) -> Floats:
@@ -82,33 +70,20 @@ class _Search:
 
     def take(self, variant: Variant) -> bool:
         """Goes on with a variant if it fails in the same way and not on a knife's edge."""
-        settling = len(self._chain).bit_length() * (COPIES - FIRST)  # at most, with one more in the chain
-        if self.stage.played + 1 + FIRST + settling + COPIES + 1 > self._most:  # other copies are counted in the end
+        if self.stage.played + 1 + COPIES > self._most - COPIES - 1:  # as many are counted afresh in the end
             return False
         found = self.stage.play(variant)
         if not alike(found, self.stage.collision) or found is None or _grade(found) != _grade(self.stage.collision):
             return False
-        if not all(map(self.stage.fails, islice(self.stage.copies(variant, SHARE, COPIES), FIRST))):
+        if not self._holds(variant):
             return False
-        self._chain.append(variant)
+        self.left = variant
         return True
 
-    def settle(self) -> None:
-        """Goes back to the last reduction that holds, found by bisection; without a new one, nothing is played."""
-        holds, fails = 0, len(self._chain)
-        tried = fails - 1
-        while holds < tried:
-            if self._holds(self._chain[tried]):
-                holds = tried
-            else:
-                fails = tried
-            tried = (holds + fails) // 2
-        self._chain = [self._chain[holds]]
-
     def _holds(self, variant: Variant) -> bool:
-        """Whether enough of its copies fail, of which the first are known to; played no further than it takes."""
-        failed = FIRST
-        for played, copy in enumerate(islice(self.stage.copies(variant, SHARE, COPIES), FIRST, None), FIRST + 1):
+        """Whether enough of its copies fail; played no further than it takes to know."""
+        failed = 0
+        for played, copy in enumerate(self.stage.copies(variant, SHARE, COPIES), 1):
             failed += self.stage.fails(copy)
             if failed == HELD or played - failed > COPIES - HELD:
                 break
