@@ -7,6 +7,7 @@ from pydantic import Field
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.failures.clusters import Overview
+from risk_sac.failures.studied import Studied
 from risk_sac.records import Phase
 from risk_sac.report import PairedTest
 from risk_sac.report.cells import Cell
@@ -81,6 +82,8 @@ class Table(Body):
     others; declared before any run, so corrected by themselves."""
     failures: Mapping[FamilyName, Overview]
     """The kinds of failures that all methods have found together."""
+    studies: Mapping[FamilyName, Mapping[str, Studied]]
+    """By family and id, the cores and the regions of failures that were asked for in the runs' folders."""
     runs: list[ReportedRun]
 
 
