@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.errors import NotFinite
 from risk_sac.types import Vector
 
 Layers = Sequence[NDArray[np.float32]]
@@ -22,8 +23,16 @@ class FrozenPolicy:
     """The first of the network's outputs; a tanh-Gaussian's log σ follow."""
 
     def __call__(self, observation: Vector) -> Vector:
-        """Action in [-1, 1], `action_size`."""
-        return np.tanh(respond(self.layers, observation)[: self.action_size])
+        """Action in [-1, 1], `action_size`.
+
+        Raises:
+          NotFinite: the network is none that anybody has learnt.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            action = np.tanh(respond(self.layers, observation)[: self.action_size])
+        if not np.isfinite(action).all():
+            raise NotFinite("the policy acts by no number")
+        return action
 
     def check(self, observation_size: int) -> None:
         """Refuses arrays that are no network from an observation to an action.

@@ -18,7 +18,7 @@ class Outcome(StrEnum):
     FAILURE = "failure"  # valid collision
 
 
-REPEATS = "repeats"  # asked of a contact that was replayed and went another way, and of no other
+REPEATS = "repeats"  # failed by what was replayed and went another way, and by its like; asked of nothing else
 # The rules, among a collision's verdicts, that speak of the simulator or the control and not of who is to blame.
 ARTEFACT_RULES = frozenset(
     {
@@ -234,7 +234,11 @@ class EpisodeRecord(Record):
         """The same episode, whose contact fails one more rule; without a contact, the episode itself."""
         if self.collision is None:
             return self
-        collision = self.collision.model_copy(update={"verdicts": {**self.collision.verdicts, rule: False}})
+        judgement = self.collision.judgement
+        if judgement is not None:  # drivers are asked of valid contacts alone
+            judgement = judgement.model_copy(update={"grade": None, "drivers": {}})
+        verdicts = {**self.collision.verdicts, rule: False}
+        collision = self.collision.model_copy(update={"verdicts": verdicts, "judgement": judgement})
         ending = {"outcome": Outcome.DEGENERATE, "reason": ", ".join(collision.broken)}
         return self.model_copy(update={"collision": collision} | ending)
 

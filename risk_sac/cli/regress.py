@@ -34,7 +34,7 @@ def add_regress(commands: Commands) -> None:
         nargs="+",
         required=True,
         metavar="SET",
-        help="bundles, folders of bundles, or folders of runs, whose policy acts on after the recorded actions",
+        help="bundles, folders of bundles, or folders of runs; their policy acts on after the recorded actions",
     )
     regress.add_argument("--ego", required=True, metavar="EGO", help=EGO)
     regress.add_argument("--baseline", type=Path, metavar="FILE.json", help="known cases, as --out wrote them")

@@ -73,12 +73,12 @@ def _asked(options: argparse.Namespace) -> _Asked:
     from risk_sac.failures.bundle import read_bundle  # here, for the simulator takes a second to load
     from risk_sac.failures.collect import bundles
 
-    folder: Path = options.path
+    path: Path = options.path
     if options.failure is None:
-        if folder.is_dir():
-            raise ConfigError(f"{folder} is a folder; wanted a bundle, or a failure of its run too", field="FAILURE")
-        return _Asked(read_bundle(folder), None)
-    results = read_results(folder)
+        if path.is_dir():
+            raise ConfigError(f"{path} is a folder; wanted a bundle, or a failure of its run too", field="FAILURE")
+        return _Asked(read_bundle(path), None)
+    results, folder = read_results(path), path if path.is_dir() else path.parent
     if results.digest is None:
         raise ConfigError(f"the run in {folder} is not finished", field="PATH")
     (bundle,) = bundles(folder, results, [results.contact(options.failure).episode])
@@ -95,7 +95,6 @@ def _minimise(options: argparse.Namespace) -> int:
     minimal = minimise(asked.bundle)
     core = minimal.manifest.core
     assert core is not None  # that is what `minimise` makes
-    asked.note(Studied(core=core))
     if options.out is not None:
         write_bundle(options.out, minimal)
     before, after = core.before, core.after
@@ -110,6 +109,7 @@ def _minimise(options: argparse.Namespace) -> int:
         *([] if options.out is None else [f"Bundle: {options.out}"]),
     )
     console.print(printable("\n".join(lines)), markup=False, soft_wrap=True)
+    asked.note(Studied(core=core))
     return OK
 
 
@@ -120,7 +120,6 @@ def _region(options: argparse.Namespace) -> int:
     if options.out is not None:
         options.out.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
     found = region(asked.bundle)
-    asked.note(Studied(region=found))
     table = Table(title=Text(printable(asked.bundle.manifest.id)), box=SIMPLE_HEAD, padding=0)
     for name in ("changed", "fail", "of", "share", "95 % interval"):
         table.add_column(name, no_wrap=True)
@@ -131,6 +130,7 @@ def _region(options: argparse.Namespace) -> int:
     console.print("a needle: most scenes right beside it do not fail" if found.needle else "no needle")
     if options.out is not None:
         replace_file(options.out, found.model_dump_json(indent=2).encode())
+    asked.note(Studied(region=found))
     return OK
 
 

@@ -34,7 +34,7 @@ PACKAGES = ("libsumo", "numpy")  # that decide how an episode goes, its scene an
 PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 CODE, WORLD = "risk_sac", "sumo_nets"
 MOST_ARRAYS, MOST_FILE_BYTES, MOST_BYTES = 64, 2**25, 2**28  # a full series of dense has 23 arrays and some 5 MB
-MOST_POLICY_BYTES = 2**23  # a larger one stays out of the file
+MOST_POLICY_BYTES = 2**23
 MANIFEST, HEADS, LAYER = "manifest", "signal_heads", "policy_layer_"  # the layers are numbered
 
 
@@ -66,7 +66,7 @@ class Bundle:
     manifest: Manifest
     series: Series
     signal_heads: NDArray[np.uint8]  # T since the release x heads, SUMO's letters
-    policy: FrozenPolicy | None = None  # that the run came to; None of a run that learned none
+    policy: FrozenPolicy | None = None  # that the run came to; None where it learnt none, or left none that fits
 
 
 def make_bundle(
@@ -77,7 +77,9 @@ def make_bundle(
     policy: FrozenPolicy | None,
     core: Core | None = None,
 ) -> Bundle:
-    """A bundle of what was just played here."""
+    """A bundle of what was just played here; a policy that would make it too large to be read stays out."""
+    if policy is not None and sum(layer.nbytes for layer in policy.layers) > MOST_POLICY_BYTES:
+        policy = None
     manifest = Manifest(
         format=1 if policy is None else 2,
         id=episode.id_in(spec.id),
@@ -115,7 +117,7 @@ def bundle_bytes(bundle: Bundle) -> bytes:
     """The content of its file."""
     content = io.BytesIO()
     arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
-    if bundle.policy is not None and sum(layer.nbytes for layer in bundle.policy.layers) <= MOST_POLICY_BYTES:
+    if bundle.policy is not None:
         arrays |= {f"{LAYER}{place}": layer for place, layer in enumerate(bundle.policy.layers)}
     np.savez_compressed(content, allow_pickle=False, **arrays)
     return content.getvalue()

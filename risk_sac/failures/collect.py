@@ -1,5 +1,6 @@
 """The failures of a run as bundles, and the policy that found them."""
 
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -10,17 +11,19 @@ import numpy as np
 from risk_sac.agents.learner import Learner
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import ConfigError, SimulationError
+from risk_sac.errors import CheckpointError, ConfigError, SimulationError
 from risk_sac.failures.bundle import Bundle, make_bundle
 from risk_sac.failures.play import Played, play
 from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.records import EpisodeRecord
 from risk_sac.run import RunState
-from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
+from risk_sac.run_folder.results import FAILURES, Results, series_name
 from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import read_verified
 from risk_sac.types import Scene
+
+logger = logging.getLogger(__name__)
 
 
 def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -> Iterator[Bundle]:
@@ -31,7 +34,7 @@ def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -
       ConfigError: its series is from before there was a release.
       DamagedError, OSError: its series cannot be read.
     """
-    spec, policy = results.spec, policy_of(folder)
+    spec, policy = results.spec, policy_of(folder, results)
     with closing(RiskSacEnv.of(spec)) as env:
         for episode in episodes:
             recorded = _series(folder, spec, episode)
@@ -92,18 +95,21 @@ def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: S
     return played
 
 
-def policy_of(folder: Path) -> FrozenPolicy | None:
-    """The policy that a run came to; None of a method that learns none, or of a folder without a checkpoint.
+def policy_of(folder: Path, results: Results) -> FrozenPolicy | None:
+    """The policy that a run came to.
 
-    Raises:
-      ConfigError: the folder holds no run.
-      CheckpointError: its checkpoint is of another run.
+    None of a method that learns none, of a run that goes on, and where no checkpoint fits.
     """
-    spec = read_results(folder).spec
-    if not METHODS[spec.method].learns:
+    spec = results.spec
+    if not METHODS[spec.method].learns or not results.finished:
         return None
     with closing(RunState(spec, folder)) as run:
-        if not run.resume():
+        try:
+            found = run.resume()
+        except CheckpointError as error:
+            logger.warning("the policy of %s is left out: %s", spec.id, error)
+            return None
+        if not found:
             return None
         learner = run.searchers.agent
         assert isinstance(learner, Learner)  # since the method learns

@@ -68,12 +68,13 @@ def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Case]:
 
     Raises:
       ConfigError: the folder holds no run, or none whose policy can act on.
-      CheckpointError: its checkpoint is of another run.
       DamagedError, OSError: a series cannot be read.
     """
-    results, policy = read_results(folder), policy_of(folder)
+    results = read_results(folder)
+    policy = policy_of(folder, results)
     if policy is None and METHODS[results.spec.method].learns:
-        raise ConfigError(f"{folder} has no checkpoint, so its policy cannot act on; make bundles", field="--failures")
+        message = f"{folder} has not finished, or has no checkpoint, so that its policy cannot act on; make bundles"
+        raise ConfigError(message, field="--failures")
     for episode in distinct_failures(results):
         yield regress(recorded_bundle(folder, results, episode, policy), ego)
 
@@ -92,7 +93,10 @@ def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig) -> _Ending:
                 why = "with its own ego it does not happen under this code and these packages"
                 return _Ending(Verdict.NOT_COMPARABLE, why)
         other = manifest.spec.model_copy(update={"ego": ego})
-        attacks = {"recorded actions": partial(_play, other, bundle, bundle.policy)}
+        actions = "recorded actions"
+        if METHODS[manifest.spec.method].learns and bundle.policy is None:
+            actions += ", without its policy,"
+        attacks = {actions: partial(_play, other, bundle, bundle.policy)}
         if manifest.episode.script is not None:
             attacks["its scripts"] = partial(_follow, other, bundle)
         endings = {}

@@ -46,6 +46,11 @@ def note(folder: Path, digest: str, index: int, studied: Studied) -> None:
     replace_file(file, _Note(digest=digest, **dict(studied)).model_dump_json(indent=2).encode())
 
 
+def edition(folder: Path) -> str:
+    """Another one whenever something is noted."""
+    return " ".join(sorted(f"{file.name}:{file.stat().st_mtime_ns}" for file in (folder / STUDIES).glob("*.json")))
+
+
 def read_studies(folder: Path, digest: str) -> Mapping[int, Studied]:
     """What was told of the results with this digest, by index of the episode; what is damaged or of others is not."""
     found: dict[int, Studied] = {}

@@ -44,17 +44,16 @@ def _bundle(question: Question) -> Bundle:
     recorded = read_series(question.series)
     with closing(RiskSacEnv.of(question.spec)) as env:
         played = repeated(env, question.spec, question.episode, recorded)
-    return make_bundle(question.spec, question.episode, recorded, played.signal_heads, _policy(question.series))
+    return make_bundle(question.spec, question.episode, recorded, played.signal_heads, _policy(question))
 
 
-def _policy(series: Path) -> FrozenPolicy | None:
-    """Of the run that the series is of, once that is over."""
-    folder = series.parents[len(Path(FAILURES).parts)]
+def _policy(question: Question) -> FrozenPolicy | None:
+    """Of the run that the failure is of; a region has no use for it."""
+    folder = question.series.parents[len(Path(FAILURES).parts)]
     try:
-        over = read_results(folder).finished
-    except ConfigError:
+        return None if question.subject == "region" else policy_of(folder, read_results(folder))
+    except ConfigError:  # results are not there yet
         return None
-    return policy_of(folder) if over else None
 
 
 def _beside_twin(question: Question) -> bytes:

@@ -24,8 +24,8 @@ def definitions() -> str:
         "each kind once; of these, what the careful driver would have prevented (PCR counts repetitions too). What was "
         "found before contacts were judged counts as not preventable, and is in no histogram and no signature.",
         "- verified: of the first failures of each kind, and the first preventable ones, those that were the same to "
-        "the bit each time that they were replayed in a fresh process; what is like one that was not counts in no "
-        "budget.",
+        "the bit each time that they were replayed in a fresh process; one that was not, and what is like it, counts "
+        "as no failure.",
         "- what a budget finds: distinct preventable failures, distinct valid ones and kinds in the episodes that "
         "ended within it; median over the runs that spent it, least and most. Processor time is that of one process, "
         "its start apart.",

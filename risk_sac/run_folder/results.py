@@ -4,6 +4,7 @@ results.json    the spec, the metrics and every contact, sealed; rewritten at ea
 episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
 failures/       the time series of every contact, see `risk_sac.run_folder.series`
 verified.json   which failures repeated, see `risk_sac.run_folder.verified`
+studies/        cores and regions that were asked for, see `risk_sac.failures.studied`
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
 

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
-from risk_sac.records import REPEATS, EpisodeRecord, Record
+from risk_sac.records import REPEATS, EpisodeRecord, Outcome, Record
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import Results
 from risk_sac.run_folder.seal import seal, unseal
@@ -49,11 +49,18 @@ class Verified:
         return frozenset(index for index, repetition in self.episodes.items() if not repetition.verified)
 
     def judged(self, records: Sequence[EpisodeRecord]) -> tuple[EpisodeRecord, ...]:
-        """A run's episodes, those with a failure of a kind whose first one does not repeat refused by that rule."""
-        flaky = {niche_of(record.collision) for record in records if record.index in self.flaky and record.collision}
+        """A run's episodes; failures that do not repeat are refused by that rule, and those like them in their phase.
+
+        One that was replayed itself and does repeat stays.
+        """
+        if not self.flaky:
+            return tuple(records)
+        kinds = {each.index: (each.phase, niche_of(each.collision)) for each in records if each.collision}
+        flaky = {kinds[index] for index in self.flaky if index in kinds}
+        repeating = self.episodes.keys() - self.flaky
         return tuple(
             each.refused(REPEATS)
-            if each.collision and each.collision.valid and niche_of(each.collision) in flaky
+            if each.outcome is Outcome.FAILURE and kinds[each.index] in flaky and each.index not in repeating
             else each
             for each in records
         )

@@ -84,12 +84,15 @@ class Regressions:
         """Takes up what an earlier server left."""
         for file in sorted((self._settings.data_dir / "campaigns").glob(f"*/{FOLDER}/*.json")):
             try:
-                waits = not _read(file).state.final
+                found = _read(file)
+                if found.state.final:
+                    continue
+                if found.state is not State.QUEUED:  # the server before died while it played it
+                    _write(file, found.model_copy(update={"state": State.QUEUED}))
             except StorageError as error:
                 logger.warning("%s", error)
                 continue
-            if waits:
-                self._queue.put(file)
+            self._queue.put(file)
         self._thread.start()
 
     def stop(self) -> None:

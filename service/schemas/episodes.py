@@ -41,7 +41,7 @@ class Episode(records.EpisodeRecord, _OfARun):
     collision: Collision | None
     wall_s: float
     funnel: Funnel | None
-    """What the run's phase has found up to and including this episode; null in what is older."""
+    """What the run's phase had found up to and including this episode, as it was told then; null in what is older."""
     repetition: Repetition | None
     """Of the first failure of its kind, once the run has ended; a failure that was not the same each time is flaky."""
 

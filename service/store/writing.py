@@ -215,8 +215,13 @@ class Ledger:
 
 def _refuse(session: Session, run: RunRow, flaky: Collection[int]) -> None:
     """Failures that do not repeat are none."""
-    rows = select(EpisodeRow).where(EpisodeRow.run_number == run.number, EpisodeRow.index.in_(flaky))
-    for row in session.scalars(rows):
+    if not flaky:
+        return
+    indices = set(flaky)  # which may be more than a statement may have parameters
+    failures = select(EpisodeRow).filter_by(run_number=run.number, outcome=Outcome.FAILURE)
+    for row in session.scalars(failures):
+        if row.index not in indices:
+            continue
         count(run, Outcome(row.outcome), -1)
         fill_record(row, EpisodeRecord.model_validate_json(row.record).refused(REPEATS))
         count(run, Outcome(row.outcome), +1)

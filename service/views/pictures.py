@@ -26,7 +26,9 @@ class ContactOfARun:
     def of(cls, campaign: StoredCampaign, episode: StoredEpisode) -> "ContactOfARun":
         """A contact of a campaign."""
         run = next(run for run in campaign.runs if run.id == episode.run_id)
-        parts = (__version__, campaign.id, episode.id, str(episode.series_sha256), episode.record.model_dump_json())
+        # The run's digest: what is made of a run that has ended holds its policy too.
+        told = (str(run.digest), str(episode.series_sha256), episode.record.model_dump_json())
+        parts = (__version__, campaign.id, episode.id, *told)
         edition = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
         return cls(edition, campaign, run, episode)
 

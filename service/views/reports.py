@@ -5,18 +5,13 @@ import threading
 
 from risk_sac import __version__
 from risk_sac.errors import ConfigError
+from risk_sac.failures import studied
 from risk_sac.report import Comparison, FinishedRun, compare, figure_bytes, figure_names, read_run
 from risk_sac.report.figures import Format
 from service.errors import NotFoundError
 from service.settings import ServiceSettings
 from service.store.states import State
 from service.store.stored import StoredCampaign, StoredRun
-
-
-def edition(campaign: StoredCampaign) -> str:
-    """A name that changes whenever the report would: a run has finished, or why one is missing has changed."""
-    lines = [__version__, campaign.id, *(f"{run.id} {run.digest or _missing(run)}" for run in campaign.runs)]
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:32]
 
 
 class CampaignReport:
@@ -62,9 +57,21 @@ class Reports:
         self._lock = threading.Lock()
         self._newest: tuple[str, CampaignReport] | None = None
 
+    def edition(self, campaign: StoredCampaign) -> str:
+        """A name that changes whenever the report would.
+
+        A run has finished, why one is missing has changed, or something was noted of a failure in a run's folder.
+        """
+        lines = [__version__, campaign.id]
+        for run in campaign.runs:
+            lines.append(f"{run.id} {run.digest or _missing(run)}")
+            if run.digest:
+                lines.append(studied.edition(self._settings.run_folder(campaign.id, run.id)))
+        return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:32]
+
     def report(self, campaign: StoredCampaign) -> CampaignReport:
         """The report of a campaign as it stands; blocks for the seconds that the statistics take."""
-        name = edition(campaign)
+        name = self.edition(campaign)
         with self._lock:
             if self._newest is None or self._newest[0] != name:
                 report = self._make(campaign)

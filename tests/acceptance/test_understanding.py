@@ -16,7 +16,7 @@ from risk_sac.cli import main
 from risk_sac.config import EgoConfig
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError
-from risk_sac.failures.bundle import MOST_POLICY_BYTES, Bundle, read_bundle, write_bundle
+from risk_sac.failures.bundle import MOST_POLICY_BYTES, Bundle, make_bundle, read_bundle, write_bundle
 from risk_sac.failures.cases import Regression, Verdict
 from risk_sac.failures.collect import bundles, policy_of
 from risk_sac.failures.minimise import COPIES, MOST, SHARE
@@ -294,29 +294,30 @@ def test_a_policy_acts_on_when_the_recorded_actions_have_ended(failure: Path) ->
 def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run: Path, tmp_path: Path) -> None:
     learner = ["run", "--family", "low", "--method", "risk-sac", "--seed", "3", "--episodes", "9"]
     subprocess.run([sys.executable, "-m", "risk_sac", *learner, "--out", tmp_path / "run"], check=True)
-    policy = policy_of(tmp_path / "run")
+    results = read_results(tmp_path / "run")
+    policy = policy_of(tmp_path / "run", results)
     assert policy is not None
-    env = RiskSacEnv.of(read_results(tmp_path / "run").spec)
+    env = RiskSacEnv.of(results.spec)
     with closing(env):
         observation, _ = env.reset(seed=1)
         first, second = policy(observation), policy(observation)
     assert first.shape == (env.action_size,)
     np.testing.assert_array_equal(first, second)  # it does not explore
-    assert policy_of(run) is None
+    assert policy_of(run, read_results(run)) is None
+    assert policy_of(tmp_path / "run", replace(results, finished=False)) is None
 
-    results = read_results(tmp_path / "run")
     (bundle,) = bundles(tmp_path / "run", results, distinct_failures(results))
     write_bundle(tmp_path / "failure.npz", bundle)
     kept = read_bundle(tmp_path / "failure.npz")
     assert kept.policy is not None
     np.testing.assert_array_equal(kept.policy(observation), first)
     large = FrozenPolicy((np.zeros(MOST_POLICY_BYTES // 4 + 1, np.float32),), 2)
-    write_bundle(tmp_path / "large.npz", replace(bundle, policy=large))
-    assert read_bundle(tmp_path / "large.npz").policy is None
+    manifest = bundle.manifest
+    assert make_bundle(manifest.spec, manifest.episode, bundle.series, bundle.signal_heads, large).policy is None
     slower = EgoConfig(reaction_time_s=1.0)
     (case,) = regress_run(tmp_path / "run", slower)
     assert regress(kept, slower) == case  # the policy acts on from a file as it does from the run
     (tmp_path / "run" / "checkpoint").unlink()
-    assert policy_of(tmp_path / "run") is None
+    assert policy_of(tmp_path / "run", results) is None
     with pytest.raises(ConfigError, match="has no checkpoint"):
         list(regress_run(tmp_path / "run", slower))

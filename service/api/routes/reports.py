@@ -20,7 +20,7 @@ from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOW
 from service.api.context import Context, Service
 from service.schemas.reports import Clusters, Figure, FigureFile, Figures, Table
 from service.store.stored import StoredCampaign
-from service.views.reports import CampaignReport, edition
+from service.views.reports import CampaignReport
 
 TableFormat = Literal["json", "md", "csv"]
 SpecFormat = Literal["json", "yaml"]
@@ -31,8 +31,8 @@ SPECS: dict[str, Callable[[CampaignSpec], str]] = {"json": CampaignSpec.model_du
 
 CACHED = {
     "ETag": {
-        "description": "Changes when a run finishes and when the reason why one is missing changes; "
-        "absent where the folder of a finished run cannot be read.",
+        "description": "Changes when a run finishes, when the reason why one is missing changes, and when the core or "
+        "the region of a failure is noted in a run's folder; absent where the folder of a finished run cannot be read.",
         "schema": {"type": "string"},
     },
     "Cache-Control": {"description": "`no-cache`: keep it, and ask with If-None-Match.", "schema": {"type": "string"}},
@@ -157,7 +157,7 @@ def _shown(
     vary: str = "",
 ) -> Response:
     """What the report says in one representation, which `parts` name, unless the client has it."""
-    tag = entity_tag(edition(campaign), *parts)
+    tag = entity_tag(service.reports.edition(campaign), *parts)
     if has(request, tag):
         return not_modified(tag, vary)
     report = service.reports.report(campaign)

@@ -1,5 +1,6 @@
 import io
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from risk_sac.config import (
     MethodName,
     ReplayConfig,
 )
-from risk_sac.errors import CheckpointError
+from risk_sac.errors import CheckpointError, NotFinite
 
 Make = Callable[..., Transition]
 CONFIG = LearnerConfig(
@@ -70,6 +71,12 @@ def test_a_frozen_policy_acts_as_the_learner_does_without_exploring(
     frozen.check(3)
     with pytest.raises(ValueError, match="wanted from 4 to 2"):
         frozen.check(4)
+    first, *others = (np.full_like(layer, 3e38) for layer in frozen.layers)
+    others[1][::2] *= -1.0
+    wild = replace(frozen, layers=(first, *others))
+    wild.check(3)
+    with pytest.raises(NotFinite):
+        wild(np.array([1.0, -1.0, 1.0], np.float32))
 
 
 def test_same_seed_same_decisions(random_transition: Make) -> None:
