@@ -8,6 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 
+from risk_sac.rules import ARTEFACT_RULES
+
 
 class Outcome(StrEnum):
     """How an episode ended; exactly one holds."""
@@ -16,22 +18,6 @@ class Outcome(StrEnum):
     SAFE = "safe"  # the horizon passed without contact
     DEGENERATE = "degenerate"  # raw contact that a validity rule refused
     FAILURE = "failure"  # valid collision
-
-
-REPEATS = "repeats"  # failed by what was replayed and went another way, and by its like; asked of nothing else
-# The rules, among a collision's verdicts, that speak of the simulator or the control and not of who is to blame.
-ARTEFACT_RULES = frozenset(
-    {
-        REPEATS,
-        "no_teleport",
-        "no_spawn_overlap",
-        "conflict_after_release",
-        "inside_limits",
-        "inside_grip",
-        "solid_bodies",
-        "ego_model_saw",
-    }
-)
 
 
 class ConflictType(StrEnum):

@@ -25,7 +25,8 @@ from typing import TYPE_CHECKING
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
 from risk_sac.execution.postmortem import without_folders
-from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.rules import REPEATS
 from service.workers.memory import limit_memory, out_of_memory
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
 from service.workers.takeover import take_over

@@ -9,7 +9,8 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
-from risk_sac.records import REPEATS, EpisodeRecord, Outcome, Record
+from risk_sac.records import EpisodeRecord, Outcome, Record
+from risk_sac.rules import REPEATS
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import Results
 from risk_sac.run_folder.seal import seal, unseal

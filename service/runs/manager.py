@@ -5,12 +5,12 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.executor import Cause, Executor, Exited
 from risk_sac.problem import check_campaign
 from service.errors import ConflictError, OutdatedError, StorageError
+from service.runs.active import Active
 from service.runs.disposal import dispose, settle
 from service.runs.quota import check_quota, exhausted
 from service.runs.retention import Retention
@@ -30,22 +30,6 @@ MOST_AT_ONCE = 500  # messages; meanwhile nobody can post or cancel, and a state
 UNKILLABLE_S = 3.0  # how long after SIGKILL a worker may take to vanish
 
 
-@dataclass(slots=True)
-class _Active:
-    """A run whose worker lives."""
-
-    run: StoredRun
-    project: str
-    cancelled: bool = False
-    abandoned: bool = False  # the disk refused; what it still says is not wanted, since it will be said again
-    last: Finished | Failed | None = None
-
-    @property
-    def ids(self) -> dict[str, str]:
-        """What a line of the log says it is about."""
-        return {"campaign": self.run.campaign_id, "run": self.run.id}
-
-
 class Manager:
     """Runs campaigns: one thread turns what workers say into rows and starts what waits.
 
@@ -60,7 +44,7 @@ class Manager:
         self._store = store
         self._ledger = Ledger(store)
         self._executor = executor
-        self._active: dict[int, _Active] = {}
+        self._active: dict[int, Active] = {}
         self._deaths: Counter[int] = Counter()  # of a run's workers in a row, without a new episode
         self.restarts: Counter[str] = Counter()
         self._lock = threading.RLock()
@@ -198,7 +182,7 @@ class Manager:
         except StorageError as error:
             self._pause(str(error))
 
-    def _handle(self, active: _Active, message: Event | Exited) -> None:
+    def _handle(self, active: Active, message: Event | Exited) -> None:
         number = active.run.number
         try:
             if isinstance(message, Exited):
@@ -231,7 +215,7 @@ class Manager:
         except StorageError as error:
             self._pause(str(error))
 
-    def _end(self, active: _Active, exited: Exited) -> None:
+    def _end(self, active: Active, exited: Exited) -> None:
         """Decide what became of a run; a worker's own account goes before its exit status."""
         number, last = active.run.number, active.last
         if active.abandoned:
@@ -253,7 +237,7 @@ class Manager:
         if active.last is not None or active.cancelled:
             self._deaths.pop(number, None)
 
-    def _replace(self, active: _Active, exited: Exited) -> None:
+    def _replace(self, active: Active, exited: Exited) -> None:
         """A worker was lost: another one goes on from its checkpoint, unless that has failed too often."""
         number = active.run.number
         reason = exited.reason or "worker stopped before its run was done"
@@ -284,7 +268,7 @@ class Manager:
         folder = self._settings.run_folder(run.campaign_id, run.id)
         campaign = self._store.campaign(run.campaign_id)
         self._ledger.start_run(run.number)
-        self._active[run.number] = active = _Active(run, campaign.project)
+        self._active[run.number] = active = Active(run, campaign.project)
         try:
             self._executor.submit(run.number, run.attempts + 1, campaign.run_spec(run), folder)
         except OutdatedError as error:
@@ -294,7 +278,7 @@ class Manager:
             del self._active[run.number]
             self._pause(refused("starting a run", folder, error), active)
 
-    def _pause(self, reason: str, *without_worker: _Active) -> None:
+    def _pause(self, reason: str, *without_worker: Active) -> None:
         """The disk refused: nothing is lost, since workers have their checkpoints; all wait until it has room.
 
         Args:

@@ -9,7 +9,8 @@ from sqlalchemy import delete, select, tuple_
 from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import REPEATS, EpisodeRecord, Outcome
+from risk_sac.records import EpisodeRecord, Outcome
+from risk_sac.rules import REPEATS
 from service.errors import ConflictError
 from service.store.counting import add_usage, count, fill, fill_record, tally, to_text
 from service.store.database import WRITING, storage_errors
