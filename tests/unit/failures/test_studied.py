@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from risk_sac.failures.core import Core, Extent
-from risk_sac.failures.studied import STUDIES, Studied, note, read_studies
+from risk_sac.failures.studied import STUDIES, Studied, edition, note, read_studies
 from risk_sac.failures.surroundings import Region, Share
 
 CORE = Core(
@@ -26,6 +26,14 @@ def test_a_core_and_a_region_come_back_together(tmp_path: Path) -> None:
     note(tmp_path, "d", 3, Studied(region=REGION))
     note(tmp_path, "d", 12, Studied(region=REGION))
     assert read_studies(tmp_path, "d") == {3: Studied(core=CORE, region=REGION), 12: Studied(region=REGION)}
+
+
+def test_what_was_noted_makes_another_edition(tmp_path: Path) -> None:
+    before = edition(tmp_path)
+    note(tmp_path, "d", 3, Studied(core=CORE))
+    first = edition(tmp_path)
+    note(tmp_path, "d", 3, Studied(region=REGION))
+    assert len({before, first, edition(tmp_path)}) == 3
 
 
 def test_of_other_results_or_damaged_nothing_is_told(tmp_path: Path) -> None:
