@@ -47,8 +47,11 @@ def note(folder: Path, digest: str, index: int, studied: Studied) -> None:
 
 
 def edition(folder: Path) -> str:
-    """Another one whenever something is noted."""
-    return " ".join(sorted(f"{file.name}:{file.stat().st_mtime_ns}" for file in (folder / STUDIES).glob("*.json")))
+    """Another one whenever something is noted; of a folder that is just being removed, any."""
+    try:
+        return " ".join(sorted(f"{file.name}:{file.stat().st_mtime_ns}" for file in (folder / STUDIES).glob("*.json")))
+    except OSError:
+        return ""
 
 
 def read_studies(folder: Path, digest: str) -> Mapping[int, Studied]:
