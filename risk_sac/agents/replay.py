@@ -85,11 +85,14 @@ class Replay(Protocol):
         """Continue from `state()`; raises CheckpointError if it is of another shape."""
 
 
+SCALARS = 5  # of a transition, behind its vectors
+
+
 class Storage:
     """Ring buffer of transitions, one packed row each, so that a batch is one gather."""
 
     def __init__(self, observation_size: int, action_size: int, capacity: int) -> None:
-        self._widths = [observation_size, action_size, observation_size, 1, 1, 1, 1, 1]
+        self._widths = [observation_size, action_size, observation_size, SCALARS]
         self._rows = np.zeros((capacity, sum(self._widths)), np.float32)
         self._next = 0
         self.size = 0
@@ -125,8 +128,8 @@ class Storage:
     def gather(self, indices: Indices, weight: Floats) -> Batch:
         """The transitions at `indices`, with their importance weights."""
         rows = torch.from_numpy(self._rows.take(indices, axis=0))
-        observation, action, next_observation, *scalars = torch.split(rows, self._widths, dim=1)
-        risk_reward, cost, robustness, next_robustness, terminated = (column.squeeze(1) for column in scalars)
+        observation, action, next_observation, scalars = torch.split(rows, self._widths, dim=1)
+        risk_reward, cost, robustness, next_robustness, terminated = scalars.unbind(dim=1)
         return Batch(
             observation=observation,
             action=action,

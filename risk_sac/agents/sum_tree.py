@@ -79,14 +79,16 @@ def _sum(nodes: Floats, first: int) -> None:
 
 @compiled
 def _find(nodes: Floats, first: int, fractions: Floats) -> Indices:
-    found = np.empty(len(fractions), np.int64)
-    for i in range(len(fractions)):
-        prefix, node = fractions[i] * nodes[1], 1
-        while node < first:
-            node *= 2
+    # All descend together, level by level: the processor waits for many nodes of the tree at once.
+    prefix = fractions * nodes[1]
+    found = np.ones(len(fractions), np.int64)
+    level = 1
+    while level < first:
+        for i in range(len(found)):
+            left = 2 * found[i]
             # Rounding may lift the prefix to the end of both children: an empty one is never entered.
-            if prefix >= nodes[node] and nodes[node + 1] > 0.0:
-                prefix -= nodes[node]
-                node += 1
-        found[i] = node - first
-    return found
+            goes_right = np.int64((prefix[i] >= nodes[left]) & (nodes[left + 1] > 0.0))
+            prefix[i] -= goes_right * nodes[left]
+            found[i] = left + goes_right
+        level *= 2
+    return found - first
