@@ -25,6 +25,7 @@ from service.api.routes import (
     events,
     networks,
     operations,
+    page,
     pictures,
     regressions,
     reports,
@@ -78,6 +79,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
     )
     for routes in (campaigns, episodes, pictures, events, reports, regressions, networks, catalogue, operations, docs):
         app.include_router(routes.router)
+    app.router.routes += page.routes()
     add_problem_handlers(app)
     app.add_middleware(AnswerCache)
     add_guards(app, settings, made)

@@ -1,6 +1,6 @@
 """Whom the service lets in, decided before a body is read and before a route is looked up.
 
-A route that is added tomorrow is therefore guarded today: it wants a key unless `PUBLIC` names it.
+A route that is added tomorrow is therefore guarded today: it wants a key unless `PUBLIC` or `PAGE` names it.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,8 @@ from service.settings import ServiceSettings
 
 HEALTH = frozenset({"/healthz", "/readyz"})
 _PAGE = {"/docs", "/docs/swagger-ui-bundle.js", "/docs/swagger-ui.css", "/docs/favicon.png"}
-PUBLIC = HEALTH | _PAGE | {"/", "/openapi.json"}
+PUBLIC = HEALTH | _PAGE | {"/", "/openapi.json", "/page"}
+PAGE = "/page/"  # and what lies below: it asks for the key itself
 
 RequestHeaders = Mapping[bytes, bytes]
 
@@ -76,7 +77,7 @@ class Gate:
         if path in HEALTH:  # not counted, or a flood from one address would make the service look ill
             return
         address = scope["client"][0] if scope.get("client") else ""
-        if path in PUBLIC:
+        if path in PUBLIC or path.startswith(PAGE):
             self._rate.count("address", address)
             return
         try:

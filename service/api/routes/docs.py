@@ -4,9 +4,9 @@ from collections.abc import Awaitable, Callable
 from importlib.resources import files
 from pathlib import Path
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request, Response
 from fastapi.openapi.docs import get_swagger_ui_html
-from fastapi.responses import FileResponse, HTMLResponse
+from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse
 
 from risk_sac import __version__
 from service.schemas.entrance import Entrance
@@ -19,9 +19,11 @@ POLICY = "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self
 router = APIRouter()
 
 
-@router.get("/", tags=["operations"])
-async def get_entrance() -> Entrance:
-    """Where to go from here."""
+@router.get("/", tags=["operations"], response_model=Entrance)
+async def get_entrance(request: Request) -> Entrance | Response:
+    """Where to go from here; a browser is sent to the page."""
+    if "text/html" in request.headers.get("accept", ""):
+        return RedirectResponse("page/", status_code=303, headers={"Vary": "Accept"})
     return Entrance(version=__version__)
 
 

@@ -1,0 +1,100 @@
+/** The shell: what stands around every screen, and which screen is shown. */
+
+import type { ComponentChildren } from "preact";
+import { useEffect, useState } from "preact/hooks";
+import { absolute, connected, hasKey, setKey, wantsKey } from "./api/client";
+import { placeOf, usePlace, type Place } from "./router";
+import { CampaignScreen } from "./screens/campaign/screen";
+import { CampaignsScreen } from "./screens/campaigns/screen";
+import { CompareScreen } from "./screens/compare/screen";
+import { FailuresScreen } from "./screens/failures/screen";
+import { NewScreen } from "./screens/new/screen";
+import { PairScreen } from "./screens/pair/screen";
+import { ReplayScreen } from "./screens/replay/screen";
+import { useSignal } from "./signal";
+import { Login } from "./ui/login";
+import { Empty } from "./ui/states";
+import { ThemeButton } from "./ui/theme";
+
+export function App() {
+  const place = usePlace();
+  const keyWanted = useSignal(wantsKey);
+  const lost = !useSignal(connected);
+  useFocusOnArrival(place);
+  return (
+    <>
+      <a class="skip" href={location.hash || "#/"} onClick={toContent}>
+        Skip to content
+      </a>
+      <header class="bar">
+        <a class="brand" href="#/campaigns">
+          RISK-SAC
+        </a>
+        <nav aria-label="Main">
+          <Tab to="#/campaigns">Campaigns</Tab>
+          <Tab to="#/new">New campaign</Tab>
+          <Tab to="#/compare">Compare</Tab>
+          <a href={absolute("docs")}>API</a>
+        </nav>
+        <span class="bar-end">
+          {hasKey() && <button onClick={() => setKey(null)}>Log out</button>}
+          <ThemeButton />
+        </span>
+      </header>
+      {lost && (
+        <p class="banner" role="alert">
+          The service does not answer. What you see is what it said last; it is asked again every two seconds.
+        </p>
+      )}
+      <main id="content" tabIndex={-1}>
+        {keyWanted ? <Login /> : screen(place)}
+      </main>
+    </>
+  );
+}
+
+function screen({ parts, query }: Place): ComponentChildren {
+  const [room = "campaigns", id, part, failure, twin, kind] = parts;
+  if (room === "campaigns" && id === undefined) return <CampaignsScreen query={query} />;
+  if (room === "new") return <NewScreen query={query} />;
+  if (room === "compare") return <CompareScreen query={query} />;
+  if (room === "campaigns" && id !== undefined) {
+    if (part === undefined) return <CampaignScreen id={id} key={id} />;
+    if (part === "compare") return <CompareScreen query={new URLSearchParams({ ids: id })} />;
+    if (part === "failures" && failure === undefined) return <FailuresScreen campaign={id} query={query} key={id} />;
+    if (part === "failures" && failure !== undefined) {
+      if (twin === "twin") return <PairScreen campaign={id} failure={failure} twin={kind ?? "idle"} query={query} key={failure} />;
+      return <ReplayScreen campaign={id} failure={failure} query={query} key={failure} />;
+    }
+  }
+  return (
+    <Empty>
+      <h1>Nothing is here</h1>
+      <p>
+        <a href="#/campaigns">To the campaigns</a>
+      </p>
+    </Empty>
+  );
+}
+
+function Tab({ to, children }: { to: string; children: ComponentChildren }) {
+  const room = usePlace().parts[0] ?? "campaigns";
+  return (
+    <a href={to} aria-current={placeOf(to).parts[0] === room ? "page" : undefined}>
+      {children}
+    </a>
+  );
+}
+
+function toContent(event: Event): void {
+  event.preventDefault();
+  document.getElementById("content")!.focus();
+}
+
+/** A screen reader hears where it came to; nothing moves when only a filter changes. */
+function useFocusOnArrival({ parts }: Place): void {
+  const [first] = useState(parts.join("/"));
+  useEffect(() => {
+    if (parts.join("/") !== first) document.getElementById("content")!.focus({ preventScroll: true });
+  }, [parts.join("/")]);
+}

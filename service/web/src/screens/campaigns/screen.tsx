@@ -1,0 +1,7 @@
+export function CampaignsScreen({ query }: { query: URLSearchParams }) {
+  return (
+    <h1>
+      Campaigns {query.toString()}
+    </h1>
+  );
+}

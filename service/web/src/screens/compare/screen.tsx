@@ -1,0 +1,7 @@
+export function CompareScreen({ query }: { query: URLSearchParams }) {
+  return (
+    <h1>
+      Compare {query.toString()}
+    </h1>
+  );
+}

@@ -1,0 +1,30 @@
+/** Asks for the API key, where the service wants one. */
+
+import { useRef, useState } from "preact/hooks";
+import { get, setKey } from "../api/client";
+
+export function Login() {
+  const input = useRef<HTMLInputElement>(null);
+  const [refused, setRefused] = useState("");
+  const enter = async (event: Event) => {
+    event.preventDefault();
+    setKey(input.current!.value.trim());
+    try {
+      await get("v1/campaigns?limit=1");
+    } catch (error) {
+      setKey(null);
+      setRefused((error as Error).message);
+    }
+  };
+  return (
+    <form class="card login" onSubmit={enter}>
+      <h1>API key</h1>
+      <p>This service wants a key. It stays in this tab, and is forgotten with it.</p>
+      <label>
+        Key <input ref={input} type="password" autocomplete="off" required autofocus />
+      </label>
+      {refused && <p role="alert">{refused}</p>}
+      <button class="primary">Enter</button>
+    </form>
+  );
+}

@@ -1,0 +1,25 @@
+/** Numbers and times in words; what is unknown is a dash. */
+
+export function number(value: number | null | undefined, digits = 2): string {
+  return value === null || value === undefined || !Number.isFinite(value) ? "–" : value.toFixed(digits);
+}
+
+export function count(value: number): string {
+  return value.toLocaleString("en");
+}
+
+export function seconds(value: number | null | undefined): string {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  if (value < 60) return `${Math.round(value)} s`;
+  if (value < 3600) return `${Math.floor(value / 60)} min ${Math.round(value % 60)} s`;
+  return `${Math.floor(value / 3600)} h ${Math.round((value % 3600) / 60)} min`;
+}
+
+/** `red_light` -> `red light`. */
+export function words(name: string): string {
+  return name.replaceAll("_", " ");
+}
+
+export function moment(iso: string | null): string {
+  return iso === null ? "–" : new Date(iso).toLocaleString("en-GB", { dateStyle: "medium", timeStyle: "short" });
+}
