@@ -122,6 +122,15 @@ class Store:
         with self._reading() as session:
             return event_page(session, find_campaign(session, campaign_id), limit, after)
 
+    def count_of_events(self, campaign_id: str) -> int:
+        """How many have happened so far, which is the newest one's sequence.
+
+        Raises:
+          NotFoundError: there is no such campaign.
+        """
+        with self._reading() as session:
+            return find_campaign(session, campaign_id).events
+
     def episodes(
         self,
         campaign_id: str,

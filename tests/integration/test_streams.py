@@ -21,11 +21,11 @@ def shared(serve_shared):
     return serve_shared("striking_worker")
 
 
-def events(client, campaign_id, after=None):
+def events(client, campaign_id, after=None, **asked):
     """Events of one connection, as dictionaries of their fields."""
     headers = {"Last-Event-ID": after} if after else {}
     path = f"/v1/campaigns/{campaign_id}/events"
-    with client.stream("GET", path, headers=headers, timeout=120) as response:
+    with client.stream("GET", path, headers=headers, params=asked, timeout=120) as response:
         if response.status_code == 204:
             return
         assert response.status_code == 200, response.read()
@@ -79,6 +79,25 @@ def test_a_stream_taken_up_after_any_event_tells_exactly_the_rest(shared):
     path = f"/v1/campaigns/{campaign_id}/events"
     over = shared.client.get(path, headers={"Last-Event-ID": seen[-1]["id"]})
     assert (over.status_code, over.content) == (204, b"")
+
+
+def test_a_stream_begins_with_as_many_of_the_newest_events_as_are_asked_for(shared):
+    campaign_id = shared.post(budget={"episodes": 5})
+    seen = list(events(shared.client, campaign_id))
+    for newest in (1, 3, len(seen), 1000):
+        assert list(events(shared.client, campaign_id, newest=newest)) == seen[-newest:]
+    assert list(events(shared.client, campaign_id, newest=0)) == []  # it has ended: nothing comes any more
+    assert list(events(shared.client, campaign_id, seen[1]["id"], newest=1)) == seen[2:]
+
+
+def test_a_stream_of_what_comes_tells_all_that_comes(shared):
+    campaign_id = shared.post(budget={"episodes": 10_000})
+    whole, tail = events(shared.client, campaign_id), events(shared.client, campaign_id, newest=0)
+    first = next(tail)
+    with httpx.Client(base_url=shared.client.base_url, timeout=600) as other:
+        other.post(f"/v1/campaigns/{campaign_id}/cancel")
+    told_all = list(whole)
+    assert [first, *tail] == told_all[told_all.index(first) :]
 
 
 def test_what_was_told_first_is_told_again_in_its_order_from_every_id(serve):

@@ -3,7 +3,7 @@
 from typing import Annotated
 
 import anyio
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Header, Query, Response
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
@@ -52,15 +52,29 @@ LastEventId = Annotated[
     Header(alias="Last-Event-ID", max_length=100, description="The `id` of the last event that was received."),
 ]
 
+Newest = Annotated[
+    int | None,
+    Query(
+        ge=0,
+        le=1000,
+        description="Begin with so many of the newest events, 0 to hear only of what comes; without it with the"
+        " campaign's first. Last-Event-ID goes before it.",
+    ),
+]
+
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
 
 
 @router.get("/{campaign_id}/events", response_class=Response, responses=EVENTS)
 async def get_events(
-    campaign_id: str, service: Service, caller: CurrentCaller, last_event_id: LastEventId = None
+    campaign_id: str,
+    service: Service,
+    caller: CurrentCaller,
+    last_event_id: LastEventId = None,
+    newest: Newest = None,
 ) -> Response:
     """Server-sent events: episodes, failures and changes of state, all of them or those after the last one received."""
-    position, ended = await run_in_threadpool(_start, service.store, campaign_id, caller.sees, last_event_id)
+    position, ended = await run_in_threadpool(_start, service.store, campaign_id, caller.sees, last_event_id, newest)
     if position is None:
         return Response(status_code=204)
     stopping = anyio.Event()
@@ -73,10 +87,12 @@ async def get_events(
     )
 
 
-def _start(store: Store, campaign_id: str, project: str | None, event_id: str | None) -> tuple[int | None, bool]:
+def _start(
+    store: Store, campaign_id: str, project: str | None, event_id: str | None, newest: int | None
+) -> tuple[int | None, bool]:
     """Where to begin, None where nothing is left to tell; and whether the campaign has ended."""
     campaign = store.campaign(campaign_id, project)
-    position = decode_position(store, campaign_id, event_id) if event_id else 0
+    position = _position(store, campaign_id, event_id, newest)
     if position is None:
         raise invalid_field(
             "Last-Event-ID", event_id, "the id of an event of this campaign, unchanged; else leave it out"
@@ -84,3 +100,9 @@ def _start(store: Store, campaign_id: str, project: str | None, event_id: str | 
     ended = campaign.state.final
     told = ended and not store.events(campaign_id, after=position, limit=1).items
     return None if told else position, ended
+
+
+def _position(store: Store, campaign_id: str, event_id: str | None, newest: int | None) -> int | None:
+    if event_id:
+        return decode_position(store, campaign_id, event_id)
+    return 0 if newest is None else max(0, store.count_of_events(campaign_id) - newest)
