@@ -68,6 +68,15 @@ def intersect(default: Odd, user: Odd) -> Odd:
     )
 
 
+def widest(default: Odd) -> Odd:
+    """All that a user may ask of a family with this default: `intersect` keeps nothing beyond it."""
+    for path, extreme in EXTREME.items():
+        branch, name = path.split(".")
+        widened = getattr(default, branch).model_copy(update={name: extreme})
+        default = default.model_copy(update={branch: widened})
+    return default
+
+
 def check(odd: Odd) -> None:
     """Refuse an ODD that contradicts physics, whatever the family.
 

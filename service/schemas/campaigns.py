@@ -67,11 +67,22 @@ class Progress(Body):
     """Seconds until the campaign ends at its present pace; null before there is one, 0 at the end."""
 
 
+class Driver(Body):
+    """Who drives the ego. These are no enums: what an earlier version knew can still be listed."""
+
+    profile: str
+    car_following: str
+
+
 class CampaignSummary(Body):
     """A campaign as it appears in a list."""
 
     id: str
     label: str
+    families: list[str]
+    methods: list[str]
+    ego: Driver
+    """The rest of its settings is in the campaign's `spec`."""
     state: State
     reason: str | None
     """Why it failed."""

@@ -12,6 +12,8 @@ class SceneParameter(Body):
     low: float
     high: float
     meaning: str
+    odd: str | None
+    """The field of the ODD that narrows it, such as `dynamic.ego_speed_mps`."""
 
 
 class Family(Body):
@@ -25,6 +27,8 @@ class Family(Body):
     adversaries: list[str]
     odd: Odd
     """Default operational design domain; a campaign's own narrows it."""
+    odd_limits: Odd
+    """How far a campaign's own may go: a few fields may be wider than the default, as far as this."""
     requirements: list[Requirement]
     """What the default ego has to meet in the default ODD. A campaign's own ODD and ego change their thresholds; the
     campaign's own requirements come on top, under other names."""

@@ -97,6 +97,22 @@ class StoredCampaign:
         return cls(**_columns(cls, row) | read)
 
     @property
+    def families(self) -> list[str]:
+        """Of its runs, as they were posted."""
+        return list(dict.fromkeys(run.family for run in self.runs))
+
+    @property
+    def methods(self) -> list[str]:
+        """Of its runs, as they were posted."""
+        return list(dict.fromkeys(run.method for run in self.runs))
+
+    @property
+    def ego(self) -> dict[str, Any]:
+        """Its settings as they were posted, which this version need not know."""
+        ego: dict[str, Any] = from_json(self.spec_json)["ego"]
+        return ego
+
+    @property
     def spec(self) -> CampaignSpec:
         """What was posted; read only when somebody asks, which a list does not.
 

@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from risk_sac.config import METHODS, EgoConfig
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.odd import requirements_from_odd
+from risk_sac.scenario.odd import requirements_from_odd, widest
 from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter, Signal
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
@@ -24,6 +24,7 @@ def list_families() -> Families:
             parameters=[SceneParameter.model_validate(parameter) for parameter in family.space.parameters],
             adversaries=list(family.adversaries),
             odd=family.odd,
+            odd_limits=widest(family.odd),
             requirements=list(requirements_from_odd(family.odd, EgoConfig().reaction_time_s)),
         )
         for family in FAMILIES.values()

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from risk_sac.config import DynamicElements, Environment, Interval, Odd, Scenery
 from risk_sac.errors import OddError
 from risk_sac.risk.stl import Monitor
-from risk_sac.scenario.odd import intersect, narrow, requirements_from_odd
+from risk_sac.scenario.odd import intersect, narrow, requirements_from_odd, widest
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 
@@ -218,3 +218,15 @@ def test_passing_a_pedestrian_on_the_sidewalk_or_standing_beside_one_violates_no
     monitor = Monitor([requirement], 0.1, 150)
     assert monitor.update({"pedestrian_gap_m": gap_m, "ego_speed_mps": speed_mps})[0] > 0
     assert monitor.update({"pedestrian_gap_m": 0.4, "ego_speed_mps": max(speed_mps, 1.0)})[0] < 0
+
+
+def test_the_widest_odd_is_what_intersect_keeps_of_any_other():
+    limits = widest(DEFAULT)
+    assert limits.dynamic.pedestrian_speed_mps == interval(0, 3)  # running, where the default has its own
+    assert limits.dynamic.vehicle_lateral_speed_mps == interval(0, 1.8)
+    assert limits.scenery == DEFAULT.scenery
+    assert limits.environment == DEFAULT.environment
+    assert intersect(DEFAULT, limits) == limits
+    assert intersect(DEFAULT, Odd(dynamic=DynamicElements(pedestrian_speed_mps=interval(0, 9)))).dynamic == (
+        DEFAULT.dynamic.model_copy(update={"pedestrian_speed_mps": interval(0, 3)})
+    )

@@ -1,6 +1,7 @@
 /** Calls of the API: the key goes along, problems become errors, and a lost connection is known to the whole page. */
 
 import { signal } from "../signal";
+import type { Body } from "./types";
 
 const KEY = "risk-sac-key";
 const BASE = new URL("../", new URL(".", document.baseURI)).href; // the page lies in `page/`, the API beside it
@@ -15,7 +16,7 @@ export class Problem extends Error {
     readonly status: number,
     readonly reason: string,
     message: string,
-    readonly errors: { field: string; detail?: string }[] = [],
+    readonly errors: Body<"FieldProblem">[] = [],
   ) {
     super(message);
   }

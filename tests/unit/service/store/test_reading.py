@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.metrics import Funnel
 from risk_sac.records import Grade, Outcome
 from service.errors import NotFoundError, StorageError
@@ -49,6 +49,14 @@ def test_campaigns_are_listed_newest_first(store, ledger):
     ledger.create(SPEC)
     second = store.campaigns(limit=10, before=first.last)
     assert [item.id for item in first.items + second.items] == ids[::-1]
+
+
+def test_a_list_tells_what_a_campaign_searches_and_whom(store, ledger):
+    ego = EgoConfig(profile="careful", car_following="IDM")
+    ledger.create(CampaignSpec(families=("mixed", "low"), methods=("random", "archive"), seeds=(4, 3), ego=ego))
+    (listed,) = store.campaigns(limit=5).items
+    assert (listed.families, listed.methods) == (["mixed", "low"], ["random", "archive"])
+    assert (listed.ego["profile"], listed.ego["car_following"]) == ("careful", "IDM")
 
 
 @pytest.mark.parametrize(
