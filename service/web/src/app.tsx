@@ -23,10 +23,10 @@ export function App() {
   useFocusOnArrival(place);
   return (
     <>
-      <a class="skip" href={location.hash || "#/"} onClick={toContent}>
-        Skip to content
-      </a>
       <header class="bar">
+        <a class="skip" href={location.hash || "#/"} onClick={toContent}>
+          Skip to content
+        </a>
         <a class="brand" href="#/campaigns">
           RISK-SAC
         </a>

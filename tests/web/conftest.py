@@ -1,0 +1,122 @@
+"""The page in a real browser, on a real service with a real campaign."""
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+from tests.server import ROOT, Service, servers
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+EXECUTABLE = os.environ.get("RISK_SAC_CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+# Without a browser one test says so, in one line, instead of all.
+collect_ignore_glob = [] if EXECUTABLE else ["test_[!t]*.py", "test_t[!h]*.py"]
+
+if EXECUTABLE:
+    from playwright.sync_api import Browser, Page, sync_playwright
+
+WIDE = {"width": 1280, "height": 720}
+PHONE = {"width": 390, "height": 844}
+LONG_MS = 120_000  # what has not happened by then never will, however busy the machine
+AXE = ROOT / "service" / "web" / "node_modules" / "axe-core" / "axe.min.js"
+CAMPAIGN = {
+    "label": "night <b>7</b>",
+    "families": ["low", "mixed"],
+    "methods": ["archive"],
+    "seeds": [601],
+    "budget": {"episodes": 60},
+}
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator["Browser"]:
+    """One browser for all tests of a process."""
+    with sync_playwright() as playwright:
+        # Containers have no sandbox of their own to give; what is opened here is ours alone.
+        browser = playwright.chromium.launch(executable_path=EXECUTABLE, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="session")
+def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """A service with real workers."""
+    with servers(tmp_path_factory.mktemp("page")) as start:
+        yield start("service.worker")
+
+
+@pytest.fixture(scope="session")
+def campaign(service: Service) -> str:
+    """A finished campaign of two families with valid failures and refused contacts; its label is hostile."""
+    posted = service.post(**CAMPAIGN)
+    ended = service.wait(posted)
+    assert ended["state"] == "succeeded"
+    assert ended["progress"]["distinct_failures"] >= 3
+    assert ended["progress"]["raw_collisions"] > ended["progress"]["failures"]
+    return posted
+
+
+@pytest.fixture
+def new_page(browser: "Browser", service: Service) -> Iterator[Callable[..., "Page"]]:
+    """Opens pages, in contexts of their own, and fails where one of them said or asked for what it should not.
+
+    That is an error on the console, one that nobody caught, a violation of the content-security policy (which the
+    console tells), and any request that leaves the loopback. Tests that break something on purpose name what the
+    console may say by `allowed`.
+    """
+    said: list[str] = []
+    contexts = []
+
+    def open_page(viewport: dict[str, int] = WIDE, allowed: tuple[str, ...] = (), **options: object) -> "Page":
+        context = browser.new_context(viewport=viewport, **options)
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(LONG_MS)
+
+        def tell(text: str) -> None:
+            if not any(each in text for each in allowed):
+                said.append(text)
+
+        page.on("console", lambda message: tell(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: tell(str(error)))
+        page.on("request", lambda request: tell(f"asked {request.url}") if _leaves(request.url) else None)
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert not said
+
+
+def _leaves(url: str) -> bool:
+    parts = urlsplit(url)
+    return parts.scheme not in ("blob", "data") and parts.hostname != "127.0.0.1"
+
+
+@pytest.fixture
+def page_at(new_page: Callable[..., "Page"], service: Service) -> Callable[..., "Page"]:
+    """A page at a place, such as `campaigns/ID/failures?grade=careful`."""
+
+    def open_at(place: str = "", **options: object) -> "Page":
+        page = new_page(**options)
+        page.goto(f"{service.client.base_url}/page/#/{place}")
+        return page
+
+    return open_at
+
+
+@pytest.fixture
+def check_axe() -> Callable[["Page"], None]:
+    """Holds a page against the accessibility rules of axe."""
+
+    def check(page: "Page") -> None:
+        page.evaluate(Path(AXE).read_text(encoding="utf-8"))  # by the debugger, which no policy forbids
+        violations = page.evaluate("async () => (await axe.run()).violations")
+        assert not violations, "\n".join(
+            f"{each['id']}: {each['help']}: {[node['html'][:200] for node in each['nodes'][:3]]}" for each in violations
+        )
+
+    return check
