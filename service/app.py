@@ -29,6 +29,7 @@ from service.api.routes import (
     pictures,
     regressions,
     reports,
+    sketches,
 )
 from service.api.stream import Streams
 from service.api.telemetry.metrics import registry, request_latencies
@@ -77,7 +78,8 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
         docs_url=None,  # the routes have pages that need no network
         redoc_url=None,
     )
-    for routes in (campaigns, episodes, pictures, events, reports, regressions, networks, catalogue, operations, docs):
+    shown = (episodes, pictures, sketches, events, reports)
+    for routes in (campaigns, *shown, regressions, networks, catalogue, operations, docs):
         app.include_router(routes.router)
     app.router.routes += page.routes()
     add_problem_handlers(app)

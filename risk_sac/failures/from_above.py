@@ -1,19 +1,15 @@
 """The view from above: the roads, both paths, and the bodies at the contact and before it."""
 
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
-import sumo_nets
 from risk_sac.config import FamilyName
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.roads import Surface, read_surfaces
+from risk_sac.failures.roads import roads_of
 from risk_sac.failures.style import BYSTANDER_COLOUR, CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, legend
-from risk_sac.scenario.families import FAMILIES
 from risk_sac.types import Kind, Role
 
 SURFACE_COLOURS = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
@@ -31,7 +27,7 @@ def draw_from_above(axis: Axes, family: FamilyName, recording: Recording, apart_
       recording: of the contact.
       apart_m: earlier places of a body that are nearer to each other are drawn as one.
     """
-    for surface in _roads(family, recording.contact.episode.scene):
+    for surface in roads_of(family, recording.contact.episode.scene):
         colour = SURFACE_COLOURS[surface.use]
         axis.add_patch(Polygon(surface.outline, facecolor=colour, edgecolor="0.7", linewidth=0.5))
     for actor in range(1, len(recording.series["ids"])):
@@ -65,13 +61,6 @@ def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float
         else:
             groups.append([before_s])
     return groups
-
-
-def _roads(family: FamilyName, scene: Mapping[str, float]) -> list[Surface]:
-    """Those of the scene's net; none for a scene from before its family had all the parameters it has now."""
-    if not set(FAMILIES[family].space.names) <= scene.keys():
-        return []
-    return read_surfaces(Path(sumo_nets.__path__[0]) / FAMILIES[family].layout(scene).net)
 
 
 def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, *, involved: bool = False) -> None:

@@ -1,20 +1,40 @@
 """What a picture needs of a SUMO net: the surfaces one drives and walks on, as polygons."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
+import sumo_nets
+from risk_sac.config import FamilyName
+from risk_sac.scenario.families import FAMILIES
 from risk_sac.types import Floats
+
+Use = Literal["lane", "sidewalk", "crossing", "junction"]
 
 
 @dataclass(frozen=True, slots=True)
 class Surface:
     """A lane, crossing or junction."""
 
-    use: str  # lane | sidewalk | crossing | junction
+    use: Use
     outline: Floats  # `k x 2`, m, a closed ring without its last point
+
+
+def roads_of(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Surface]:
+    """The surfaces of a scene's net; none for a scene from before its family had all the parameters it has now."""
+    if not set(FAMILIES[family].space.names) <= scene.keys():
+        return ()
+    return _shipped(FAMILIES[family].layout(scene).net)
+
+
+@cache  # there are a few nets, and they stay as they are
+def _shipped(net: str) -> tuple[Surface, ...]:
+    return tuple(read_surfaces(Path(sumo_nets.__path__[0]) / net))
 
 
 def read_surfaces(net: Path) -> list[Surface]:
@@ -34,7 +54,7 @@ def read_surfaces(net: Path) -> list[Surface]:
             continue
         for lane in edge.iter("lane"):
             pedestrian = lane.get("allow") == "pedestrian"
-            use = "crossing" if function == "crossing" else "sidewalk" if pedestrian else "lane"
+            use: Use = "crossing" if function == "crossing" else "sidewalk" if pedestrian else "lane"
             centre = _points(lane.get("shape", ""))
             surfaces.append(Surface(use, _ribbon(centre, float(lane.get("width", "3.2")))))
     return surfaces

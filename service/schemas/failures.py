@@ -1,6 +1,7 @@
-"""One contact with its full time series."""
+"""One contact with its full time series, and where it came about."""
 
 from risk_sac import series
+from risk_sac.failures.roads import Use
 from service.schemas.base import Body
 from service.schemas.episodes import Episode
 
@@ -18,3 +19,18 @@ class Failure(Episode):
     series: Series | None
     """Null when the record is lost; `series_problem` says why."""
     series_problem: str | None
+
+
+class Surface(Body):
+    """A piece of ground that one drives or walks on."""
+
+    use: Use
+    outline: list[tuple[float, float]]
+    """Its corners, m, on the map that the series is on; the last one is joined to the first."""
+
+
+class Roads(Body):
+    """The ground on which a contact came about."""
+
+    surfaces: list[Surface]
+    """In the order in which they are to be drawn; none where the scene's family had other roads then."""

@@ -63,6 +63,8 @@ ASKED = {
     "core_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/core.npz"),
     "region_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/region"),
     "twin_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/twins/idle.png"),
+    "roads_older": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-1/roads"),
+    "roads_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/roads"),
     "regression_unknown": ("GET", f"/v1/regressions/{ENDED_ID}-0000000000000000"),
     "events": ("GET", f"{ENDED}/events"),
     "events_cancelled": ("GET", f"{CANCELLED}/events"),

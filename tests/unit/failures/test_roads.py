@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import sumo_nets
-from risk_sac.failures.roads import read_surfaces
+from risk_sac.config import FamilyName
+from risk_sac.failures.roads import read_surfaces, roads_of
+from risk_sac.scenario.families import FAMILIES
 
 NETS = Path(sumo_nets.__path__[0])
 
@@ -30,3 +32,15 @@ def test_heights_in_a_net_are_dropped(tmp_path: Path) -> None:
     net = tmp_path / "hill.net.xml"
     net.write_text('<net><edge id="e"><lane id="e_0" width="2" shape="0,0,5 0,10,6"/></edge></net>')
     np.testing.assert_allclose(read_surfaces(net)[0].outline, [(-1, 0), (-1, 10), (1, 10), (1, 0)])
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_scene_has_the_surfaces_of_its_net_and_an_older_one_has_none(family: FamilyName) -> None:
+    space = FAMILIES[family].space
+    scene = {parameter.name: (parameter.low + parameter.high) / 2 for parameter in space.parameters}
+    read = read_surfaces(NETS / family / f"{family}.net.xml")
+    for surface, wanted in zip(roads_of(family, scene), read, strict=True):
+        assert surface.use == wanted.use
+        np.testing.assert_array_equal(surface.outline, wanted.outline)
+    assert not roads_of(family, dict(list(scene.items())[1:]))
+    assert roads_of(family, scene) is roads_of(family, scene), "a net is read once"
