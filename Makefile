@@ -1,6 +1,6 @@
 # Everything runs in .venv, which the first target that needs it makes. Needs Python 3.11 or 3.12 and make.
 .DEFAULT_GOAL := help
-.PHONY: help install demo test serve bench torture load lint openapi settings nets image smoke clean
+.PHONY: help install page demo test serve bench torture load lint openapi settings nets image smoke screenshots clean
 
 BIN := .venv/bin
 PYTHON := $(BIN)/python
@@ -27,8 +27,11 @@ $(STAMP): pyproject.toml constraints.txt
 		$(PYTHON) -m risk_sac run --family $$run --seed 1 --out "$$folder/$${run%% *}" > /dev/null; done
 	@touch $@
 
-demo: $(STAMP) ## start the service, run a campaign over REST, write results/demo.json
-	$(PYTHON) -m service.demo
+page: $(STAMP) ## build the web page anew, after a change of its sources
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check --no-deps -e .
+
+demo: $(STAMP) ## start the service, run a campaign over REST, write results/demo.json; KEEP=1 goes on serving its page
+	$(PYTHON) -m service.demo $(if $(KEEP),--keep)
 
 # By file: two processes would each make what the tests of a file share. In order: the long ones come first. By three
 # processes, on two cores too: a fifth of the tests' time they wait for servers.

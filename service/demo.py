@@ -5,6 +5,7 @@ import contextlib
 import json
 import os
 import shlex
+import signal
 import socket
 import subprocess
 import sys
@@ -44,16 +45,36 @@ def main(arguments: list[str] | None = None) -> int:
         with _service(options.data_dir, console) as client:
             campaign = _follow(client, client.submit(_spec(options)).id, console)
             found = _collect(client, campaign)
+            status = _tell(found, options, console)
+            if options.keep:
+                _keep(f"{client.url}/page/#/campaigns/{campaign.id}", console)
+            return status
     except (DemoError, ClientError) as error:
         console.print(f"demo failed: {error}", style="bold red", markup=False)
         return 1
+
+
+def _tell(found: Json, options: argparse.Namespace, console: Console) -> int:
+    """Writes and prints what was found, and where to look at it; returns the exit status."""
+    campaign_id, data_dir = found["campaign"]["id"], options.data_dir
     options.out.parent.mkdir(parents=True, exist_ok=True)
     options.out.write_text(json.dumps(found, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     _summarise(found, console)
     console.print(f"results: {options.out}")
-    console.print(f"recorded failures: {options.data_dir}/campaigns/{campaign.id}", soft_wrap=True)
-    _invite(found, options.data_dir, console)
+    console.print(f"recorded failures: {data_dir}/campaigns/{campaign_id}", soft_wrap=True)
+    _invite(found, data_dir, console)
+    if not options.keep:
+        serve = f"RISK_SAC_DATA_DIR={shlex.quote(str(data_dir))} make serve"
+        place = f"http://127.0.0.1:8000/page/#/campaigns/{campaign_id}"
+        console.print(f"look at all: {serve}, then {place}", soft_wrap=True, markup=False, highlight=False)
     return _verdict(found, console)
+
+
+def _keep(page: str, console: Console) -> None:
+    """Goes on serving until somebody has seen enough."""
+    console.print(f"look at all: {page} (Ctrl+C ends it)", soft_wrap=True, markup=False, highlight=False)
+    with contextlib.suppress(KeyboardInterrupt):
+        signal.pause()
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -71,6 +92,7 @@ def _parser() -> argparse.ArgumentParser:
         default=Path("results") / time.strftime("demo-%Y%m%d-%H%M%S"),
         help="where the service keeps its database and the recorded failures",
     )
+    parser.add_argument("--keep", action="store_true", help="go on serving the page at the end")
     return parser
 
 

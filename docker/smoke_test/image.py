@@ -78,6 +78,7 @@ def sources() -> list[str]:
     arguments = {
         "APT_MIRROR": next(iter(_mirror()), "").rstrip("/"),
         "TORCH_INDEX_URL": os.environ.get("TORCH_INDEX_URL"),
+        "NPM_CONFIG_REGISTRY": _npm_registry(),
     }
     return flags + [flag for name, value in arguments.items() if value for flag in ("--build-arg", f"{name}={value}")]
 
@@ -93,6 +94,14 @@ def _pip_settings() -> Iterator[tuple[str, list[str]]]:
             # The environment, listed first, goes before the files.
             settings.setdefault(key.rpartition(".")[2], str(ast.literal_eval(value)).split())
     yield from settings.items()
+
+
+def _npm_registry() -> str:
+    """Where this machine has npm's packages from; empty where it has no npm."""
+    if shutil.which("npm") is None:
+        return ""
+    command = ["npm", "config", "get", "registry"]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
 
 
 def _debootstrap(context: Path, log: Path) -> None:

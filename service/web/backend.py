@@ -61,7 +61,10 @@ def build_page() -> None:
         return
     npm, path = _npm()
     environment = os.environ | {"PATH": path}
-    for command in (["ci", "--no-audit", "--no-fund", "--loglevel=error"], ["run", "--silent", "build"]):
+    for command in (
+        ["ci", "--prefer-offline", "--no-audit", "--no-fund", "--loglevel=error"],
+        ["run", "--silent", "build"],
+    ):
         try:
             subprocess.run([*npm, *command], cwd=HERE, env=environment, check=True, stdout=sys.stderr)
         except (OSError, subprocess.CalledProcessError) as error:

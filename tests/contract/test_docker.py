@@ -16,13 +16,14 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "service" / "README.md").read_text(encoding="utf-8")
 DOCKERFILE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
 COMPOSE = (ROOT / "docker" / "compose.yaml").read_text(encoding="utf-8")
-# A shell's own, which name the image, what is published and where secrets lie.
+# No setting of the service: a shell's own, which name the image, what is published and where secrets lie.
 OTHERS = {
     "RISK_SAC_SECRETS_DIR",
     "RISK_SAC_API_KEY_FILE",
     "RISK_SAC_IMAGE",
     "RISK_SAC_MEMORY",
     "RISK_SAC_PUBLISHED_PORT",
+    "RISK_SAC_WITHOUT_PAGE",  # of the installation: the page has been built before
 }
 
 

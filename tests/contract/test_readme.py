@@ -9,7 +9,10 @@ from service.demo import COLUMNS
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("risk_sac", "service", "docker", "sumo_nets", "tests")
-PAGES = [ROOT / "README.md", *sorted(page for folder in FOLDERS for page in (ROOT / folder).rglob("README.md"))]
+OURS = sorted(
+    page for folder in FOLDERS for page in (ROOT / folder).rglob("README.md") if "node_modules" not in page.parts
+)
+PAGES = [ROOT / "README.md", *OURS]
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)")
 
 

@@ -9,6 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("risk_sac", "service", "sumo_nets")
 FAMILIES = ("low", "mixed", "dense")
+MADE = ("node_modules", "dist")  # beside the page's sources, by an installation
 
 
 @pytest.fixture(scope="module")
@@ -16,8 +17,9 @@ def contents(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     """Names in a wheel built from a copy: building in the tree would leave files there."""
     source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
     for package in PACKAGES:
-        shutil.copytree(ROOT / package, source / package, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(ROOT / "pyproject.toml", source)
+        shutil.copytree(ROOT / package, source / package, ignore=shutil.ignore_patterns("__pycache__", *MADE))
+    for file in ("pyproject.toml", "openapi.yaml"):
+        shutil.copy(ROOT / file, source)
     command = [sys.executable, "-m", "pip", "wheel", str(source), "--wheel-dir", str(out)]
     offline = ["--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check", "--quiet"]
     built = subprocess.run([*command, *offline], capture_output=True, text=True)
@@ -35,8 +37,20 @@ def test_wheel_contains_actor_types_readme_and_type_markers(contents: set[str]) 
     assert {"sumo_nets/vtypes.add.xml", "sumo_nets/README.md", "risk_sac/py.typed", "service/py.typed"} <= contents
 
 
+def test_wheel_contains_the_page_which_it_has_built(contents: set[str]) -> None:
+    assert "service/web/dist/index.html" in contents
+    assets = [Path(name).suffix for name in contents if name.startswith("service/web/dist/assets/")]
+    assert {".js", ".css"} <= set(assets)
+
+
 def test_wheel_contains_every_module(contents: set[str]) -> None:
-    modules = {str(path.relative_to(ROOT)) for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
+    modules = {
+        str(path.relative_to(ROOT))
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*.py")
+        if path.parent != ROOT / "service" / "web"  # what builds the page is no part of it
+        and "node_modules" not in path.parts
+    }
     assert modules <= contents
 
 
