@@ -84,7 +84,7 @@ def test_build_context_has_all_that_the_image_is_built_of():
     copied = {
         source for line in re.findall(r"^COPY (?!--from)(.+)$", DOCKERFILE, re.M) for source in shlex.split(line)[:-1]
     }
-    assert copied == allowed
+    assert {Path(source).parts[0] for source in copied} == allowed
     assert all((ROOT / source).exists() for source in copied)
 
 
