@@ -1,0 +1,33 @@
+/** Asking again and again, but not while nobody looks. */
+
+import { useEffect, useRef, useState } from "preact/hooks";
+
+/**
+ * @param key what is asked for: with another one it is asked at once; null to ask nothing.
+ * @param ask asks, and says how many milliseconds to wait before the next time; null: until the tab comes back to sight.
+ * @returns how to ask at once.
+ */
+export function usePolled(key: string | null, ask: (left: AbortSignal) => Promise<number | null>): () => void {
+  const [turn, setTurn] = useState(0);
+  const latest = useRef(ask);
+  latest.current = ask;
+  useEffect(() => {
+    if (key === null) return;
+    const left = new AbortController();
+    let timer: ReturnType<typeof setTimeout>;
+    const round = async () => {
+      const wait = await latest.current(left.signal);
+      if (left.signal.aborted) return;
+      if (wait === null) whenSeen();
+      else timer = setTimeout(next, wait);
+    };
+    const whenSeen = () => document.addEventListener("visibilitychange", next, { once: true, signal: left.signal });
+    const next = () => (document.hidden ? whenSeen() : round());
+    round();
+    return () => {
+      left.abort();
+      clearTimeout(timer);
+    };
+  }, [key, turn]);
+  return () => setTurn((n) => n + 1);
+}

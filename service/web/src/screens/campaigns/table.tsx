@@ -1,0 +1,198 @@
+/** The list as a table: one row for each campaign, and heads that sort. */
+
+import type { ComponentChildren } from "preact";
+import { address } from "../../router";
+import { count, moment, percent, seconds } from "../../ui/text";
+import { ended, type Listed } from "./listed";
+import { clicked, type Column, type Order } from "./order";
+import { Sparkline } from "./sparkline";
+
+const HEADS: { column: Column; title: string; number?: boolean; hint?: string }[] = [
+  { column: "label", title: "Campaign" },
+  { column: "state", title: "State" },
+  { column: "families", title: "Families" },
+  { column: "methods", title: "Methods" },
+  { column: "ego", title: "Ego" },
+  { column: "progress", title: "Episodes" },
+  { column: "ecr", title: "ECR", hint: "valid collisions per episode, over each run's newest 100 episodes" },
+  { column: "distinct", title: "Distinct", number: true, hint: "distinct valid failures, summed over the runs" },
+  {
+    column: "preventable",
+    title: "Prevent\u00adable",
+    number: true,
+    hint: "the distinct failures that a careful driver would have prevented",
+  },
+  { column: "eta", title: "ETA", number: true, hint: "time until it ends at its present pace" },
+  { column: "created", title: "Created", number: true },
+];
+
+interface Shown {
+  campaigns: readonly Listed[];
+  learners: readonly string[];
+  order: Order;
+  sort: (order: Order) => void;
+  chosen: ReadonlySet<string>;
+  choose: (ids: ReadonlySet<string>) => void;
+  ask: (verb: "cancel" | "delete", campaigns: readonly Listed[]) => void;
+}
+
+export function CampaignTable({ campaigns, learners, order, sort, chosen, choose, ask }: Shown) {
+  const all = campaigns.length > 0 && campaigns.every((each) => chosen.has(each.id));
+  return (
+    <div class="scroll card campaigns-card" tabIndex={0} role="region" aria-label="Campaigns">
+      <table class="campaigns">
+        <thead>
+          <tr>
+            <th>
+              <input
+                type="checkbox"
+                aria-label="Select all"
+                checked={all}
+                onChange={() => choose(new Set(all ? [] : campaigns.map((each) => each.id)))}
+              />
+            </th>
+            {HEADS.map((head) => (
+              <Head key={head.column} {...head} order={order} sort={sort} />
+            ))}
+            <th>
+              <span class="hidden-label">What can be done</span>
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          {campaigns.map((campaign) => (
+            <tr key={campaign.id} class={chosen.has(campaign.id) ? "chosen" : undefined}>
+              <td>
+                <input
+                  type="checkbox"
+                  aria-label={`Select ${nameOf(campaign)}`}
+                  checked={chosen.has(campaign.id)}
+                  onChange={() => choose(toggled(chosen, campaign.id))}
+                />
+              </td>
+              <Cells campaign={campaign} learners={learners} />
+              <td class="row-actions">
+                <a class="button" href={address(["new"], { from: campaign.id })} aria-label={`Clone ${nameOf(campaign)}`}>
+                  Clone
+                </a>
+                {ended(campaign) ? (
+                  <Act verb="Delete" name={nameOf(campaign)} act={() => ask("delete", [campaign])} />
+                ) : (
+                  <Act verb="Cancel" name={nameOf(campaign)} act={() => ask("cancel", [campaign])} />
+                )}
+              </td>
+            </tr>
+          ))}
+        </tbody>
+      </table>
+    </div>
+  );
+}
+
+export function nameOf(campaign: Listed): string {
+  return campaign.label || campaign.id;
+}
+
+type HeadShown = (typeof HEADS)[number] & Pick<Shown, "order" | "sort">;
+
+function Head({ column, title, number, hint, order, sort }: HeadShown) {
+  const current = order.column === column;
+  const way = order.descending ? "descending" : "ascending";
+  return (
+    <th class={number ? "number" : undefined} aria-sort={current ? way : undefined} title={hint}>
+      <button onClick={() => sort(clicked(order, column))}>
+        {title}
+        <span aria-hidden="true" class="way">
+          {current ? (order.descending ? "▾" : "▴") : ""}
+        </span>
+      </button>
+    </th>
+  );
+}
+
+function Act({ verb, name, act }: { verb: string; name: string; act: () => void }) {
+  return (
+    <button class="danger" aria-label={`${verb} ${name}`} onClick={act}>
+      {verb}
+    </button>
+  );
+}
+
+function Cells({ campaign, learners }: { campaign: Listed; learners: readonly string[] }) {
+  const { progress, ego } = campaign;
+  return (
+    <>
+      <td class="campaign-name">
+        <a href={address(["campaigns", campaign.id])} title={campaign.label || undefined}>
+          <bdi>{nameOf(campaign)}</bdi>
+        </a>
+        {campaign.label && <code class="faint">{campaign.id}</code>}
+      </td>
+      <td>
+        <span class={`tag ${campaign.state}`} title={campaign.reason ?? undefined}>
+          {campaign.state}
+        </span>
+        {campaign.reason && <span class="reason small">{campaign.reason}</span>}
+      </td>
+      <td class="wraps">{campaign.families.join(", ")}</td>
+      <td class="wraps" title={campaign.methods.join(", ")}>
+        <Several names={campaign.methods} />
+      </td>
+      <td class="wraps">
+        {ego.profile} <span class="faint">{ego.car_following}</span>
+      </td>
+      <td>
+        <Bar done={progress.episodes_done} total={progress.episodes_total} name={nameOf(campaign)} />
+      </td>
+      <td>
+        <span class="ecr">
+          <Sparkline campaign={campaign} learners={learners} /> {percent(progress.window_ecr)}
+        </span>
+      </td>
+      <td class="number">{count(progress.distinct_failures)}</td>
+      <td class="number">{count(progress.distinct_preventable)}</td>
+      <td class="number">{remaining(campaign)}</td>
+      <td class="number">
+        <time dateTime={campaign.created_at} title={moment(campaign.created_at)}>
+          {shortly(campaign.created_at)}
+        </time>
+      </td>
+    </>
+  );
+}
+
+const MOST_NAMES = 3;
+
+function Several({ names }: { names: readonly string[] }): ComponentChildren {
+  const left = names.length - MOST_NAMES;
+  if (left <= 1) return names.join(", ");
+  return `${names.slice(0, MOST_NAMES).join(", ")} and ${left} more`;
+}
+
+function Bar({ done, total, name }: { done: number; total: number; name: string }) {
+  return (
+    <>
+      <div class="progress" role="progressbar" aria-label={`Episodes of ${name}`} aria-valuenow={done} aria-valuemin={0} aria-valuemax={total}>
+        <span style={{ width: `${(100 * done) / Math.max(1, total)}%` }} />
+      </div>
+      <span class="small faint">{done === total ? count(total) : `${count(done)} of ${count(total)}`}</span>
+    </>
+  );
+}
+
+function remaining(campaign: Listed): ComponentChildren {
+  if (!ended(campaign)) return seconds(campaign.progress.eta_s);
+  if (campaign.started_at === null || campaign.finished_at === null) return "–";
+  const took = (Date.parse(campaign.finished_at) - Date.parse(campaign.started_at)) / 1000;
+  return <span class="faint">took {seconds(took)}</span>;
+}
+
+function shortly(iso: string): string {
+  return new Date(iso).toLocaleString("en-GB", { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
+}
+
+function toggled(chosen: ReadonlySet<string>, id: string): Set<string> {
+  const next = new Set(chosen);
+  if (!next.delete(id)) next.add(id);
+  return next;
+}
