@@ -1,6 +1,6 @@
+import "uplot/dist/uPlot.min.css";
+import "./style.css"; // before the screens, whose own styles refine it
 import { render } from "preact";
 import { App } from "./app";
-import "uplot/dist/uPlot.min.css";
-import "./style.css";
 
 render(<App />, document.getElementById("page")!);

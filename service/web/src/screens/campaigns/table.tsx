@@ -145,17 +145,14 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
         <Bar done={progress.episodes_done} total={progress.episodes_total} name={nameOf(campaign)} />
       </td>
       <td>
-        <span class="ecr">
-          <Sparkline campaign={campaign} learners={learners} /> {percent(progress.window_ecr)}
-        </span>
+        <Sparkline campaign={campaign} learners={learners} />
+        <span class="small faint">{percent(progress.window_ecr)}</span>
       </td>
       <td class="number">{count(progress.distinct_failures)}</td>
       <td class="number">{count(progress.distinct_preventable)}</td>
       <td class="number">{remaining(campaign)}</td>
       <td class="number">
-        <time dateTime={campaign.created_at} title={moment(campaign.created_at)}>
-          {shortly(campaign.created_at)}
-        </time>
+        <Created at={campaign.created_at} />
       </td>
     </>
   );
@@ -184,11 +181,24 @@ function remaining(campaign: Listed): ComponentChildren {
   if (!ended(campaign)) return seconds(campaign.progress.eta_s);
   if (campaign.started_at === null || campaign.finished_at === null) return "–";
   const took = (Date.parse(campaign.finished_at) - Date.parse(campaign.started_at)) / 1000;
-  return <span class="faint">took {seconds(took)}</span>;
+  return (
+    <span class="faint small">
+      took
+      <br />
+      {seconds(took)}
+    </span>
+  );
 }
 
-function shortly(iso: string): string {
-  return new Date(iso).toLocaleString("en-GB", { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
+function Created({ at }: { at: string }) {
+  const when = new Date(at);
+  return (
+    <time dateTime={at} title={moment(at)}>
+      {when.toLocaleDateString("en-GB", { day: "numeric", month: "short" })}
+      <br />
+      <span class="small faint">{when.toLocaleTimeString("en-GB", { timeStyle: "short" })}</span>
+    </time>
+  );
 }
 
 function toggled(chosen: ReadonlySet<string>, id: string): Set<string> {
