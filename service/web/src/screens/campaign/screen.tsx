@@ -1,7 +1,81 @@
+/** A campaign as it goes on, or as it ended. */
+
+import { useCallback, useState } from "preact/hooks";
+import { Problem } from "../../api/client";
+import { Empty, Failed, Loading } from "../../ui/states";
+import { count, number } from "../../ui/text";
+import { Charts } from "./charts";
+import { Funnel } from "./funnel";
+import { Header } from "./header";
+import { ended, useLive } from "./live";
+import { Newest } from "./newest";
+import { Runs } from "./runs";
+import "./campaign.css";
+
 export function CampaignScreen({ id }: { id: string }) {
+  const { campaign, curves, found, error, again } = useLive(id);
+  const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set());
+  const hide = useCallback((runs: string[], away: boolean) => {
+    setHidden((before) => {
+      const after = new Set(before);
+      for (const run of runs) away ? after.add(run) : after.delete(run);
+      return after;
+    });
+  }, []);
+  if (!campaign && error instanceof Problem && error.status === 404) {
+    return (
+      <Empty>
+        <h1>There is no such campaign</h1>
+        <p>It was deleted, or never was.</p>
+        <a href="#/campaigns">To the campaigns</a>
+      </Empty>
+    );
+  }
+  if (!campaign) return error ? <Failed error={error} again={again} /> : <Loading what="the campaign" />;
+  const { progress } = campaign;
+  const drawn = curves?.some((curve) => curve.episodes.length);
   return (
-    <h1>
-      Campaign {id}
-    </h1>
+    <div class="campaign">
+      <Header campaign={campaign} again={again} />
+      <div class="summary">
+        <section class="card" aria-labelledby="funnel-title">
+          <h2 id="funnel-title">From contact to what is worth your time</h2>
+          <Funnel counts={progress} />
+        </section>
+        <section class="card tiles" aria-label="Where the search stands">
+          <Tile name="sliding ECR" value={percent(progress.window_ecr)} title={OVER} />
+          <Tile name="sliding PCR" value={percent(progress.window_pcr)} title={OVER} />
+          <Tile name="dual variable λ" value={number(progress.dual_variable)} title={OVER} />
+          <Tile name="valid and preventable, repeats too" value={count(progress.preventable)} />
+          <Tile name="scenes refused" value={count(progress.rejected)} />
+          <Tile name="runs" value={`${campaign.runs.filter((run) => ended(run)).length} of ${campaign.runs.length} ended`} />
+        </section>
+        {!ended(campaign) && <Newest campaign={id} found={found} />}
+      </div>
+      {error && !(error instanceof TypeError) && <Failed error={error} again={again} />}
+      {drawn ? (
+        <Charts spec={campaign.spec} curves={curves!} hidden={hidden} hide={hide} />
+      ) : (
+        <section class="card">
+          {curves ? <Empty>{ended(campaign) ? "No episode was finished." : "Curves begin with the first episode."}</Empty> : <Loading what="curves" />}
+        </section>
+      )}
+      <Runs campaign={campaign} hidden={hidden} hide={hide} />
+    </div>
   );
+}
+
+const OVER = "Mean over the runs at work, or over all once none is; without controls such as random, unless there is nothing else.";
+
+function Tile({ name, value, title }: { name: string; value: string; title?: string }) {
+  return (
+    <div class="tile" title={title}>
+      <b>{value}</b>
+      <span>{name}</span>
+    </div>
+  );
+}
+
+function percent(value: number | null): string {
+  return value === null ? "–" : `${number(100 * value, 1)} %`;
 }

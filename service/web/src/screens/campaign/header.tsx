@@ -1,0 +1,118 @@
+/** What a campaign is, how far it is, and what can be done with it. */
+
+import { useState } from "preact/hooks";
+import { download, send } from "../../api/client";
+import type { Body } from "../../api/types";
+import { address, go } from "../../router";
+import { count, moment, seconds, words } from "../../ui/text";
+import { Confirm } from "./confirm";
+import { ended } from "./live";
+
+type Campaign = Body<"Campaign">;
+
+export function Header({ campaign, again }: { campaign: Campaign; again: () => void }) {
+  const { spec, state } = campaign;
+  const title = campaign.label || campaign.id;
+  return (
+    <>
+      <div class="head">
+        <p class="crumbs">
+          <a href="#/campaigns">Campaigns</a> / {title}
+        </p>
+        <h1 class="breaking">{title}</h1>
+        <span class={`tag ${state}`}>{state}</span>
+        <Actions campaign={campaign} again={again} />
+      </div>
+      {campaign.reason && <p class="bad breaking">{campaign.reason}</p>}
+      <dl class="facts">
+        <Fact name={spec.families.length > 1 ? "Families" : "Family"}>{spec.families.join(", ")}</Fact>
+        <Fact name={spec.methods.length > 1 ? "Methods" : "Method"}>{spec.methods.join(", ")}</Fact>
+        <Fact name="Ego">
+          {words(spec.ego.profile)}, {spec.ego.car_following}
+        </Fact>
+        <Fact name={spec.seeds.length > 1 ? "Seeds" : "Seed"}>{spec.seeds.join(", ")}</Fact>
+        <Fact name="Posted">{moment(campaign.created_at)}</Fact>
+      </dl>
+      <Advance campaign={campaign} />
+    </>
+  );
+}
+
+function Fact({ name, children }: { name: string; children: preact.ComponentChildren }) {
+  return (
+    <div>
+      <dt>{name}</dt>
+      <dd>{children}</dd>
+    </div>
+  );
+}
+
+function Advance({ campaign }: { campaign: Campaign }) {
+  const { episodes_done: done, episodes_total: total, eta_s } = campaign.progress;
+  const started = campaign.started_at && new Date(campaign.started_at).getTime();
+  const finished = campaign.finished_at && new Date(campaign.finished_at).getTime();
+  const took = started && finished ? `took ${seconds((finished - started) / 1000)}` : "";
+  const left = eta_s === null ? "time left not known yet" : `${seconds(eta_s)} left`;
+  return (
+    <div class="advance">
+      <div class="progress" role="progressbar" aria-label="Episodes done" aria-valuemin={0} aria-valuemax={total} aria-valuenow={done}>
+        <span style={{ width: `${total ? (100 * done) / total : 0}%` }} />
+      </div>
+      <span class="small">
+        <b data-field="done">{count(done)}</b> of {count(total)} episodes
+        <span class="faint"> · {ended(campaign) ? took || "ended" : left}</span>
+      </span>
+    </div>
+  );
+}
+
+function Actions({ campaign, again }: { campaign: Campaign; again: () => void }) {
+  const [asking, setAsking] = useState<"cancel" | "delete">();
+  const [refused, setRefused] = useState("");
+  const path = `v1/campaigns/${encodeURIComponent(campaign.id)}`;
+  const save = (format: string) => {
+    setRefused("");
+    download(`${path}/spec?format=${format}`, `${campaign.id}.${format}`).catch((error: Error) => setRefused(error.message));
+  };
+  return (
+    <div class="actions">
+      <a class="button primary" href={address(["campaigns", campaign.id, "failures"])}>
+        Failures
+      </a>
+      <a class="button" href={address(["campaigns", campaign.id, "compare"])}>
+        Compare methods
+      </a>
+      <a class="button" href={address(["new"], { from: campaign.id })}>
+        Clone
+      </a>
+      <span class="joined" role="group" aria-label="Download what was posted">
+        <button onClick={() => save("json")}>Spec JSON</button>
+        <button onClick={() => save("yaml")}>YAML</button>
+      </span>
+      {ended(campaign) ? (
+        <button class="danger" onClick={() => setAsking("delete")}>
+          Delete
+        </button>
+      ) : (
+        <button class="danger" onClick={() => setAsking("cancel")} disabled={campaign.state === "cancelling"}>
+          Cancel
+        </button>
+      )}
+      {refused && <span role="alert" class="bad">{refused}</span>}
+      {asking === "cancel" && (
+        <Confirm title="Cancel this campaign?" yes="Cancel the campaign" act={() => send("POST", `${path}/cancel`).then(again)} close={() => setAsking(undefined)}>
+          <p>
+            Its runs stop after the episode they are at. What was found stays. A cancelled campaign cannot go on, but it can be cloned.
+          </p>
+        </Confirm>
+      )}
+      {asking === "delete" && (
+        <Confirm title="Delete this campaign?" yes="Delete for good" act={() => send("DELETE", path).then(() => go("#/campaigns"))} close={() => setAsking(undefined)}>
+          <p>
+            All that it found goes with it: {count(campaign.progress.raw_collisions)} recorded contacts, figures and logs. This cannot be undone.
+          </p>
+        </Confirm>
+      )}
+    </div>
+  );
+}
