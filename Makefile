@@ -75,6 +75,9 @@ image: ## build the container image localhost/risk-sac with docker
 smoke: $(STAMP) ## build the image, run it, and say in one line whether it works
 	docker/smoke
 
+screenshots: $(STAMP) ## draw every screen of the page, with a Chromium; the replay is the picture of README.md
+	$(PYTHON) -m tests.web.screenshots
+
 clean: ## remove .venv, caches and builds; data/ and results/ stay
-	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks .import_linter_cache
+	rm -rf .venv build dist service/web/dist service/web/node_modules *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
