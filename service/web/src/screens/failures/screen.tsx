@@ -1,7 +1,101 @@
+/** What a campaign found: its failures, and the contacts that do not count. */
+
+import "./failures.css";
+import { useMemo } from "preact/hooks";
+import { useAsked } from "../../api/asked";
+import type { Body } from "../../api/types";
+import { address } from "../../router";
+import { Empty, Shown } from "../../ui/states";
+import { count } from "../../ui/text";
+import { useTable } from "./adapter";
+import { Explorer } from "./explorer";
+import { queryOf, read, reset } from "./filters";
+import type { FailureTable } from "./wire";
+
+const RUNNING_MS = 5000;
+const ENDED: readonly string[] = ["succeeded", "failed", "cancelled"];
+
 export function FailuresScreen({ campaign, query }: { campaign: string; query: URLSearchParams }) {
+  const path = `v1/campaigns/${encodeURIComponent(campaign)}`;
+  const about = useAsked<Body<"Campaign">>(path, ({ state }) => (ENDED.includes(state) ? null : RUNNING_MS));
+  const asked = useTable(campaign);
   return (
-    <h1>
-      Failures {campaign} {query.toString()}
-    </h1>
+    <>
+      <Head campaign={campaign} about={about.value} query={query} table={asked.value} />
+      <Shown asked={asked} what="failures">
+        {(table) => (table.ids.length ? <Explorer campaign={campaign} query={query} table={table} /> : <NothingFound about={about.value} />)}
+      </Shown>
+    </>
+  );
+}
+
+interface HeadProps {
+  campaign: string;
+  about: Body<"Campaign"> | undefined;
+  query: URLSearchParams;
+  table: FailureTable | undefined;
+}
+
+function Head({ campaign, about, query, table }: HeadProps) {
+  const funnel = useMemo(() => table && funnelOf(table), [table]);
+  const filters = read(query);
+  const to = (tab: "failures" | "refused") =>
+    address(["campaigns", campaign, "failures"], queryOf({ ...reset(filters), tab, family: filters.family }));
+  return (
+    <>
+      <div class="head">
+        <p class="crumbs">
+          <a href="#/campaigns">Campaigns</a> / <a href={address(["campaigns", campaign])}>{about?.label || campaign}</a>
+        </p>
+        <h1>Failures</h1>
+        {about && <span class={`tag ${about.state}`}>{about.state}</span>}
+        {funnel && (
+          <ol class="funnel" aria-label="From contacts to what is worth a person's time">
+            {funnel.map(([name, number, meaning]) => (
+              <li key={name} title={meaning}>
+                <b>{count(number)}</b> {name}
+              </li>
+            ))}
+          </ol>
+        )}
+      </div>
+      {funnel && (
+        <nav class="tabs" aria-label="What is shown">
+          <a href={to("failures")} aria-current={filters.tab === "failures" ? "page" : undefined}>
+            Failures <span class="faint">{count(funnel[1]![1])}</span>
+          </a>
+          <a href={to("refused")} aria-current={filters.tab === "refused" ? "page" : undefined}>
+            Refused contacts <span class="faint">{count(funnel[0]![1] - funnel[1]![1])}</span>
+          </a>
+        </nav>
+      )}
+    </>
+  );
+}
+
+/** Each step of the funnel: its name, how many, and what it takes. */
+function funnelOf({ valid, distinct, grade }: FailureTable): [string, number, string][] {
+  const among = (test: (i: number) => boolean) => valid.reduce((sum, _, i) => sum + (test(i) ? 1 : 0), 0);
+  return [
+    ["contacts", valid.length, "The bodies touched"],
+    ["valid", among((i) => valid[i]!), "No rule refused them"],
+    ["distinct", among((i) => distinct[i]!), "The first of their kind in their run"],
+    ["preventable", among((i) => distinct[i]! && grade[i] === "careful"), "Distinct, and a careful driver would have prevented them"],
+  ];
+}
+
+function NothingFound({ about }: { about: Body<"Campaign"> | undefined }) {
+  const running = about && !ENDED.includes(about.state);
+  return (
+    <Empty>
+      <h2>{running ? "Nothing has been found yet" : "Nothing was found"}</h2>
+      {about && (
+        <p>
+          {count(about.progress.episodes_done)} of {count(about.progress.episodes_total)} episodes are done
+          {running ? "; what they find appears here." : "; in none of them did the ego touch anybody."}
+        </p>
+      )}
+      {about && <a href={address(["campaigns", about.id])}>To the campaign</a>}
+    </Empty>
   );
 }

@@ -1,0 +1,92 @@
+/** One failure, as much of it as one needs to decide whether to look. */
+
+import { address } from "../../router";
+import { number, words } from "../../ui/text";
+import { reactionOf } from "./features";
+import { GradeTag, Mark } from "./grade";
+import { halves, refusal, TRIAGE } from "./naming";
+import { useThumbnail } from "./thumbnails";
+import type { FailureTable } from "./wire";
+
+interface Props {
+  campaign: string;
+  table: FailureTable;
+  /** Which one, by its place in the columns. */
+  at: number;
+  /** How many valid failures of the campaign are of its kind. */
+  often: number;
+  triage: (failure: number) => void;
+}
+
+export function Card({ campaign, table, at, often, triage }: Props) {
+  const id = table.ids[at]!;
+  const kind = table.kinds[table.kind[at]!]!.name;
+  const [striker, ego] = halves(kind);
+  const state = table.triage[at]!;
+  return (
+    <article class="failure">
+      <Thumbnail campaign={campaign} id={id} />
+      <div class="over">
+        {table.valid[at] ? <GradeTag grade={table.grade[at] ?? "none"} /> : <Refusal rules={table.refused_by[at]!} />}
+        <Repeats repeats={table.repeats[at]!} />
+      </div>
+      <div class="what">
+        <a href={address(["campaigns", campaign, "failures", id])} title={kind} data-go>
+          {striker}
+        </a>
+        <p class="faint small ego">{ego}</p>
+      </div>
+      <dl class="measures">
+        <Measure name="closing" value={number(table.relative_speed_mps[at], 1)} unit="m/s" />
+        <Measure name="from conflict" value={number(reactionOf(table, at), 1)} unit="s" />
+        {table.valid[at] && <Measure name="of this kind" value={`${often}`} unit="×" />}
+      </dl>
+      <div class="foot small">
+        <span class="faint" title={`${words(table.striker[at]!)} (${table.striker_kind[at]}), ${id}`}>
+          <b>{words(table.striker[at]!)}</b> · {table.families[at]} · {table.methods[at]}
+        </span>
+        <button class={`tag triage-${state}`} onClick={() => triage(at)} aria-label={`Triage: ${TRIAGE[state]}. Change`}>
+          {TRIAGE[state]} ▾
+        </button>
+      </div>
+    </article>
+  );
+}
+
+function Thumbnail({ campaign, id }: { campaign: string; id: string }) {
+  const url = useThumbnail(`v1/campaigns/${encodeURIComponent(campaign)}/failures/${encodeURIComponent(id)}/thumbnail.svg`);
+  if (url) return <img class="thumbnail" src={url} alt="" />;
+  return <div class="thumbnail">{url === "" && <span class="faint small">no picture</span>}</div>;
+}
+
+function Refusal({ rules }: { rules: readonly string[] }) {
+  const [first, ...more] = rules.map(refusal);
+  return (
+    <span class="grade" title={rules.map(refusal).join("; ")}>
+      <Mark grade="none" /> {first ?? "refused"}
+      {more.length > 0 && ` +${more.length}`}
+    </span>
+  );
+}
+
+function Repeats({ repeats }: { repeats: FailureTable["repeats"][number] }) {
+  if (repeats === null) return null;
+  const [text, title] =
+    repeats === "verified" ? ["✓ verified", "It was the same each time it was replayed"] : ["≈ flaky", "It went another way when it was replayed"];
+  return (
+    <span class={`grade ${repeats}`} title={title}>
+      {text}
+    </span>
+  );
+}
+
+function Measure({ name, value, unit }: { name: string; value: string; unit: string }) {
+  return (
+    <div>
+      <dt>{name}</dt>
+      <dd>
+        {value} <span class="unit">{unit}</span>
+      </dd>
+    </div>
+  );
+}

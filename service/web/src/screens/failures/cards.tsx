@@ -1,0 +1,131 @@
+/** The cards in a grid of which only the rows in view are in the document: ten thousand scroll as a hundred do. */
+
+import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import type { Signal } from "../../signal";
+import { useSize } from "./canvas";
+import { Card } from "./card";
+import { moved, rowsInView, type Grid } from "./rows";
+import type { FailureTable } from "./wire";
+
+const LEAST_PX = 262;
+const HEIGHT_PX = 296; // as in failures.css
+const GAP_PX = 14;
+const left = new Map<string, number>(); // address -> how far it was scrolled, for whoever comes back from a replay
+
+interface Props {
+  campaign: string;
+  table: FailureTable;
+  often: Int32Array;
+  /** In the order of the cards. */
+  shown: readonly number[];
+  hovered: Signal<number | null>;
+  triage: (failure: number) => void;
+}
+
+export function Cards({ campaign, table, often, shown, hovered, triage }: Props) {
+  const list = useRef<HTMLUListElement>(null);
+  const { width } = useSize(list);
+  const [top, viewHeight] = useView(list);
+  const [focused, setFocused] = useState<string | null>(null); // stays in the document, wherever the view goes
+  const wanted = useRef<number | null>(null);
+  const grid: Grid = { size: shown.length, width, least: LEAST_PX, height: HEIGHT_PX, gap: GAP_PX };
+  const rows = rowsInView(grid, top, viewHeight);
+  const cardWidth = (width - GAP_PX * (rows.columns - 1)) / rows.columns;
+  useComingBack(width > 0);
+  useEffect(() => {
+    if (wanted.current === null) return;
+    const link = list.current!.querySelector<HTMLElement>(`[data-at="${wanted.current}"] [data-go]`);
+    if (link) wanted.current = null;
+    link?.focus({ preventScroll: true });
+  });
+  const [, again] = useState(0);
+  const onKeyDown = (event: KeyboardEvent) => {
+    const from = Number((event.target as HTMLElement).closest("li")?.dataset.at);
+    const to = moved(event.key, from, rows.columns, shown.length);
+    if (to === null || Number.isNaN(from) || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    wanted.current = to;
+    bringIntoView(list.current!, Math.floor(to / rows.columns) * (HEIGHT_PX + GAP_PX));
+    again((n) => n + 1);
+  };
+  const drawn = Array.from({ length: Math.max(0, rows.to - rows.from) }, (_, n) => rows.from + n);
+  const held = focused === null ? -1 : shown.findIndex((i) => table.ids[i] === focused);
+  if (held >= 0 && (held < rows.from || held >= rows.to)) drawn.push(held);
+  return (
+    <ul
+      class="cards"
+      ref={list}
+      role="list"
+      aria-label={`${shown.length} failures`}
+      style={{ height: `${rows.whole}px` }}
+      onKeyDown={onKeyDown}
+      onFocusIn={(event) => setFocused(idOf(table, shown, event.target))}
+      onFocusOut={() => setFocused(null)}
+      onPointerLeave={() => hovered.set(null)}
+    >
+      {width > 0 &&
+        drawn.map((at) => {
+          const [row, column] = [Math.floor(at / rows.columns), at % rows.columns];
+          const failure = shown[at]!;
+          const place = `translate(${column * (cardWidth + GAP_PX)}px, ${row * (HEIGHT_PX + GAP_PX)}px)`;
+          return (
+            <li
+              key={table.ids[failure]}
+              data-at={at}
+              aria-setsize={shown.length}
+              aria-posinset={at + 1}
+              style={{ width: `${cardWidth}px`, transform: place }}
+              onPointerEnter={() => hovered.set(failure)}
+              onFocusIn={() => hovered.set(failure)}
+            >
+              <Card {...{ campaign, table, triage }} at={failure} often={often[failure]!} />
+            </li>
+          );
+        })}
+    </ul>
+  );
+}
+
+function idOf(table: FailureTable, shown: readonly number[], target: EventTarget | null): string | null {
+  const at = Number((target as HTMLElement).closest("li")?.dataset.at);
+  return table.ids[shown[at] ?? -1] ?? null;
+}
+
+/** How far the window's upper edge lies below the list's, and the window's height. */
+function useView(list: { current: HTMLElement | null }): [number, number] {
+  const [view, setView] = useState<[number, number]>([0, innerHeight]);
+  useLayoutEffect(() => {
+    const look = () => {
+      const top = -list.current!.getBoundingClientRect().top;
+      setView((before) => (before[0] === top && before[1] === innerHeight ? before : [top, innerHeight]));
+    };
+    look();
+    addEventListener("scroll", look, { passive: true });
+    addEventListener("resize", look);
+    return () => {
+      removeEventListener("scroll", look);
+      removeEventListener("resize", look);
+    };
+  }, []);
+  return view;
+}
+
+function bringIntoView(list: HTMLElement, row: number): void {
+  const top = list.getBoundingClientRect().top + row;
+  const [least, most] = [70, innerHeight - HEIGHT_PX - GAP_PX];
+  if (top < least) scrollBy(0, top - least);
+  else if (top > most) scrollBy(0, Math.min(top - most, top - least));
+}
+
+/** Scrolls to where one was before one went to a replay. */
+function useComingBack(ready: boolean): void {
+  useEffect(() => {
+    if (!ready) return;
+    const address = location.hash;
+    const before = left.get(address);
+    if (before !== undefined) scrollTo(0, before);
+    const keep = () => location.hash === address && left.set(address, scrollY);
+    addEventListener("scroll", keep, { passive: true });
+    return () => removeEventListener("scroll", keep);
+  }, [ready]);
+}

@@ -1,0 +1,150 @@
+/** Failures that are there: filters, plots and cards, all of them by what the address says. */
+
+import { useMemo, useState } from "preact/hooks";
+import { address, go, replace } from "../../router";
+import { signal } from "../../signal";
+import { count } from "../../ui/text";
+import { within, type Brushes } from "./brushes";
+import { Cards } from "./cards";
+import { Controls } from "./controls";
+import { outcomeFeatures, sceneFeatures } from "./features";
+import { inTab, isNarrowed, oftenOf, passing, queryOf, read, reset, type Filters } from "./filters";
+import { Parallel } from "./parallel";
+import { RefusedBy } from "./refused";
+import { Scatter } from "./scatter";
+import { sorted, SORTS, type Sort } from "./sorting";
+import { TriageDialog, noted, useNoting } from "./triage";
+import type { FailureTable } from "./wire";
+
+const AXES = 7; // outcome features among the parallel coordinates; the scatter plot offers all of them
+const WIDE = "(min-width: 1000px)"; // as in failures.css
+
+export function Explorer({ campaign, query, table: read_ }: { campaign: string; query: URLSearchParams; table: FailureTable }) {
+  const noting = useNoting(campaign);
+  const table = useMemo(() => noted(read_, noting.notes), [read_, noting.notes]);
+  const asked = useMemo(() => read(query), [query.toString()]);
+  const [dragged, setDragged] = useState<Brushes | null>(null);
+  const [plots, setPlots] = useState(() => matchMedia(WIDE).matches);
+  const [open, setOpen] = useState<number | null>(null);
+  const hovered = useMemo(() => signal<number | null>(null), []);
+  const filters = dragged ? { ...asked, brushes: dragged } : asked;
+  const show = (next: Filters) => replace(address(["campaigns", campaign, "failures"], queryOf(next)));
+  const change = (changed: Partial<Filters>) => show({ ...asked, ...changed });
+  const brush = (brushes: Brushes, done: boolean) => {
+    setDragged(done ? null : brushes);
+    if (done) change({ brushes });
+  };
+
+  const often = useMemo(() => oftenOf(read_), [read_]);
+  const all = useMemo(() => inTab(table, asked), [read_, asked.tab, asked.every]);
+  const families = useMemo(() => [...new Set(table.families)], [read_]);
+  const family = asked.family || (families.length === 1 ? families[0]! : "");
+  const outcomes = useMemo(() => outcomeFeatures(read_), [read_]);
+  const scene = useMemo(() => sceneFeatures(read_, family), [read_, family]);
+  const features = useMemo(() => [...outcomes, ...scene], [outcomes, scene]);
+  const axes = useMemo(() => [...outcomes.slice(0, AXES), ...scene], [outcomes, scene]);
+  const plotted = useMemo(() => (asked.family ? all.filter((i) => table.families[i] === asked.family) : all), [all, asked.family]);
+  const passed = useMemo(() => passing(table, all, asked), [table, all, asked]);
+  const shown = useMemo(
+    () => sorted(table, within(passed, filters.brushes, features), asked.sort, often),
+    [table, passed, filters.brushes, features, asked.sort],
+  );
+  const again = noting.refused;
+  const dialogFor = open ?? (again ? table.ids.indexOf(again.failure) : null);
+  const close = () => {
+    setOpen(null);
+    noting.forgive();
+  };
+  return (
+    <>
+      <Controls {...{ table, all, filters: asked, change }} resetAll={() => show(reset(asked))} />
+      <div class="explorer" data-plots={plots || undefined}>
+        {plots && (
+          <aside class="plots" aria-label="Plots" tabIndex={0}>
+            {asked.tab === "refused" && <RefusedBy {...{ table, all }} chosen={asked.rule} choose={(rule) => change({ rule })} />}
+            <Scatter
+              {...{ table, features, shown, hovered }}
+              x={asked.x}
+              y={asked.y}
+              all={plotted}
+              choose={change}
+              open={(i) => go(address(["campaigns", campaign, "failures", table.ids[i]!]))}
+            />
+            {!family && <FamilyHint families={families} choose={(chosen) => change({ family: chosen })} />}
+            <Parallel {...{ table, shown, hovered, brush }} features={axes} all={plotted} brushes={filters.brushes} />
+          </aside>
+        )}
+        <section class="found" aria-label="Failures">
+          <div class="row found-head">
+            <p role="status">
+              <b>{count(shown.length)}</b> of {count(all.length)} {asked.tab === "refused" ? "refused contacts" : asked.every ? "failures" : "distinct failures"}
+            </p>
+            {asked.tab === "failures" && (
+              <label>
+                <input type="checkbox" checked={asked.every} onChange={(event) => change({ every: event.currentTarget.checked })} /> every failure
+              </label>
+            )}
+            <label class="sort">
+              Order{" "}
+              <select value={asked.sort} onChange={(event) => change({ sort: event.currentTarget.value as Sort })}>
+                {Object.entries(SORTS).map(([sort, words]) => (
+                  <option key={sort} value={sort}>
+                    {words}
+                  </option>
+                ))}
+              </select>
+            </label>
+            <button aria-pressed={plots} onClick={() => setPlots(!plots)}>
+              Plots
+            </button>
+          </div>
+          {shown.length ? (
+            <Cards {...{ campaign, table, often, shown, hovered }} triage={setOpen} />
+          ) : (
+            <Nothing filters={filters} all={all.length} resetAll={() => show(reset(asked))} />
+          )}
+        </section>
+      </div>
+      {dialogFor !== null && dialogFor >= 0 && (
+        <TriageDialog
+          key={`${dialogFor} ${again ? "again" : ""}`}
+          campaign={campaign}
+          failure={table.ids[dialogFor]!}
+          refused={again}
+          close={close}
+          save={(triage) => {
+            setOpen(null);
+            noting.save(table.ids[dialogFor]!, triage);
+          }}
+        />
+      )}
+    </>
+  );
+}
+
+function FamilyHint({ families, choose }: { families: readonly string[]; choose: (family: string) => void }) {
+  return (
+    <p class="row small faint hint">
+      Scene parameters of
+      {families.map((each) => (
+        <button key={each} onClick={() => choose(each)}>
+          {each}
+        </button>
+      ))}
+    </p>
+  );
+}
+
+function Nothing({ filters, all, resetAll }: { filters: Filters; all: number; resetAll: () => void }) {
+  const what = filters.tab === "refused" ? "refused contact" : "failure";
+  return (
+    <div class="state">
+      <p>{all && isNarrowed(filters) ? `No ${what} passes all the filters.` : `There is no ${what}.`}</p>
+      {isNarrowed(filters) && (
+        <button class="primary" onClick={resetAll}>
+          Reset the filters
+        </button>
+      )}
+    </div>
+  );
+}

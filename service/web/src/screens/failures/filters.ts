@@ -1,0 +1,127 @@
+/** What is shown of the failures, as the address's query says it. */
+
+import { parsed, written, type Brushes } from "./brushes";
+import { SORTS, type Sort } from "./sorting";
+import type { FailureTable } from "./wire";
+
+/** Filters that want one value; the empty text wants any. */
+export const FACETS = ["family", "method", "run", "grade", "kind", "striker", "triage", "broke", "rule"] as const;
+export type Facet = (typeof FACETS)[number];
+
+export interface Filters extends Record<Facet, string> {
+  /** Failures, or the contacts that a rule refused. */
+  tab: "failures" | "refused";
+  /** Each failure, and not only the first of its kind in a run. */
+  every: boolean;
+  q: string;
+  sort: Sort;
+  x: string;
+  y: string;
+  brushes: Brushes;
+}
+
+export function read(query: URLSearchParams): Filters {
+  const text = (name: string) => query.get(name) ?? "";
+  const facets = Object.fromEntries(FACETS.map((facet) => [facet, text(facet)])) as Record<Facet, string>;
+  const sort = text("sort");
+  return {
+    ...facets,
+    tab: text("tab") === "refused" ? "refused" : "failures",
+    every: text("every") === "1",
+    q: text("q"),
+    sort: Object.hasOwn(SORTS, sort) ? (sort as Sort) : "grade",
+    x: text("x") || "reaction",
+    y: text("y") || "closing",
+    brushes: parsed(text("brush")),
+  };
+}
+
+/** What `router.address` writes; what is as usual is left out. */
+export function queryOf(filters: Filters): Record<string, string> {
+  const { tab, every, q, sort, x, y, brushes } = filters;
+  return {
+    tab: tab === "failures" ? "" : tab,
+    every: every ? "1" : "",
+    ...Object.fromEntries(FACETS.map((facet) => [facet, filters[facet]])),
+    q,
+    sort: sort === "grade" ? "" : sort,
+    x: x === "reaction" ? "" : x,
+    y: y === "closing" ? "" : y,
+    brush: written(brushes),
+  };
+}
+
+/** Takes back everything that hides failures; tab, order and axes stay. */
+export function reset(filters: Filters): Filters {
+  const { tab, every, sort, x, y } = filters;
+  return { ...read(new URLSearchParams()), tab, every, sort, x, y };
+}
+
+export function isNarrowed(filters: Filters): boolean {
+  return FACETS.some((facet) => filters[facet]) || !!filters.q.trim() || filters.brushes.size > 0;
+}
+
+/** What a failure has of a facet: none, one or several values. */
+export function valuesOf(table: FailureTable, facet: Facet, i: number): readonly string[] {
+  switch (facet) {
+    case "family":
+      return [table.families[i]!];
+    case "method":
+      return [table.methods[i]!];
+    case "run":
+      return [table.run_ids[i]!];
+    case "grade":
+      return [table.grade[i] ?? "none"];
+    case "kind":
+      return [table.kinds[table.kind[i]!]!.signature];
+    case "striker":
+      return [table.striker[i]!];
+    case "triage":
+      return [table.triage[i]!];
+    case "broke":
+      return table.broke[i]!.length ? table.broke[i]! : ["nothing"];
+    case "rule":
+      return table.refused_by[i]!;
+  }
+}
+
+/** The failures of the tab, before any filter. */
+export function inTab(table: FailureTable, { tab, every }: Pick<Filters, "tab" | "every">): number[] {
+  const found: number[] = [];
+  for (let i = 0; i < table.ids.length; i++) {
+    if (tab === "refused" ? !table.valid[i] : table.valid[i] && (every || table.distinct[i])) found.push(i);
+  }
+  return found;
+}
+
+/** Those of the failures that pass every filter; brushes come later, see `within`. */
+export function passing(table: FailureTable, failures: readonly number[], filters: Filters): readonly number[] {
+  const wanted = FACETS.filter((facet) => filters[facet]);
+  const terms = filters.q.toLowerCase().split(/\s+/).filter(Boolean);
+  if (!wanted.length && !terms.length) return failures;
+  return failures.filter(
+    (i) =>
+      wanted.every((facet) => valuesOf(table, facet, i).includes(filters[facet])) &&
+      (!terms.length || said(table, i, terms)),
+  );
+}
+
+function said(table: FailureTable, i: number, terms: string[]): boolean {
+  const text = [table.ids[i], table.kinds[table.kind[i]!]!.name, table.striker[i], ...table.broke[i]!, ...table.refused_by[i]!];
+  const all = text.join(" ").toLowerCase();
+  return terms.every((term) => all.includes(term));
+}
+
+/** Each value of a facet and how many failures have it, the most frequent first. */
+export function tally(table: FailureTable, failures: readonly number[], facet: Facet): [string, number][] {
+  const counts = new Map<string, number>();
+  for (const i of failures) for (const value of valuesOf(table, facet, i)) counts.set(value, (counts.get(value) ?? 0) + 1);
+  return [...counts].sort((a, b) => b[1] - a[1] || a[0].localeCompare(b[0]));
+}
+
+/** For each failure, how many of the campaign's valid ones are of its kind. */
+export function oftenOf(table: FailureTable): Int32Array {
+  const counts = new Int32Array(table.kinds.length);
+  table.kind.forEach((kind, i) => (counts[kind]! += table.valid[i] ? 1 : 0));
+  return Int32Array.from(table.kind, (kind) => counts[kind]!);
+}

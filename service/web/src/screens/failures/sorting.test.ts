@@ -1,0 +1,42 @@
+import { expect, test } from "vitest";
+import { oftenOf } from "./filters";
+import { sample } from "./sample";
+import { sorted, SORTS, type Sort } from "./sorting";
+
+const table = sample(12);
+const all = table.ids.map((_, i) => i);
+const by = (sort: Sort) => sorted(table, all, sort, oftenOf(table));
+
+test("every order holds every failure once", () => {
+  for (const sort of Object.keys(SORTS) as Sort[]) expect([...by(sort)].sort((a, b) => a - b)).toEqual(all);
+});
+
+test("preventable ones come first, among them the fastest", () => {
+  expect(by("grade").map((i) => table.grade[i])).toEqual([
+    ...["careful", "careful", "careful"],
+    ...["ideal", "ideal", "ideal"],
+    ...["unavoidable", "unavoidable", "unavoidable"],
+    ...[null, null, null],
+  ]);
+  const closing = by("grade").slice(0, 3).map((i) => table.relative_speed_mps[i]!);
+  expect(closing).toEqual([...closing].sort((a, b) => b - a));
+});
+
+test("who has no time to contact comes last", () => {
+  expect(by("reaction").slice(0, 3)).toEqual([0, 1, 3]);
+  expect(by("reaction").at(-1)).toBe(2);
+});
+
+test("fastest, newest, most frequent", () => {
+  expect(table.relative_speed_mps[by("closing")[0]!]).toBe(9);
+  expect(by("newest").slice(0, 2)).toEqual([11, 10]);
+  expect(by("often")[0]! % 2).toBe(0);
+  expect(by("rare")[0]! % 2).toBe(1);
+});
+
+test("ten thousand are in order within a frame or two", () => {
+  const many = sample(10_000);
+  const began = performance.now();
+  sorted(many, many.ids.map((_, i) => i), "grade", oftenOf(many));
+  expect(performance.now() - began).toBeLessThan(500);
+});
