@@ -1,7 +1,129 @@
-export function ReplayScreen({ campaign, failure, query }: { campaign: string; failure: string; query: URLSearchParams }) {
+/** A failure, played again: seen from above, with what was measured, and what was judged of it. */
+
+import { useMemo, useRef } from "preact/hooks";
+import { useAsked } from "../../api/asked";
+import type { Body } from "../../api/types";
+import { address } from "../../router";
+import { Tripod } from "../../stage/camera";
+import { Clock } from "../../stage/clock";
+import { useKeys } from "../../stage/keys";
+import { Legend } from "../../stage/legend";
+import { panelsOf } from "../../stage/panels";
+import { Plots } from "../../stage/plots";
+import { hiddenSpans, recordingOf, type Collision, type Series } from "../../stage/recording";
+import { roadPaths } from "../../stage/roads";
+import { askedTime, conflictBounds, marksOf, opening, useLayers, useStopped, useTimeInAddress } from "../../stage/room";
+import { Stage } from "../../stage/stage";
+import { KeyList, Transport } from "../../stage/transport";
+import { Empty, Shown } from "../../ui/states";
+import { words } from "../../ui/text";
+import { Actors } from "./actors";
+import { Take } from "./take";
+import { Verdict } from "./verdict";
+import "../../stage/stage.css";
+import "./replay.css";
+
+interface Props {
+  campaign: string;
+  failure: string;
+  query: URLSearchParams;
+}
+
+export function ReplayScreen({ campaign, failure, query }: Props) {
+  const path = `v1/campaigns/${encodeURIComponent(campaign)}/failures/${encodeURIComponent(failure)}`;
+  const asked = useAsked<Body<"Failure">>(path);
   return (
-    <h1>
-      Replay {campaign} {failure} {query.toString()}
-    </h1>
+    <>
+      <Head campaign={campaign} failure={failure} query={query} known={asked.value} />
+      <Shown asked={asked} what="the failure">
+        {(known) =>
+          known.series === null || known.collision === null ? (
+            <>
+              <Empty>{known.series_problem ?? "Nothing of it was recorded that could be played."}</Empty>
+              <Verdict failure={known} />
+            </>
+          ) : (
+            <Replay campaign={campaign} path={path} known={known} series={known.series} collision={known.collision} query={query} />
+          )
+        }
+      </Shown>
+    </>
   );
+}
+
+function Head({ campaign, failure, query, known }: Props & { known: Body<"Failure"> | undefined }) {
+  const neighbour = (name: "prev" | "next", text: string) => {
+    const id = query.get(name);
+    return id && <a class="button" href={address(["campaigns", campaign, "failures", id])}>{text}</a>;
+  };
+  const back = query.get("from") ?? "";
+  const signature = known?.collision?.judgement?.signature;
+  return (
+    <div class="head">
+      <nav class="crumbs" aria-label="Breadcrumb">
+        <a href={address(["campaigns", campaign])}>Campaign</a> /{" "}
+        <a href={`${address(["campaigns", campaign, "failures"])}${back && `?${back}`}`}>Failures</a> / {failure}
+      </nav>
+      <h1>{signature ? capital(signature) : `Failure ${failure}`}</h1>
+      {known && <span class={`tag ${known.collision?.judgement?.grade ?? ""}`}>{known.collision?.judgement?.grade ?? words(known.outcome)}</span>}
+      <span class="actions">
+        {neighbour("prev", "Previous")}
+        {neighbour("next", "Next")}
+        <a class="button" href={address(["campaigns", campaign, "failures", failure, "twin", "idle"])}>
+          Compare with a twin
+        </a>
+      </span>
+    </div>
+  );
+}
+
+function Replay({ campaign, path, known, series, collision, query }: { campaign: string; path: string; known: Body<"Failure">; series: Series; collision: Collision; query: URLSearchParams }) {
+  const roads = useAsked<Body<"Roads">>(`${path}/roads`).value;
+  const spec = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value?.spec;
+  const recording = useMemo(() => recordingOf(series, collision), [series, collision]);
+  const clock = useMemo(() => new Clock(recording.time_s, askedTime(query) ?? opening(recording)), [recording]);
+  const tripod = useMemo(() => new Tripod(conflictBounds(recording)), [recording]);
+  const panels = useMemo(() => panelsOf(recording), [recording]);
+  const marks = useMemo(() => marksOf(recording), [recording]);
+  const hidden = useMemo(() => hiddenSpans(recording, recording.striker), [recording]);
+  const paths = useMemo(() => (roads ? roadPaths(roads.surfaces) : null), [roads]);
+  const [layers, toggle] = useLayers();
+  const card = useRef<HTMLElement>(null);
+  useKeys({ clock, tripod, toggle });
+  useStopped(clock);
+  useTimeInAddress(clock, query);
+  return (
+    <div class="grid">
+      <div class="replay">
+        <section class="card stage-card" ref={card} aria-label="Replay">
+          <Stage
+            recording={recording}
+            collision={collision}
+            roads={paths}
+            sensor={spec?.ego?.sensor ?? null}
+            clock={clock}
+            tripod={tripod}
+            layers={layers}
+            label="View from above; the table of actors says in text what is seen"
+          />
+          <Legend />
+          <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} />
+        </section>
+        <Verdict failure={known} />
+      </div>
+      <p class="faint small plots-hint">Time in s from the contact. Grey: the striker is hidden from the ego. Dotted: release; dashed: the conflict begins.</p>
+      <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
+      <Actors recording={recording} clock={clock} />
+      <div class="replay-end">
+        <Take campaign={campaign} run={known.run_id} failure={known.id} path={path} stage={card} />
+        <section class="card" aria-label="Keys">
+          <KeyList />
+        </section>
+      </div>
+    </div>
+  );
+}
+
+function capital(text: string): string {
+  return text.charAt(0).toUpperCase() + text.slice(1);
 }

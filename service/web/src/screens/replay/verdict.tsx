@@ -1,0 +1,82 @@
+/** The verdicts in words: who would have prevented it, what happened, and whether it holds. */
+
+import type { Body } from "../../api/types";
+import { number, words } from "../../ui/text";
+import * as say from "./words";
+
+type Failure = Body<"Failure">;
+
+export function Verdict({ failure }: { failure: Failure }) {
+  const { collision } = failure;
+  if (collision === null) return <p class="card">No contact is on record.</p>;
+  const { judgement } = collision;
+  const refused = say.refusals(collision);
+  const flaky = failure.repetition !== null && failure.repetition.same < failure.repetition.times;
+  return (
+    <section class="card verdict" aria-label="Verdict">
+      <p class={`verdict-grade grade-${judgement?.grade ?? "none"}`}>{say.verdictOf(failure)}</p>
+      {refused.length > 0 && (
+        <div class="verdict-refused">
+          <p>Refused by {refused.length === 1 ? "this rule" : "these rules"}:</p>
+          <ul>
+            {refused.map((why) => (
+              <li>{why}</li>
+            ))}
+          </ul>
+        </div>
+      )}
+      <p>{say.contactOf(collision)}</p>
+      {judgement !== null && (
+        <>
+          <p>{say.conflictOf(judgement, collision.time_s)}</p>
+          <p>
+            {say.responseOf(judgement, collision.ego_peak_braking_mps2)} {say.knownOf(collision)}
+          </p>
+          <p class={judgement.broke.length > 0 ? "verdict-broke" : ""}>{say.brokeOf(judgement)}</p>
+          <Drivers drivers={judgement.drivers} />
+        </>
+      )}
+      <p class={flaky ? "bad" : "faint"}>{say.repetitionOf(failure)}</p>
+      <Triage failure={failure} />
+    </section>
+  );
+}
+
+function Drivers({ drivers }: { drivers: Record<string, Body<"ReferenceOutcome">> }) {
+  const rows = Object.entries(drivers);
+  if (rows.length === 0) return null;
+  return (
+    <table class="verdict-drivers">
+      <caption>In the ego's place</caption>
+      <thead>
+        <tr>
+          <th scope="col">Driver</th>
+          <th scope="col">Would</th>
+          <th scope="col" class="number">
+            At impact
+          </th>
+        </tr>
+      </thead>
+      <tbody>
+        {rows.map(([name, { avoids, impact_speed_mps }]) => (
+          <tr>
+            <th scope="row">{say.DRIVERS[name] ?? words(name)}</th>
+            <td>{avoids ? <span class="good">✓ prevent it</span> : <span class="bad">✗ strike</span>}</td>
+            <td class="number">{avoids ? "–" : `${number(impact_speed_mps, 1)} m/s`}</td>
+          </tr>
+        ))}
+      </tbody>
+    </table>
+  );
+}
+
+/** What somebody noted about it, where the service keeps such notes. */
+function Triage({ failure }: { failure: Failure }) {
+  const triage = (failure as { triage?: { state: string; comment: string } | null }).triage;
+  if (!triage) return null;
+  return (
+    <p class="verdict-triage">
+      <span class="tag">{triage.state}</span> {triage.comment}
+    </p>
+  );
+}

@@ -1,0 +1,104 @@
+/** What the verdicts say, in plain words; the rules are those of `risk_sac/verdicts/README.md`. */
+
+import type { Body } from "../../api/types";
+import { number, words } from "../../ui/text";
+
+type Failure = Body<"Failure">;
+type Collision = Body<"Collision">;
+type Judgement = Body<"Judgement">;
+
+export const GRADES: Record<Body<"Grade">, string> = {
+  careful: "A careful driver would have prevented it.",
+  ideal: "Only full braking at once would have prevented it.",
+  unavoidable: "Not even full braking at once would have prevented it.",
+};
+
+const CONFLICTS: Record<string, string> = {
+  cut_in: "a cut-in",
+  leader: "a leader that slows down",
+  pedestrian: "a pedestrian in the way",
+  crossing_vehicle: "a crossing vehicle",
+};
+
+export const DRIVERS: Record<string, string> = {
+  careful: "Careful driver",
+  fsm: "Fuzzy safety model",
+  rss: "RSS driver",
+  ideal: "Full braking at once",
+};
+
+const BROKE: Record<string, string> = {
+  red_light: "ran a red light",
+  priority: "took the ego's priority",
+  wrong_direction: "went in the wrong direction",
+  speeding: "was more than 10 % too fast",
+  pedestrian_on_red: "walked on red",
+};
+
+/** A rule that a contact did not pass, as what is wrong with it. */
+const RULES: Record<string, string> = {
+  no_teleport: "the simulator moved somebody by a jump",
+  no_spawn_overlap: "bodies overlapped at the start",
+  conflict_after_release: "the conflict began less than 1 s after the release",
+  inside_limits: "an adversary left its limits",
+  inside_grip: "the striker drove beyond the friction of the road",
+  solid_bodies: "somebody passed through another body",
+  ego_model_saw: "SUMO's boxes do not agree with the contact",
+  repeats: "it went another way when it was replayed",
+  not_from_behind: "the ego was struck from behind",
+  ego_moving: "the ego stood, or nearly",
+  no_sideswipe: "the adversary swiped the ego's side",
+  seen_before: "the striker could never be seen",
+};
+
+export function verdictOf({ collision, outcome }: Failure): string {
+  const grade = collision?.judgement?.grade;
+  if (grade) return GRADES[grade];
+  return outcome === "failure" ? "It counts as a failure; nobody judged who would have prevented it." : "It is refused as a failure.";
+}
+
+/** Names of the rules that refused it, with what each means. */
+export function refusals(collision: Collision): string[] {
+  return Object.entries(collision.verdicts).flatMap(([rule, passed]) => (passed ? [] : [RULES[rule] ?? words(rule)]));
+}
+
+export function contactOf(collision: Collision): string {
+  const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, other_speed_mps, relative_speed_mps } = collision;
+  return (
+    `The ego's ${ego_zone}, at ${number(ego_speed_mps, 1)} m/s, touched the ${other_zone} of the ${other_role} ${other_id}, ` +
+    `at ${number(other_speed_mps, 1)} m/s. They closed at ${number(relative_speed_mps, 1)} m/s.`
+  );
+}
+
+export function knownOf({ visible_for_s, other_id }: Collision): string {
+  if (visible_for_s === null || visible_for_s <= 0) return `The ego did not know of ${other_id}.`;
+  return `The ego had known of ${other_id} for ${number(visible_for_s, 1)} s without a break.`;
+}
+
+export function conflictOf({ conflict_type, conflict_s, hidden, position }: Judgement, contact_s: number | null): string {
+  const before = conflict_s === null || contact_s === null ? "" : `, which began ${number(contact_s - conflict_s, 1)} s before the contact`;
+  const where = position === "alongside" ? "alongside" : "ahead";
+  const sight = hidden ? ", and the ego knew nothing of it" : "";
+  return `The conflict is ${CONFLICTS[conflict_type] ?? words(conflict_type)}${before}; the striker was ${where} then${sight}.`;
+}
+
+export function responseOf(judgement: Judgement, peak: number | null): string {
+  const manoeuvre = { straight: "goes straight", left_turn: "turns left", right_turn: "turns right", lane_change: "changes lanes" };
+  const response = { none: "does not brake", late_braking: "brakes late", braking: "brakes", standing: "stands", starting: "starts" };
+  const goes = manoeuvre[judgement.ego_manoeuvre as keyof typeof manoeuvre] ?? words(judgement.ego_manoeuvre);
+  const does = response[judgement.ego_response as keyof typeof response] ?? words(judgement.ego_response);
+  const hardest = peak === null || peak < 0.05 ? "" : `, by ${number(peak, 1)} m/s² at most`;
+  const never = judgement.unresponsive ? " It saw a collision course for 1.5 s or more, and never braked." : "";
+  return `The ego ${goes} and ${does}${hardest}.${never}`;
+}
+
+export function brokeOf({ broke }: Judgement): string {
+  return broke.length === 0 ? "The striker broke no rule of the road." : `The striker ${broke.map((rule) => BROKE[rule] ?? words(rule)).join(", and ")}.`;
+}
+
+export function repetitionOf({ repetition }: Failure): string {
+  if (repetition === null) return "It was not replayed: only the first failure of each kind is, once its run has ended.";
+  const { same, times } = repetition;
+  if (same === times) return `Verified: ${same} of ${times} replays were the same, to the bit.`;
+  return `Flaky: only ${same} of ${times} replays were the same.`;
+}

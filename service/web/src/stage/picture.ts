@@ -1,0 +1,128 @@
+/** One picture of the stage, from the ground up. */
+
+import { drawBodies } from "./bodies";
+import { roundLength } from "./geometry";
+import { posesAt } from "./interpolate";
+import { drawLabels, signed, type Sides } from "./labels";
+import { drawPaths } from "./paths";
+import type { Recording } from "./recording";
+import { drawRisk } from "./risk";
+import { drawGround } from "./roads";
+import { pixelX, pixelY, type Scene } from "./scene";
+import { drawShade, drawSightLines } from "./sight";
+
+export function drawPicture(scene: Scene, sides: Sides): void {
+  const { ctx, density } = scene;
+  ctx.setTransform(density, 0, 0, density, 0, 0);
+  drawGround(scene);
+  drawShade(scene);
+  drawPaths(scene);
+  drawContact(scene);
+  drawSightLines(scene);
+  drawRisk(scene);
+  drawBodies(scene);
+  drawLabels(scene, sides);
+  drawScaleBar(scene);
+  drawTime(scene);
+  drawSignal(scene);
+}
+
+const CONTACT = new WeakMap<Recording, [number, number]>();
+
+/** Where ego and striker touched, on the map. */
+function contactOf({ recording, collision }: Scene): [number, number] {
+  let place = CONTACT.get(recording);
+  if (place === undefined) {
+    const poses = new Float64Array(3 * recording.actors);
+    posesAt(recording, { index: recording.steps - 1, share: 0 }, poses);
+    const [along, across] = [collision.contact_x_m ?? Number.NaN, collision.contact_y_m ?? Number.NaN];
+    const [cos, sin] = [Math.cos(poses[2]!), Math.sin(poses[2]!)];
+    place = [poses[0]! + along * cos - across * sin, poses[1]! + along * sin + across * cos];
+    CONTACT.set(recording, place);
+  }
+  return place;
+}
+
+function drawContact(scene: Scene): void {
+  if (!scene.original) return;
+  const { ctx, ink } = scene;
+  const [x, y] = contactOf(scene);
+  const [px, py] = [pixelX(scene, x), pixelY(scene, y)];
+  ctx.save();
+  ctx.strokeStyle = ink["--text"];
+  ctx.lineWidth = 1.5;
+  ctx.beginPath();
+  ctx.arc(px, py, 7, 0, 2 * Math.PI);
+  for (const [dx, dy] of [[1, 1], [1, -1]] as const) {
+    ctx.moveTo(px - 4 * dx, py - 4 * dy);
+    ctx.lineTo(px + 4 * dx, py + 4 * dy);
+  }
+  ctx.stroke();
+  ctx.restore();
+}
+
+function drawScaleBar({ ctx, view, camera, ink }: Scene): void {
+  const metres = roundLength(Math.min(160, view.width / 4) / camera.scale);
+  const length = metres * camera.scale;
+  const [x, y] = [16, view.height - 14];
+  ctx.save();
+  ctx.strokeStyle = ctx.fillStyle = ink["--text"];
+  ctx.lineWidth = 1.5;
+  ctx.beginPath();
+  ctx.moveTo(x, y - 5);
+  ctx.lineTo(x, y);
+  ctx.lineTo(x + length, y);
+  ctx.lineTo(x + length, y - 5);
+  ctx.stroke();
+  ctx.font = "12px system-ui, sans-serif";
+  ctx.textAlign = "center";
+  halo(ctx, ink["--ground"], `${metres} m`, x + length / 2, y - 7);
+  ctx.restore();
+}
+
+function drawTime({ ctx, time_s, ink }: Scene): void {
+  ctx.save();
+  ctx.font = "600 18px system-ui, sans-serif";
+  ctx.fillStyle = ink["--text"];
+  halo(ctx, ink["--ground"], `${signed(time_s, 2)} s`, 14, 26);
+  ctx.font = "12px system-ui, sans-serif";
+  ctx.fillStyle = ink["--faint"];
+  halo(ctx, ink["--ground"], time_s <= 0 ? "to the contact" : "after the contact", 14, 43);
+  ctx.restore();
+}
+
+const LAMPS = ["red", "yellow", "green"] as const;
+const LAMP_COLOURS = { red: "#e5484d", yellow: "#f5b700", green: "#30a46c" };
+
+/** The signal ahead of the ego, as a head of three lamps and in words. */
+function drawSignal({ ctx, view, recording, instant, ink }: Scene): void {
+  const colour = recording.series.signal[instant.index];
+  if (colour === undefined || colour === "none") return;
+  const [x, y] = [view.width - 32, 12];
+  ctx.save();
+  ctx.fillStyle = "#20242c";
+  ctx.beginPath();
+  ctx.roundRect(x, y, 20, 52, 6);
+  ctx.fill();
+  LAMPS.forEach((lamp, k) => {
+    ctx.beginPath();
+    ctx.arc(x + 10, y + 10 + 16 * k, 6, 0, 2 * Math.PI);
+    ctx.fillStyle = lamp === colour ? LAMP_COLOURS[lamp] : "#4a505c";
+    ctx.fill();
+  });
+  ctx.font = "12px system-ui, sans-serif";
+  ctx.textAlign = "right";
+  ctx.fillStyle = ink["--text"];
+  halo(ctx, ink["--ground"], `${colour} ahead of the ego`, x - 8, y + 30);
+  ctx.restore();
+}
+
+function halo(ctx: CanvasRenderingContext2D, ground: string, text: string, x: number, y: number): void {
+  ctx.save();
+  ctx.strokeStyle = ground;
+  ctx.lineWidth = 3.5;
+  ctx.lineJoin = "round";
+  ctx.strokeText(text, x, y);
+  ctx.restore();
+  ctx.fillText(text, x, y);
+}
