@@ -45,14 +45,17 @@ def cell_of(collision: Collision) -> Cell:
       NotFinite: a feature is NaN; infinite ones lie in the outermost cell.
     """
     judged = collision.judgement
-    values = {
-        "ego_speed_mps": collision.ego_speed_mps,
-        "other_speed_mps": collision.other_speed_mps,
-        "from_conflict_s": collision.time_s - judged.conflict_s if judged else 0.0,
-    }
-    if any(value != value for value in values.values()):
-        raise NotFinite(f"collision at {collision.time_s:g} s has {values}; wanted no NaN")
-    return tuple(bisect_right(axis.edges, values[axis.name]) for axis in AXES)
+    from_conflict_s = collision.time_s - judged.conflict_s if judged else 0.0
+    values = (collision.ego_speed_mps, collision.other_speed_mps, from_conflict_s)
+    if any(value != value for value in values):
+        named = dict(zip((axis.name for axis in AXES), values, strict=True))
+        raise NotFinite(f"collision at {collision.time_s:g} s has {named}; wanted no NaN")
+    return cell(values)
+
+
+def cell(values: Sequence[float]) -> Cell:
+    """The cell of these values of `AXES`."""
+    return tuple(bisect_right(axis.edges, value) for axis, value in zip(AXES, values, strict=True))
 
 
 def niche_of(collision: Collision) -> tuple[str, Cell]:

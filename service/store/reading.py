@@ -4,19 +4,21 @@ import time
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import closing, contextmanager
+from dataclasses import fields
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, selectinload
 
 from risk_sac.records import Outcome
 from service.errors import StorageError
+from service.store.columns import read_columns
 from service.store.counting import HOUR_S
 from service.store.database import open_database, storage_errors
 from service.store.finding import Judged, episode_page, find_campaign, find_run, split_failure_id, unknown_failure
 from service.store.revisions import Revisions
 from service.store.sequence import event_page
 from service.store.states import FINAL, State
-from service.store.stored import Page, StoredCampaign, StoredChange, StoredEpisode, StoredRun, Usage
+from service.store.stored import Page, PlainEpisode, StoredCampaign, StoredChange, StoredEpisode, StoredRun, Usage
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, UsageRow
 
 DAY_HOURS = 24
@@ -155,6 +157,20 @@ class Store:
                 query = select(EpisodeRow).where(EpisodeRow.run_number == find_run(session, campaign, run_id))
             query = query if judged is None else query.where(*judged.conditions())
             return episode_page(session, query, outcomes, limit, after or 0)
+
+    def plain_episodes(self, number: int, outcomes: Collection[Outcome] = ()) -> Iterator[PlainEpisode]:
+        """All episodes of the campaign with this number in order of arrival; no outcomes means all.
+
+        Raises:
+          StorageError: one of them is damaged.
+        """
+        conditions = [EpisodeRow.campaign_number == number]
+        if outcomes:
+            conditions.append(EpisodeRow.outcome.in_(outcomes))
+        names = [field.name for field in fields(PlainEpisode)]
+        with self._reading() as session:
+            for values in read_columns(session, EpisodeRow, names, *conditions):
+                yield PlainEpisode(*values)
 
     def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredEpisode:
         """The episode with this id in which the ego touched something.

@@ -10,7 +10,7 @@ from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, FamilyName, RunSpec
 from risk_sac.metrics import Funnel
-from risk_sac.records import EpisodeRecord, RunMetrics
+from risk_sac.records import EpisodeRecord, Outcome, RunMetrics
 from risk_sac.run_folder.verified import Repetition
 from service.errors import OutdatedError
 from service.store.states import State
@@ -179,6 +179,17 @@ class StoredEpisode:
     def id(self) -> str:
         """Unique within the campaign, and the same whenever the same campaign is run again."""
         return self.record.id_in(self.run_id)
+
+
+@dataclass(frozen=True, slots=True)
+class PlainEpisode:
+    """An episode of very many, as its row has it: what it recorded is still JSON."""
+
+    run_number: int
+    phase: str
+    index: int
+    outcome: Outcome
+    record: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -196,7 +196,11 @@ def checksum(row: Checked) -> int:
     and the last ones only up to the last that is not null.
     """
     mapper = inspect(type(row))
-    values, added = _summed(mapper)(row), _added(mapper)(row)
+    return checksum_of(_summed(mapper)(row), _added(mapper)(row))
+
+
+def checksum_of(values: tuple[Any, ...], added: tuple[Any, ...]) -> int:
+    """The same of values that are at hand: of the first columns, and of those that came later."""
     while added and added[-1] is None:
         added = added[:-1]
     return zlib.crc32(to_json((*values, *added) if any(added) else values, inf_nan_mode="strings"))
@@ -204,17 +208,20 @@ def checksum(row: Checked) -> int:
 
 @cache
 def _summed(mapper: Mapper[Any]) -> Callable[[Checked], tuple[Any, ...]]:
-    return attrgetter(*(name for name in _checked(mapper) if not mapper.columns[name].info))
+    return attrgetter(*summed_columns(mapper)[0])
 
 
 @cache
 def _added(mapper: Mapper[Any]) -> Callable[[Checked], tuple[Any, ...]]:
-    names = [name for name in _checked(mapper) if mapper.columns[name].info]
+    names = summed_columns(mapper)[1]
     return lambda row: tuple(getattr(row, name) for name in names)
 
 
-def _checked(mapper: Mapper[Any]) -> list[str]:
-    return [name for name in mapper.columns.keys() if name not in ("number", "checksum")]  # noqa: SIM118
+def summed_columns(mapper: Mapper[Any]) -> tuple[list[str], list[str]]:
+    """Names of the columns that a checksum is formed over: those there were first, and those that came later."""
+    names = [name for name in mapper.columns.keys() if name not in ("number", "checksum")]  # noqa: SIM118
+    later = [name for name in names if mapper.columns[name].info]
+    return [name for name in names if name not in later], later
 
 
 @event.listens_for(Checked, "before_insert", propagate=True)
@@ -230,5 +237,10 @@ def _seal(mapper: Mapper[Any], connection: object, row: Checked) -> None:
 @event.listens_for(Checked, "refresh", propagate=True)
 def _verify(row: Checked, *_: object) -> None:
     if row.checksum is not None and row.checksum != checksum(row):
-        name, table = getattr(row, "id", None) or getattr(row, "number", ""), inspect(type(row)).local_table.name
-        raise StorageError(f"row {name} of the table {table!r} is damaged; restore the database from a copy")
+        raise damaged(type(row), getattr(row, "id", None) or getattr(row, "number", ""))
+
+
+def damaged(table: type[Checked], name: object) -> StorageError:
+    """What to raise of a row whose checksum does not hold."""
+    local = inspect(table).local_table.name
+    return StorageError(f"row {name} of the table {local!r} is damaged; restore the database from a copy")

@@ -24,15 +24,18 @@ from service.api.answers.responses import (
     TAGGED,
     UNKNOWN,
 )
+from service.api.answers.tiers import TIERS, Tier
 from service.api.context import Context, Service
 from service.api.posted import documented
 from service.api.posted_campaign import PostedCampaign
 from service.schemas.base import Body
 from service.schemas.campaign_results import Results
 from service.schemas.campaigns import Campaign, CampaignPage
+from service.schemas.failure_table import FailureTable
 from service.store.states import State
 from service.store.stored import StoredCampaign
 from service.views.bodies import campaign_body, summary_body
+from service.views.failure_table import failure_table
 from service.views.progress import retry_after_s
 from service.views.totals import results
 
@@ -119,6 +122,20 @@ def get_campaign(campaign_id: str, request: Request, service: Service, caller: C
 def get_results(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """What a campaign has found; partial until it has ended."""
     return _kept(campaign_id, request, service, caller, results)
+
+
+@router.get("/{campaign_id}/failure-table", response_model=FailureTable, responses=UNKNOWN | LIVE)
+def get_failure_table(
+    campaign_id: str, request: Request, service: Service, caller: CurrentCaller, tier: Tier = "valid"
+) -> Response:
+    """All failures at once, by columns: for whoever sorts, filters and plots them."""
+    return _kept(
+        campaign_id,
+        request,
+        service,
+        caller,
+        lambda found: failure_table(found, service.store.plain_episodes(found.number, TIERS[tier])),
+    )
 
 
 def _kept(

@@ -1,6 +1,6 @@
 """/v1/campaigns/{id}/episodes and failures: what a campaign did, one by one."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query
 
@@ -8,14 +8,13 @@ from risk_sac.records import Grade, Outcome
 from service.api.access import CurrentCaller
 from service.api.answers.pages import Cursor, Limit
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN
+from service.api.answers.tiers import TIERS, Tier
 from service.api.context import Service
 from service.schemas.episodes import EpisodePage
 from service.schemas.failures import Failure
 from service.store.finding import Judged
 from service.store.stored import Page, StoredEpisode
 from service.views.bodies import episode_body, failure_body
-
-TIERS = {"valid": (Outcome.FAILURE,), "raw": (Outcome.FAILURE, Outcome.DEGENERATE)}
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
 
@@ -47,7 +46,7 @@ def list_failures(
     campaign_id: str,
     service: Service,
     caller: CurrentCaller,
-    tier: Annotated[Literal["valid", "raw"], Query(description="`raw` adds contacts that a rule refused.")] = "valid",
+    tier: Tier = "valid",
     run: Annotated[str | None, Query(description="Only failures of this run.")] = None,
     grade: Annotated[Grade | None, Query(description="Only failures of this grade; `careful`: preventable.")] = None,
     broke: Annotated[

@@ -6,6 +6,7 @@ from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.metrics import Funnel
 from risk_sac.records import Grade, Outcome
 from service.errors import NotFoundError, StorageError
+from service.store.counting import to_text
 from service.store.finding import Judged
 from service.store.reading import Store
 from service.store.states import State
@@ -202,3 +203,29 @@ def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):
             store.episodes(campaign.id, limit=1, run_id=wrong)
         with pytest.raises(NotFoundError):
             store.failure(campaign.id, f"{wrong}-train-0")
+
+
+def test_plain_episodes_are_the_stored_ones_in_their_order(store, ledger, episode):
+    campaign, other = ledger.create(SPEC), ledger.create(SPEC)
+    number = start(store, ledger)
+    outcomes = [Outcome.FAILURE, Outcome.SAFE, Outcome.DEGENERATE, Outcome.FAILURE]
+    for index, outcome in enumerate(outcomes):
+        ledger.add_episodes([(number, episode(index, outcome))])
+    assert list(store.plain_episodes(other.number)) == []
+    found = list(store.plain_episodes(campaign.number))
+    assert [(each.run_number, each.index, each.outcome) for each in found] == [
+        (number, index, outcome) for index, outcome in enumerate(outcomes)
+    ]
+    shown = store.episodes(campaign.id, limit=9).items
+    assert [to_text(each.record) for each in shown] == [each.record for each in found]
+    some = store.plain_episodes(campaign.number, (Outcome.FAILURE, Outcome.DEGENERATE))
+    assert [each.index for each in some] == [0, 2, 3]
+
+
+def test_a_plain_episode_that_changed_on_the_disk_is_noticed(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    ledger.add_episodes([(start(store, ledger), episode(0, Outcome.FAILURE))])
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE episodes SET funnel = NULL")
+    with pytest.raises(StorageError, match="row 1 of the table 'episodes' is damaged"):
+        list(store.plain_episodes(campaign.number))

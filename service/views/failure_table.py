@@ -1,0 +1,120 @@
+"""The table of a campaign's failures. Pure.
+
+Ten thousand of them are to be there at once, so records are taken from their JSON without being validated: they were
+when they were written, and the checksums of their rows hold.
+"""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
+from pydantic_core import from_json
+
+from risk_sac.records import Grade, Outcome
+from service.schemas.failure_table import FailureKind, FailureTable, FamilyScenes
+from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
+from service.views.plain import Kinds, Plain, signature_of
+
+DECIMALS = 4
+OF_RUN = {"run_ids": "id", "families": "family", "methods": "method", "seeds": "seed"}  # column -> field
+OF_COLLISION = {
+    **{"striker": "other_id", "striker_kind": "other_kind", "time_s": "time_s", "visible_for_s": "visible_for_s"},
+    **{name: name for name in ("ego_speed_mps", "other_speed_mps", "relative_speed_mps", "lateral_offset_m")},
+    **{name: name for name in ("min_rss_margin_m", "ego_peak_braking_mps2")},
+}
+OF_JUDGEMENT = ("signature", "grade", "conflict_type", "conflict_s", "hidden", "ego_response", "ground", "broke")
+DECIDED = ("ids", "indices", "phases", "valid", "distinct", "refused_by", "repeats", "triage")
+EARLY = ("min_ttc_s", "min_robustness")
+COLUMNS = (*OF_RUN, *OF_COLLISION, *OF_JUDGEMENT, *DECIDED, *EARLY, "name", "scene")
+ROUNDED = (*(name for name in OF_COLLISION if not name.startswith("striker")), *EARLY, "conflict_s")
+UNJUDGED: Plain = dict.fromkeys(OF_JUDGEMENT) | {"broke": []}
+
+_of_collision, _of_judgement = itemgetter(*OF_COLLISION.values()), itemgetter(*OF_JUDGEMENT)
+
+Columns = Mapping[str, Sequence[Any]]
+
+
+def failure_table(campaign: StoredCampaign, contacts: Iterable[PlainEpisode]) -> FailureTable:
+    """The table of these contacts of the campaign, in their order."""
+    runs = {run.number: run for run in campaign.runs}
+    found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)
+    rows = [_row(runs[each.run_number], each, found[each.run_number, each.phase]) for each in contacts]
+    columns: dict[str, Sequence[Any]] = dict.fromkeys(COLUMNS, ())
+    columns |= zip(COLUMNS, zip(*rows, strict=True), strict=bool(rows))
+    kinds = _kinds(columns)
+    places = {kind.name: place for place, kind in enumerate(kinds)}
+    made = {name: _rounded(columns[name]) for name in ROUNDED} | {
+        "kind": [places[name] for name in columns["name"]],
+        "kinds": kinds,
+        "scenes": _scenes(columns),
+    }
+    return FailureTable.model_validate(columns | made)
+
+
+def _row(run: StoredRun, contact: PlainEpisode, found: Kinds) -> tuple[Any, ...]:
+    """`COLUMNS`."""
+    record = from_json(contact.record)
+    collision = record["collision"]
+    repetition = run.repetitions.get(contact.index)
+    valid = contact.outcome == Outcome.FAILURE
+    return (
+        *(run.id, run.family, run.method, run.seed),
+        *_of_collision(collision),
+        *_of_judgement(collision.get("judgement") or UNJUDGED),
+        f"{run.id}-{contact.phase}-{contact.index}",
+        contact.index,
+        contact.phase,
+        valid,
+        valid and found.add(collision),
+        [rule for rule, passed in collision.get("verdicts", {}).items() if not passed],
+        None if repetition is None else "verified" if repetition.verified else "flaky",
+        "new",
+        *(collision.get(f"early_{name}", collision.get(name)) for name in EARLY),
+        signature_of(collision),
+        record["scene"],
+    )
+
+
+def _kinds(columns: Columns) -> list[FailureKind]:
+    """Of the signatures, the most preventable failures first."""
+    signatures = dict(zip(columns["name"], columns["signature"], strict=True))
+    failures, distinct, preventable = Counter[str](), Counter[str](), Counter[str]()
+    told = (columns[name] for name in ("name", "valid", "distinct", "grade"))
+    for name, valid, first, grade in zip(*told, strict=True):
+        failures[name] += valid
+        distinct[name] += first
+        preventable[name] += valid and grade == Grade.CAREFUL
+    kinds = [
+        FailureKind(
+            signature=signature,
+            name=name,
+            failures=failures[name],
+            distinct=distinct[name],
+            preventable=preventable[name],
+        )
+        for name, signature in signatures.items()
+    ]
+    return sorted(kinds, key=lambda kind: (-kind.preventable, -kind.failures, kind.name))
+
+
+def _scenes(columns: Columns) -> dict[str, FamilyScenes]:
+    places: defaultdict[str, list[int]] = defaultdict(list)
+    for place, family in enumerate(columns["families"]):
+        places[family].append(place)
+    scenes = columns["scene"]
+    return {family: _family_scenes([scenes[place] for place in of], of) for family, of in places.items()}
+
+
+def _family_scenes(scenes: Sequence[Plain], of: list[int]) -> FamilyScenes:
+    names = list(dict.fromkeys(name for scene in scenes for name in scene))  # those of an earlier version too
+    parameters = [_rounded([scene.get(name) for scene in scenes]) for name in names]
+    rows = list(zip(*parameters, strict=True)) or [()] * len(of)
+    return FamilyScenes(names=names, rows=rows, of=of)
+
+
+def _rounded(values: Sequence[Any]) -> list[Any]:
+    """Numbers as they are shown; what is missing or a word for what is not finite becomes no finite number."""
+    rounded: list[Any] = np.round(np.array(values, dtype=np.float64), DECIMALS).tolist()
+    return rounded

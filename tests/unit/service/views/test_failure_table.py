@@ -1,0 +1,140 @@
+import json
+import math
+from dataclasses import replace
+
+from risk_sac.config import CampaignSpec
+from risk_sac.records import Grade, Outcome
+from risk_sac.run_folder.verified import Repetition
+from risk_sac.verdicts.distinct import DistinctFailures
+from service.store.counting import to_text
+from service.store.stored import PlainEpisode
+from service.views.failure_table import failure_table
+from tests.builders import collision, episode_record, judgement
+
+SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
+FAILURE, REFUSED = Outcome.FAILURE, Outcome.DEGENERATE
+
+
+def plain(run, index, hit, outcome=FAILURE, phase="train", **changes):
+    record = episode_record(index, outcome, phase=phase, collision=hit, **changes)
+    return PlainEpisode(run.number, phase, index, outcome, to_text(record))
+
+
+def told(table):
+    return json.loads(table.model_dump_json())
+
+
+def test_a_column_has_what_the_record_has(ledger):
+    campaign = ledger.create(SPEC)
+    run = campaign.runs[1]
+    hit = collision(
+        time_s=3.21987654,
+        min_ttc_s=math.inf,
+        min_robustness=-0.123456,
+        ego_speed_mps=math.nan,
+        verdicts={"inside_limits": True, "ego_moving": False},
+        judgement=judgement(None, conflict_s=-math.inf),
+    )
+    table = told(failure_table(campaign, [plain(run, 7, hit, REFUSED, scene={"lead_gap_m": 12.34567})]))
+    kinds, scenes = table.pop("kinds"), table.pop("scenes")
+    assert {name: values[0] for name, values in table.items()} == {
+        "ids": "low-random-4-train-7",
+        "run_ids": "low-random-4",
+        "families": "low",
+        "methods": "random",
+        "seeds": 4,
+        "indices": 7,
+        "phases": "train",
+        "valid": False,
+        "grade": None,
+        "distinct": False,
+        "kind": 0,
+        "striker": "lead",
+        "striker_kind": "vehicle",
+        "conflict_type": "cut_in",
+        "conflict_s": None,
+        "time_s": 3.2199,
+        "visible_for_s": 3.0,
+        "ego_speed_mps": None,
+        "other_speed_mps": 2.0,
+        "relative_speed_mps": 7.0,
+        "lateral_offset_m": 0.1,
+        "min_ttc_s": None,
+        "min_rss_margin_m": -3.0,
+        "min_robustness": -0.1235,
+        "ego_peak_braking_mps2": 4.5,
+        "hidden": False,
+        "ego_response": "late_braking",
+        "ground": "lane",
+        "broke": ["red_light", "speeding"],
+        "refused_by": ["ego_moving"],
+        "repeats": None,
+        "triage": "new",
+    }
+    named = {"signature": "cut-in, straight", "name": "cut-in, straight"}
+    assert kinds == [named | {"failures": 0, "distinct": 0, "preventable": 0}]
+    assert scenes == {"low": {"names": ["lead_gap_m"], "rows": [[12.3457]], "of": [0]}}
+
+
+def test_distinct_are_those_that_the_run_counted(ledger):
+    campaign = ledger.create(SPEC)
+    first, second = campaign.runs
+    hits = [
+        collision(judgement=judgement(), ego_speed_mps=5.0),
+        collision(judgement=judgement(), ego_speed_mps=6.0),
+        collision(judgement=judgement(), ego_speed_mps=9.0),
+        collision(judgement=judgement(Grade.IDEAL, signature="leader"), ego_speed_mps=9.0),
+        collision(judgement=judgement(conflict_s=0.5), ego_speed_mps=9.0),
+        collision(),
+    ]
+    contacts = [plain(first, index, hit) for index, hit in enumerate(hits)]
+    contacts += [
+        plain(second, 0, hits[0]),
+        plain(first, 9, hits[0], phase="evaluate"),
+        plain(first, 10, hits[0], phase="evaluate"),
+    ]
+    counted = DistinctFailures()
+    table = failure_table(campaign, contacts)
+    assert table.distinct == [*(counted.add(hit) for hit in hits), True, True, False]
+    assert table.distinct[:6] == [True, False, True, True, True, True]
+    assert [(kind.name, kind.failures, kind.distinct, kind.preventable) for kind in table.kinds] == [
+        ("cut-in, straight", 7, 5, 7),
+        ("leader", 1, 1, 0),
+        ("unjudged adversary vehicle", 1, 1, 0),
+    ]
+    assert [kind.signature for kind in table.kinds] == ["cut-in, straight", "leader", None]
+    assert table.kind == [0, 0, 0, 1, 0, 2, 0, 0, 0]
+    assert (table.grade[5], table.conflict_type[5], table.hidden[5], table.broke[5]) == (None, None, None, [])
+
+
+def test_a_failure_says_whether_it_repeats(ledger):
+    campaign = ledger.create(SPEC)
+    run = campaign.runs[0]
+    repetitions = {0: Repetition(times=3, same=3), 1: Repetition(times=3, same=2)}
+    campaign = replace(campaign, runs=(replace(run, repetitions=repetitions), campaign.runs[1]))
+    table = failure_table(campaign, [plain(run, index, collision()) for index in range(3)])
+    assert table.repeats == ["verified", "flaky", None]
+
+
+def test_a_record_from_before_minima_were_called_early_is_read(ledger):
+    campaign = ledger.create(SPEC)
+    contact = plain(campaign.runs[0], 0, collision(min_ttc_s=0.75))
+    older = replace(contact, record=contact.record.replace('"early_min_ttc_s"', '"min_ttc_s"'))
+    assert older.record != contact.record
+    assert failure_table(campaign, [older]).min_ttc_s == [0.75]
+
+
+def test_without_a_failure_the_table_is_empty(ledger):
+    table = failure_table(ledger.create(SPEC), [])
+    assert {name: len(values) for name, values in table} == dict.fromkeys(type(table).model_fields, 0)
+
+
+def test_scenes_of_a_family_have_all_parameters_that_one_of_them_has(ledger):
+    campaign = ledger.create(CampaignSpec(families=("low", "dense"), methods=("random",)))
+    low, dense = campaign.runs
+    scenes = [(low, {"gap": 1.0}), (dense, {}), (low, {"gap": 2.0, "friction": 0.5})]
+    table = told(failure_table(campaign, [plain(run, 0, collision(), scene=scene) for run, scene in scenes]))
+    assert table["scenes"] == {
+        "low": {"names": ["gap", "friction"], "rows": [[1.0, None], [2.0, 0.5]], "of": [0, 2]},
+        "dense": {"names": [], "rows": [[]], "of": [1]},
+    }
