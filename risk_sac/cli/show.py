@@ -50,7 +50,7 @@ def _show(options: argparse.Namespace) -> int:
 
 def _twin(spec: RunSpec, recording: Recording, name: str) -> Recording:
     """The same scene with what the command line names changed."""
-    from risk_sac.failures.collect import check_release
+    from risk_sac.failures.play import check_release
     from risk_sac.failures.twin import twin_recording
 
     check_release(spec, recording.contact.episode, recording.series)

@@ -11,17 +11,16 @@ import numpy as np
 from risk_sac.agents.learner import Learner
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import CheckpointError, ConfigError, SimulationError
+from risk_sac.errors import CheckpointError
 from risk_sac.failures.bundle import Bundle, make_bundle
-from risk_sac.failures.play import Played, play
-from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
+from risk_sac.failures.play import check_release, repeated
+from risk_sac.failures.trajectory import Series
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.records import EpisodeRecord
 from risk_sac.run import RunState
 from risk_sac.run_folder.results import FAILURES, Results, series_name
 from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import read_verified
-from risk_sac.types import Scene
 
 logger = logging.getLogger(__name__)
 
@@ -68,31 +67,6 @@ def _series(folder: Path, spec: RunSpec, episode: EpisodeRecord) -> Series:
     recorded = read_series(folder / FAILURES / series_name(episode.index))
     check_release(spec, episode, recorded)
     return recorded
-
-
-def check_release(spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> None:
-    """Refuses what was recorded before there was a release.
-
-    Raises:
-      ConfigError: it was.
-    """
-    if "released_s" not in recorded:
-        message = f"the series of {episode.id_in(spec.id)} is older than the release of adversaries"
-        raise ConfigError(message, field="FAILURE")
-
-
-def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> Played:
-    """A contact played again, the same to the bit.
-
-    Raises:
-      SimulationError: it does not repeat.
-      ConfigError: its series is from before there was a release.
-    """
-    check_release(spec, episode, recorded)
-    played = play(env, Scene(spec.family, episode.scene), episode.seed, actions_of(recorded))
-    if trajectory_digest(played.series) != trajectory_digest(recorded):
-        raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here")
-    return played
 
 
 def policy_of(folder: Path, results: Results) -> FrozenPolicy | None:

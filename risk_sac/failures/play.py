@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.config import RunSpec
 from risk_sac.env import RiskSacEnv
-from risk_sac.failures.trajectory import Series
-from risk_sac.records import Collision
+from risk_sac.errors import ConfigError, SimulationError
+from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
+from risk_sac.records import Collision, EpisodeRecord
 from risk_sac.types import Floats, Scene, Vector
 
 Policy = Callable[[Vector], Vector]
@@ -56,3 +58,28 @@ def play(env: RiskSacEnv, scene: Scene, seed: int, actions: Floats, policy: Poli
         risk_return=sum(rewards),
         mean_cost=sum(costs) / max(len(costs) - 1, 1),
     )
+
+
+def check_release(spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> None:
+    """Refuses what was recorded before there was a release.
+
+    Raises:
+      ConfigError: it was.
+    """
+    if "released_s" not in recorded:
+        message = f"the series of {episode.id_in(spec.id)} is older than the release of adversaries"
+        raise ConfigError(message, field="FAILURE")
+
+
+def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> Played:
+    """A contact played again, the same to the bit.
+
+    Raises:
+      SimulationError: it does not repeat.
+      ConfigError: its series is from before there was a release.
+    """
+    check_release(spec, episode, recorded)
+    played = play(env, Scene(spec.family, episode.scene), episode.seed, actions_of(recorded))
+    if trajectory_digest(played.series) != trajectory_digest(recorded):
+        raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here")
+    return played

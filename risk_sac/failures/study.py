@@ -13,27 +13,27 @@ from pathlib import Path
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.failures.bundle import Bundle, bundle_bytes, make_bundle
-from risk_sac.failures.collect import policy_of, repeated
 from risk_sac.failures.minimise import minimise
+from risk_sac.failures.play import repeated
 from risk_sac.failures.question import REFUSED, Question
-from risk_sac.failures.recording import Recording
 from risk_sac.failures.region import region
-from risk_sac.failures.show import recording_bytes
-from risk_sac.failures.twin import twin_recording
+from risk_sac.failures.trajectory import actions_of
+from risk_sac.failures.twin import twin
+from risk_sac.failures.twin_play import TwinPlay, twin_bytes
 from risk_sac.frozen_policy import FrozenPolicy
-from risk_sac.run_folder.results import FAILURES, Contact, read_results
+from risk_sac.run_folder.results import FAILURES, read_results
 from risk_sac.run_folder.series import read_series
 
 
 def answer(question: Question) -> bytes:
-    """A bundle or a core as files, a region as JSON, a failure and its twin as a picture.
+    """A bundle or a core as files, a region as JSON, a twin with its time series.
 
     Raises:
       RiskSacError: the failure does not repeat, or cannot be played.
       ValueError: it is no contact that was judged.
     """
     if question.subject == "twin":
-        return _beside_twin(question)
+        return _twin(question)
     bundle = _bundle(question)
     if question.subject == "region":
         return region(bundle).model_dump_json().encode()
@@ -49,21 +49,24 @@ def _bundle(question: Question) -> Bundle:
 
 def _policy(question: Question) -> FrozenPolicy | None:
     """Of the run that the failure is of; a region has no use for it."""
+    if question.subject == "region":
+        return None
+    from risk_sac.failures.collect import policy_of  # here, because it loads torch, which takes seconds
+
     folder = question.series.parents[len(Path(FAILURES).parts)]
     try:
-        return None if question.subject == "region" else policy_of(folder, read_results(folder))
+        return policy_of(folder, read_results(folder))
     except ConfigError:  # results are not there yet
         return None
 
 
-def _beside_twin(question: Question) -> bytes:
-    contact = Contact.of(question.spec.id, question.episode)
+def _twin(question: Question) -> bytes:
+    """Of a failure that repeats here: what a change does to another episode tells nothing."""
     recorded = read_series(question.series)
     with closing(RiskSacEnv.of(question.spec)) as env:
         repeated(env, question.spec, question.episode, recorded)
-    recording = Recording(contact, recorded)
-    twin = twin_recording(question.spec, recording, question.twin)
-    return recording_bytes(question.spec.family, recording, "png", twin)
+    played = twin(question.spec, question.episode, actions_of(recorded), question.twin)
+    return twin_bytes(TwinPlay.of(question.twin, played.collision), played.series)
 
 
 def _main(file: Path) -> int:

@@ -10,6 +10,7 @@ from risk_sac.env import RiskSacEnv
 from risk_sac.failures.play import Played, play
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.trajectory import actions_of
+from risk_sac.failures.twin_play import TwinPlay
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord
 from risk_sac.types import STEP_S, Floats, Scene
@@ -27,10 +28,7 @@ def twin_recording(spec: RunSpec, recording: Recording, changed: EgoConfig | Non
       name: of the other ego; its profile if not given.
     """
     played = twin(spec, recording.contact.episode, actions_of(recording.series), changed)
-    what = "nobody attacks" if changed is None else f"ego: {name or changed.profile}"
-    found = played.collision
-    outcome = f"touches {found.other_id} at {found.ego_speed_mps:.1f} m/s" if found else "touches nobody"
-    return replace(recording, series=played.series, twin=f"{what}: {outcome}")
+    return replace(recording, series=played.series, twin=TwinPlay.of(changed, played.collision, name).title)
 
 
 def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoConfig | None) -> Played:

@@ -13,7 +13,7 @@ from service.runs.manager import Manager
 from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
 from service.store.reading import Store
-from service.views.pictures import ContactOfARun
+from service.views.pictures import Picture
 from service.views.products import Products
 from service.views.reports import Reports
 from service.views.studies import Studies
@@ -27,7 +27,7 @@ class Context:
     store: Store
     manager: Manager
     reports: Reports
-    pictures: Products[ContactOfARun]
+    pictures: Products[Picture]
     studies: Studies
     regressions: Regressions
     networks: Shelf

@@ -1,9 +1,10 @@
-"""One contact with its full time series, and where it came about."""
+"""One contact with its full time series, where it came about, and how its twin went."""
 
 from risk_sac import series
+from risk_sac.failures.question import Twin
 from risk_sac.failures.roads import Use
 from service.schemas.base import Body
-from service.schemas.episodes import Episode
+from service.schemas.episodes import Collision, Episode
 
 
 class Series(series.Series, Body):
@@ -34,3 +35,16 @@ class Roads(Body):
 
     surfaces: list[Surface]
     """In the order in which they are to be drawn; none where the scene's family had other roads then."""
+
+
+class TwinPlay(Body):
+    """The scene of a contact, played with one thing changed."""
+
+    twin: Twin
+    """`idle`: nobody attacks; else the profile of another ego."""
+    outcome: str
+    """In words, such as "touches nobody"."""
+    collision: Collision | None
+    """Null if the ego touches nobody."""
+    series: Series
+    """From the same start as the contact's own, up to 3 s after it, or until the ego touches somebody."""

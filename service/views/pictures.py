@@ -1,10 +1,12 @@
-"""Pictures of contacts."""
+"""Pictures of contacts, alone or beside a twin."""
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from risk_sac import __version__
+from risk_sac.failures.question import Twin
 from risk_sac.failures.recording import Recording
+from risk_sac.failures.twin_play import read_twin
 from risk_sac.run_folder.results import Contact
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign, StoredEpisode, StoredRun
@@ -33,16 +35,31 @@ class ContactOfARun:
         return cls(edition, campaign, run, episode)
 
 
-def pictures(settings: ServiceSettings) -> Products[ContactOfARun]:
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """What is drawn."""
+
+    contact: ContactOfARun
+    twin: Twin | None = None
+    """What is drawn beside it."""
+    played: bytes = field(default=b"", compare=False)
+    """That twin as a study told it."""
+
+
+def pictures(settings: ServiceSettings) -> Products[Picture]:
     """PNGs of contacts; StorageError where the time series is lost."""
 
-    def draw(contact: ContactOfARun) -> bytes:
+    def draw(picture: Picture) -> bytes:
         from risk_sac.failures.show import recording_bytes  # here, because it loads matplotlib
 
-        episode = contact.episode
+        contact, episode = picture.contact, picture.contact.episode
         path, sha256 = series_file(contact.campaign.id, episode, settings)
         arrays = load_arrays(path, sha256)
         shown = Contact(id=episode.id, series=path.name, episode=episode.record)
-        return recording_bytes(contact.run.family, Recording(shown, arrays), "png")
+        recording, twin = Recording(shown, arrays), None
+        if picture.twin is not None:
+            told, series = read_twin(picture.played)
+            twin = replace(recording, series=series, twin=told.title)
+        return recording_bytes(contact.run.family, recording, "png", twin)
 
     return Products(draw, "pictures")

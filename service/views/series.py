@@ -4,6 +4,7 @@ import hashlib
 import io
 import zipfile
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,18 @@ _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 
 
 def load_series(path: Path, sha256: str | None) -> Series:
-    """The series as a body; numbers that are not finite become None.
+    """The series as a body.
 
     Raises:
       StorageError: as `load_arrays`.
     """
-    return Series.model_validate({name: _plain(name, array) for name, array in load_arrays(path, sha256).items()})
+    return series_body(load_arrays(path, sha256))
+
+
+def series_body(arrays: Mapping[str, NDArray[Any]]) -> Series:
+    """Arrays as a body, in which numbers that are not finite are None; it leaves out arrays that nobody is told of."""
+    told = arrays.keys() & Series.model_fields.keys()
+    return Series.model_validate({name: _plain(name, arrays[name]) for name in told})
 
 
 def load_arrays(path: Path, sha256: str | None) -> dict[str, NDArray[Any]]:

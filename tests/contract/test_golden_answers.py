@@ -67,6 +67,7 @@ ASKED = {
     "core_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/core.npz"),
     "region_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/region"),
     "twin_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/twins/idle.png"),
+    "twin_play_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/twins/idle"),
     "roads_older": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-1/roads"),
     "roads_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/roads"),
     "regression_unknown": ("GET", f"/v1/regressions/{ENDED_ID}-0000000000000000"),
@@ -124,7 +125,12 @@ def test_every_documented_route_that_is_read_is_asked_for(client):
     """But for the pictures, which matplotlib draws as its version does."""
     paths = client.get("/openapi.json").json()["paths"]
     known = {ENDED_ID: "{campaign_id}", "low-risk-sac-3-train-1": "{failure_id}", "n0": "{network_id}"}
-    known |= {"low-risk-sac-3-train-0": "{failure_id}", "pie.png": "{name}.{format}", "idle.png": "{twin}.png"}
+    known |= {
+        "low-risk-sac-3-train-0": "{failure_id}",
+        "pie.png": "{name}.{format}",
+        "idle.png": "{twin}.png",
+        "idle": "{twin}",
+    }
     known[f"{ENDED_ID}-0000000000000000"] = "{regression_id}"
     parts = [path.partition("?")[0].split("/") for _, path in ASKED.values()]
     asked = {"/".join(known.get(part, part) for part in each) for each in parts}

@@ -9,15 +9,18 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 
 import httpx
+import numpy as np
 import pytest
 
 from risk_sac import cli
 from risk_sac.client import Client, Refused, Series
 from risk_sac.failures import show
+from risk_sac.failures.twin_play import TwinPlay, twin_bytes
 from risk_sac.run_folder.results import FAILURES, series_name
 from service.settings import ServiceSettings
 from service.store.database import READERS
 from service.views import products
+from service.views.studies import Studies
 from tests.contract.recorded_campaigns import ENDED_ID, Recorded, known_times_and_ids
 from tests.contract.serving import serving
 
@@ -56,10 +59,10 @@ def drawn(monkeypatch):
     """The pictures that are drawn, each as soon as its gate is open."""
     draw, begun, gate = show.recording_bytes, [], threading.Event()
 
-    def drawing(family, recording, format_):
+    def drawing(family, recording, format_, twin):
         begun.append(recording.contact.id)
         assert gate.wait(600)
-        return draw(family, recording, format_)
+        return draw(family, recording, format_, twin)
 
     monkeypatch.setattr(show, "recording_bytes", drawing)
     drawing.begun, drawing.gate = begun, gate
@@ -145,14 +148,40 @@ def test_no_more_than_a_bounded_number_waits_and_others_are_told_when_to_come_ba
 
 
 def test_what_does_not_repeat_can_be_drawn_but_not_played(client, tmp_path):
-    for what in ("bundle.npz", "core.npz", "region", "twins/idle.png"):
+    for what in ("bundle.npz", "core.npz", "region", "twins/idle.png", "twins/idle"):
         answer = client.get(f"{FOLDER}/{RUN}-train-1/{what}")
         assert (answer.status_code, answer.json()["reason"]) == (409, "not_playable")
         assert "/" not in answer.json()["detail"]
     for failure, status, reason in ((f"{RUN}-train-0", 404, "unknown_id"), ("x", 404, "unknown_id")):
         answer = client.get(f"{FOLDER}/{failure}/bundle.npz")
         assert (answer.status_code, answer.json()["reason"]) == (status, reason)
-    assert client.get(f"{FOLDER}/{RUN}-train-1/twins/nobody.png").status_code == 422
+    for twin in ("nobody.png", "nobody", "idle.svg", ".png"):
+        assert client.get(f"{FOLDER}/{RUN}-train-1/twins/{twin}").status_code == 422
+
+
+def test_the_picture_and_the_series_of_a_twin_are_of_one_play_and_need_not_be_sent_twice(tmp_path, monkeypatch):
+    asked = []
+
+    def answer(studies, study):
+        asked.append(study)
+        file = tmp_path / "campaigns" / ENDED_ID / RUN / FAILURES / study.contact.episode.series
+        with np.load(file) as arrays:
+            return twin_bytes(TwinPlay.of(None, None), dict(arrays))
+
+    monkeypatch.setattr(Studies, "_answer", answer)
+    with recorded(ServiceSettings(data_dir=tmp_path, max_workers=1)) as client:
+        path = f"{FOLDER}/{RUN}-train-1/twins/idle"
+        told, drawn, again = (client.get(url).raise_for_status() for url in (path, f"{path}.png", path))
+        assert drawn.content.startswith(b"\x89PNG")
+        assert told.json() == again.json()
+        assert (told.json()["twin"], told.json()["outcome"]) == ("idle", "touches nobody")
+        assert told.json()["series"] == client.get(f"{FOLDER}/{RUN}-train-1").json()["series"]
+        assert len(asked) == 1
+        for answered in (told, drawn):
+            known = {"If-None-Match": answered.headers["etag"]}
+            assert client.get(answered.url.path, headers=known).status_code == 304
+        client.get(f"{FOLDER}/{RUN}-train-1/twins/careful").raise_for_status()
+        assert [study.twin for study in asked] == ["idle", "careful"]
 
 
 def test_the_client_has_the_picture_and_the_series_as_arrays_with_units(client):

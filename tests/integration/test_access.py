@@ -58,6 +58,7 @@ ROUTES = {
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/core.npz"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/region"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}.png"): ("read", 404),
+    ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/roads"): ("read", 200),
     ("GET", f"{CAMPAIGN}/failure-table"): ("read", 200),
     ("GET", f"{CAMPAIGN}/clusters"): ("read", 200),

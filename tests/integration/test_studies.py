@@ -3,6 +3,7 @@
 import signal
 
 import pytest
+from shapely import Point, Polygon, union_all
 
 from risk_sac import cli
 from risk_sac.client import Client, Refused
@@ -41,6 +42,22 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
         with pytest.raises(Refused) as refused:
             client.picture(campaign_id, id_, "nobody")
         assert refused.value.status == 422
+
+    own = service.get(campaign_id, f"/failures/{id_}")
+    surfaces = service.get(campaign_id, f"/failures/{id_}/roads")["surfaces"]
+    ground = union_all([Polygon(surface["outline"]) for surface in surfaces])
+    assert all(
+        ground.covers(Point(x[0], y[0])) for x, y in zip(own["series"]["x_m"], own["series"]["y_m"], strict=True)
+    )
+    default, idle = (service.get(campaign_id, f"/failures/{id_}/twins/{twin}") for twin in ("default", "idle"))
+    assert default["series"] == own["series"], "the failure's own ego"
+    assert default["collision"] == own["collision"]
+    assert (
+        default["outcome"] == f"touches {own['collision']['other_id']} at {own['collision']['ego_speed_mps']:.1f} m/s"
+    )
+    assert idle["series"]["ids"] == own["series"]["ids"]
+    assert idle["series"]["x_m"][0] == own["series"]["x_m"][0], "they begin alike"
+    assert (idle["collision"] is None) == (idle["outcome"] == "touches nobody")
 
     replayed = [each for each in service.get(campaign_id, "/failures", limit=100)["items"] if each["repetition"]]
     assert all(each["repetition"] == {"times": 2, "same": 2} for each in replayed)

@@ -1,5 +1,6 @@
 """/v1/campaigns/{id}/failures/{id}/…: what takes seconds to make of a collision, made when it is asked for."""
 
+from collections.abc import Awaitable, Callable
 from http import HTTPStatus
 from typing import Annotated, Any
 
@@ -12,12 +13,14 @@ from service.api.access import CurrentCaller
 from service.api.answers.problems import ProblemError
 from service.api.answers.representations import caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, Responses, header, problem
-from service.api.context import Service
+from service.api.context import Context, Service
 from service.errors import StorageError
+from service.schemas.failures import TwinPlay
 from service.schemas.problems import Reason
-from service.views.pictures import ContactOfARun
-from service.views.products import Products, S, TooManyWaiting
+from service.views.pictures import ContactOfARun, Picture
+from service.views.products import TooManyWaiting
 from service.views.studies import CannotBePlayed, Study
+from service.views.twins import twin_body
 
 PNG, JSON, NPZ = "image/png", "application/json", "application/zip"
 RETRY_AFTER_S = 2  # in which some of those who wait get theirs
@@ -38,7 +41,7 @@ def _made(media_type: str) -> Responses:
 
 PICTURE = _made(PNG)
 PLAYED = problem(409, "The collision does not repeat here, or cannot be played")
-BUNDLE, TWIN, REGION = _made(NPZ) | PLAYED, _made(PNG) | PLAYED, _made(JSON) | PLAYED
+BUNDLE, TWIN, TOLD = _made(NPZ) | PLAYED, _made(PNG) | PLAYED, _made(JSON) | PLAYED
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
 
@@ -55,35 +58,55 @@ Asked = Annotated[ContactOfARun, Depends(_contact)]
 @router.get("/failures/{failure_id}/picture.png", response_class=Response, responses=PICTURE)
 async def get_picture(contact: Asked, request: Request, service: Service) -> Response:
     """One collision, valid or not: both paths from above, and what was measured along the way."""
-    return await _answer(contact, request, PNG, service.pictures, contact)
+    return await _answer(contact, request, PNG, lambda: service.pictures.product(Picture(contact)))
 
 
 @router.get("/failures/{failure_id}/bundle.npz", response_class=Response, responses=BUNDLE)
 async def get_bundle(contact: Asked, request: Request, service: Service) -> Response:
     """One collision in a file that stands alone, once it was played again; `risk-sac replay` plays it anywhere."""
-    return await _answer(contact, request, NPZ, service.studies, Study(contact, "bundle"))
+    return await _answer(contact, request, NPZ, lambda: service.studies.product(Study(contact, "bundle")))
 
 
 @router.get("/failures/{failure_id}/core.npz", response_class=Response, responses=BUNDLE)
 async def get_core(contact: Asked, request: Request, service: Service) -> Response:
     """The same with all taken away that the failure does not need; takes up to 150 episodes, some 10 s."""
-    return await _answer(contact, request, NPZ, service.studies, Study(contact, "core"))
+    return await _answer(contact, request, NPZ, lambda: service.studies.product(Study(contact, "core")))
 
 
-@router.get("/failures/{failure_id}/region", response_model=Region, responses=REGION)
+@router.get("/failures/{failure_id}/region", response_model=Region, responses=TOLD)
 async def get_region(contact: Asked, request: Request, service: Service) -> Response:
     """How many of its neighbours fail as it does: nearby scenes, other traffic, other actions; takes 170 episodes."""
-    return await _answer(contact, request, JSON, service.studies, Study(contact, "region"))
+    return await _answer(contact, request, JSON, lambda: service.studies.product(Study(contact, "region")))
 
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=TWIN)
 async def get_twin(contact: Asked, twin: Twin, request: Request, service: Service) -> Response:
     """One collision beside the same scene with nobody attacking (`idle`), or with another ego, on one clock."""
-    return await _answer(contact, request, PNG, service.studies, Study(contact, "twin", twin))
+
+    async def draw() -> bytes:
+        return await service.pictures.product(Picture(contact, twin, await _played(contact, twin, service)))
+
+    return await _answer(contact, request, PNG, draw)
+
+
+@router.get("/failures/{failure_id}/twins/{twin}", response_model=TwinPlay, responses=TOLD)
+async def get_twin_play(contact: Asked, twin: Twin, request: Request, service: Service) -> Response:
+    """What the same scene comes to with nobody attacking (`idle`), or with another ego, and its full time series."""
+
+    async def tell() -> bytes:
+        played = await _played(contact, twin, service)
+        return await run_in_threadpool(lambda: twin_body(twin, played).model_dump_json().encode())
+
+    return await _answer(contact, request, JSON, tell)
+
+
+async def _played(contact: ContactOfARun, twin: Twin, service: Context) -> bytes:
+    """A twin as a study tells it, which is played once for its picture and its time series."""
+    return await service.studies.product(Study(contact, "twin", twin))
 
 
 async def _answer(
-    contact: ContactOfARun, request: Request, media_type: str, products: Products[S], subject: S
+    contact: ContactOfARun, request: Request, media_type: str, make: Callable[[], Awaitable[bytes]]
 ) -> Response:
     """A product of a contact, unless the client has it: routes differ in their paths, so the edition is tag enough."""
     tag = entity_tag(contact.edition)
@@ -91,7 +114,7 @@ async def _answer(
         return not_modified(tag)
     id_ = contact.episode.id
     try:
-        content = await products.product(subject)
+        content = await make()
     except StorageError as error:
         raise _problem(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, f"{id_!r} cannot be shown: {error}") from error
     except CannotBePlayed as error:

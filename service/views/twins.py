@@ -1,0 +1,19 @@
+"""A contact's twin as a body."""
+
+from risk_sac.failures.question import Twin
+from risk_sac.failures.twin_play import read_twin
+from service.schemas.episodes import Collision
+from service.schemas.failures import TwinPlay
+from service.views.series import series_body
+
+
+def twin_body(twin: Twin, played: bytes) -> TwinPlay:
+    """A twin with its full time series.
+
+    Args:
+      twin: which.
+      played: as a study told it.
+    """
+    told, arrays = read_twin(played)
+    collision = None if told.collision is None else Collision.model_validate(told.collision.model_dump())
+    return TwinPlay(twin=twin, outcome=told.outcome, collision=collision, series=series_body(arrays))

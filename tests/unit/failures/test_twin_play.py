@@ -1,0 +1,25 @@
+import math
+
+import numpy as np
+
+from risk_sac.config import EgoConfig
+from risk_sac.failures.twin_play import TwinPlay, read_twin, twin_bytes
+from tests.builders import collision
+from tests.unit.failures.staged import synthetic_series
+
+
+def test_a_twin_is_named_by_what_was_changed_and_what_came_of_it() -> None:
+    hit = collision(other_id="lead", ego_speed_mps=5.44)
+    careful = EgoConfig(profile="careful")
+    assert TwinPlay.of(None, None).title == "nobody attacks: touches nobody"
+    assert TwinPlay.of(careful, hit).title == "ego: careful: touches lead at 5.4 m/s"
+    assert TwinPlay.of(careful, hit, "slow.yaml").changed == "ego: slow.yaml"
+
+
+def test_a_twin_reads_back_with_its_series_and_what_is_not_finite() -> None:
+    play = TwinPlay.of(None, collision(min_ttc_s=math.inf))
+    read, series = read_twin(twin_bytes(play, synthetic_series()))
+    assert read == play
+    assert series.keys() == synthetic_series().keys()
+    for name, array in synthetic_series().items():
+        np.testing.assert_array_equal(series[name], array)
