@@ -1,7 +1,205 @@
+/** A new campaign: a form made from the API's own description, and the same as text. */
+
+import { useMemo, useState } from "preact/hooks";
+import { useAsked } from "../../api/asked";
+import { call, Problem } from "../../api/client";
+import type { Body } from "../../api/types";
+import { address, go } from "../../router";
+import { Shown } from "../../ui/states";
+import { bodyOf, isPerfect, NOT_OF_PERFECT, textOf } from "./body";
+import { useChecked } from "./checked";
+import { Choices, Fields, Group, SchemaField } from "./field";
+import { FormContext, type Wrong } from "./form";
+import { OddFields } from "./odd";
+import { applied, isOf, PRESETS } from "./presets";
+import { Preview } from "./preview";
+import { Requirements } from "./requirements";
+import { posted, type Description, type Field, type Json, type Shape, type Values } from "./schema";
+import { Submit } from "./submit";
+import { filled, leaves, put, type Path } from "./values";
+import "./new.css";
+
+type Known = [Description, Body<"Families">, Body<"Methods">];
+
 export function NewScreen({ query }: { query: URLSearchParams }) {
+  const from = query.get("from");
+  const description = useAsked<Description>("openapi.json");
+  const families = useAsked<Body<"Families">>("v1/families");
+  const methods = useAsked<Body<"Methods">>("v1/methods");
+  const cloned = useAsked<Values>(from === null ? null : `v1/campaigns/${encodeURIComponent(from)}/spec?format=json`);
   return (
-    <h1>
-      New {query.toString()}
-    </h1>
+    <>
+      <div class="head">
+        <h1>{from === null ? "New campaign" : "New campaign, from another one"}</h1>
+      </div>
+      <Shown asked={description} what="the form">
+        {(described) => (
+          <Shown asked={families} what="the families">
+            {(known) => (
+              <Shown asked={methods} what="the methods">
+                {(search) => {
+                  const given: Known = [described, known, search];
+                  if (from === null) return <CampaignForm key="" known={given} />;
+                  return (
+                    <Shown asked={cloned} what="the campaign to begin with">
+                      {(spec) => <CampaignForm key={from} known={given} from={{ id: from, spec }} />}
+                    </Shown>
+                  );
+                }}
+              </Shown>
+            )}
+          </Shown>
+        )}
+      </Shown>
+    </>
   );
+}
+
+interface Begun {
+  known: Known;
+  from?: { id: string; spec: Values };
+}
+
+function CampaignForm({ known: [description, families, methods], from }: Begun) {
+  const shape = useMemo(() => posted(description, "/v1/campaigns"), [description]);
+  const [spec, setSpec] = useState<Values>(() =>
+    from ? (filled(shape, from.spec) as Values) : applied(PRESETS[0]!, filled(shape, {}) as Values),
+  );
+  const body = useMemo(() => bodyOf(shape, spec), [shape, spec]);
+  const text = textOf(body);
+  const verdict = useChecked(text);
+  const { submit, refused, busy } = useSubmit(text);
+  const wrong = verdict.state === "wrong" ? verdict.wrong : refused.text === text ? refused.wrong : [];
+  const why = verdict.state === "wrong" && wrong.length === 0 ? verdict.why : refused.text === text ? refused.why : "";
+  const form = useMemo(
+    () => ({ spec, wrong, change: (path: Path, value: Json) => setSpec((before) => put(before, path, value) as Values) }),
+    [spec, wrong],
+  );
+  const chosen = families.items.filter(({ name }) => (spec.families as string[]).includes(name));
+  const field = fieldsOf(shape);
+  const tally = (name: string) => leaves(body[name]);
+  return (
+    <FormContext.Provider value={form}>
+      <form class="new" noValidate onSubmit={submit}>
+        <div class="grid parts">
+          {from && (
+            <p class="card small">
+              Begun with the spec of <a href={address(["campaigns", from.id])}>{from.id}</a>; the seeds are the same, so that an unchanged
+              one finds the same.
+            </p>
+          )}
+          <Presets spec={spec} choose={setSpec} />
+          <section class="card">
+            <SchemaField field={field("label")} path={["label"]} />
+            <Choices field={field("families")} path={["families"]} abouts={summaries(families.items)} />
+            <Choices field={field("methods")} path={["methods"]} abouts={summaries(methods.items)} />
+            <SchemaField field={{ ...field("seeds"), about: "Each method is run once with each; 0-4 is five of them." }} path={["seeds"]} />
+          </section>
+          <section class="card">
+            <h2>Budget of each run</h2>
+            <Fields shape={field("budget").shape} path={["budget"]} />
+          </section>
+          <Group title="Ego" about={field("ego").shape.kind === "object" ? aboutOf(field("ego")) : ""} path={["ego"]} changed={tally("ego") > 0} open={tally("ego") > 0}>
+            <Fields shape={egoShape(field("ego").shape, spec)} path={["ego"]} />
+          </Group>
+          <Group title="Operational design domain" about={aboutOf(field("odd"))} path={["odd"]} changed={tally("odd") > 0} open={tally("odd") > 0}>
+            <OddFields shape={field("odd").shape} families={chosen} />
+          </Group>
+          <Group title="Requirements" path={["requirements"]} changed={tally("requirements") > 0} open={tally("requirements") > 0}>
+            <Requirements shape={itemOf(field("requirements").shape)} signals={families.signals} families={chosen} />
+          </Group>
+          <Group title="Learner" about={aboutOf(field("learner"))} path={["learner"]} changed={tally("learner") > 0} open={tally("learner") > 0}>
+            <Fields shape={field("learner").shape} path={["learner"]} />
+          </Group>
+        </div>
+        <aside class="grid beside" aria-label="What it comes to">
+          <Submit spec={spec} verdict={verdict} wrong={wrong} refused={why} busy={busy} />
+          <Preview body={body} />
+        </aside>
+      </form>
+    </FormContext.Provider>
+  );
+}
+
+function Presets({ spec, choose }: { spec: Values; choose: (spec: Values) => void }) {
+  return (
+    <div class="presets" role="group" aria-label="Presets">
+      {PRESETS.map((preset) => (
+        <button
+          key={preset.title}
+          type="button"
+          class="preset"
+          aria-pressed={isOf(preset, spec)}
+          onClick={() => choose(applied(preset, spec))}
+        >
+          <b>{preset.title}</b>
+          <span class="small">{preset.about}</span>
+        </button>
+      ))}
+    </div>
+  );
+}
+
+const NOTHING = { text: "", wrong: [] as readonly Wrong[], why: "" };
+
+/** Posts the text under a key of the form's own: whoever tries again after a lost answer gets the campaign that there is. */
+function useSubmit(text: string) {
+  const [key, setKey] = useState(newKey);
+  const [busy, setBusy] = useState(false);
+  const [refused, setRefused] = useState(NOTHING);
+  const submit = async (event: Event) => {
+    event.preventDefault();
+    setBusy(true);
+    setRefused(NOTHING);
+    try {
+      const headers = { "Content-Type": "application/json", "Idempotency-Key": key };
+      const answer = await call("v1/campaigns", { method: "POST", headers, body: text });
+      const { id } = (await answer.json()) as Body<"Campaign">;
+      go(address(["campaigns", id]));
+    } catch (error) {
+      const problem = error instanceof Problem ? error : undefined;
+      if (problem?.status === 409) setKey(newKey()); // an earlier try came through, with other values
+      setRefused({ text, wrong: problem?.errors ?? [], why: problem?.errors.length ? "" : wordsOf(error as Error) });
+      setBusy(false);
+    }
+  };
+  return { submit, refused, busy };
+}
+
+function wordsOf(error: Error): string {
+  if (error instanceof TypeError) return "The service does not answer. Trying again cannot start it twice.";
+  if (error instanceof Problem && error.status === 409) {
+    return "An earlier try did start a campaign; see the list. Press again to start this one too.";
+  }
+  return error.message;
+}
+
+function newKey(): string {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+function fieldsOf(shape: Shape): (name: string) => Field {
+  const fields = shape.kind === "object" ? shape.fields : [];
+  return (name) => {
+    const found = fields.find((field) => field.name === name);
+    if (!found) throw new Error(`the service's description of a campaign has no ${name}`);
+    return found;
+  };
+}
+
+function aboutOf({ shape }: Field): string {
+  return shape.kind === "object" ? shape.about : "";
+}
+
+function itemOf(shape: Shape): Shape {
+  return shape.kind === "list" ? shape.item : shape;
+}
+
+function egoShape(shape: Shape, spec: Values): Shape {
+  if (shape.kind !== "object" || !isPerfect(spec)) return shape;
+  return { ...shape, fields: shape.fields.filter(({ name }) => !NOT_OF_PERFECT.includes(name)) };
+}
+
+function summaries(items: readonly { name: string; summary: string }[]): Values {
+  return Object.fromEntries(items.map(({ name, summary }) => [name, summary]));
 }

@@ -1,0 +1,239 @@
+/** A field of the form made from its schema, whatever it is. */
+
+import type { ComponentChildren } from "preact";
+import { useContext, useState } from "preact/hooks";
+import { FormContext, isWithin, useField, type Wrong } from "./form";
+import { numbersOf, numbersText } from "./numbers";
+import type { Field, Json, Shape, Values } from "./schema";
+import { blank, equal, filled, pathText, type Path } from "./values";
+
+/** All fields of an object; objects among them become groups that open. */
+export function Fields({ shape, path }: { shape: Shape; path: Path }) {
+  if (shape.kind !== "object") return null;
+  return (
+    <div class="fields">
+      {shape.fields.map((field) => (
+        <SchemaField key={field.name} field={field} path={[...path, field.name]} />
+      ))}
+    </div>
+  );
+}
+
+export function SchemaField({ field, path }: { field: Field; path: Path }) {
+  const { value, change } = useField(path);
+  const { shape, optional, title, about } = field;
+  if (optional) return <Optional field={field} path={path} />;
+  if (shape.kind === "object") {
+    const changed = field.preset !== undefined && !equal(value, filled(shape, field.preset));
+    return (
+      <Group title={title} about={about || shape.about} path={path} changed={changed} reset={() => change(filled(shape, field.preset))}>
+        <Fields shape={shape} path={path} />
+      </Group>
+    );
+  }
+  return <Leaf field={field} path={path} />;
+}
+
+/** A field that may be null: a switch beside it says whether it is there at all. */
+function Optional({ field, path }: { field: Field; path: Path }) {
+  const { id, value, change } = useField(path);
+  const { shape, title, about, preset } = field;
+  const there = value !== null;
+  const begin = () => change(filled(shape, preset === null || preset === undefined ? blank(shape) : preset));
+  return (
+    <div class="optional">
+      <label class="check">
+        <input id={`${id}-there`} type="checkbox" checked={there} onChange={() => (there ? change(null) : begin())} />
+        {there ? `${title}:` : `${title}: none`}
+      </label>
+      {there ? <SchemaField field={{ ...field, optional: false, title: `${title} ` }} path={path} /> : about && <p class="help">{about}</p>}
+    </div>
+  );
+}
+
+interface Grouped {
+  title: string;
+  about?: string;
+  path: Path;
+  changed?: boolean;
+  reset?: () => void;
+  open?: boolean;
+  children: ComponentChildren;
+}
+
+/** A part of the form that opens; it does so by itself where something in it is wrong. */
+export function Group({ title, about, path, changed, reset, open = false, children }: Grouped) {
+  const { wrong } = useContext(FormContext);
+  const broken = wrong.filter(({ field }) => isWithin(field, pathText(path))).length;
+  const [opened, setOpened] = useState(open);
+  const shown = opened || broken > 0;
+  return (
+    <details class="group" open={shown} onToggle={(event) => setOpened(event.currentTarget.open)}>
+      <summary>
+        <span class="group-title">{title}</span>
+        {broken > 0 ? <span class="tag failed">{broken} wrong</span> : changed && <span class="tag running">changed</span>}
+      </summary>
+      {about && <p class="help">{about}</p>}
+      {shown && children}
+      {shown && changed && reset && (
+        <button type="button" class="reset" onClick={reset}>
+          Back to the defaults
+        </button>
+      )}
+    </details>
+  );
+}
+
+/** A label, its control, what it means and what is wrong with it. */
+export function Labelled(props: { id: string; title: string; unit?: string; about?: string; wrong: readonly Wrong[]; children: ComponentChildren }) {
+  const { id, title, unit, about, wrong, children } = props;
+  return (
+    <div class={wrong.length ? "field is-wrong" : "field"}>
+      <label for={id}>{title}</label>
+      <span class="control">
+        {children}
+        {unit && <span class="faint">{unit}</span>}
+      </span>
+      <Wrongs id={id} wrong={wrong} />
+      {about && (
+        <p class="help" id={`${id}-help`}>
+          {about}
+        </p>
+      )}
+    </div>
+  );
+}
+
+export function Wrongs({ id, wrong }: { id: string; wrong: readonly Wrong[] }) {
+  if (wrong.length === 0) return null;
+  return (
+    <p class="wrong" id={`${id}-wrong`} role="alert">
+      {wrong.map(({ message }) => message).join("; ")}
+    </p>
+  );
+}
+
+/** What a control says of itself to those who do not see what stands beside it. */
+export function described(id: string, wrong: readonly Wrong[], about: string): Record<string, string | boolean | undefined> {
+  const by = [wrong.length ? `${id}-wrong` : "", about ? `${id}-help` : ""].filter(Boolean).join(" ");
+  return { "aria-invalid": wrong.length ? true : undefined, "aria-describedby": by || undefined };
+}
+
+function Leaf({ field, path }: { field: Field; path: Path }) {
+  const { shape, title, unit, about } = field;
+  const bound = useField(path, true);
+  const help = [about, boundsOf(shape)].filter(Boolean).join(" ");
+  if (shape.kind === "switch") return <Switch field={field} path={path} />;
+  if (shape.kind === "list" && shape.item.kind === "choice") return <Choices field={field} path={path} />;
+  return (
+    <Labelled {...bound} title={title} unit={unit} about={help}>
+      <Control shape={shape} {...bound} more={described(bound.id, bound.wrong, help)} />
+    </Labelled>
+  );
+}
+
+function boundsOf(shape: Shape): string {
+  if (shape.kind !== "number") return "";
+  const { low, high } = shape;
+  if (Number.isFinite(low) && Number.isFinite(high)) return `${low} to ${high > 1e6 ? high.toExponential().replace("+", "") : high}.`;
+  return Number.isFinite(low) ? `At least ${low}.` : "";
+}
+
+interface Controlled {
+  shape: Shape;
+  id: string;
+  value: Json;
+  change: (value: Json) => void;
+  more: Record<string, string | boolean | undefined>;
+}
+
+function Control({ shape, id, value, change, more }: Controlled) {
+  if (shape.kind === "number") return <NumberInput id={id} shape={shape} value={value as number | null} change={change} more={more} />;
+  if (shape.kind === "list") return <NumbersInput id={id} value={value as number[]} change={change} more={more} />;
+  if (shape.kind === "choice") {
+    return (
+      <select id={id} value={value as string} onChange={(event) => change(event.currentTarget.value)} {...more}>
+        {shape.options.map((option) => (
+          <option key={option}>{option}</option>
+        ))}
+      </select>
+    );
+  }
+  const most = shape.kind === "text" && Number.isFinite(shape.most) ? shape.most : undefined;
+  return <input id={id} value={value as string} maxLength={most} onInput={(event) => change(event.currentTarget.value)} {...more} />;
+}
+
+type NumberShape = Extract<Shape, { kind: "number" }>;
+type Numbered = Omit<Controlled, "shape" | "value"> & { shape: NumberShape; value: number | null };
+
+export function NumberInput({ id, shape, value, change, more }: Numbered) {
+  const bounds = { min: Number.isFinite(shape.low) ? shape.low : undefined, max: Number.isFinite(shape.high) ? shape.high : undefined };
+  return (
+    <input
+      id={id}
+      type="number"
+      {...bounds}
+      step={shape.integer ? 1 : "any"}
+      value={value ?? ""}
+      onInput={({ currentTarget: { valueAsNumber: number } }) => change(Number.isFinite(number) ? number : null)}
+      {...more}
+    />
+  );
+}
+
+/** Numbers as one line of text; what is none of them counts for nothing. */
+export function NumbersInput({ id, value, change, more }: Omit<Controlled, "shape" | "value"> & { value: number[] }) {
+  const [typed, setTyped] = useState<string>(); // while it is written, since `0-` is on the way to `0-4`
+  return (
+    <input
+      id={id}
+      value={typed ?? numbersText(value)}
+      onInput={(event) => {
+        const text = event.currentTarget.value;
+        const numbers = numbersOf(text);
+        setTyped(text);
+        if (numbers !== null) change(numbers);
+      }}
+      onBlur={() => setTyped(undefined)}
+      {...more}
+    />
+  );
+}
+
+function Switch({ field: { title, about }, path }: { field: Field; path: Path }) {
+  const { id, value, change, wrong } = useField<boolean>(path);
+  return (
+    <div class="field">
+      <label class="check">
+        <input id={id} type="checkbox" checked={value} onChange={() => change(!value)} {...described(id, wrong, about)} /> {title}
+      </label>
+      <Wrongs id={id} wrong={wrong} />
+      {about && (
+        <p class="help" id={`${id}-help`}>
+          {about}
+        </p>
+      )}
+    </div>
+  );
+}
+
+/** Some of a few names, each with a box; `abouts` has a word on each. */
+export function Choices({ field, path, abouts = {} }: { field: Field; path: Path; abouts?: Values }) {
+  const { id, value, change, wrong } = useField<string[]>(path, true);
+  const options = field.shape.kind === "list" && field.shape.item.kind === "choice" ? field.shape.item.options : [];
+  const toggle = (option: string) => options.filter((each) => (each === option) !== value.includes(each));
+  return (
+    <fieldset class={wrong.length ? "choices is-wrong" : "choices"} id={id}>
+      <legend>{field.title}</legend>
+      <Wrongs id={id} wrong={wrong} />
+      {options.map((option) => (
+        <label key={option} class={value.includes(option) ? "choice-card on" : "choice-card"}>
+          <input type="checkbox" checked={value.includes(option)} onChange={() => change(toggle(option))} />
+          <span>
+            <b>{option}</b> {abouts[option] && <span class="small">{abouts[option] as string}</span>}
+          </span>
+        </label>
+      ))}
+    </fieldset>
+  );
+}

@@ -1,0 +1,114 @@
+/** What a form needs to know of a JSON schema: for each field its kind, bounds, default and meaning. */
+
+import { words } from "../../ui/text";
+
+export type Json = null | boolean | number | string | Json[] | { [name: string]: Json };
+export type Values = { [name: string]: Json };
+
+/** The part of JSON Schema that the API's description uses. */
+export interface Schema {
+  $ref?: string;
+  type?: string;
+  enum?: string[];
+  anyOf?: Schema[];
+  properties?: Record<string, Schema>;
+  required?: string[];
+  items?: Schema;
+  default?: Json;
+  description?: string;
+  minimum?: number;
+  maximum?: number;
+  minItems?: number;
+  maxItems?: number;
+  maxLength?: number;
+  pattern?: string;
+}
+
+export interface Description {
+  paths: Record<string, Record<string, { requestBody?: { content: Record<string, { schema: Schema }> } }>>;
+  components: { schemas: Record<string, Schema> };
+}
+
+export type Shape =
+  | { kind: "object"; about: string; fields: Field[] }
+  | { kind: "list"; item: Shape; least: number; most: number }
+  | { kind: "number"; integer: boolean; low: number; high: number }
+  | { kind: "text"; most: number; pattern: string }
+  | { kind: "choice"; options: string[] }
+  | { kind: "switch" };
+
+export interface Field {
+  name: string;
+  title: string;
+  unit: string;
+  about: string;
+  shape: Shape;
+  /** Whether it may be null. */
+  optional: boolean;
+  /** What it is where it is left out; undefined where it must not be. */
+  preset: Json | undefined;
+}
+
+/** The shape of what is posted to a path. */
+export function posted(description: Description, path: string): Shape {
+  const schema = description.paths[path]?.post?.requestBody?.content["application/json"]?.schema;
+  if (!schema) throw new Error(`the service's description tells of no POST ${path}`);
+  return shapeOf(schema, description.components.schemas);
+}
+
+export function shapeOf(schema: Schema, schemas: Record<string, Schema>): Shape {
+  const known = resolved(schema, schemas);
+  if (known.properties) {
+    const fields = Object.entries(known.properties).map(([name, each]) => fieldOf(name, each, schemas));
+    return { kind: "object", about: oneLine(known.description), fields };
+  }
+  if (known.enum) return { kind: "choice", options: known.enum };
+  if (known.type === "array") {
+    const { items = {}, minItems = 0, maxItems = Infinity } = known;
+    return { kind: "list", item: shapeOf(items, schemas), least: minItems, most: maxItems };
+  }
+  if (known.type === "boolean") return { kind: "switch" };
+  if (known.type === "number" || known.type === "integer") {
+    const { minimum = -Infinity, maximum = Infinity } = known;
+    return { kind: "number", integer: known.type === "integer", low: minimum, high: maximum };
+  }
+  return { kind: "text", most: known.maxLength ?? Infinity, pattern: known.pattern ?? "" };
+}
+
+function fieldOf(name: string, schema: Schema, schemas: Record<string, Schema>): Field {
+  const named = resolved(schema, schemas);
+  const some = named.anyOf?.filter((each) => each.type !== "null") ?? [];
+  const optional = some.length > 0 && some.length < named.anyOf!.length;
+  const [title, unit] = titleOf(name);
+  return {
+    name,
+    title,
+    unit,
+    about: oneLine(schema.description),
+    shape: shapeOf(some[0] ?? named, schemas),
+    optional,
+    preset: schema.default,
+  };
+}
+
+function resolved(schema: Schema, schemas: Record<string, Schema>): Schema {
+  if (schema.$ref === undefined) return schema;
+  const name = schema.$ref.split("/").at(-1)!;
+  const found = schemas[name];
+  if (!found) throw new Error(`the service's description has no ${name}`);
+  return resolved(found, schemas);
+}
+
+const UNITS: Record<string, string> = { mps: "m/s", mps2: "m/s²", m: "m", s: "s", rad: "rad" };
+
+/** `reaction_time_s` -> "Reaction time" and "s". */
+export function titleOf(name: string): [title: string, unit: string] {
+  const cut = name.lastIndexOf("_");
+  const unit = cut > 0 ? UNITS[name.slice(cut + 1)] : undefined;
+  const said = words(unit === undefined ? name : name.slice(0, cut));
+  return [said.charAt(0).toUpperCase() + said.slice(1), unit ?? ""];
+}
+
+function oneLine(text = ""): string {
+  return text.replaceAll(/\s*\n\s*/g, " ");
+}

@@ -1,0 +1,84 @@
+/** What the campaign costs, what is wrong with it, and the button that starts it. */
+
+import type { Verdict } from "./checked";
+import { count } from "../../ui/text";
+import type { Wrong } from "./form";
+import { costOf } from "./presets";
+import type { Values } from "./schema";
+
+interface Ready {
+  spec: Values;
+  verdict: Verdict;
+  wrong: readonly Wrong[];
+  /** Why the last try was refused, where no field is to blame. */
+  refused: string;
+  busy: boolean;
+}
+
+export function Submit({ spec, verdict, wrong, refused, busy }: Ready) {
+  const { runs, episodes } = costOf(spec);
+  const length = (name: string) => (spec[name] as unknown[]).length;
+  return (
+    <section class="card submit" aria-label="Start">
+      <div class="tiles">
+        <span class="tile">
+          <b>{count(episodes)}</b>
+          <span>episodes in all</span>
+        </span>
+        <span class="tile">
+          <b>{count(runs)}</b>
+          <span>{runs === 1 ? "run" : "runs"}</span>
+        </span>
+      </div>
+      <p class="help">
+        {plural(length("families"), "family", "families")} × {plural(length("methods"), "method", "methods")} ×{" "}
+        {plural(length("seeds"), "seed", "seeds")}
+      </p>
+      <button class="primary start" disabled={busy}>
+        {busy ? "Starting …" : "Start the campaign"}
+      </button>
+      <p class="small verdict" role="status">
+        {wrong.length === 0 && SAID[verdict.state]}
+      </p>
+      {refused && (
+        <p class="wrong" role="alert">
+          {refused}
+        </p>
+      )}
+      {wrong.length > 0 && (
+        <ul class="faults">
+          {wrong.map(({ field, message }) => (
+            <li key={field + message}>
+              <button type="button" class="to-field" onClick={() => show(field)}>
+                {field || "the campaign"}
+              </button>{" "}
+              {message}
+            </li>
+          ))}
+        </ul>
+      )}
+    </section>
+  );
+}
+
+const SAID: Record<Verdict["state"], string> = {
+  silent: "",
+  asking: "Checking …",
+  good: "✓ The service would take it.",
+  wrong: "",
+};
+
+function plural(n: number, one: string, several: string): string {
+  return `${n} ${n === 1 ? one : several}`;
+}
+
+/** Leads to the field, or to the nearest one around it that is on the page. */
+function show(field: string): void {
+  for (let name = field; name !== ""; name = name.replace(/(^|\.|\[)[^.[]*$/, "")) {
+    const found = document.getElementById(`field-${name}`);
+    if (!found) continue;
+    found.scrollIntoView({ block: "center" });
+    (found.matches("input, select, textarea") ? found : found.querySelector<HTMLElement>("input, select, textarea"))?.focus();
+    return;
+  }
+}
