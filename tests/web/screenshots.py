@@ -1,4 +1,4 @@
-"""`make screenshots`: every screen of a real campaign as a picture below results/screenshots, and README's first one."""
+"""`make screenshots`: every screen of a real campaign as a picture in results/screenshots, and the one of README.md."""
 
 import sys
 import tempfile
@@ -50,7 +50,7 @@ def main(folder: Path) -> None:
 
 
 def chosen(service: Service, campaign: str) -> str:
-    """The failure that a careful driver would soonest have prevented; among equals one with a pedestrian out of hiding."""
+    """A failure that is worth looking at: preventable if there is one, with a pedestrian, out of hiding."""
 
     def order(failure: dict[str, Any]) -> tuple[int, bool, bool]:
         judgement = failure["collision"]["judgement"]
