@@ -5,7 +5,7 @@ import { download, send } from "../../api/client";
 import type { Body } from "../../api/types";
 import { address, go } from "../../router";
 import { count, moment, seconds, words } from "../../ui/text";
-import { Confirm } from "./confirm";
+import { Confirm } from "../../ui/confirm";
 import { ended } from "./live";
 
 type Campaign = Body<"Campaign">;
@@ -100,14 +100,14 @@ function Actions({ campaign, again }: { campaign: Campaign; again: () => void })
       )}
       {refused && <span role="alert" class="bad">{refused}</span>}
       {asking === "cancel" && (
-        <Confirm title="Cancel this campaign?" yes="Cancel the campaign" act={() => send("POST", `${path}/cancel`).then(again)} close={() => setAsking(undefined)}>
+        <Confirm title="Cancel this campaign?" verb="Cancel the campaign" act={async () => { await send("POST", `${path}/cancel`); again(); }} close={() => setAsking(undefined)}>
           <p>
             Its runs stop after the episode they are at. What was found stays. A cancelled campaign cannot go on, but it can be cloned.
           </p>
         </Confirm>
       )}
       {asking === "delete" && (
-        <Confirm title="Delete this campaign?" yes="Delete for good" act={() => send("DELETE", path).then(() => go("#/campaigns"))} close={() => setAsking(undefined)}>
+        <Confirm title="Delete this campaign?" verb="Delete for good" act={async () => { await send("DELETE", path); go("#/campaigns"); }} close={() => setAsking(undefined)}>
           <p>
             All that it found goes with it: {count(campaign.progress.raw_collisions)} recorded contacts, figures and logs. This cannot be undone.
           </p>

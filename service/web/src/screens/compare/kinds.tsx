@@ -1,0 +1,67 @@
+/** Which different failures there are, who found them, and one of each to look at. */
+
+import type { Body } from "../../api/types";
+import { address } from "../../router";
+import { count } from "../../ui/text";
+
+interface Found {
+  campaign: string;
+  overview: Body<"Overview">;
+  cells: Body<"Cell">[];
+}
+
+export function Kinds({ campaign, overview, cells }: Found) {
+  const most = Math.max(1, ...cells.flatMap((cell) => Object.values(cell.signatures)));
+  if (!overview.clusters.length) return <p class="faint">No method has found a valid failure.</p>;
+  return (
+    <section class="block">
+      <h3>
+        Kinds of failures <span class="faint">({overview.clusters.length})</span>
+      </h3>
+      <p class="faint small">
+        The distinct ones are as various as {overview.vendi.toFixed(1)} that have nothing in common (Vendi score). They lie in {overview.covered} of the taxonomy's{" "}
+        {count(overview.cells)} cells.
+      </p>
+      <div class="scroll" tabIndex={0} role="region" aria-label="Kinds of failures">
+        <table class="kinds">
+          <thead>
+            <tr>
+              <th scope="col">Kind, with one to look at</th>
+              {cells.map((cell) => (
+                <th key={cell.method} scope="col" class="number">
+                  {cell.method}
+                </th>
+              ))}
+              <th scope="col" class="number">Distinct</th>
+              <th scope="col" class="number">Preventable</th>
+            </tr>
+          </thead>
+          <tbody>
+            {overview.clusters.map((kind) => (
+              <tr key={kind.name}>
+                <th scope="row">
+                  <a href={address(["campaigns", campaign, "failures", kind.representative])}>{kind.name}</a>{" "}
+                  {kind.grade && <span class={`tag ${kind.grade}`}>{kind.grade}</span>}
+                </th>
+                {cells.map((cell) => (
+                  <Heat key={cell.method} value={cell.signatures[kind.name] ?? 0} most={most} />
+                ))}
+                <td class="number">{count(kind.distinct)}</td>
+                <td class="number">{count(kind.preventable)}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      </div>
+    </section>
+  );
+}
+
+function Heat({ value, most }: { value: number; most: number }) {
+  const strength = value ? 12 + (36 * value) / most : 0;
+  return (
+    <td class="number" style={{ background: `color-mix(in srgb, var(--series-6) ${strength}%, transparent)` }}>
+      {value ? count(value) : <span class="faint">–</span>}
+    </td>
+  );
+}
