@@ -61,15 +61,17 @@ def build_page() -> None:
         return
     npm, path = _npm()
     environment = os.environ | {"PATH": path}
+    # No script calls npm: that of the package is none that a shell finds.
     for command in (
-        ["ci", "--prefer-offline", "--no-audit", "--no-fund", "--loglevel=error"],
+        ["--prefer-offline", "--no-audit", "--no-fund", "--loglevel=error", "ci"],
+        ["run", "--silent", "check"],
         ["run", "--silent", "build"],
     ):
         try:
             subprocess.run([*npm, *command], cwd=HERE, env=environment, check=True, stdout=sys.stderr)
         except (OSError, subprocess.CalledProcessError) as error:
             raise SystemExit(
-                f"the page could not be built: npm {command[0]}: {error}. It needs npm's registry, or a mirror by "
+                f"the page could not be built: npm {command[-1]}: {error}. It needs npm's registry, or a mirror by "
                 f"npm_config_registry; {WITHOUT}=1 installs the service without its page"
             ) from error
 
