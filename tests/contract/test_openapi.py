@@ -51,7 +51,7 @@ def test_wrong_method_is_a_problem_that_names_the_right_ones(base_url):
 
 
 @pytest.mark.parametrize(
-    "part", ["", "/results", "/episodes", "/failures", "/failure-table", "/table", "/figures", "/spec"]
+    "part", ["", "/results", "/episodes", "/failures", "/failure-table", "/curves", "/table", "/figures", "/spec"]
 )
 def test_answers_about_a_campaign_that_exists_are_as_documented(base_url, part):
     campaign_id = httpx.post(f"{base_url}/v1/campaigns", json={"families": ["dense"]}).json()["id"]

@@ -61,6 +61,7 @@ ROUTES = {
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/roads"): ("read", 200),
     ("GET", f"{CAMPAIGN}/failure-table"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/curves"): ("read", 200),
     ("GET", f"{CAMPAIGN}/clusters"): ("read", 200),
     ("GET", f"{CAMPAIGN}/table"): ("read", 200),
     ("GET", f"{CAMPAIGN}/figures"): ("read", 200),

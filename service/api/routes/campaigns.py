@@ -31,10 +31,12 @@ from service.api.posted_campaign import PostedCampaign
 from service.schemas.base import Body
 from service.schemas.campaign_results import Results
 from service.schemas.campaigns import Campaign, CampaignPage
+from service.schemas.curves import Curves
 from service.schemas.failure_table import FailureTable
 from service.store.states import State
 from service.store.stored import StoredCampaign
 from service.views.bodies import campaign_body, summary_body
+from service.views.curves import curves
 from service.views.failure_table import failure_table
 from service.views.progress import retry_after_s
 from service.views.totals import results
@@ -52,6 +54,7 @@ IdempotencyKey = Annotated[
         " campaign that there is, so that a client that got no answer can simply try again.",
     ),
 ]
+Points = Annotated[int, Query(ge=1, le=1000, description="Of each curve, at most.")]
 
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
 
@@ -135,6 +138,20 @@ def get_failure_table(
         service,
         caller,
         lambda found: failure_table(found, service.store.plain_episodes(found.number, TIERS[tier])),
+    )
+
+
+@router.get("/{campaign_id}/curves", response_model=Curves, responses=UNKNOWN | LIVE)
+def get_curves(
+    campaign_id: str, request: Request, service: Service, caller: CurrentCaller, points: Points = 200
+) -> Response:
+    """How the search of each run has gone: rates, distinct failures, λ and cost over its episodes."""
+    return _kept(
+        campaign_id,
+        request,
+        service,
+        caller,
+        lambda found: curves(found, service.store.plain_episodes(found.number), points),
     )
 
 

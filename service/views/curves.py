@@ -1,0 +1,98 @@
+"""Curves of a campaign's runs over the episodes of their search. Pure.
+
+They follow `risk_sac.metrics`, but go by what each episode is taken for now: a failure may have been refused since.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import from_json
+
+from risk_sac.metrics import WINDOW
+from risk_sac.records import RECORDED, Grade, Outcome
+from risk_sac.types import Floats
+from service.schemas.curves import Curves, RunCurves
+from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
+from service.views.plain import Kinds, Plain
+
+SEARCH = RECORDED["search"]
+Counts = NDArray[np.int64]
+
+
+def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: int) -> Curves:
+    """The curves of all runs.
+
+    Args:
+      campaign: whose runs they are.
+      episodes: all of the campaign, those of a run in their order.
+      points: of each curve, at most.
+    """
+    searches = {run.number: _Search() for run in campaign.runs}
+    for each in episodes:
+        if each.phase == SEARCH:
+            searches[each.run_number].add(each.outcome, from_json(each.record))
+    return Curves(runs=[_curves(run, searches[run.number], points) for run in campaign.runs])
+
+
+@dataclass(slots=True)
+class _Search:
+    """What each episode of a run's search adds to its curves."""
+
+    failures: list[bool] = field(default_factory=list)
+    preventable: list[bool] = field(default_factory=list)
+    distinct: list[bool] = field(default_factory=list)
+    distinct_preventable: list[bool] = field(default_factory=list)
+    steps: list[int] = field(default_factory=list)
+    cost: list[float] = field(default_factory=list)  # summed over the steps
+    dual_variable: list[float] = field(default_factory=list)
+    _kinds: Kinds = field(default_factory=Kinds)
+    _preventable_kinds: Kinds = field(default_factory=Kinds)
+
+    def add(self, outcome: str, record: Plain) -> None:
+        failed = outcome == Outcome.FAILURE
+        collision = record["collision"]
+        judged = collision.get("judgement") if failed else None
+        preventable = judged is not None and judged["grade"] == Grade.CAREFUL
+        self.failures.append(failed)
+        self.preventable.append(preventable)
+        self.distinct.append(failed and self._kinds.add(collision))
+        self.distinct_preventable.append(preventable and self._preventable_kinds.add(collision))
+        self.steps.append(record["steps"])
+        self.cost.append(float(record["mean_cost"]) * record["steps"] if record["steps"] else 0.0)
+        self.dual_variable.append(float(record["dual_variable"]))
+
+
+def _curves(run: StoredRun, search: _Search, points: int) -> RunCurves:
+    at = spread(len(search.failures), points)
+    steps, cost = (np.diff(_summed(each)[at], prepend=0.0) for each in (search.steps, search.cost))
+    lines = {name: _summed(getattr(search, name))[at] for name in ("distinct", "preventable", "distinct_preventable")}
+    lines |= {
+        "window_ecr": _window(search.failures, at),
+        "window_pcr": _window(search.preventable, at),
+        "dual_variable": np.array([0.0, *search.dual_variable])[at],
+        "mean_cost": np.divide(cost, steps, out=np.full(len(at), np.nan), where=steps > 0.0),
+    }
+    named = {name: getattr(run, name) for name in ("family", "method", "seed", "state")}
+    values = {name: line.tolist() for name, line in lines.items()}
+    return RunCurves.model_validate(named | values | {"run_id": run.id, "episodes": at.tolist()})
+
+
+def spread(count: int, points: int) -> Counts:
+    """At most so many of 1, 2, … count, evenly spread, the last included; none of none."""
+    if count == 0:
+        return np.empty(0, dtype=np.int64)
+    return np.unique(-(-count * np.arange(1, points + 1) // points))
+
+
+def _summed(values: Sequence[float]) -> Floats:
+    """Sums of the first 0, 1, 2, … values."""
+    return np.concatenate((np.zeros(1), np.cumsum(values)))
+
+
+def _window(happened: Sequence[bool], at: Counts) -> Floats:
+    """Share of the newest `WINDOW` episodes by then in which it happened."""
+    sums, before = _summed(happened), np.maximum(at - WINDOW, 0)
+    shares: Floats = (sums[at] - sums[before]) / (at - before)
+    return shares

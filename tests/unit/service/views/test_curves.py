@@ -1,0 +1,87 @@
+import json
+import math
+import random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.config import CampaignSpec
+from risk_sac.metrics import MetricsAccumulator
+from risk_sac.records import Grade, Outcome
+from service.store.counting import to_text
+from service.store.stored import PlainEpisode
+from service.views.curves import curves, spread
+from tests.builders import collision, episode_record, judgement
+
+SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
+
+
+def plain(run, record):
+    return PlainEpisode(run.number, record.phase, record.index, record.outcome, to_text(record))
+
+
+def drawn(count):
+    """Records of a search: half of them contacts of several kinds."""
+    dice = random.Random(5)
+    for index in range(count):
+        outcome = dice.choice([Outcome.SAFE, Outcome.REJECTED, Outcome.FAILURE, Outcome.FAILURE, Outcome.DEGENERATE])
+        grade = dice.choice(list(Grade)) if outcome is Outcome.FAILURE else None
+        hit = collision(
+            ego_speed_mps=dice.choice([5.0, 15.0]), judgement=judgement(grade, signature=dice.choice("abcdefgh"))
+        )
+        touched = outcome in (Outcome.FAILURE, Outcome.DEGENERATE)
+        more = {"mean_cost": dice.random(), "dual_variable": dice.random()}
+        yield episode_record(index, outcome, collision=hit if touched else None, **more)
+
+
+def test_curves_are_what_the_metrics_of_the_run_were_at_each_point(ledger):
+    campaign = ledger.create(SPEC)
+    records = list(drawn(250))
+    told, accumulator = [], MetricsAccumulator(horizon_steps=200)
+    for record in records:
+        told.append(accumulator.add(record))
+    found, empty = curves(campaign, [plain(campaign.runs[0], each) for each in records], 40).runs
+    assert len(found.episodes) == 40
+    assert found.episodes[-1] == 250
+    at = [told[count - 1] for count in found.episodes]
+    for name in ("window_ecr", "window_pcr", "preventable", "distinct_preventable", "dual_variable"):
+        assert getattr(found, name) == pytest.approx([getattr(each, name) for each in at]), name
+    assert found.distinct == [each.distinct_failures for each in at]
+    assert found.distinct[-1] > found.distinct_preventable[-1] > 3
+    assert (found.run_id, found.family, found.method, found.seed) == ("low-random-3", "low", "random", 3)
+    assert [value for _, value in empty if isinstance(value, list)] == [[]] * 8
+
+
+def test_mean_cost_is_that_of_the_steps_since_the_point_before(ledger):
+    campaign = ledger.create(SPEC)
+    costs = [(0.5, 100), (0.25, 300), (0.75, 0), (math.nan, 0), (0.125, 10), (0.125, 10)]
+    records = [
+        episode_record(index, Outcome.SAFE if steps else Outcome.REJECTED, mean_cost=cost, steps=steps)
+        for index, (cost, steps) in enumerate(costs)
+    ]
+    body = curves(campaign, [plain(campaign.runs[1], each) for each in records], 3).model_dump_json()
+    assert json.loads(body)["runs"][1]["mean_cost"] == [pytest.approx((50 + 75) / 400), None, pytest.approx(0.125)]
+
+
+def test_an_evaluation_is_no_part_of_the_search(ledger):
+    campaign = ledger.create(SPEC)
+    records = [episode_record(0), episode_record(1, phase="evaluate")]
+    found, _ = curves(campaign, [plain(campaign.runs[0], each) for each in records], 9).runs
+    assert found.episodes == [1]
+
+
+def test_lambda_that_is_not_finite_is_null(ledger):
+    campaign = ledger.create(SPEC)
+    body = curves(campaign, [plain(campaign.runs[0], episode_record(0, dual_variable=math.inf))], 9).model_dump_json()
+    assert json.loads(body)["runs"][0]["dual_variable"] == [None]
+
+
+@given(count=st.integers(1, 3000), points=st.integers(1, 1000))
+def test_points_are_evenly_spread_and_the_newest_is_one(count, points):
+    at = spread(count, points).tolist()
+    assert len(at) == min(count, points)
+    assert at[-1] == count
+    gaps = [later - earlier for earlier, later in zip([0, *at], at, strict=False)]
+    assert min(gaps) >= 1
+    assert max(gaps) - min(gaps) <= 1
