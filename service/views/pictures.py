@@ -35,6 +35,18 @@ class ContactOfARun:
         return cls(edition, campaign, run, episode)
 
 
+def recording_of(contact: ContactOfARun, settings: ServiceSettings) -> Recording:
+    """What is drawn of a contact.
+
+    Raises:
+      StorageError: the time series is lost.
+    """
+    episode = contact.episode
+    path, sha256 = series_file(contact.campaign.id, episode, settings)
+    arrays = load_arrays(path, sha256)
+    return Recording(Contact(id=episode.id, series=path.name, episode=episode.record), arrays)
+
+
 @dataclass(frozen=True, slots=True)
 class Picture:
     """What is drawn."""
@@ -52,14 +64,10 @@ def pictures(settings: ServiceSettings) -> Products[Picture]:
     def draw(picture: Picture) -> bytes:
         from risk_sac.failures.show import recording_bytes  # here, because it loads matplotlib
 
-        contact, episode = picture.contact, picture.contact.episode
-        path, sha256 = series_file(contact.campaign.id, episode, settings)
-        arrays = load_arrays(path, sha256)
-        shown = Contact(id=episode.id, series=path.name, episode=episode.record)
-        recording, twin = Recording(shown, arrays), None
+        recording, twin = recording_of(picture.contact, settings), None
         if picture.twin is not None:
             told, series = read_twin(picture.played)
             twin = replace(recording, series=series, twin=told.title)
-        return recording_bytes(contact.run.family, recording, "png", twin)
+        return recording_bytes(picture.contact.run.family, recording, "png", twin)
 
     return Products(draw, "pictures")

@@ -73,6 +73,8 @@ ASKED = {
     "region_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/region"),
     "twin_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/twins/idle.png"),
     "twin_play_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/twins/idle"),
+    "thumbnail": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-1/thumbnail.svg"),
+    "thumbnail_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/thumbnail.svg"),
     "roads_older": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-1/roads"),
     "roads_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/roads"),
     "regression_unknown": ("GET", f"/v1/regressions/{ENDED_ID}-0000000000000000"),

@@ -91,6 +91,17 @@ def test_every_contact_has_a_picture_that_need_not_be_sent_twice(client):
         assert client.get(f"{FOLDER}/{failure}/picture.png", headers=known).status_code == 304
 
 
+def test_every_contact_has_a_small_drawing_that_need_not_be_sent_twice(client):
+    for failure in ids(client):
+        answer = client.get(f"{FOLDER}/{failure}/thumbnail.svg")
+        assert (answer.status_code, answer.headers["content-type"]) == (200, "image/svg+xml")
+        assert answer.headers["cache-control"] == "no-cache"
+        assert answer.text.startswith("<svg ")
+        assert answer.text.endswith("</svg>")
+        known = {"If-None-Match": answer.headers["etag"]}
+        assert client.get(answer.url.path, headers=known).status_code == 304
+
+
 def test_pictures_of_two_contacts_have_two_tags(client):
     tags = {client.get(f"{FOLDER}/{failure}/picture.png").headers["etag"] for failure in ids(client)[:2]}
     assert len(tags) == 2
@@ -107,12 +118,14 @@ def test_a_contact_whose_series_is_lost_or_damaged_has_no_picture_and_says_so(fr
     content = file.read_bytes()
     for breaking, why in ((lambda: file.write_bytes(content[:-1]), "is damaged"), (file.unlink, "is gone")):
         breaking()
-        answer = fresh.get(f"{FOLDER}/{RUN}-train-1/picture.png")
-        assert (answer.status_code, answer.json()["reason"]) == (404, "series_lost")
-        assert why in answer.json()["detail"]
-        assert str(tmp_path) not in answer.text
+        for picture in ("picture.png", "thumbnail.svg"):
+            answer = fresh.get(f"{FOLDER}/{RUN}-train-1/{picture}")
+            assert (answer.status_code, answer.json()["reason"]) == (404, "series_lost")
+            assert why in answer.json()["detail"]
+            assert str(tmp_path) not in answer.text
     file.write_bytes(content)
-    assert fresh.get(f"{FOLDER}/{RUN}-train-1/picture.png").status_code == 200
+    for picture in ("picture.png", "thumbnail.svg"):
+        assert fresh.get(f"{FOLDER}/{RUN}-train-1/{picture}").status_code == 200
 
 
 def test_a_picture_is_drawn_once_for_all_who_ask_for_it_and_holds_up_nothing_else(fresh, drawn):

@@ -59,6 +59,7 @@ ROUTES = {
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/region"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}.png"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}"): ("read", 404),
+    ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/thumbnail.svg"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/roads"): ("read", 200),
     ("GET", f"{CAMPAIGN}/failure-table"): ("read", 200),
     ("GET", f"{CAMPAIGN}/curves"): ("read", 200),

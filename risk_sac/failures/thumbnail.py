@@ -1,0 +1,125 @@
+"""A contact as a small drawing from above: what it came about on, both paths, and both bodies as they touch.
+
+Written out by hand: a screen shows dozens of them, and matplotlib takes a second for each.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from risk_sac.failures.recording import Recording
+from risk_sac.failures.roads import Surface
+from risk_sac.types import Floats, Kind
+
+WIDTH, HEIGHT = 240, 150  # px
+VIEW_S = 3.0  # before the contact
+MARGIN_M = 5.0
+WIDTHS_M = (30.0, 56.0)  # least and greatest of the view
+LEAST_RADIUS = 3.5  # px, of a pedestrian
+STRIPE_M = 0.6  # of a crossing
+EGO, STRIKER, GREY = "#0072b2", "#d55e00", "#808080"
+# Grey that is seen through suits a light and a dark ground.
+GROUND = {
+    "junction": f'fill="{GREY}" fill-opacity=".22"',
+    "lane": f'fill="{GREY}" fill-opacity=".22" stroke="{GREY}" stroke-opacity=".5" stroke-width=".7"',
+    "sidewalk": f'fill="{GREY}" fill-opacity=".1"',
+}
+
+
+def thumbnail(recording: Recording, roads: Sequence[Surface]) -> str:
+    """An SVG with a transparent ground.
+
+    Args:
+      recording: of the contact.
+      roads: of its scene.
+    """
+    view, ends = _View(recording), [(recording.other, STRIKER), (0, EGO)]
+    if recording.series["kind"][recording.other] == Kind.PEDESTRIAN:
+        ends.reverse()  # a small body lies over a large one
+    shapes = [
+        *(shape for surface in roads if view.shows(surface) for shape in _ground(view, surface)),
+        *_others(view, recording),
+        *(shape for actor, colour in ends for shape in _actor(view, recording, actor, colour)),
+    ]
+    size = f'width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>{"".join(shapes)}</svg>'
+
+
+class _View:
+    """The piece of ground that is seen: the end of both paths, in its middle where there is room for all of it."""
+
+    def __init__(self, recording: Recording) -> None:
+        paths = np.concatenate([_path(recording, actor) for actor in (0, recording.other)])
+        bodies = np.array([recording.pose(actor, 0.0)[:2] for actor in (0, recording.other)])
+        low, high = paths.min(axis=0) - MARGIN_M, paths.max(axis=0) + MARGIN_M
+        width_m = np.clip(max(high[0] - low[0], (high[1] - low[1]) * WIDTH / HEIGHT), *WIDTHS_M)
+        self.scale = WIDTH / float(width_m)  # px per m
+        reach = np.array((WIDTH, HEIGHT)) / self.scale / 2 - MARGIN_M
+        self._middle = np.clip((low + high) / 2, bodies.max(axis=0) - reach, bodies.min(axis=0) + reach)
+
+    def __call__(self, points: Floats) -> Floats:
+        """Pixels of `k x 2` points on the map."""
+        pixels: Floats = (points - self._middle) * (self.scale, -self.scale) + (WIDTH / 2, HEIGHT / 2)
+        return pixels
+
+    def shows(self, surface: Surface) -> bool:
+        """Whether any of it can be seen."""
+        low, high = self(surface.outline).min(axis=0), self(surface.outline).max(axis=0)
+        return bool((high > 0).all() and (low < (WIDTH, HEIGHT)).all())
+
+
+def _path(recording: Recording, actor: int) -> Floats:
+    """`k x 2`, m: where an actor was in the end, without frames in which it was absent."""
+    places = np.column_stack((recording["x_m"][:, actor], recording["y_m"][:, actor]))
+    return places[(recording.time_s >= -VIEW_S) & np.isfinite(places).all(axis=1)]
+
+
+def _ground(view: _View, surface: Surface) -> Iterator[str]:
+    if surface.use != "crossing":
+        yield f'<polygon {GROUND[surface.use]} points="{_text(view(surface.outline))}"/>'
+        return
+    sides = surface.outline.reshape(2, -1, 2)  # of a ribbon; the second one runs back
+    centre, width_m = (sides[0] + sides[1][::-1]) / 2, np.hypot(*(sides[0][0] - sides[1][-1]))
+    yield _line(
+        view(centre), GREY, width_m * view.scale, f' stroke-opacity=".4" stroke-dasharray="{STRIPE_M * view.scale:.1f}"'
+    )
+
+
+def _others(view: _View, recording: Recording) -> Iterator[str]:
+    """Whoever else is there at the contact: a body that hid the striker belongs to the story."""
+    for actor in range(1, len(recording.series["ids"])):
+        if actor != recording.other:
+            yield from _body(view, recording, actor, f'fill="{GREY}" fill-opacity=".6"')
+
+
+def _actor(view: _View, recording: Recording, actor: int, colour: str) -> Iterator[str]:
+    yield _line(view(_path(recording, actor)), colour, 2.2, ' stroke-opacity=".9" stroke-linejoin="round"')
+    yield from _body(view, recording, actor, f'fill="{colour}" stroke="#fff" stroke-width=".8"')
+
+
+def _body(view: _View, recording: Recording, actor: int, style: str) -> Iterator[str]:
+    """A body at the contact, that of a vehicle with an arrow head to the front."""
+    x, y, heading = recording.pose(actor, 0.0)
+    if not np.isfinite((x, y, heading)).all():
+        return
+    half = np.array((recording["length_m"][actor], recording["width_m"][actor])) / 2
+    if recording.series["kind"][actor] == Kind.PEDESTRIAN:
+        ((left, top),) = view(np.array([(x, y)]))
+        yield f'<circle {style} cx="{left:.1f}" cy="{top:.1f}" r="{max(half.max() * view.scale, LEAST_RADIUS):.1f}"/>'
+        return
+    cos, sin = np.cos(heading), np.sin(heading)
+
+    def placed(corners: list[tuple[float, float]]) -> str:
+        """Of `corners` in half lengths ahead and half widths to the left."""
+        return _text(view(corners * half @ np.array([(cos, sin), (-sin, cos)]) + (x, y)))
+
+    yield f'<polygon {style} points="{placed([(1, 1), (-1, 1), (-1, -1), (1, -1)])}"/>'
+    yield f'<polygon fill="#fff" fill-opacity=".75" points="{placed([(0.2, 0.7), (0.75, 0), (0.2, -0.7)])}"/>'
+
+
+def _line(points: Floats, colour: str, width: float, style: str) -> str:
+    return f'<polyline fill="none" stroke="{colour}" stroke-width="{width:.1f}"{style} points="{_text(points)}"/>'
+
+
+def _text(points: Floats) -> str:
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in points.tolist())

@@ -1,0 +1,110 @@
+import re
+import time
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from shapely import Polygon, box
+
+import sumo_nets
+from risk_sac.failures.recording import Recording
+from risk_sac.failures.roads import read_surfaces, roads_of
+from risk_sac.failures.thumbnail import EGO, GREY, HEIGHT, STRIKER, WIDTH, thumbnail
+from tests.unit.failures.staged import synthetic_contact, synthetic_series
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def drawn(series: Mapping[str, Any], roads: bool = True) -> list[ET.Element]:
+    """The shapes, as a reader of XML finds them."""
+    contact = synthetic_contact()
+    text = thumbnail(Recording(contact, series), roads_of("mixed", contact.episode.scene) if roads else ())
+    root = ET.fromstring(text)
+    assert (root.tag, root.get("viewBox")) == (f"{SVG}svg", f"0 0 {WIDTH} {HEIGHT}")
+    assert not re.search(r"nan|inf|\d\.\d\d", text)
+    return list(root)
+
+
+def points(shape: ET.Element) -> np.ndarray:
+    return np.array([[float(value) for value in point.split(",")] for point in shape.get("points", "").split()])
+
+
+def body(shapes: list[ET.Element], colour: str) -> ET.Element:
+    (found,) = (shape for shape in shapes if shape.get("fill") == colour)
+    return found
+
+
+def turned(series: Mapping[str, Any], by_rad: float, far_m: float = 0.0) -> dict[str, Any]:
+    """The same encounter elsewhere and in another direction."""
+    cos, sin = np.cos(by_rad), np.sin(by_rad)
+    x, y = series["x_m"] - 300.0, series["y_m"]
+    place = {"x_m": x * cos - y * sin + far_m, "y_m": x * sin + y * cos - far_m}
+    return dict(series) | place | {"heading_rad": series["heading_rad"] + by_rad}
+
+
+@pytest.mark.parametrize("by_rad", np.linspace(0, 2 * np.pi, 9))
+@pytest.mark.parametrize("far_m", [0.0, 700.0])
+def test_both_bodies_are_seen_and_touch_whatever_their_direction(by_rad: float, far_m: float) -> None:
+    shapes = drawn(turned(synthetic_series(), by_rad, far_m), roads=False)
+    ego, walker = Polygon(points(body(shapes, EGO))), body(shapes, STRIKER)
+    assert box(0, 0, WIDTH, HEIGHT).contains(ego)
+    left, top, radius = (float(walker.get(name, "")) for name in ("cx", "cy", "r"))
+    assert 0 < left < WIDTH
+    assert 0 < top < HEIGHT
+    assert ego.distance(box(left, top, left, top)) <= radius
+    length, width = sorted(np.hypot(*np.diff(points(body(shapes, EGO)), axis=0).T))[::-2]
+    series = synthetic_series()
+    assert length / width == pytest.approx(series["length_m"][0] / series["width_m"][0], rel=0.05)
+
+
+def test_north_is_up_and_an_arrow_head_points_to_where_a_car_heads() -> None:
+    for by_rad, ahead in ((0.0, (1, 0)), (np.pi / 2, (0, -1)), (np.pi, (-1, 0))):
+        shapes = drawn(turned(synthetic_series(), by_rad), roads=False)
+        (head,) = (shape for shape in shapes if shape.get("fill") == "#fff")
+        _, tip, _ = points(head)
+        away = tip - points(body(shapes, EGO)).mean(axis=0)
+        np.testing.assert_allclose(away / np.hypot(*away), ahead, atol=0.1)
+
+
+def test_a_path_has_the_last_seconds_alone_and_the_frames_in_which_its_actor_was_there() -> None:
+    series = synthetic_series()
+    long = {name: np.concatenate([array[:1]] * 80 + [array]) for name, array in series.items() if len(array) == 21}
+    long |= {"time_s": np.arange(101) * 0.1 + 0.1 - 8.0, "released_s": np.array(0.1)}
+    absent = series | {
+        "x_m": np.where(np.arange(3) == 1, np.where(np.arange(21) < 8, np.nan, 300.0)[:, None], series["x_m"])
+    }
+    for given, colour, frames in ((series, EGO, 21), (series | long, EGO, 31), (absent, STRIKER, 13)):
+        (path,) = (shape for shape in drawn(given, roads=False) if shape.get("stroke") == colour)
+        assert len(points(path)) == pytest.approx(frames, abs=1)
+
+
+def test_who_has_left_is_not_drawn_and_who_stands_by_is_grey() -> None:
+    here = synthetic_series()
+    there = here | {name: np.nan_to_num(here[name], nan=310.0) for name in ("x_m", "y_m", "heading_rad")}
+
+    def bystanders(series: Mapping[str, Any]) -> int:
+        return sum(shape.get("fill") == GREY for shape in drawn(series, roads=False))
+
+    assert (bystanders(here), bystanders(there)) == (0, 1)
+
+
+def test_the_roads_in_view_lie_below_everything_else_with_stripes_across_a_crossing() -> None:
+    shapes = drawn(synthetic_series())
+    ground = [shape for shape in shapes if float(shape.get("fill-opacity", 1)) < 0.5 or shape.get("stroke-dasharray")]
+    assert shapes[: len(ground)] == ground
+    view = box(0, 0, WIDTH, HEIGHT)
+    for shape in ground:
+        assert Polygon(points(shape)).intersects(view) if shape.get("fill") != "none" else len(points(shape)) == 2
+    assert 0 < len(ground) < len(read_surfaces(Path(sumo_nets.__path__[0]) / "mixed" / "mixed.net.xml"))
+
+
+def test_a_screen_full_of_them_is_drawn_at_once_and_small() -> None:
+    contact = synthetic_contact()
+    recording, roads = Recording(contact, synthetic_series()), roads_of("mixed", contact.episode.scene)
+    began = time.thread_time()
+    for _ in range(30):
+        assert len(thumbnail(recording, roads)) < 8000
+    assert time.thread_time() - began < 30 * 0.03
