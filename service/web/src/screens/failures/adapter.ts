@@ -73,7 +73,10 @@ export async function tableOf(campaign: string, signal: AbortSignal): Promise<Fa
 export function useTable(campaign: string): Asked<FailureTable> {
   const [value, setValue] = useState<FailureTable>();
   useEffect(() => {
-    tableOf(campaign, new AbortController().signal).then(setValue);
+    const signal = new AbortController().signal;
+    get<FailureTable>(`v1/campaigns/${campaign}/failure-table?tier=raw`, signal)
+      .catch(() => tableOf(campaign, signal))
+      .then(setValue);
   }, []);
   return { value, error: undefined, again: () => {} };
 }

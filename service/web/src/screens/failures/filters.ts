@@ -73,7 +73,7 @@ export function valuesOf(table: FailureTable, facet: Facet, i: number): readonly
     case "grade":
       return [table.grade[i] ?? "none"];
     case "kind":
-      return [table.kinds[table.kind[i]!]!.signature];
+      return [table.kinds[table.kind[i]!]!.name];
     case "striker":
       return [table.striker[i]!];
     case "triage":

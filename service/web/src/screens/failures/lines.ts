@@ -2,6 +2,7 @@
 
 import type { Brushes } from "./brushes";
 import type { Size } from "./canvas";
+import { colourOf, counted, laidOver, MANY } from "./density";
 import type { Feature } from "./features";
 import { tickText, type Scale } from "./scale";
 import type { Grade } from "./wire";
@@ -28,23 +29,43 @@ export interface Ink {
 }
 
 const ORDER: readonly (Grade | null)[] = [null, "unavoidable", "ideal", "careful"]; // what matters most lies on top
-const AT_ONCE = 40; // a path of thousands of segments takes the rasteriser longer than many short ones
+const [LEAST_COVER, MOST_COVER] = [0.05, 0.9]; // of a pixel that one line passes, and of the fullest one
 
 /** Lines of failures, each grade with a pen of its own; the more lines, the fainter. */
-export function drawLines(context: CanvasRenderingContext2D, lines: Lines, failures: readonly number[], penOf: (grade: Grade | null) => Pen): void {
+export function drawLines(context: CanvasRenderingContext2D, lines: Lines, size: Size, failures: readonly number[], penOf: (grade: Grade | null) => Pen): void {
+  if (failures.length < MANY) stroked(context, lines, failures, penOf);
+  else painted(context, lines, size, failures, penOf);
+}
+
+function stroked(context: CanvasRenderingContext2D, lines: Lines, failures: readonly number[], penOf: (grade: Grade | null) => Pen): void {
   for (const grade of ORDER) {
     const some = failures.filter((i) => lines.grades[i] === grade);
     const { colour, width } = penOf(grade);
     context.strokeStyle = colour;
     context.lineWidth = width;
-    context.globalAlpha = Math.max(0.06, Math.min(0.85, 9 / Math.sqrt(some.length + 1)));
-    for (let from = 0; from < some.length; from += AT_ONCE) {
+    context.globalAlpha = Math.max(0.15, Math.min(0.85, 9 / Math.sqrt(some.length + 1)));
+    for (const i of some) {
       context.beginPath();
-      for (const i of some.slice(from, from + AT_ONCE)) strokeLine(context, lines, i);
+      strokeLine(context, lines, i);
       context.stroke();
     }
   }
   context.globalAlpha = 1;
+}
+
+/** The same as a picture that is reckoned pixel by pixel. */
+function painted(context: CanvasRenderingContext2D, { features, scales, pitch, grades }: Lines, { width }: Size, failures: readonly number[], penOf: (grade: Grade | null) => Pen): void {
+  const stack = { width, pitch, axes: features.length };
+  const picture = new ImageData(width, features.length * pitch);
+  for (const grade of ORDER) {
+    const some = failures.filter((i) => grades[i] === grade);
+    if (!some.length) continue;
+    const counts = counted(some, stack, (i, axis) => scales[axis]!.at(features[axis]!.values[i]!));
+    laidOver(picture.data, counts, colourOf(penOf(grade).colour), LEAST_COVER, MOST_COVER);
+  }
+  const canvas = Object.assign(document.createElement("canvas"), { width: picture.width, height: picture.height });
+  canvas.getContext("2d")!.putImageData(picture, 0, 0);
+  context.drawImage(canvas, 0, 0, picture.width, picture.height);
 }
 
 /** Adds one failure's line to the path; it is broken where there is no value. */

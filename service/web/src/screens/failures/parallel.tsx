@@ -39,12 +39,13 @@ export function Parallel(props: Props) {
     return { features, scales, pitch: PITCH_PX, grades: table.grade };
   }, [features, all, size, table]);
   const ink: Ink = { ...inkOf(colours), brush: colours["--accent"] };
-  usePaint(back, size, (context) => drawLines(context, lines, all, () => ink.hidden), [lines, all, colours]);
+  const filtered = shown.length < all.length; // else the lines in front hide all that lie behind
+  usePaint(back, size, (context) => filtered && drawLines(context, lines, size, all, () => ink.hidden), [lines, all, filtered, colours]);
   usePaint(
     front,
     size,
     (context) => {
-      drawLines(context, lines, shown, (grade) => ink.grades[grade ?? "none"]!);
+      drawLines(context, lines, size, shown, (grade) => ink.grades[grade ?? "none"]!);
       drawAxes(context, lines, size, brushes, ink);
     },
     [lines, shown, brushes, colours],
@@ -78,8 +79,8 @@ export function Parallel(props: Props) {
           ))}
         </ul>
         <div class="lines" ref={box} style={{ height: `${features.length * PITCH_PX}px` }} {...drag}>
-          {/* What no filter hides lies behind: drawn once, however the brushes move. */}
-          <canvas ref={back} aria-hidden="true" data-faded={shown.length < all.length || undefined} />
+          {/* All of them lie behind those that no filter hides: drawn once, however the brushes move. */}
+          <canvas ref={back} aria-hidden="true" />
           <canvas ref={front} role="img" aria-label={`${shown.length} of ${all.length} failures as lines over ${features.length} axes`} />
           <PointedLine {...{ lines, hovered, size, ink: colours["--text"] }} />
         </div>
