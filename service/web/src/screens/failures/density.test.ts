@@ -35,7 +35,7 @@ test("what lies outside the picture is not drawn elsewhere", () => {
 
 test("more lines cover more, and none cover nothing", () => {
   const pixels = new Uint8ClampedArray(12);
-  laidOver(pixels, Uint16Array.from([0, 1, 100]), [255, 0, 0], 0.2, 1);
+  laidOver(pixels, Uint16Array.from([0, 1, 100]), [255, 0, 0], { least: 0.2, most: 1, highest: 100 });
   expect(pixels[3]).toBe(0);
   expect([...pixels.slice(4, 8)]).toEqual([255, 0, 0, 51]);
   expect(pixels[11]).toBeGreaterThan(240);
@@ -43,6 +43,6 @@ test("more lines cover more, and none cover nothing", () => {
 
 test("a colour over another one mixes", () => {
   const pixels = Uint8ClampedArray.from([0, 0, 255, 255]);
-  laidOver(pixels, Uint16Array.from([1]), colourOf("#ff0000"), 0.5, 1);
+  laidOver(pixels, Uint16Array.from([1]), colourOf("#ff0000"), { least: 0.5, most: 1, highest: 1 });
   expect([...pixels]).toEqual([128, 0, 128, 255]);
 });

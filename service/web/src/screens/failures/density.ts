@@ -39,10 +39,22 @@ export function counted(lines: readonly number[], { width, axes, pitch }: Stack,
 
 export type Colour = readonly [red: number, green: number, blue: number];
 
-/** Lays counts over a picture of RGBA pixels; the more lines, the less is seen through them, by the logarithm. */
-export function laidOver(pixels: Uint8ClampedArray, counts: Uint16Array, [red, green, blue]: Colour, least: number, most: number): void {
+/** The most lines that pass one pixel. */
+export function highestOf(counts: Uint16Array): number {
   let highest = 1;
-  for (const count of counts) if (count > highest) highest = count;
+  for (let i = 0; i < counts.length; i++) if (counts[i]! > highest) highest = counts[i]!;
+  return highest;
+}
+
+/** How much of a pixel a line covers, and how much the most lines there are anywhere. */
+export interface Cover {
+  least: number;
+  most: number;
+  highest: number;
+}
+
+/** Lays counts over a picture of RGBA pixels; the more lines, the less is seen through them, by the logarithm. */
+export function laidOver(pixels: Uint8ClampedArray, counts: Uint16Array, [red, green, blue]: Colour, { least, most, highest }: Cover): void {
   const covers = Float64Array.from({ length: highest + 1 }, (_, n) => (n ? least + (most - least) * (Math.log(n) / Math.log(highest + 1)) : 0));
   for (let i = 0; i < counts.length; i++) {
     if (!counts[i]) continue;

@@ -2,7 +2,7 @@
 
 import type { Brushes } from "./brushes";
 import type { Size } from "./canvas";
-import { colourOf, counted, laidOver, MANY } from "./density";
+import { colourOf, counted, highestOf, laidOver, MANY } from "./density";
 import type { Feature } from "./features";
 import { tickText, type Scale } from "./scale";
 import type { Grade } from "./wire";
@@ -29,7 +29,7 @@ export interface Ink {
 }
 
 const ORDER: readonly (Grade | null)[] = [null, "unavoidable", "ideal", "careful"]; // what matters most lies on top
-const [LEAST_COVER, MOST_COVER] = [0.05, 0.9]; // of a pixel that one line passes, and of the fullest one
+const COVER = { least: 0.05, most: 0.85 };
 
 /** Lines of failures, each grade with a pen of its own; the more lines, the fainter. */
 export function drawLines(context: CanvasRenderingContext2D, lines: Lines, size: Size, failures: readonly number[], penOf: (grade: Grade | null) => Pen): void {
@@ -57,12 +57,12 @@ function stroked(context: CanvasRenderingContext2D, lines: Lines, failures: read
 function painted(context: CanvasRenderingContext2D, { features, scales, pitch, grades }: Lines, { width }: Size, failures: readonly number[], penOf: (grade: Grade | null) => Pen): void {
   const stack = { width, pitch, axes: features.length };
   const picture = new ImageData(width, features.length * pitch);
-  for (const grade of ORDER) {
+  const layers = ORDER.map((grade) => {
     const some = failures.filter((i) => grades[i] === grade);
-    if (!some.length) continue;
-    const counts = counted(some, stack, (i, axis) => scales[axis]!.at(features[axis]!.values[i]!));
-    laidOver(picture.data, counts, colourOf(penOf(grade).colour), LEAST_COVER, MOST_COVER);
-  }
+    return { grade, counts: counted(some, stack, (i, axis) => scales[axis]!.at(features[axis]!.values[i]!)) };
+  });
+  const highest = Math.max(...layers.map(({ counts }) => highestOf(counts))); // a few of one grade stay fainter than many of another
+  for (const { grade, counts } of layers) laidOver(picture.data, counts, colourOf(penOf(grade).colour), { ...COVER, highest });
   const canvas = Object.assign(document.createElement("canvas"), { width: picture.width, height: picture.height });
   canvas.getContext("2d")!.putImageData(picture, 0, 0);
   context.drawImage(canvas, 0, 0, picture.width, picture.height);

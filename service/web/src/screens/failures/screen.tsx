@@ -7,7 +7,6 @@ import type { Body } from "../../api/types";
 import { address } from "../../router";
 import { Empty, Shown } from "../../ui/states";
 import { count } from "../../ui/text";
-import { useTable } from "./adapter";
 import { Explorer } from "./explorer";
 import { queryOf, read, reset } from "./filters";
 import type { FailureTable } from "./wire";
@@ -18,7 +17,8 @@ const ENDED: readonly string[] = ["succeeded", "failed", "cancelled"];
 export function FailuresScreen({ campaign, query }: { campaign: string; query: URLSearchParams }) {
   const path = `v1/campaigns/${encodeURIComponent(campaign)}`;
   const about = useAsked<Body<"Campaign">>(path, ({ state }) => (ENDED.includes(state) ? null : RUNNING_MS));
-  const asked = useTable(campaign);
+  const ended = about.value === undefined || ENDED.includes(about.value.state);
+  const asked = useAsked<FailureTable>(`${path}/failure-table?tier=raw`, () => (ended ? null : RUNNING_MS));
   return (
     <>
       <Head campaign={campaign} about={about.value} query={query} table={asked.value} />
