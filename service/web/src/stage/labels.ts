@@ -1,6 +1,6 @@
 /** Names and numbers beside the bodies, placed so that they do not cover each other. */
 
-import { RSS_CAP_M, ttcAt } from "./risk";
+import { dangerousAt, marginsAt, ttcAt } from "./risk";
 import { pixelX, pixelY, present, seen, type Scene } from "./scene";
 
 const LINE_PX = 14;
@@ -71,7 +71,7 @@ function drawLabel(scene: Scene, i: number, count: number, sides: Sides): number
     lines.forEach((line, k) => {
       const y = top + (k + 0.5) * LINE_PX;
       ctx.fillStyle = background || k > 0 ? ink["--faint"] : ink["--text"];
-      if (k > 0 && line.includes("−")) ctx.fillStyle = ink["--bad"];
+      if (k > 0 && i === recording.striker && dangerousAt(scene, i)) ctx.fillStyle = ink["--bad"];
       ctx.strokeText(line, left, y);
       ctx.fillText(line, left, y);
     });
@@ -116,8 +116,8 @@ function linesOf(scene: Scene, i: number): string[] {
   if (i !== striker || !layers.risk) return lines;
   const ttc = ttcAt(scene, i);
   if (ttc !== null) lines.push(`TTC ${ttc.toFixed(1)} s`);
-  const margin = series.rss_longitudinal_m[instant.index]?.[i];
-  if (margin !== null && margin !== undefined && margin < RSS_CAP_M) lines.push(`RSS ${signed(margin)} m along`);
+  const { along, across } = marginsAt(scene, i);
+  if (along !== null && across !== null) lines.push(`RSS ${signed(along)} m along, ${signed(across)} across`);
   return lines;
 }
 

@@ -80,14 +80,15 @@ function drawScaleBar({ ctx, view, camera, ink }: Scene): void {
   ctx.restore();
 }
 
-function drawTime({ ctx, time_s, ink }: Scene): void {
+function drawTime({ ctx, time_s, ink, recording }: Scene): void {
+  const ended = time_s > recording.time_s.at(-1)! + 0.05;
   ctx.save();
   ctx.font = "600 18px system-ui, sans-serif";
   ctx.fillStyle = ink["--text"];
   halo(ctx, ink["--ground"], `${signed(time_s, 2)} s`, 14, 26);
   ctx.font = "12px system-ui, sans-serif";
   ctx.fillStyle = ink["--faint"];
-  halo(ctx, ink["--ground"], time_s <= 0 ? "to the contact" : "after the contact", 14, 43);
+  halo(ctx, ink["--ground"], ended ? "the recording ended with the contact" : time_s <= 0 ? "to the contact" : "after the contact", 14, 43);
   ctx.restore();
 }
 

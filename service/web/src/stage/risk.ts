@@ -17,6 +17,21 @@ export function ttcAt(scene: Pick<Scene, "recording" | "instant">, actor: number
   return ttc === null || ttc === undefined || ttc >= TTC_CAP_S ? null : ttc;
 }
 
+/** RSS margins along and across the ego's axis; null where they are at their cap. */
+export function marginsAt({ recording, instant }: Pick<Scene, "recording" | "instant">, actor: number) {
+  const below = (rows: (number | null)[][]) => {
+    const margin = rows[instant.index]?.[actor];
+    return margin === null || margin === undefined || margin >= RSS_CAP_M ? null : margin;
+  };
+  return { along: below(recording.series.rss_longitudinal_m), across: below(recording.series.rss_lateral_m) };
+}
+
+/** RSS calls it dangerous where both margins are negative. */
+export function dangerousAt(scene: Pick<Scene, "recording" | "instant">, actor: number): boolean {
+  const { along, across } = marginsAt(scene, actor);
+  return along !== null && across !== null && along < 0 && across < 0;
+}
+
 export function drawRisk(scene: Scene): void {
   const striker = scene.recording.striker;
   if (!scene.layers.risk || striker < 0 || !present(scene, 0) || !present(scene, striker)) return;
@@ -54,11 +69,11 @@ function drawMotion(scene: Scene, actor: number, ttc: number | null): void {
   ctx.restore();
 }
 
-/** A bar ahead of the ego, as long as the margin; what is missing is hatched. */
+/** A bar ahead of the ego, as long as the margin along its way: red where it lacks, hatched where that is dangerous. */
 function drawMargin(scene: Scene, striker: number): void {
-  const { ctx, recording, poses, instant, camera, ink } = scene;
-  const margin = recording.series.rss_longitudinal_m[instant.index]?.[striker];
-  if (margin === null || margin === undefined || margin >= RSS_CAP_M) return;
+  const { ctx, recording, poses, camera, ink } = scene;
+  const margin = marginsAt(scene, striker).along;
+  if (margin === null) return;
   const colour: Colour = margin < 0 ? "--bad" : "--good";
   const length = Math.abs(margin) * camera.scale;
   const width = recording.width_m[0]! * camera.scale;
@@ -74,7 +89,7 @@ function drawMargin(scene: Scene, striker: number): void {
   ctx.beginPath();
   ctx.rect(0, -width / 2, length, width);
   ctx.stroke();
-  if (margin < 0) {
+  if (dangerousAt(scene, striker)) {
     ctx.clip();
     ctx.globalAlpha = 0.5;
     ctx.beginPath();

@@ -49,8 +49,8 @@ export function drawGround(scene: Scene): void {
   ctx.fillStyle = ink["--road"];
   ctx.fill(roads.junctions);
   ctx.fill(roads.lanes);
-  ctx.strokeStyle = ink["--line"];
-  ctx.lineWidth = 1 / camera.scale;
+  ctx.strokeStyle = ink["--crossing"];
+  ctx.lineWidth = 1.2 / camera.scale;
   ctx.stroke(roads.sidewalks);
   ctx.stroke(roads.lanes);
   ctx.fillStyle = ink["--road"];

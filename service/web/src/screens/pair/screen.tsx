@@ -1,7 +1,146 @@
-export function PairScreen({ campaign, failure, twin, query }: { campaign: string; failure: string; twin: string; query: URLSearchParams }) {
+/** A failure beside its twin: the same scene with one thing changed, by one clock and one camera. */
+
+import { useMemo, useRef } from "preact/hooks";
+import { useAsked } from "../../api/asked";
+import type { Body } from "../../api/types";
+import { address } from "../../router";
+import { Tripod } from "../../stage/camera";
+import { Clock } from "../../stage/clock";
+import { useKeys } from "../../stage/keys";
+import { Legend } from "../../stage/legend";
+import { Plots } from "../../stage/plots";
+import { hiddenSpans, recordingOf, type Collision, type Series } from "../../stage/recording";
+import { roadPaths } from "../../stage/roads";
+import { askedTime, conflictBounds, marksOf, opening, useLayers, useStopped, useTimeInAddress } from "../../stage/room";
+import { Stage } from "../../stage/stage";
+import { KeyList, Transport } from "../../stage/transport";
+import { Empty, Shown } from "../../ui/states";
+import { contactOf, verdictOf } from "../replay/words";
+import { between, commonTimes, pairPanels, sensorOf, TWINS } from "./twins";
+import { Waiting } from "./waiting";
+import type { TwinPlay } from "./wire";
+import "../../stage/stage.css";
+import "./pair.css";
+
+interface Props {
+  campaign: string;
+  failure: string;
+  twin: string;
+  query: URLSearchParams;
+}
+
+export function PairScreen({ campaign, failure, twin, query }: Props) {
+  const path = `v1/campaigns/${encodeURIComponent(campaign)}/failures/${encodeURIComponent(failure)}`;
+  const asked = useAsked<Body<"Failure">>(path);
+  if (!(twin in TWINS)) return <Empty>There is no twin of this name. There are {Object.keys(TWINS).join(", ")}.</Empty>;
+  const place = ["campaigns", campaign, "failures"];
+  const kept = { t: query.get("t") ?? undefined };
   return (
-    <h1>
-      Pair {campaign} {failure} {twin} {query.toString()}
-    </h1>
+    <>
+      <div class="head">
+        <nav class="crumbs" aria-label="Breadcrumb">
+          <a href={address(["campaigns", campaign])}>Campaign</a> / <a href={address(place)}>Failures</a> /{" "}
+          <a href={address([...place, failure], kept)}>{failure}</a> / Twin
+        </nav>
+        <h1>The failure and its twin</h1>
+        <nav class="twins" aria-label="Twin">
+          {Object.entries(TWINS).map(([kind, name]) => (
+            <a class="button" href={address([...place, failure, "twin", kind], kept)} aria-current={kind === twin ? "page" : undefined}>
+              {name}
+            </a>
+          ))}
+        </nav>
+      </div>
+      <Shown asked={asked} what="the failure">
+        {(known) =>
+          known.series === null || known.collision === null ? (
+            <Empty>{known.series_problem ?? "Nothing of it was recorded that could be played."}</Empty>
+          ) : (
+            <Pair campaign={campaign} path={path} twin={twin} known={known} series={known.series} collision={known.collision} query={query} />
+          )
+        }
+      </Shown>
+    </>
   );
+}
+
+interface PairProps {
+  campaign: string;
+  path: string;
+  twin: string;
+  known: Body<"Failure">;
+  series: Series;
+  collision: Collision;
+  query: URLSearchParams;
+}
+
+function Pair({ campaign, path, twin, known, series, collision, query }: PairProps) {
+  const asked = useAsked<TwinPlay>(`${path}/twins/${twin}`);
+  const roads = useAsked<Body<"Roads">>(`${path}/roads`).value;
+  const sensor = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value?.spec.ego?.sensor ?? null;
+  const played = asked.value;
+  const failure = useMemo(() => recordingOf(series, collision), [series, collision]);
+  const other = useMemo(() => (played ? recordingOf(played.series, collision) : null), [played, collision]);
+  const at = useRef<Clock>();
+  const clock = useMemo(() => {
+    const time = at.current?.time.get() ?? askedTime(query) ?? opening(failure); // the twin comes later, and time goes on
+    return (at.current = new Clock(commonTimes(failure.time_s, other?.time_s ?? null), time));
+  }, [failure, other]);
+  const tripod = useMemo(() => new Tripod(conflictBounds(failure)), [failure]);
+  const followed = useMemo(() => between(other ? [failure, other] : [failure]), [failure, other]);
+  const panels = useMemo(() => (other ? pairPanels(failure, other, TWINS[twin]!.toLowerCase()) : []), [failure, other, twin]);
+  const hidden = useMemo(() => hiddenSpans(failure, failure.striker), [failure]);
+  const paths = useMemo(() => (roads ? roadPaths(roads.surfaces) : null), [roads]);
+  const marks = useMemo(() => marksOf(failure), [failure]);
+  const [layers, toggle] = useLayers();
+  useKeys({ clock, tripod, toggle });
+  useStopped(clock);
+  useTimeInAddress(clock, query);
+  const shared = { collision, roads: paths, clock, tripod, layers, followed };
+  return (
+    <div class="grid pair-screen">
+      <div class="card stage-card">
+        <div class="pair">
+          <section aria-label="The failure">
+            <Caption title="The failure" outcome={`${contactOf(collision)} ${verdictOf(known)}`} kind="failed" />
+            <Stage {...shared} recording={failure} sensor={sensor} label="The failure from above" />
+          </section>
+          <section aria-label="Its twin">
+            <Caption title={TWINS[twin]!} outcome={played ? sentence(played.outcome) : ""} kind={played?.collision ? "failed" : "passed"} />
+            {other ? (
+              <Stage {...shared} recording={other} original={false} sensor={sensorOf(twin, sensor)} label="Its twin from above" />
+            ) : (
+              <div class="stage pair-waiting">
+                <Waiting error={asked.error} again={asked.again} key={twin} />
+              </div>
+            )}
+          </section>
+        </div>
+        <Legend />
+        <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} />
+      </div>
+      {other && (
+        <>
+          <p class="faint small plots-hint">Time in s from the contact of the failure. Grey: the striker is hidden from the failure's ego.</p>
+          <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
+        </>
+      )}
+      <section class="card" aria-label="Keys">
+        <KeyList />
+      </section>
+    </div>
+  );
+}
+
+function Caption({ title, outcome, kind }: { title: string; outcome: string; kind: "failed" | "passed" }) {
+  return (
+    <div class="pair-caption">
+      <h2>{title}</h2>
+      <p class={`small ${outcome && kind === "passed" ? "good" : ""}`}>{outcome || "\u00a0"}</p>
+    </div>
+  );
+}
+
+function sentence(text: string): string {
+  return text.charAt(0).toUpperCase() + text.slice(1) + (text.endsWith(".") ? "" : ".");
 }

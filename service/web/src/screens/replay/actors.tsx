@@ -4,7 +4,7 @@ import { useLazyTime, type Clock } from "../../stage/clock";
 import { instantAt } from "../../stage/interpolate";
 import { signed } from "../../stage/labels";
 import type { Recording } from "../../stage/recording";
-import { RSS_CAP_M, ttcAt } from "../../stage/risk";
+import { dangerousAt, marginsAt, ttcAt } from "../../stage/risk";
 import { inWords } from "../../stage/transport";
 import { number } from "../../ui/text";
 
@@ -16,10 +16,7 @@ export function Actors({ recording, clock }: { recording: Recording; clock: Cloc
   const instant = instantAt(recording.time_s, time);
   const { series, ids, parts, pedestrian } = recording;
   const at = (rows: (number | null)[][], i: number) => rows[instant.index]?.[i] ?? null;
-  const margin = (rows: (number | null)[][], i: number) => {
-    const value = at(rows, i);
-    return value === null || value >= RSS_CAP_M ? "–" : <span class={value < 0 ? "bad" : ""}>{signed(value)} m</span>;
-  };
+  const margin = (value: number | null, bad: boolean) => (value === null ? "–" : <span class={bad ? "bad" : ""}>{signed(value)} m</span>);
   const present = ids.map((_, i) => i).filter((i) => at(series.x_m, i) !== null);
   const signal = series.signal[instant.index];
   return (
@@ -47,6 +44,8 @@ export function Actors({ recording, clock }: { recording: Recording; clock: Cloc
           <tbody>
             {present.map((i) => {
               const ttc = i === 0 ? null : ttcAt({ recording, instant }, i);
+              const { along, across } = marginsAt({ recording, instant }, i);
+              const dangerous = dangerousAt({ recording, instant }, i);
               const letter = series.link?.[instant.index]?.[i];
               return (
                 <tr class={`actor-${parts[i]}`}>
@@ -59,8 +58,8 @@ export function Actors({ recording, clock }: { recording: Recording; clock: Cloc
                   <td class="number">{signed(at(series.accel_mps2, i) ?? Number.NaN)} m/s²</td>
                   <td class="number">{i === 0 ? "–" : `${number(at(series.distance_m, i), 1)} m`}</td>
                   <td class="number">{ttc === null ? "–" : `${ttc.toFixed(1)} s`}</td>
-                  <td class="number">{margin(series.rss_longitudinal_m, i)}</td>
-                  <td class="number">{margin(series.rss_lateral_m, i)}</td>
+                  <td class="number">{margin(along, dangerous)}</td>
+                  <td class="number">{margin(across, dangerous)}</td>
                   <td>{i === 0 ? "–" : series.visible[instant.index]?.[i] ? "in view" : "not seen"}</td>
                   <td>{letter ? (LETTERS[letter] ?? letter) : "–"}</td>
                 </tr>

@@ -93,7 +93,7 @@ function Replay({ campaign, path, known, series, collision, query }: { campaign:
   useStopped(clock);
   useTimeInAddress(clock, query);
   return (
-    <div class="grid">
+    <div class="grid replay-screen">
       <div class="replay">
         <section class="card stage-card" ref={card} aria-label="Replay">
           <Stage

@@ -25,6 +25,7 @@ export const DRIVERS: Record<string, string> = {
   fsm: "Fuzzy safety model",
   rss: "RSS driver",
   ideal: "Full braking at once",
+  r157_ttc: "By R157's time to collision",
 };
 
 const BROKE: Record<string, string> = {
