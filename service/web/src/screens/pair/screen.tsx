@@ -18,7 +18,6 @@ import { Empty, Shown } from "../../ui/states";
 import { contactOf, verdictOf } from "../replay/words";
 import { between, commonTimes, pairPanels, sensorOf, TWINS } from "./twins";
 import { Waiting } from "./waiting";
-import type { TwinPlay } from "./wire";
 import "../../stage/stage.css";
 import "./pair.css";
 
@@ -75,7 +74,7 @@ interface PairProps {
 }
 
 function Pair({ campaign, path, twin, known, series, collision, query }: PairProps) {
-  const asked = useAsked<TwinPlay>(`${path}/twins/${twin}`);
+  const asked = useAsked<Body<"TwinPlay">>(`${path}/twins/${twin}`);
   const roads = useAsked<Body<"Roads">>(`${path}/roads`).value;
   const sensor = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value?.spec.ego?.sensor ?? null;
   const played = asked.value;

@@ -45,8 +45,8 @@ export function between(recordings: Recording[]): (time: number) => Followed {
 /** The same measurement of both, in one panel each. */
 export function pairPanels(failure: Recording, twin: Recording, name: string): Panel[] {
   const both = (values: (recording: Recording) => Curve["values"]): Curve[] => [
-    { name: "failure", time_s: failure.time_s, values: values(failure), colour: "--striker", width: 2 },
-    { name, time_s: twin.time_s, values: values(twin), colour: "--ego", dash: DASHES.striker, width: 2 },
+    { name: "failure", time_s: failure.time_s, values: values(failure), colour: "--text", width: 2 },
+    { name, time_s: twin.time_s, values: values(twin), colour: "--series-3", dash: DASHES.striker, width: 2 },
   ];
   const striker = (recording: Recording) => Math.max(recording.striker, 0);
   return [
@@ -55,7 +55,7 @@ export function pairPanels(failure: Recording, twin: Recording, name: string): P
     {
       title: "Soft minimum, broken below 0",
       unit: "",
-      curves: [softMinimum(failure, "failure", "--striker"), softMinimum(twin, name, "--ego", DASHES.striker)],
+      curves: [softMinimum(failure, "failure", "--text"), softMinimum(twin, name, "--series-3", DASHES.striker)],
       zero: true,
     },
   ];

@@ -3,6 +3,7 @@
 import { useMemo, useRef } from "preact/hooks";
 import { useAsked } from "../../api/asked";
 import type { Body } from "../../api/types";
+import { listedAround } from "../../listed";
 import { address } from "../../router";
 import { Tripod } from "../../stage/camera";
 import { Clock } from "../../stage/clock";
@@ -52,23 +53,25 @@ export function ReplayScreen({ campaign, failure, query }: Props) {
 }
 
 function Head({ campaign, failure, query, known }: Props & { known: Body<"Failure"> | undefined }) {
-  const neighbour = (name: "prev" | "next", text: string) => {
-    const id = query.get(name);
-    return id && <a class="button" href={address(["campaigns", campaign, "failures", id])}>{text}</a>;
-  };
-  const back = query.get("from") ?? "";
+  const listed = listedAround(campaign, failure);
+  const neighbour = (id: string | null | undefined, text: string) =>
+    id && (
+      <a class="button" href={address(["campaigns", campaign, "failures", id])}>
+        {text}
+      </a>
+    );
   const signature = known?.collision?.judgement?.signature;
   return (
     <div class="head">
       <nav class="crumbs" aria-label="Breadcrumb">
         <a href={address(["campaigns", campaign])}>Campaign</a> /{" "}
-        <a href={`${address(["campaigns", campaign, "failures"])}${back && `?${back}`}`}>Failures</a> / {failure}
+        <a href={`${address(["campaigns", campaign, "failures"])}${listed.query && `?${listed.query}`}`}>Failures</a> / {failure}
       </nav>
       <h1>{signature ? capital(signature) : `Failure ${failure}`}</h1>
       {known && <span class={`tag ${known.collision?.judgement?.grade ?? ""}`}>{known.collision?.judgement?.grade ?? words(known.outcome)}</span>}
       <span class="actions">
-        {neighbour("prev", "Previous")}
-        {neighbour("next", "Next")}
+        {neighbour(query.get("prev") ?? listed.previous, "Previous")}
+        {neighbour(query.get("next") ?? listed.next, "Next")}
         <a class="button" href={address(["campaigns", campaign, "failures", failure, "twin", "idle"])}>
           Compare with a twin
         </a>
