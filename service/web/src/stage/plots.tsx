@@ -22,7 +22,7 @@ interface Props {
 
 export function Plots({ panels, ...rest }: Props) {
   return (
-    <div class="plots">
+    <div class="time-plots">
       {panels.map((panel) => (
         <Plot key={panel.title} panel={panel} {...rest} />
       ))}
@@ -40,7 +40,7 @@ function Plot({ panel, clock, marks, hidden }: Omit<Props, "panels"> & { panel: 
     const options = { ...optionsOf(panel, clock, marks, hidden, ink), width: element.clientWidth || 300, height: HEIGHT };
     const plot = new uPlot(options, dataOf(panel.curves), element);
     const line = document.createElement("div");
-    line.className = "plot-now";
+    line.className = "time-now";
     plot.over.append(line);
     let shown = -1;
     const moved = () => {
@@ -66,19 +66,19 @@ function Plot({ panel, clock, marks, hidden }: Omit<Props, "panels"> & { panel: 
   }, [panel, clock, ink]);
 
   return (
-    <figure class="plot">
+    <figure class="time-plot">
       <figcaption>
         <b>{panel.title}</b> <span class="faint">{panel.unit}</span>
-        <span class="plot-legend">
+        <span class="time-legend">
           {panel.curves.map((curve, k) => (
-            <span class="plot-key">
+            <span class="time-key">
               <Swatch curve={curve} ink={ink} />
-              {curve.name} <span class="plot-value" ref={(element) => void (element && (values.current[k] = element))} />
+              {curve.name} <span class="time-value" ref={(element) => void (element && (values.current[k] = element))} />
             </span>
           ))}
         </span>
       </figcaption>
-      <div ref={area} class="plot-area" role="img" aria-label={`${panel.title} over time: ${panel.curves.map(({ name }) => name).join(", ")}`} />
+      <div ref={area} class="time-area" role="img" aria-label={`${panel.title} over time: ${panel.curves.map(({ name }) => name).join(", ")}`} />
     </figure>
   );
 }

@@ -1,6 +1,7 @@
 /** Failures that are there: filters, plots and cards, all of them by what the address says. */
 
-import { useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { keepListed } from "../../listed";
 import { address, go, replace } from "../../router";
 import { signal } from "../../signal";
 import { count } from "../../ui/text";
@@ -49,6 +50,7 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
     () => sorted(table, within(passed, filters.brushes, features), asked.sort, often),
     [table, passed, filters.brushes, features, asked.sort],
   );
+  useEffect(() => keepListed({ campaign, ids: shown.map((at) => table.ids[at]!), query: query.toString() }), [shown, query.toString()]);
   const again = noting.refused;
   const dialogFor = open ?? (again ? table.ids.indexOf(again.failure) : null);
   const close = () => {

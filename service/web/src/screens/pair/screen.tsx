@@ -120,7 +120,7 @@ function Pair({ campaign, path, twin, known, series, collision, query }: PairPro
       </div>
       {other && (
         <>
-          <p class="faint small plots-hint">Time in s from the contact of the failure. Grey: the striker is hidden from the failure's ego.</p>
+          <p class="faint small time-hint">Time in s from the contact of the failure. Grey: the striker is hidden from the failure's ego.</p>
           <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
         </>
       )}

@@ -114,7 +114,7 @@ function Replay({ campaign, path, known, series, collision, query }: { campaign:
         </section>
         <Verdict failure={known} />
       </div>
-      <p class="faint small plots-hint">Time in s from the contact. Grey: the striker is hidden from the ego. Dotted: release; dashed: the conflict begins.</p>
+      <p class="faint small time-hint">Time in s from the contact. Grey: the striker is hidden from the ego. Dotted: release; dashed: the conflict begins.</p>
       <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
       <Actors recording={recording} clock={clock} />
       <div class="replay-end">

@@ -13,7 +13,7 @@ export function Verdict({ failure }: { failure: Failure }) {
   const refused = say.refusals(collision);
   const flaky = failure.repetition !== null && failure.repetition.same < failure.repetition.times;
   return (
-    <section class="card verdict" aria-label="Verdict">
+    <section class="card replay-verdict" aria-label="Verdict">
       <p class={`verdict-grade grade-${judgement?.grade ?? "none"}`}>{say.verdictOf(failure)}</p>
       {refused.length > 0 && (
         <div class="verdict-refused">
