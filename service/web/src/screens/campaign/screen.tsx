@@ -24,11 +24,11 @@ export function CampaignScreen({ id }: { id: string }) {
   }, []);
   if (!campaign && error instanceof Problem && error.status === 404) {
     return (
-      <Empty>
+      <div class="state" role="alert">
         <h1>There is no such campaign</h1>
-        <p>It was deleted, or never was.</p>
+        <p class="breaking">“{id}” was deleted, or never was.</p>
         <a href="#/campaigns">To the campaigns</a>
-      </Empty>
+      </div>
     );
   }
   if (!campaign) return error ? <Failed error={error} again={again} /> : <Loading what="the campaign" />;

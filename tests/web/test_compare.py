@@ -1,0 +1,167 @@
+"""The screen Compare: a campaign's methods against each other, and campaigns beside each other."""
+
+import csv
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from tests.server import Service
+from tests.web.conftest import PHONE
+
+
+@pytest.fixture(scope="session")
+def methods(service: Service) -> str:
+    """A finished campaign of two methods and two seeds, so that its report has tests; its label is hostile."""
+    posted = service.post(
+        label="<img src=x onerror=alert(1)> night",
+        families=["low"],
+        methods=["archive", "random"],
+        seeds=[601, 602],
+        budget={"episodes": 40},
+    )
+    assert service.wait(posted)["state"] == "succeeded"
+    return posted
+
+
+def numbers(text: str) -> list[float]:
+    return [float(number) for number in re.findall(r"\d+\.\d", text)]
+
+
+def per_cent(*values: float) -> Any:
+    """As they are shown, rounded to a tenth of a per cent."""
+    return pytest.approx([100 * value for value in values], abs=0.0501)
+
+
+def row_of(page: Page, key: str, family: str = "low") -> Locator:
+    return page.locator(f"section[aria-labelledby='family-{family}'] tr[data-row='{key}']")
+
+
+def test_the_numbers_of_a_report_are_the_services(
+    page_at: Callable[..., Page], service: Service, methods: str, check_axe: Callable[[Page], None]
+) -> None:
+    page = page_at(f"campaigns/{methods}/compare")
+    table = service.get(methods, "/table", format="json")
+    assert len(table["cells"]) == 2
+    for cell in table["cells"]:
+        row = row_of(page, cell["method"])
+        expect(row).to_be_visible()
+        shown = row.locator("td").all_inner_texts()
+        assert shown[:2] == ["2", str(cell["episodes"])]
+        assert [text.strip() for text in shown[2:4]] == [
+            str(cell["distinct_failures"]),
+            str(cell["distinct_preventable"]),
+        ]
+        for name, text in zip(("ecr", "pcr"), shown[4:], strict=True):
+            estimate = cell["estimates"][name]
+            assert numbers(text) == per_cent(estimate["mean"], estimate["low"], estimate["high"])
+        funnel = page.get_by_role("region", name=f"Funnel of {cell['method']}")
+        assert funnel.locator("b").all_inner_texts() == [
+            str(cell[name]) for name in ("raw_collisions", "failures", "distinct_failures", "distinct_preventable")
+        ]
+    tests = page.get_by_role("region", name=f"{table['reference']} against the others").locator("tbody tr")
+    assert tests.count() == sum(test["family"] == "low" for test in table["tests"])
+    for name in service.get(methods, "/clusters")["families"]["low"]["clusters"]:
+        expect(page.get_by_role("link", name=name["name"], exact=True)).to_have_attribute(
+            "href", f"#/campaigns/{methods}/failures/{name['representative']}"
+        )
+    page.get_by_text("More measures").click()
+    check_axe(page)
+
+
+def test_error_bars_stand_where_their_numbers_say(page_at: Callable[..., Page], service: Service, methods: str) -> None:
+    page = page_at(f"campaigns/{methods}/compare")
+    cells = service.get(methods, "/table", format="json")["cells"]
+    row_of(page, "archive").wait_for()
+    end = float(page.locator("th.rate .axis").first.inner_text().split("\n")[-1].removesuffix(" %")) / 100
+    for cell in cells:
+        drawn = page.get_by_role("img", name=f"ECR of {cell['method']}: ")
+        axis, dot = drawn.bounding_box(), drawn.locator("circle").bounding_box()
+        middle = dot["x"] + dot["width"] / 2
+        assert (middle - axis["x"]) / axis["width"] == pytest.approx(cell["estimates"]["ecr"]["mean"] / end, abs=0.01)
+
+
+def test_a_report_and_its_figures_can_be_taken_away(
+    page_at: Callable[..., Page], service: Service, methods: str, tmp_path: Path
+) -> None:
+    page = page_at(f"campaigns/{methods}/compare")
+    report = page.get_by_role("group", name="Download the report")
+    for button, ending in (("CSV", "csv"), ("Markdown", "md"), ("JSON", "json")):
+        assert _saved(page, report.get_by_role("button", name=button), tmp_path).suffix == f".{ending}"
+    page.get_by_text("All figures").click()
+    name = service.get(methods, "/figures")["items"][0]["name"]
+    figure = page.locator("details figure").first
+    image = figure.locator("img")
+    expect(image).to_be_visible()
+    assert image.evaluate("image => image.decode().then(() => image.naturalWidth)") > 100
+    picture = _saved(page, figure.get_by_role("button", name="PNG"), tmp_path)
+    assert picture.name == f"{name}.png"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_two_campaigns_stand_beside_each_other(
+    page_at: Callable[..., Page],
+    service: Service,
+    campaign: str,
+    methods: str,
+    check_axe: Callable[[Page], None],
+    tmp_path: Path,
+) -> None:
+    page = page_at("compare")
+    for label in ("night <b>7</b>", "<img src=x onerror=alert(1)> night"):
+        page.get_by_role("checkbox", name=label).check()
+    page.get_by_role("button", name="Compare 2 campaigns").click()
+    for at, one in enumerate((campaign, methods)):
+        for total in service.get(one, "/results")["totals"]:
+            _check_total(row_of(page, f"{one} {total['method']}", total["family"]), "AB"[at], total)
+    posted = dict.fromkeys(("families", "methods", "seeds", "budget.episodes"))
+    differing = page.get_by_role("region", name="What was posted differently", exact=True).last
+    assert [row.inner_text() for row in differing.locator("tbody th").all()] == list(posted)
+    expect(differing.get_by_role("row", name="budget.episodes")).to_contain_text("60")
+    saved = _saved(page, page.get_by_role("button", name="CSV"), tmp_path)
+    rows = list(csv.DictReader(saved.read_text().splitlines()))
+    assert {(row["campaign"], row["family"], row["method"]) for row in rows} == {
+        (one, total["family"], total["method"])
+        for one in (campaign, methods)
+        for total in service.get(one, "/results")["totals"]
+    }
+    saved = _saved(page, page.get_by_role("button", name="JSON"), tmp_path)
+    assert len(json.loads(saved.read_text())) == len(rows)
+    check_axe(page)
+
+
+def test_a_campaign_that_is_gone_does_not_hide_the_others(page_at: Callable[..., Page], campaign: str) -> None:
+    page = page_at(f"compare?ids={campaign},unknown", allowed=("404",))
+    expect(page.get_by_role("alert")).to_contain_text("unknown")
+    expect(row_of(page, f"{campaign} archive")).to_be_visible()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_a_phone(
+    scheme: str, page_at: Callable[..., Page], methods: str, campaign: str, check_axe: Callable[[Page], None]
+) -> None:
+    for place in (f"campaigns/{methods}/compare", f"compare?ids={methods},{campaign}"):
+        page = page_at(place, viewport=PHONE, color_scheme=scheme)
+        page.locator("tr[data-row]").first.wait_for()
+        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+        check_axe(page)
+
+
+def _check_total(row: Locator, letter: str, total: dict[str, Any]) -> None:
+    expect(row.get_by_role("rowheader")).to_have_text(f"{letter}: {total['method']}")
+    for name, text in zip(("ecr", "pcr"), row.locator("td.rate").all_inner_texts(), strict=True):
+        assert numbers(text) == per_cent(total[name], total[f"{name}_low"], total[f"{name}_high"])
+    counts = [text.strip() for text in row.locator("td").all_inner_texts()[:4]]
+    assert counts == [str(total[name]) for name in ("runs", "episodes", "distinct_failures", "distinct_preventable")]
+
+
+def _saved(page: Page, button: Locator, folder: Path) -> Path:
+    with page.expect_download() as download:
+        button.click()
+    target = folder / download.value.suggested_filename
+    download.value.save_as(target)
+    return target
