@@ -76,7 +76,7 @@ export function Chart({ title, meaning, lines, written, atLeast, pointed }: Plot
   };
   const episode = pointer === null ? undefined : data[0][pointer.at];
   return (
-    <section class="card chart" aria-label={title}>
+    <section class="card curve" aria-label={title}>
       <header>
         <h3 title={meaning}>{title}</h3>
         <span class="faint small">{meaning}</span>
@@ -87,7 +87,7 @@ export function Chart({ title, meaning, lines, written, atLeast, pointed }: Plot
         )}
       </header>
       <div
-        class="plot"
+        class="curve-plot"
         ref={room}
         tabIndex={0}
         role="group"
@@ -123,7 +123,7 @@ function Values({ episode, left, width, lines, data, at, written }: Shown) {
     .sort((one, other) => other.value - one.value);
   const side = left > width / 2 ? { right: `${width - left + 12}px` } : { left: `${left + 12}px` };
   return (
-    <div class="values" style={side} role="status">
+    <div class="curve-values" style={side} role="status">
       <b>Episode {episode.toLocaleString("en")}</b>
       {values.slice(0, SHOWN).map((line) => (
         <span key={line.run}>

@@ -3,10 +3,9 @@
 import { useMemo, useState } from "preact/hooks";
 import type { Body } from "../../api/types";
 import { Chart, type Line } from "./chart";
-import { trailing, WINDOW } from "./curves";
+import { trailing, WINDOW, type Curve } from "./curves";
 import { groupName, markOf, runName } from "./look";
 import { Sample } from "./sample";
-import type { Curve } from "./wire";
 
 type Spec = Body<"CampaignSpec">;
 
@@ -40,19 +39,19 @@ export function Charts({ spec, curves, hidden, hide }: Panels) {
   const constrained = curves.some((curve) => curve.dual_variable.some(Boolean));
   return (
     <section aria-label="Curves over episodes">
-      <div class="row legend-row">
+      <div class="row over-row">
         <h2>Over episodes</h2>
         <Legend spec={spec} curves={curves} hidden={hidden} hide={hide} point={setPointed} />
         <Choice label="Rate" names={RATES.map((each) => each[1])} chosen={rate} choose={setRate} />
         <Choice label="Count" names={COUNTS.map((each) => each[1])} chosen={found} choose={setFound} />
       </div>
-      <div class="charts">
+      <div class="curves">
         <Chart title={`Sliding ${RATES[rate]![1]}`} meaning={RATES[rate]![2]} lines={rates} written={percent} atLeast={0.1} pointed={pointed} />
         <Chart title={`${COUNTS[found]![1]} failures`} meaning={COUNTS[found]![2]} lines={counts} written={whole} atLeast={4} pointed={pointed} />
         {constrained ? (
           <Chart title="Dual variable λ" meaning="weight of the realism cost in the search" lines={multipliers} written={decimals} atLeast={0.1} pointed={pointed} />
         ) : (
-          <section class="card chart" aria-label="Dual variable λ">
+          <section class="card curve curve-none" aria-label="Dual variable λ">
             <h3>Dual variable λ</h3>
             <p class="faint">λ is 0 throughout: none of these runs has to hold a limit of realism cost, or none has reached it yet.</p>
           </section>
@@ -75,7 +74,7 @@ function Legend({ spec, curves, hidden, hide, point }: Groups) {
     groups.set(name, [...(groups.get(name) ?? []), curve]);
   }
   return (
-    <div class="row legend" role="group" aria-label="Runs in the curves">
+    <div class="row run-legend" role="group" aria-label="Runs in the curves">
       {[...groups].map(([name, members]) => {
         const runs = members.map((curve) => curve.run_id);
         const away = runs.every((run) => hidden.has(run));

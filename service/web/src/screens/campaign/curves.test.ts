@@ -1,6 +1,5 @@
 import { describe, expect, test } from "vitest";
-import { extend, halve, LiveCurves, POINTS, Sliding, trailing, WINDOW, type Point } from "./curves";
-import type { Curve } from "./wire";
+import { extend, halve, LiveCurves, POINTS, Sliding, trailing, WINDOW, type Curve, type Point } from "./curves";
 
 function curve(episodes: number[] = [], mean_cost: number[] = []): Curve {
   const known = (value: number) => episodes.map(() => value);
@@ -17,7 +16,7 @@ function point(episodes: number, mean_cost: number | null = 0): Point {
 
 function told(index: number, more: object = {}) {
   const episode = {
-    run_id: "low-random-1", phase: "train", index, outcome: "no_failure", collision: null, mean_cost: 0.5, dual_variable: 0.4,
+    run_id: "low-random-1", phase: "train", index, outcome: "no_failure", collision: null, mean_cost: 0.5, steps: 80, dual_variable: 0.4,
     funnel: { contacts: 9, valid: 8, distinct: 7, preventable: 6 }, ...more,
   };
   return { id: `${index}`, event: "episode", data: JSON.stringify(episode) };

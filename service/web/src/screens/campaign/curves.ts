@@ -2,7 +2,6 @@
 
 import type { Body } from "../../api/types";
 import type { ServerEvent } from "../../api/events";
-import type { Curve } from "./wire";
 
 export const WINDOW = 100; // episodes of a sliding rate, as in the API
 export const POINTS = 200; // of a curve, about
@@ -19,6 +18,11 @@ export interface Point {
 }
 
 type Column = Exclude<keyof Point, "episodes">;
+type Run = Pick<Body<"RunCurves">, "run_id" | "family" | "method" | "seed" | "state">;
+
+/** A run's curve as the API gives it, or longer by what its events said. */
+export type Curve = Run & { episodes: number[] } & Record<Column, (number | null)[]>;
+
 const KEPT: Column[] = ["window_ecr", "window_pcr", "distinct", "distinct_preventable", "dual_variable"];
 
 /** The share of valid and of preventable failures among a run's newest episodes, once all of those are known. */
@@ -70,7 +74,10 @@ export function halve(curve: Curve): void {
   curve.episodes = kept.map((at) => episodes[at]!);
 }
 
-/** The mean of two means over so many episodes each; null counts for nothing. */
+/**
+ * The mean of two means over so many episodes each; null counts for nothing. The API weighs by steps, which a curve does
+ * not have: on a screen there is no telling them apart, and the next snapshot has it as it is.
+ */
 function joined(first: number | null, firsts: number, second: number | null, seconds: number): number | null {
   if (first === null || !firsts) return second;
   if (second === null || !seconds) return first;
@@ -125,7 +132,7 @@ export class LiveCurves {
       distinct: episode.funnel?.distinct ?? null,
       distinct_preventable: episode.funnel?.preventable ?? null,
       dual_variable: episode.dual_variable,
-      mean_cost: episode.mean_cost,
+      mean_cost: episode.steps ? episode.mean_cost : null,
     });
   }
 }

@@ -19,17 +19,17 @@ const STEPS = [
 /** @param most what the longest bar stands for, where several funnels are to be compared. */
 export function Funnel({ counts, most = counts.raw_collisions }: { counts: Counts; most?: number }) {
   return (
-    <ol class="funnel" aria-label="Funnel">
+    <ol class="stages" aria-label="Funnel">
       {STEPS.map(([name, word, meaning], step) => {
         const before = step ? counts[STEPS[step - 1]![0]] : 0;
         return (
           <li key={name} title={meaning}>
-            <span class="funnel-word">{word}</span>
-            <span class="funnel-room">
-              {counts[name] > 0 && <span class={`funnel-bar funnel-${step}`} style={{ width: `${(100 * counts[name]) / most}%` }} />}
+            <span class="stage-word">{word}</span>
+            <span class="stage-room">
+              {counts[name] > 0 && <span class={`stage-bar stage-${step}`} style={{ width: `${(100 * counts[name]) / most}%` }} />}
             </span>
             <b data-count={name}>{count(counts[name])}</b>
-            <span class="funnel-share">{before ? share(counts[name], before) : ""}</span>
+            <span class="stage-share">{before ? share(counts[name], before) : ""}</span>
           </li>
         );
       })}

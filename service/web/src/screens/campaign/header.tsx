@@ -24,7 +24,7 @@ export function Header({ campaign, again }: { campaign: Campaign; again: () => v
         <Actions campaign={campaign} again={again} />
       </div>
       {campaign.reason && <p class="bad breaking">{campaign.reason}</p>}
-      <dl class="facts">
+      <dl class="posted">
         <Fact name={spec.families.length > 1 ? "Families" : "Family"}>{spec.families.join(", ")}</Fact>
         <Fact name={spec.methods.length > 1 ? "Methods" : "Method"}>{spec.methods.join(", ")}</Fact>
         <Fact name="Ego">

@@ -4,15 +4,14 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { get, Problem } from "../../api/client";
 import { follow, type ServerEvent } from "../../api/events";
 import type { Body } from "../../api/types";
-import { LiveCurves, POINTS, WINDOW } from "./curves";
-import type { Curve, Curves } from "./wire";
+import { LiveCurves, POINTS, WINDOW, type Curve } from "./curves";
 
 type Campaign = Body<"Campaign">;
 export type Found = Body<"Episode">;
 
 const REDRAW_MS = 250; // at most four times a second, however fast the search is
 const PACE_MS = 2000; // between two looks at the state
-const SHARE = 50; // and so many times as long as a look took, so that looking takes no more than a fiftieth of a core
+const SHARE = 20; // and so many times as long as the last look took, so that a busy service is left alone
 const NEWEST = 6; // failures shown
 
 export interface Live {
@@ -122,7 +121,7 @@ class Watch {
   }
 
   private async snapshot(campaign: Campaign): Promise<void> {
-    const { runs } = await this.get<Curves>(`/curves?points=${POINTS}`);
+    const { runs } = await this.get<Body<"Curves">>(`/curves?points=${POINTS}`);
     const known = new Map(runs.map((curve) => [curve.run_id, curve]));
     this.curves = new LiveCurves(campaign.runs.map((run) => known.get(run.id) ?? begun(run)));
     this.curves.apply(this.waiting);

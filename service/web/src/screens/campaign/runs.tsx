@@ -51,7 +51,7 @@ function Card({ run, campaign, away, hide }: { run: Run; campaign: Body<"Campaig
         </span>
         <span>{time(run)}</span>
       </p>
-      <dl class="figures">
+      <dl class="run-figures">
         <Figure name="valid" value={count(run.failures)} />
         <Figure name="distinct" value={count(run.distinct_failures)} />
         <Figure name="preventable" value={count(run.distinct_preventable)} />

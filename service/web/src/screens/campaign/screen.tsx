@@ -35,9 +35,9 @@ export function CampaignScreen({ id }: { id: string }) {
   const { progress } = campaign;
   const drawn = curves?.some((curve) => curve.episodes.length);
   return (
-    <div class="campaign">
+    <div class="live">
       <Header campaign={campaign} again={again} />
-      <div class="summary">
+      <div class="standing">
         <section class="card" aria-labelledby="funnel-title">
           <h2 id="funnel-title">From contact to what is worth your time</h2>
           <Funnel counts={progress} />
@@ -48,7 +48,7 @@ export function CampaignScreen({ id }: { id: string }) {
           <Tile name="dual variable λ" value={number(progress.dual_variable)} title={OVER} />
           <Tile name="valid and preventable, repeats too" value={count(progress.preventable)} />
           <Tile name="scenes refused" value={count(progress.rejected)} />
-          <Tile name="runs" value={`${campaign.runs.filter((run) => ended(run)).length} of ${campaign.runs.length} ended`} />
+          <Tile name="runs ended" value={`${campaign.runs.filter((run) => ended(run)).length} of ${campaign.runs.length}`} />
         </section>
         {!ended(campaign) && <Newest campaign={id} found={found} />}
       </div>
