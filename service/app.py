@@ -23,6 +23,7 @@ from service.api.routes import (
     docs,
     episodes,
     events,
+    logs,
     networks,
     operations,
     page,
@@ -78,7 +79,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
         docs_url=None,  # the routes have pages that need no network
         redoc_url=None,
     )
-    shown = (episodes, pictures, sketches, events, reports)
+    shown = (episodes, logs, pictures, sketches, events, reports)
     for routes in (campaigns, *shown, regressions, networks, catalogue, operations, docs):
         app.include_router(routes.router)
     app.router.routes += page.routes()

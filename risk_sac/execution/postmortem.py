@@ -11,7 +11,8 @@ from risk_sac.execution.executor import Cause, Exited
 TAIL_BYTES = 2000  # of a log, at most
 TAIL_LINES = 5
 
-_FOLDERS = re.compile(r"""(?<![\w./:])/(?:[^\s/'"|]+/)*(?=[\w.])""")  # of an absolute path; URLs stay
+# Of an absolute path; URLs stay. No path is deeper, and without a bound a log made for it takes minutes.
+_FOLDERS = re.compile(r"""(?<![\w./:])/(?:[^\s/'"|]+/){0,30}(?=[\w.])""")
 _SIGNAL_NAMES = {item.value: item.name for item in signal.Signals}  # real-time signals have none
 _OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
 

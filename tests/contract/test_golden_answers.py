@@ -78,6 +78,9 @@ ASKED = {
     "roads_older": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-1/roads"),
     "roads_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/roads"),
     "regression_unknown": ("GET", f"/v1/regressions/{ENDED_ID}-0000000000000000"),
+    "log_empty": ("GET", f"{ENDED}/runs/low-risk-sac-3/log"),
+    "log_unknown": ("GET", f"{ENDED}/runs/low-risk-sac-4/log"),
+    "log_bad_field": ("GET", f"{ENDED}/runs/low-risk-sac-3/log?lines=1001"),
     "events": ("GET", f"{ENDED}/events"),
     "events_cancelled": ("GET", f"{CANCELLED}/events"),
     "table": ("GET", f"{ENDED}/table"),
@@ -137,6 +140,8 @@ def test_every_documented_route_that_is_read_is_asked_for(client):
         "pie.png": "{name}.{format}",
         "idle.png": "{twin}.png",
         "idle": "{twin}",
+        "low-risk-sac-3": "{run_id}",
+        "low-risk-sac-4": "{run_id}",
     }
     known[f"{ENDED_ID}-0000000000000000"] = "{regression_id}"
     parts = [path.partition("?")[0].split("/") for _, path in ASKED.values()]

@@ -60,6 +60,7 @@ ROUTES = {
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}.png"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/thumbnail.svg"): ("read", 404),
+    ("GET", f"{CAMPAIGN}/runs/{{run_id}}/log"): ("read", 200),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/roads"): ("read", 200),
     ("GET", f"{CAMPAIGN}/failure-table"): ("read", 200),
     ("GET", f"{CAMPAIGN}/curves"): ("read", 200),
@@ -106,6 +107,7 @@ def world(serve_shared, scripted, tmp_path_factory):
             tokens=tokens,
             campaign=campaign,
             failure=failure,
+            run=service.get(campaign)["runs"][0]["id"],
             network=upload(service),
             nobody=nobody,
         )
@@ -120,7 +122,7 @@ def ask(world, method, path, key=None, known=True, **headers):
     """What a route answers whoever holds the key; of a stream, its beginning."""
     ids = (world.campaign, world.network) if known else (UNKNOWN, UNKNOWN)
     parts = {"campaign_id": ids[0], "network_id": ids[1], "failure_id": world.failure}
-    parts |= {"regression_id": f"{ids[0]}-{'0' * 16}", "twin": "idle"}
+    parts |= {"regression_id": f"{ids[0]}-{'0' * 16}", "twin": "idle", "run_id": world.run}
     url = path.format(**parts, name="ecr_low", format="png")
     if key is not None:
         headers["authorization"] = f"Bearer {world.tokens.get(key, key)}"

@@ -75,6 +75,24 @@ def test_a_run_whose_workers_break_in_a_row_fails_and_nothing_else(shared, scrip
 
 
 @EACH_DATABASE_SHARED
+def test_what_the_workers_of_a_run_printed_can_be_read_and_need_not_be_sent_twice(shared, scripted):
+    campaign = shared.wait(shared.post(seeds=[scripted.EXITS, scripted.WELL_BEHAVED], budget={"episodes": 8}))
+    path, silent = (f"/v1/campaigns/{campaign['id']}/runs/{run['id']}/log" for run in campaign["runs"])
+    log = shared.client.get(path)
+    assert (log.status_code, log.headers["content-type"]) == (200, "text/plain; charset=utf-8")
+    said = "Traceback: the policy is NaN\n"
+    assert log.text.count(said) == 3, "of each worker"
+    assert str(shared.data_dir) not in log.text
+    assert shared.client.get(path, headers={"if-none-match": log.headers["etag"]}).status_code == 304
+    assert shared.client.get(path, params={"lines": 1}).text == said
+    for lines in ("0", "1001", "-1", "x"):
+        assert shared.client.get(path, params={"lines": lines}).json()["errors"][0]["field"] == "lines"
+    assert shared.client.get(silent).text == ""
+    unknown = shared.client.get(f"/v1/campaigns/{campaign['id']}/runs/..%2F{campaign['runs'][0]['id']}/log")
+    assert unknown.status_code == 404
+
+
+@EACH_DATABASE_SHARED
 def test_a_lost_worker_is_replaced_and_no_episode_is_lost_or_told_twice(shared, scripted):
     campaign_id = shared.post(seeds=[scripted.WAITS], budget={"episodes": 80})
     folder = shared.data_dir / "campaigns" / campaign_id / f"low-random-{scripted.WAITS}"
