@@ -11,6 +11,7 @@ from service.api.guards.description import describe_guards
 from service.api.posted import input_schemas
 from service.schemas.changes import StateChange
 from service.schemas.regressions import PostedRegression
+from service.schemas.triage import PostedTriage
 
 DESCRIPTION = """Finds scenarios in which an automated driving system fails.
 
@@ -27,9 +28,9 @@ def openapi(app: FastAPI) -> dict[str, Any]:
 
 def _document(app: FastAPI) -> dict[str, Any]:
     document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
-    document["components"]["schemas"] |= (
-        input_schemas(CampaignSpec) | input_schemas(PostedRegression) | _event_schemas()
-    )
+    for posted in (CampaignSpec, PostedRegression, PostedTriage):
+        document["components"]["schemas"] |= input_schemas(posted)
+    document["components"]["schemas"] |= _event_schemas()
     for operations in document["paths"].values():
         for operation in operations.values():
             for status, response in operation["responses"].items():

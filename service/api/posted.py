@@ -34,7 +34,8 @@ async def read_posted(request: Request, model: type[Model]) -> Model:
         if error.error_count() > MOST_MISTAKES:  # naming a million of them would keep the server busy for minutes
             detail = f"the body has {error.error_count()} mistakes; wanted none. Up to {MOST_MISTAKES} would be named"
             raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail) from error
-        raise RequestValidationError([item | {"loc": ("body", *item["loc"])} for item in error.errors()]) from error
+        found = [item | {"loc": ("body", *item["loc"])} for item in error.errors()]
+        raise RequestValidationError(found, body=model) from error  # the model: it knows which fields there are
     json.loads(content, object_pairs_hook=_without_repeats)
     return posted
 

@@ -17,8 +17,8 @@ from service.runs.retention import Retention
 from service.runs.storage_pause import StoragePause, refused
 from service.settings import ServiceSettings
 from service.store.reading import Store
-from service.store.states import State
-from service.store.stored import StoredCampaign, StoredRun
+from service.store.states import State, TriageState
+from service.store.stored import StoredCampaign, StoredRun, StoredTriage
 from service.store.writing import Ledger
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
 
@@ -33,7 +33,7 @@ UNKILLABLE_S = 3.0  # how long after SIGKILL a worker may take to vanish
 class Manager:
     """Runs campaigns: one thread turns what workers say into rows and starts what waits.
 
-    Requests call `submit`, `cancel` and `delete` from their own threads; the lock makes every step whole.
+    Requests call `submit`, `cancel`, `triage` and `delete` from their own threads; the lock makes every step whole.
 
     Attributes:
       restarts: workers that were lost and replaced, by cause.
@@ -125,6 +125,18 @@ class Manager:
                     self._active[number].cancelled = True
                     self._executor.cancel(number, self._settings.grace_s)
             return self._store.campaign(campaign_id)
+
+    def triage(
+        self, campaign_id: str, failure_id: str, state: TriageState, comment: str, project: str | None = None
+    ) -> StoredTriage:
+        """Note what people make of a failure.
+
+        Raises:
+          NotFoundError: there is no such campaign or failure.
+          StorageError: it cannot be written down.
+        """
+        with self._lock:
+            return self._ledger.triage(campaign_id, failure_id, state, comment, project)
 
     def delete(self, campaign_id: str, project: str | None = None) -> None:
         """Remove a campaign that has ended, with its files.

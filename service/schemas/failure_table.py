@@ -6,9 +6,9 @@ from typing import Literal
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.records import ConflictType, Grade, Real
 from service.schemas.base import Body
+from service.store.states import TriageState
 
 Repeats = Literal["verified", "flaky"]
-TriageState = Literal["new", "confirmed", "dismissed", "fixed"]
 
 
 class FailureKind(Body):
@@ -95,7 +95,7 @@ class FailureTable(Body):
     repeats: list[Repeats | None]
     """Whether it was the same each time that it was played again; null where it was not."""
     triage: list[TriageState]
-    """What people made of it."""
+    """What people made of it; `new` if nobody has."""
     kinds: list[FailureKind]
     """The most preventable failures first, then the most failures."""
     scenes: Mapping[FamilyName, FamilyScenes]

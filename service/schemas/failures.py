@@ -5,6 +5,7 @@ from risk_sac.failures.question import Twin
 from risk_sac.failures.roads import Use
 from service.schemas.base import Body
 from service.schemas.episodes import Collision, Episode
+from service.schemas.triage import Triage
 
 
 class Series(series.Series, Body):
@@ -20,6 +21,8 @@ class Failure(Episode):
     series: Series | None
     """Null when the record is lost; `series_problem` says why."""
     series_problem: str | None
+    triage: Triage | None
+    """What people made of it; null if nobody has."""
 
 
 class Surface(Body):

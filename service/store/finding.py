@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session
 from risk_sac.records import RECORDED, Grade, Outcome
 from service.errors import NotFoundError
 from service.store.stored import Page, StoredEpisode
-from service.store.tables import CampaignRow, EpisodeRow, RunRow
+from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +74,32 @@ def episode_page(
     rows = list(islice(found, limit + 1))
     last = rows[limit - 1].number if len(rows) > limit else None
     return Page(items=tuple(StoredEpisode.from_row(row) for row in rows[:limit]), last=last)
+
+
+def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> EpisodeRow:
+    """The campaign's episode with this id in which the ego touched something.
+
+    Raises:
+      NotFoundError: there is none.
+    """
+    run_id, phase, index = split_failure_id(failure_id)
+    query = (
+        select(EpisodeRow)
+        .join(EpisodeRow.run)
+        .where(RunRow.campaign_number == campaign.number, RunRow.id == run_id)
+        .where(EpisodeRow.phase == phase, EpisodeRow.index == index)
+        .where(EpisodeRow.outcome.in_([Outcome.FAILURE, Outcome.DEGENERATE]))
+    )
+    row = session.scalars(query).one_or_none()
+    if row is None:
+        raise unknown_failure(campaign.id, failure_id)
+    return row
+
+
+def find_triage(session: Session, episode: EpisodeRow) -> TriageRow | None:
+    """What people made of a contact; None if nobody has."""
+    place = {"campaign_number": episode.campaign_number, "episode_number": episode.number}
+    return session.scalars(select(TriageRow).filter_by(**place)).one_or_none()
 
 
 def split_failure_id(failure_id: str) -> tuple[str, str, int]:

@@ -14,12 +14,21 @@ from service.errors import StorageError
 from service.store.columns import read_columns
 from service.store.counting import HOUR_S
 from service.store.database import open_database, storage_errors
-from service.store.finding import Judged, episode_page, find_campaign, find_run, split_failure_id, unknown_failure
+from service.store.finding import Judged, episode_page, find_campaign, find_failure, find_run, find_triage
 from service.store.revisions import Revisions
 from service.store.sequence import event_page
-from service.store.states import FINAL, State
-from service.store.stored import Page, PlainEpisode, StoredCampaign, StoredChange, StoredEpisode, StoredRun, Usage
-from service.store.tables import CampaignRow, EpisodeRow, RunRow, UsageRow
+from service.store.states import FINAL, State, TriageState
+from service.store.stored import (
+    Page,
+    PlainEpisode,
+    StoredCampaign,
+    StoredChange,
+    StoredEpisode,
+    StoredRun,
+    StoredTriage,
+    Usage,
+)
+from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
 
 DAY_HOURS = 24
 
@@ -178,20 +187,26 @@ class Store:
         Raises:
           NotFoundError: there is none.
         """
-        run_id, phase, index = split_failure_id(failure_id)
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
-            query = (
-                select(EpisodeRow)
-                .join(EpisodeRow.run)
-                .where(RunRow.campaign_number == campaign.number, RunRow.id == run_id)
-                .where(EpisodeRow.phase == phase, EpisodeRow.index == index)
-                .where(EpisodeRow.outcome.in_([Outcome.FAILURE, Outcome.DEGENERATE]))
-            )
-            row = session.scalars(query).one_or_none()
-            if row is None:
-                raise unknown_failure(campaign_id, failure_id)
-            return StoredEpisode.from_row(row)
+            return StoredEpisode.from_row(find_failure(session, campaign, failure_id))
+
+    def triage(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredTriage | None:
+        """What people made of the contact with this id; None if nobody has.
+
+        Raises:
+          NotFoundError: there is no such contact.
+        """
+        with self._reading() as session:
+            campaign = find_campaign(session, campaign_id, project)
+            row = find_triage(session, find_failure(session, campaign, failure_id))
+            return None if row is None else StoredTriage.from_row(row)
+
+    def triages(self, number: int) -> dict[int, TriageState]:
+        """What people made of the contacts of the campaign with this number, by the numbers of the episodes."""
+        with self._reading() as session:
+            rows = session.scalars(select(TriageRow).filter_by(campaign_number=number))
+            return {row.episode_number: TriageState(row.state) for row in rows}
 
     def waiting(self) -> dict[str, int]:
         """Number of the run that has waited longest, for each project that has runs in the queue."""

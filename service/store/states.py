@@ -13,6 +13,15 @@ from enum import StrEnum
 from service.errors import TransitionError
 
 
+class TriageState(StrEnum):
+    """What people make of a failure; any may follow any."""
+
+    NEW = "new"
+    CONFIRMED = "confirmed"
+    DISMISSED = "dismissed"
+    FIXED = "fixed"
+
+
 class State(StrEnum):
     """Where a campaign or a run stands."""
 

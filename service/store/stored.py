@@ -13,8 +13,8 @@ from risk_sac.metrics import Funnel
 from risk_sac.records import EpisodeRecord, Outcome, RunMetrics
 from risk_sac.run_folder.verified import Repetition
 from service.errors import OutdatedError
-from service.store.states import State
-from service.store.tables import Base, CampaignRow, ChangeRow, EpisodeRow, RunRow
+from service.store.states import State, TriageState
+from service.store.tables import Base, CampaignRow, ChangeRow, EpisodeRow, RunRow, TriageRow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,11 +185,26 @@ class StoredEpisode:
 class PlainEpisode:
     """An episode of very many, as its row has it: what it recorded is still JSON."""
 
+    number: int  # in the order of arrival, over all campaigns
     run_number: int
     phase: str
     index: int
     outcome: Outcome
     record: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StoredTriage:
+    """What people made of a contact."""
+
+    state: TriageState
+    comment: str
+    changed_at: float  # seconds since the epoch
+
+    @classmethod
+    def from_row(cls, row: TriageRow) -> Self:
+        """The snapshot of a triage."""
+        return cls(**_columns(cls, row) | {"state": TriageState(row.state)})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""The database: campaigns, their runs, the runs' episodes, what changed when, who used how much, and the server's own.
+"""The database: campaigns, their runs, the runs' episodes, what changed when, triages, usage, the server's own.
 
 Records of the method are stored as the JSON that the worker sent; what is filtered or counted has a
 column of its own. Numbers are primary keys in order of arrival, so that a page continues where the
@@ -167,6 +167,23 @@ class ChangeRow(Checked, Base):
     reason: Mapped[str | None]
     at: Mapped[float]
     sequence: Mapped[int] = mapped_column(info=LATER)  # among the campaign's events: 1, 2, …, with those of `episodes`
+
+
+class TriageRow(Checked, Base):
+    """What people made of a contact."""
+
+    __tablename__ = "triages"
+    __table_args__ = (
+        Index("triages_episodes", "campaign_number", "episode_number", unique=True),
+        {"sqlite_autoincrement": True},
+    )
+
+    number: Mapped[int] = mapped_column(primary_key=True)
+    campaign_number: Mapped[int] = mapped_column(ForeignKey("campaigns.number"))
+    episode_number: Mapped[int] = mapped_column(ForeignKey("episodes.number"))
+    state: Mapped[str]
+    comment: Mapped[str] = mapped_column(Text)
+    changed_at: Mapped[float]
 
 
 class UsageRow(Checked, Base):

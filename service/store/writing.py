@@ -14,12 +14,12 @@ from risk_sac.rules import REPEATS
 from service.errors import ConflictError
 from service.store.counting import add_usage, count, fill, fill_record, tally, to_text
 from service.store.database import WRITING, storage_errors
-from service.store.finding import find_campaign
+from service.store.finding import find_campaign, find_failure, find_triage
 from service.store.reading import Store
 from service.store.sequence import hold_campaigns, next_sequence
-from service.store.states import RESUMED, State, advance, campaign_state
-from service.store.stored import StoredCampaign
-from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
+from service.store.states import RESUMED, State, TriageState, advance, campaign_state
+from service.store.stored import StoredCampaign, StoredTriage
+from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow, TriageRow
 from service.workers.messages import EpisodeDone, Finished
 
 
@@ -183,6 +183,28 @@ class Ledger:
             _settle(session, campaign)
             return [run.number for run in campaign.runs if run.state == State.CANCELLING]
 
+    def triage(
+        self, campaign_id: str, failure_id: str, state: TriageState, comment: str, project: str | None = None
+    ) -> StoredTriage:
+        """Note what people make of a contact; noting the same again changes nothing.
+
+        Raises:
+          NotFoundError: there is no such campaign or contact.
+        """
+        with self._writing("noting what people make of a failure") as session:
+            campaign = find_campaign(session, campaign_id, project)
+            session.refresh(campaign, with_for_update=True)  # held, as by `hold_campaigns`
+            episode = find_failure(session, campaign, failure_id)
+            row = find_triage(session, episode)
+            if row is None:
+                row = TriageRow(campaign_number=campaign.number, episode_number=episode.number)
+                session.add(row)
+            elif (row.state, row.comment) == (state, comment):
+                return StoredTriage.from_row(row)
+            row.state, row.comment, row.changed_at = state, comment, time.time()
+            campaign.revision += 1
+            return StoredTriage.from_row(row)
+
     def delete(self, campaign_id: str) -> None:
         """Remove a campaign with all that belongs to it.
 
@@ -192,7 +214,7 @@ class Ledger:
         with self._writing("deleting a campaign") as session:
             number = find_campaign(session, campaign_id).number
             session.expunge_all()
-            for table in (EpisodeRow, ChangeRow, RunRow):
+            for table in (TriageRow, EpisodeRow, ChangeRow, RunRow):
                 session.execute(delete(table).where(table.campaign_number == number))
             session.execute(delete(CampaignRow).where(CampaignRow.number == number))
         self._store.revisions.forget(campaign_id)

@@ -9,7 +9,7 @@ from service.schemas.campaigns import Campaign, CampaignSummary, Run
 from service.schemas.episodes import Episode
 from service.schemas.failures import Failure
 from service.settings import ServiceSettings
-from service.store.stored import StoredCampaign, StoredEpisode
+from service.store.stored import StoredCampaign, StoredEpisode, StoredTriage
 from service.views.progress import progress
 from service.views.series import load_series
 
@@ -34,9 +34,11 @@ def episode_body(episode: StoredEpisode) -> Episode:
     return Episode.model_validate(_fields(episode))
 
 
-def failure_body(campaign_id: str, episode: StoredEpisode, settings: ServiceSettings) -> Failure:
-    """A contact with its time series, or with the reason why there is none."""
-    body = _fields(episode)
+def failure_body(
+    campaign_id: str, episode: StoredEpisode, triage: StoredTriage | None, settings: ServiceSettings
+) -> Failure:
+    """A contact with its time series, or with the reason why there is none, and with what people made of it."""
+    body = _fields(episode) | {"triage": triage}
     try:
         body |= {"series": load_series(*series_file(campaign_id, episode, settings)), "series_problem": None}
     except StorageError as error:

@@ -14,6 +14,7 @@ from pydantic_core import from_json
 
 from risk_sac.records import Grade, Outcome
 from service.schemas.failure_table import FailureKind, FailureTable, FamilyScenes
+from service.store.states import TriageState
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
 from service.views.plain import Kinds, Plain, signature_of
 
@@ -25,7 +26,7 @@ OF_COLLISION = {
     **{name: name for name in ("min_rss_margin_m", "ego_peak_braking_mps2")},
 }
 OF_JUDGEMENT = ("signature", "grade", "conflict_type", "conflict_s", "hidden", "ego_response", "ground", "broke")
-DECIDED = ("ids", "indices", "phases", "valid", "distinct", "refused_by", "repeats", "triage")
+DECIDED = ("ids", "number", "indices", "phases", "valid", "distinct", "refused_by", "repeats")
 EARLY = ("min_ttc_s", "min_robustness")
 COLUMNS = (*OF_RUN, *OF_COLLISION, *OF_JUDGEMENT, *DECIDED, *EARLY, "name", "scene")
 ROUNDED = (*(name for name in OF_COLLISION if not name.startswith("striker")), *EARLY, "conflict_s")
@@ -36,8 +37,16 @@ _of_collision, _of_judgement = itemgetter(*OF_COLLISION.values()), itemgetter(*O
 Columns = Mapping[str, Sequence[Any]]
 
 
-def failure_table(campaign: StoredCampaign, contacts: Iterable[PlainEpisode]) -> FailureTable:
-    """The table of these contacts of the campaign, in their order."""
+def failure_table(
+    campaign: StoredCampaign, contacts: Iterable[PlainEpisode], triages: Mapping[int, TriageState]
+) -> FailureTable:
+    """The table of these contacts of the campaign, in their order.
+
+    Args:
+      campaign: whose contacts they are.
+      contacts: by their numbers.
+      triages: what people made of them, by their numbers; of none that nobody has looked at.
+    """
     runs = {run.number: run for run in campaign.runs}
     found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)
     rows = [_row(runs[each.run_number], each, found[each.run_number, each.phase]) for each in contacts]
@@ -45,9 +54,11 @@ def failure_table(campaign: StoredCampaign, contacts: Iterable[PlainEpisode]) ->
     columns |= zip(COLUMNS, zip(*rows, strict=True), strict=bool(rows))
     kinds = _kinds(columns)
     places = {kind.name: place for place, kind in enumerate(kinds)}
+    noted = [triages.get(number, TriageState.NEW) for number in columns["number"]]
     made = {name: _rounded(columns[name]) for name in ROUNDED} | {
         "kind": [places[name] for name in columns["name"]],
         "kinds": kinds,
+        "triage": noted,
         "scenes": _scenes(columns),
     }
     return FailureTable.model_validate(columns | made)
@@ -64,13 +75,13 @@ def _row(run: StoredRun, contact: PlainEpisode, found: Kinds) -> tuple[Any, ...]
         *_of_collision(collision),
         *_of_judgement(collision.get("judgement") or UNJUDGED),
         f"{run.id}-{contact.phase}-{contact.index}",
+        contact.number,
         contact.index,
         contact.phase,
         valid,
         valid and found.add(collision),
         [rule for rule, passed in collision.get("verdicts", {}).items() if not passed],
         None if repetition is None else "verified" if repetition.verified else "flaky",
-        "new",
         *(collision.get(f"early_{name}", collision.get(name)) for name in EARLY),
         signature_of(collision),
         record["scene"],

@@ -92,6 +92,7 @@ ASKED = {
     "figure_unknown": ("GET", f"{ENDED}/figures/pie.png"),
     "spec": ("GET", f"{ENDED}/spec"),
     "spec_yaml": ("GET", f"{ENDED}/spec?format=yaml"),
+    "triage_unknown": ("PUT", f"{ENDED}/failures/low-risk-sac-3-train-0/triage"),
     "cancel_ended": ("POST", f"{ENDED}/cancel"),
     "delete_live": ("DELETE", LIVE),
     "post": ("POST", "/v1/campaigns"),
@@ -99,6 +100,7 @@ ASKED = {
     "method_not_allowed": ("DELETE", "/v1/campaigns"),
 }
 POSTED = {"families": ["low"], "methods": ["random"], "label": "posted", "budget": {"episodes": 5}}
+BODIES = {"post": POSTED, "triage_unknown": {"state": "fixed", "comment": "in 0.2"}}
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +120,7 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
 @pytest.mark.parametrize("name", ASKED)
 def test_the_answer_is_the_recorded_one(client, name):
     method, path = ASKED[name]
-    answer = shown(client.request(method, path, json=POSTED if name == "post" else None))
+    answer = shown(client.request(method, path, json=BODIES.get(name)))
     file = GOLDEN / f"{name}.json"
     if RECORD:
         file.parent.mkdir(exist_ok=True)

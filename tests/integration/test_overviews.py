@@ -1,4 +1,8 @@
-"""What shows a whole campaign at once, on a real server."""
+"""What shows a whole campaign at once, and what people note of it, on a real server."""
+
+import contextlib
+import sqlite3
+from types import SimpleNamespace
 
 import pytest
 
@@ -61,3 +65,83 @@ def test_so_many_points_as_nobody_draws_are_refused(service, campaign, points):
     response = service.client.get(f"/v1/campaigns/{campaign}/curves", params={"points": points})
     assert response.status_code == 422
     assert response.json()["errors"][0]["field"] == "points"
+
+
+@pytest.fixture
+def noted(service, campaign):
+    """A failure, and how to note something of it."""
+    failure = service.get(campaign, "/failures")["items"][3]["id"]
+    path = f"/v1/campaigns/{campaign}/failures/{failure}"
+
+    def put(**body):
+        return service.client.put(f"{path}/triage", json=body)
+
+    return SimpleNamespace(id=failure, path=path, put=put)
+
+
+def test_a_triage_shows_wherever_its_failure_does(service, campaign, noted):
+    table = f"/v1/campaigns/{campaign}/failure-table"
+    before = service.client.get(table)
+    assert service.client.get(noted.path).json()["triage"] is None
+    answer = noted.put(state="confirmed", comment="brakes late <script>alert(1)</script>\n\tünd so weiter")
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["comment"] == "brakes late <script>alert(1)</script>\n\tünd so weiter"
+    assert service.client.get(noted.path).json()["triage"] == answer.json()
+    after = service.client.get(table, headers={"if-none-match": before.headers["etag"]})
+    assert after.status_code == 200
+    states = dict(zip(after.json()["ids"], after.json()["triage"], strict=True))
+    assert states.pop(noted.id) == "confirmed"
+    assert set(states.values()) == {"new"}
+    again = noted.put(state="confirmed", comment=answer.json()["comment"])
+    assert again.json() == answer.json(), "the same again changes nothing"
+    assert service.client.get(table).headers["etag"] == after.headers["etag"]
+    assert noted.put(state="fixed").json() | {"changed_at": ""} == {"state": "fixed", "comment": "", "changed_at": ""}
+    assert "fixed" in service.client.get(table).json()["triage"]
+
+
+@pytest.mark.parametrize(
+    ("body", "field"),
+    [
+        ({"state": "confirmed", "comment": "x" * 2001}, "comment"),
+        ({"state": "confirmed", "comment": "a\0b"}, "comment"),
+        ({"state": "confirmed", "comment": "a\x1b[2Jb"}, "comment"),
+        ({"state": "confirmed", "comment": None}, "comment"),
+        ({"state": "wontfix"}, "state"),
+        ({"comment": "x"}, "state"),
+        ({"state": "new", "by": "me"}, "by"),
+    ],
+)
+def test_a_triage_that_is_none_is_refused_and_nothing_changes(service, noted, body, field):
+    before = service.client.get(noted.path).json()["triage"]
+    answer = noted.put(**body)
+    assert answer.status_code == 422, answer.text
+    (error,) = answer.json()["errors"]
+    assert error["field"] == field
+    if field == "by":
+        assert error["wanted"] == "one of comment, state"
+    assert service.client.get(noted.path).json()["triage"] == before
+    assert noted.put(state="new", comment="x" * 2000).status_code == 200
+
+
+def test_a_triage_of_what_is_no_failure_is_404(service, campaign):
+    for failure in ("low-random-0-train-0", "nothing", "a%00b"):
+        answer = service.client.put(f"/v1/campaigns/{campaign}/failures/{failure}/triage", json={"state": "new"})
+        assert (answer.status_code, answer.json()["reason"]) == (404, "unknown_id"), failure
+    assert service.client.put("/v1/campaigns/c0/failures/x/triage", json={"state": "new"}).status_code == 404
+
+
+def test_a_triage_survives_a_restart_and_goes_with_its_campaign(serve):
+    service = serve("striking_worker")
+    campaign = service.post(budget={"episodes": 2})
+    service.wait(campaign)
+    failure = service.get(campaign, "/failures")["items"][0]["id"]
+    path = f"/v1/campaigns/{campaign}/failures/{failure}"
+    noted = service.client.put(f"{path}/triage", json={"state": "dismissed", "comment": "ghost"}).json()
+    service.stop()
+    service.start()
+    assert service.client.get(path).json()["triage"] == noted
+    assert service.get(campaign, "/failure-table")["triage"] == ["dismissed"]
+    assert service.client.delete(f"/v1/campaigns/{campaign}").status_code == 204
+    assert service.client.get(path).status_code == 404
+    with contextlib.closing(sqlite3.connect(service.data_dir / "risk-sac.db")) as database:
+        assert database.execute("SELECT count(*) FROM triages").fetchone() == (0,)

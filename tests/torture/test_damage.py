@@ -82,7 +82,7 @@ def readings(data: Path) -> dict[str, object]:
         episodes = read(f"{campaign.id} episodes", lambda id_=campaign.id: store.episodes(id_, limit=1000).items)
         for episode in () if isinstance(episodes, Exception) else episodes:
             if episode.series is not None:
-                body = failure_body(campaign.id, episode, settings)
+                body = failure_body(campaign.id, episode, None, settings)
                 found[f"{campaign.id} {episode.id}"] = (
                     StorageError(body.series_problem) if body.series_problem else body
                 )

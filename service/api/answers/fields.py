@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
-from risk_sac.config import CampaignSpec
+from pydantic import BaseModel
+
 from service.schemas.problems import FieldProblem
 
 LONGEST_VALUE = 200
@@ -39,10 +40,15 @@ _LIMITS = {
 Location = tuple[int | str, ...]
 
 
-def field_problems(found: Sequence[dict[str, Any]]) -> list[FieldProblem]:
-    """One for each cause among the errors of a validation."""
+def field_problems(found: Sequence[dict[str, Any]], model: type[BaseModel] | None) -> list[FieldProblem]:
+    """One for each cause among the errors of a validation.
+
+    Args:
+      found: the errors.
+      model: what the body was to be; None where only what comes without a body was validated.
+    """
     locations = [item["loc"] for item in found]
-    return [_field_problem(item) for item in found if not _follows(item["loc"], locations)]
+    return [_field_problem(item, model) for item in found if not _follows(item["loc"], locations)]
 
 
 def _follows(location: Location, others: Sequence[Location]) -> bool:
@@ -50,12 +56,12 @@ def _follows(location: Location, others: Sequence[Location]) -> bool:
     return any(len(other) > len(location) and other[: len(location)] == location for other in others)
 
 
-def _field_problem(item: dict[str, Any]) -> FieldProblem:
+def _field_problem(item: dict[str, Any], model: type[BaseModel] | None) -> FieldProblem:
     location: Location = item["loc"]
     path = _dotted(location)
     message = str(item["msg"]).removeprefix("Value error, ")
     got = "nothing" if item["type"] == "missing" else shown(item.get("input"))
-    wanted = _wanted(item, location)
+    wanted = _wanted(item, location, model)
     if item["type"] == "value_error":
         field, stated, wanted = parse(message)
         path = f"{path}.{field}".strip(".")
@@ -69,9 +75,9 @@ def _dotted(location: Location) -> str:
     return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
 
 
-def _wanted(item: dict[str, Any], location: Location) -> str:
-    if item["type"] == "extra_forbidden":
-        return f"one of {', '.join(_known_fields(location[1:-1]))}"
+def _wanted(item: dict[str, Any], location: Location, model: type[BaseModel] | None) -> str:
+    if item["type"] == "extra_forbidden" and model is not None:
+        return f"one of {', '.join(_known_fields(location[1:-1], model))}"
     template = _LIMITS.get(item["type"])
     if template:
         return template.format(**item.get("ctx", {}))
@@ -86,9 +92,9 @@ def parse(message: str) -> tuple[str, str, str]:
     return "", "", message
 
 
-def _known_fields(location: Location) -> list[str]:
-    """Names of the fields that a campaign has at a location of its JSON schema."""
-    schema = _campaign_schema()
+def _known_fields(location: Location, model: type[BaseModel]) -> list[str]:
+    """Names of the fields that a body has at a location of its JSON schema."""
+    schema = _schema(model)
     node = schema
     for part in location:
         node = _resolve(schema, node)
@@ -97,8 +103,8 @@ def _known_fields(location: Location) -> list[str]:
 
 
 @cache
-def _campaign_schema() -> dict[str, Any]:
-    return CampaignSpec.model_json_schema()
+def _schema(model: type[BaseModel]) -> dict[str, Any]:
+    return model.model_json_schema()
 
 
 def _resolve(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:

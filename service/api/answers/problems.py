@@ -124,7 +124,7 @@ def _invalid_request(error: RequestValidationError) -> ProblemError:
     if any(item["type"] == "json_invalid" for item in found):
         detail = f"the body is no JSON: {found[0]['ctx']['error']}"
         return ProblemError(HTTPStatus.BAD_REQUEST, Reason.MALFORMED_JSON, detail)
-    errors = field_problems(found)
+    errors = field_problems(found, error.body)
     return invalid("; ".join(f"{item.field}: {item.message}".removeprefix(": ") for item in errors), *errors)
 
 

@@ -137,7 +137,11 @@ def get_failure_table(
         request,
         service,
         caller,
-        lambda found: failure_table(found, service.store.plain_episodes(found.number, TIERS[tier])),
+        lambda found: failure_table(
+            found,
+            service.store.plain_episodes(found.number, TIERS[tier]),
+            service.store.triages(found.number),
+        ),
     )
 
 

@@ -2,21 +2,27 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Depends, Query, Request
 
 from risk_sac.records import Grade, Outcome
 from service.api.access import CurrentCaller
 from service.api.answers.pages import Cursor, Limit
-from service.api.answers.responses import INVALID, STORAGE, UNKNOWN
+from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN
 from service.api.answers.tiers import TIERS, Tier
 from service.api.context import Service
+from service.api.posted import documented, read_posted
 from service.schemas.episodes import EpisodePage
 from service.schemas.failures import Failure
+from service.schemas.triage import PostedTriage, Triage
 from service.store.finding import Judged
 from service.store.stored import Page, StoredEpisode
 from service.views.bodies import episode_body, failure_body
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
+
+
+async def _posted_triage(request: Request) -> PostedTriage:
+    return await read_posted(request, PostedTriage)
 
 
 @router.get("/episodes")
@@ -75,7 +81,21 @@ def list_failures(
 def get_failure(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> Failure:
     """One collision, valid or not, with its full time series."""
     episode = service.store.failure(campaign_id, failure_id, caller.sees)
-    return failure_body(campaign_id, episode, service.settings)
+    triage = service.store.triage(campaign_id, failure_id, caller.sees)
+    return failure_body(campaign_id, episode, triage, service.settings)
+
+
+@router.put("/failures/{failure_id}/triage", responses=MALFORMED | NOT_JSON, openapi_extra=documented(PostedTriage))
+def put_triage(
+    campaign_id: str,
+    failure_id: str,
+    posted: Annotated[PostedTriage, Depends(_posted_triage)],
+    service: Service,
+    caller: CurrentCaller,
+) -> Triage:
+    """Note what you make of a collision, in place of what was noted before; it goes with the campaign."""
+    triage = service.manager.triage(campaign_id, failure_id, posted.state, posted.comment, caller.sees)
+    return Triage.model_validate(triage)
 
 
 def _episode_page(page: Page[StoredEpisode], cursor: str | None) -> EpisodePage:

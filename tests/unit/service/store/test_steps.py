@@ -2,6 +2,7 @@
 
 import sqlite3
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -19,12 +20,15 @@ from service.settings import ServiceSettings
 from service.store.__main__ import main
 from service.store.database import held
 from service.store.reading import Store
-from service.store.states import State
+from service.store.states import State, TriageState
 from service.store.steps import newest_step, present_step, step_back
+from service.store.stored import StoredCampaign
 from service.store.writing import Ledger
-from service.workers.messages import Finished
+from service.workers.messages import EpisodeDone, Finished
 
-BEFORE = "0005"
+BEFORE = "0006"
+SPEC = CampaignSpec(families=("low",), methods=("random",))
+FAILURE = "low-random-0-train-0"
 
 
 @pytest.fixture
@@ -32,6 +36,23 @@ def settings(tmp_path: Path, database_url: str, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setenv("RISK_SAC_DATA_DIR", str(tmp_path / "data"))
     monkeypatch.setenv("RISK_SAC_DATABASE_URL", database_url)
     return ServiceSettings()
+
+
+def take(url: str, command: Callable[[Config, str], None], step: str) -> None:
+    """Steps forward or back, to a step that there is."""
+    engine, config = create_engine(url), Config()
+    config.set_main_option("script_location", "service.store:migrations")
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command(config, step)
+    engine.dispose()
+
+
+def fail(store: Store, campaign: StoredCampaign, episode: Callable[..., EpisodeDone]) -> None:
+    """A run at work, and its first failure."""
+    number = campaign.runs[0].number
+    Ledger(store).start_run(number)
+    Ledger(store).add_episodes([(number, episode(0, Outcome.FAILURE))])
 
 
 def tables(url: str) -> dict[str, object]:
@@ -59,18 +80,33 @@ SUMMED = (
 
 
 def test_one_step_back_leaves_what_the_version_before_wrote_and_all_rows(settings, episode, metrics, capsys):
-    engine, config = create_engine(settings.url), Config()
-    config.set_main_option("script_location", "service.store:migrations")
-    with engine.begin() as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, BEFORE)
-    engine.dispose()
+    take(settings.url, command.upgrade, BEFORE)
+    before = tables(settings.url)
+    store = Store(settings.url)
+    campaign = Ledger(store).create(SPEC)
+    fail(store, campaign, episode)
+    Ledger(store).triage(campaign.id, FAILURE, TriageState.CONFIRMED, "seen")
+    told = repr(store.events(campaign.id, limit=9))  # in which a NaN is what it is
+    store.close()
+    assert tables(settings.url)["step"] == newest_step()
+    assert main(["back"]) == 0
+    assert f"is at step {BEFORE}" in capsys.readouterr().out
+    assert tables(settings.url) == before
+    assert main(["back"]) == 1, "no further"
+    assert f"database is at step {BEFORE}; wanted {newest_step()}" in capsys.readouterr().err
+    store = Store(settings.url)  # which steps forward again
+    assert repr(store.events(campaign.id, limit=9)) == told
+    assert store.triage(campaign.id, FAILURE) is None
+    store.close()
+
+
+def test_two_steps_back_leave_checksums_that_the_version_before_takes(settings, episode, metrics):
+    take(settings.url, command.upgrade, "0005")
     before = tables(settings.url)
     store = Store(settings.url)
     ledger = Ledger(store)
-    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
-    ledger.start_run(campaign.runs[0].number)
-    ledger.add_episodes([(campaign.runs[0].number, episode(0, Outcome.FAILURE))])
+    campaign = ledger.create(SPEC)
+    fail(store, campaign, episode)
     replayed = Finished(
         finished=True,
         metrics=metrics,
@@ -81,14 +117,12 @@ def test_one_step_back_leaves_what_the_version_before_wrote_and_all_rows(setting
         repetitions={0: Repetition(times=3, same=2)},
     )
     ledger.end_run(campaign.runs[0].number, State.SUCCEEDED, result=replayed)
-    assert store.failure(campaign.id, "low-random-0-train-0").repetition == Repetition(times=3, same=2)
+    assert store.failure(campaign.id, FAILURE).repetition == Repetition(times=3, same=2)
     (run,) = store.campaign(campaign.id).runs
     assert (run.verified, run.flaky) == (0, 1)
     told = repr(store.events(campaign.id, limit=9))  # in which a NaN is what it is
     store.close()
-    assert tables(settings.url)["step"] == newest_step()
-    assert main(["back"]) == 0
-    assert f"is at step {BEFORE}" in capsys.readouterr().out
+    take(settings.url, command.downgrade, "0005")
     assert tables(settings.url) == before
     engine = create_engine(settings.url)
     with engine.connect() as connection:
@@ -97,8 +131,6 @@ def test_one_step_back_leaves_what_the_version_before_wrote_and_all_rows(setting
     added = [row[name] for name in ("distinct_failures", "preventable", "distinct_preventable")]
     values = [row[name] for name in SUMMED] + (added if any(added) else [])
     assert row["checksum"] == zlib.crc32(to_json(values, inf_nan_mode="strings"))
-    assert main(["back"]) == 1, "no further"
-    assert f"database is at step {BEFORE}; wanted {newest_step()}" in capsys.readouterr().err
     store = Store(settings.url)  # which steps forward again
     assert repr(store.events(campaign.id, limit=9)) == told.replace("Repetition(times=3, same=2)", "None")
     store.close()

@@ -2,8 +2,8 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.records import Outcome
-from service.errors import ConflictError, NotFoundError, TransitionError
-from service.store.states import State
+from service.errors import ConflictError, NotFoundError, StorageError, TransitionError
+from service.store.states import State, TriageState
 from service.store.stored import StoredEpisode
 from service.workers.messages import Finished
 from tests.begun import start
@@ -217,3 +217,68 @@ def test_a_run_has_the_sums_of_what_its_phases_counted(store, ledger, episode, m
     done = Finished(finished=True, metrics=counted, evaluation=counted, digest="d", versions={}, wall_s=1.0)
     ledger.end_run(number, State.SUCCEEDED, result=done)
     assert tallies(store, campaign) == (8, 6, 4)
+
+
+def test_a_triage_is_kept_and_moves_the_revision(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    ledger.add_episodes([(start(store, ledger), episode(5, Outcome.DEGENERATE))])
+    failure = "low-risk-sac-3-train-5"
+    assert store.triage(campaign.id, failure) is None
+    assert store.triages(campaign.number) == {}
+    before = store.revision(campaign.id)
+    noted = ledger.triage(campaign.id, failure, TriageState.CONFIRMED, "late, ünd\nof two lines")
+    assert store.triage(campaign.id, failure) == noted
+    assert (noted.state, noted.comment) == (TriageState.CONFIRMED, "late, ünd\nof two lines")
+    revision = store.revision(campaign.id)
+    assert revision != before
+    assert ledger.triage(campaign.id, failure, noted.state, noted.comment) == noted, "the same again changes nothing"
+    assert store.revision(campaign.id) == revision
+    changed = ledger.triage(campaign.id, failure, TriageState.FIXED, "")
+    assert (changed.state, changed.comment) == (TriageState.FIXED, "")
+    assert store.revision(campaign.id) != revision
+    (stored,) = store.plain_episodes(campaign.number)
+    assert store.triages(campaign.number) == {stored.number: TriageState.FIXED}
+
+
+def test_only_a_contact_of_the_project_has_a_triage(store, ledger, episode):
+    campaign = ledger.create(SPEC, project="maps")
+    number = campaign.runs[0].number
+    ledger.start_run(number)
+    ledger.add_episodes([(number, episode(0)), (number, episode(1, Outcome.FAILURE))])
+    for failure, project in (("low-risk-sac-3-train-0", "maps"), ("low-risk-sac-3-train-1", "rivals"), ("x", "maps")):
+        with pytest.raises(NotFoundError):
+            ledger.triage(campaign.id, failure, TriageState.NEW, "", project)
+        with pytest.raises(NotFoundError):
+            store.triage(campaign.id, failure, project)
+    assert store.triages(campaign.number) == {}
+
+
+def test_a_triage_outlives_that_its_run_reports_the_episode_again(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
+    noted = ledger.triage(campaign.id, "low-risk-sac-3-train-0", TriageState.DISMISSED, "artefact")
+    ledger.add_episodes([(number, episode(0, Outcome.DEGENERATE))])
+    assert store.triage(campaign.id, "low-risk-sac-3-train-0") == noted
+
+
+def test_triages_go_with_their_campaign(store, ledger, episode):
+    campaign, other = ledger.create(SPEC), ledger.create(SPEC)
+    for run in (campaign.runs[0], other.runs[0]):
+        ledger.start_run(run.number)
+        ledger.add_episodes([(run.number, episode(0, Outcome.FAILURE))])
+    for each in (campaign, other):
+        ledger.triage(each.id, "low-risk-sac-3-train-0", TriageState.CONFIRMED, each.id)
+    ledger.delete(campaign.id)
+    assert store.triages(campaign.number) == {}
+    assert store.triage(other.id, "low-risk-sac-3-train-0").comment == other.id
+
+
+def test_a_triage_that_changed_on_the_disk_is_noticed(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    ledger.add_episodes([(start(store, ledger), episode(0, Outcome.FAILURE))])
+    ledger.triage(campaign.id, "low-risk-sac-3-train-0", TriageState.CONFIRMED, "seen")
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE triages SET comment = 'sean'")
+    with pytest.raises(StorageError, match="row 1 of the table 'triages' is damaged"):
+        store.triage(campaign.id, "low-risk-sac-3-train-0")

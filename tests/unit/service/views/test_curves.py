@@ -18,7 +18,7 @@ SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
 
 
 def plain(run, record):
-    return PlainEpisode(run.number, record.phase, record.index, record.outcome, to_text(record))
+    return PlainEpisode(1, run.number, record.phase, record.index, record.outcome, to_text(record))
 
 
 def drawn(count):

@@ -7,6 +7,7 @@ from risk_sac.records import Grade, Outcome
 from risk_sac.run_folder.verified import Repetition
 from risk_sac.verdicts.distinct import DistinctFailures
 from service.store.counting import to_text
+from service.store.states import TriageState
 from service.store.stored import PlainEpisode
 from service.views.failure_table import failure_table
 from tests.builders import collision, episode_record, judgement
@@ -17,7 +18,7 @@ FAILURE, REFUSED = Outcome.FAILURE, Outcome.DEGENERATE
 
 def plain(run, index, hit, outcome=FAILURE, phase="train", **changes):
     record = episode_record(index, outcome, phase=phase, collision=hit, **changes)
-    return PlainEpisode(run.number, phase, index, outcome, to_text(record))
+    return PlainEpisode(1, run.number, phase, index, outcome, to_text(record))
 
 
 def told(table):
@@ -35,7 +36,7 @@ def test_a_column_has_what_the_record_has(ledger):
         verdicts={"inside_limits": True, "ego_moving": False},
         judgement=judgement(None, conflict_s=-math.inf),
     )
-    table = told(failure_table(campaign, [plain(run, 7, hit, REFUSED, scene={"lead_gap_m": 12.34567})]))
+    table = told(failure_table(campaign, [plain(run, 7, hit, REFUSED, scene={"lead_gap_m": 12.34567})], {}))
     kinds, scenes = table.pop("kinds"), table.pop("scenes")
     assert {name: values[0] for name, values in table.items()} == {
         "ids": "low-random-4-train-7",
@@ -94,7 +95,7 @@ def test_distinct_are_those_that_the_run_counted(ledger):
         plain(first, 10, hits[0], phase="evaluate"),
     ]
     counted = DistinctFailures()
-    table = failure_table(campaign, contacts)
+    table = failure_table(campaign, contacts, {})
     assert table.distinct == [*(counted.add(hit) for hit in hits), True, True, False]
     assert table.distinct[:6] == [True, False, True, True, True, True]
     assert [(kind.name, kind.failures, kind.distinct, kind.preventable) for kind in table.kinds] == [
@@ -112,8 +113,18 @@ def test_a_failure_says_whether_it_repeats(ledger):
     run = campaign.runs[0]
     repetitions = {0: Repetition(times=3, same=3), 1: Repetition(times=3, same=2)}
     campaign = replace(campaign, runs=(replace(run, repetitions=repetitions), campaign.runs[1]))
-    table = failure_table(campaign, [plain(run, index, collision()) for index in range(3)])
+    table = failure_table(campaign, [plain(run, index, collision()) for index in range(3)], {})
     assert table.repeats == ["verified", "flaky", None]
+
+
+def test_what_people_made_of_a_contact_stands_beside_it(ledger):
+    campaign = ledger.create(SPEC)
+    contacts = [replace(plain(campaign.runs[0], index, collision()), number=index + 5) for index in range(3)]
+    assert failure_table(campaign, contacts, {6: TriageState.FIXED, 9: TriageState.DISMISSED}).triage == [
+        TriageState.NEW,
+        TriageState.FIXED,
+        TriageState.NEW,
+    ]
 
 
 def test_a_record_from_before_minima_were_called_early_is_read(ledger):
@@ -121,11 +132,11 @@ def test_a_record_from_before_minima_were_called_early_is_read(ledger):
     contact = plain(campaign.runs[0], 0, collision(min_ttc_s=0.75))
     older = replace(contact, record=contact.record.replace('"early_min_ttc_s"', '"min_ttc_s"'))
     assert older.record != contact.record
-    assert failure_table(campaign, [older]).min_ttc_s == [0.75]
+    assert failure_table(campaign, [older], {}).min_ttc_s == [0.75]
 
 
 def test_without_a_failure_the_table_is_empty(ledger):
-    table = failure_table(ledger.create(SPEC), [])
+    table = failure_table(ledger.create(SPEC), [], {})
     assert {name: len(values) for name, values in table} == dict.fromkeys(type(table).model_fields, 0)
 
 
@@ -133,7 +144,7 @@ def test_scenes_of_a_family_have_all_parameters_that_one_of_them_has(ledger):
     campaign = ledger.create(CampaignSpec(families=("low", "dense"), methods=("random",)))
     low, dense = campaign.runs
     scenes = [(low, {"gap": 1.0}), (dense, {}), (low, {"gap": 2.0, "friction": 0.5})]
-    table = told(failure_table(campaign, [plain(run, 0, collision(), scene=scene) for run, scene in scenes]))
+    table = told(failure_table(campaign, [plain(run, 0, collision(), scene=scene) for run, scene in scenes], {}))
     assert table["scenes"] == {
         "low": {"names": ["gap", "friction"], "rows": [[1.0, None], [2.0, 0.5]], "of": [0, 2]},
         "dense": {"names": [], "rows": [[]], "of": [1]},
