@@ -129,12 +129,7 @@ class Manager:
     def triage(
         self, campaign_id: str, failure_id: str, state: TriageState, comment: str, project: str | None = None
     ) -> StoredTriage:
-        """Note what people make of a failure.
-
-        Raises:
-          NotFoundError: there is no such campaign or failure.
-          StorageError: it cannot be written down.
-        """
+        """Note what people make of a failure; raises what `Ledger.triage` does."""
         with self._lock:
             return self._ledger.triage(campaign_id, failure_id, state, comment, project)
 
