@@ -96,11 +96,16 @@ ASKED = {
     "cancel_ended": ("POST", f"{ENDED}/cancel"),
     "delete_live": ("DELETE", LIVE),
     "post": ("POST", "/v1/campaigns"),
+    "check": ("POST", "/v1/campaigns/check"),
+    "check_bad_formula": ("POST", "/v1/campaigns/check"),
     "route_unknown": ("GET", "/v1/nothing"),
     "method_not_allowed": ("DELETE", "/v1/campaigns"),
 }
 POSTED = {"families": ["low"], "methods": ["random"], "label": "posted", "budget": {"episodes": 5}}
-BODIES = {"post": POSTED, "triage_unknown": {"state": "fixed", "comment": "in 0.2"}}
+BODIES = {"post": POSTED, "check": POSTED} | {
+    "triage_unknown": {"state": "fixed", "comment": "in 0.2"},
+    "check_bad_formula": POSTED | {"requirements": [{"name": "gap", "formula": "leader_gap_m > x", "scale": 1}]},
+}
 
 
 @pytest.fixture(scope="module")

@@ -29,6 +29,7 @@ ROADS = Path(__file__).parents[2] / "sumo_nets" / "low" / "low.net.xml"
 SPEC = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 4}}
 REGRESSIONS = "/v1/regressions"
 CAMPAIGN, NETWORK = "/v1/campaigns/{campaign_id}", "/v1/networks/{network_id}"
+CHECK = "/v1/campaigns/check"
 TRIAGE = f"{CAMPAIGN}/failures/{{failure_id}}/triage"
 
 # What each route wants, and what it answers the project's own key.
@@ -46,6 +47,7 @@ ROUTES = {
     ("GET", "/v1/methods"): ("read", 200),
     ("GET", "/v1/campaigns"): ("read", 200),
     ("POST", "/v1/campaigns"): ("run", 202),
+    ("POST", CHECK): ("run", 204),
     ("GET", CAMPAIGN): ("read", 200),
     ("DELETE", CAMPAIGN): ("run", 409),  # it runs
     ("POST", f"{CAMPAIGN}/cancel"): ("run", 202),
@@ -129,7 +131,7 @@ def ask(world, method, path, key=None, known=True, **headers):
     if key is not None:
         headers["authorization"] = f"Bearer {world.tokens.get(key, key)}"
     content = b""
-    if (method, path) == ("POST", "/v1/campaigns"):
+    if (method, path) in (("POST", "/v1/campaigns"), ("POST", CHECK)):
         content, headers["content-type"] = json.dumps(SPEC).encode(), "application/json"
     elif path == TRIAGE:
         content, headers["content-type"] = b'{"state": "confirmed"}', "application/json"

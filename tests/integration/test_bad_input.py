@@ -53,6 +53,7 @@ def test_a_bad_campaign_is_refused_by_field_got_and_wanted(client, body, field, 
     assert wanted in error["wanted"]
     assert error["wanted"]
     assert error["message"] in problem["detail"]
+    assert_checked_alike(client, body, problem)
 
 
 @pytest.mark.parametrize(
@@ -71,6 +72,31 @@ def test_a_body_that_is_no_json_is_refused(client, body, detail):
     response = client.post("/v1/campaigns", content=body, headers={"content-type": "application/json"})
     assert response.status_code == 400
     assert detail in response.json()["detail"]
+    assert_checked_alike(client, body, response.json())
+
+
+def assert_checked_alike(client, body, problem):
+    """Whether a check alone says the same."""
+    path = "/v1/campaigns/check"
+    checked = client.post(path, content=body, headers={"content-type": "application/json"})
+    assert checked.headers["content-type"] == "application/problem+json"
+    assert checked.json() == problem | {"instance": path}
+
+
+def test_a_check_keeps_nothing_and_needs_no_key(client):
+    def campaigns():
+        return client.get("/v1/campaigns").json()["items"]
+
+    before = campaigns()
+    for headers in ({}, {"idempotency-key": "nightly"}):
+        body = {"families": ["dense"], "methods": ["random"], "label": "never"}
+        answer = client.post("/v1/campaigns/check", json=body, headers=headers)
+        assert (answer.status_code, answer.content) == (204, b"")
+    assert campaigns() == before
+    posted = client.post("/v1/campaigns", json={"families": ["low"]}, headers={"idempotency-key": "nightly"})
+    assert posted.status_code == 202, "the key is still free"
+    assert client.get("/v1/campaigns/check").json()["reason"] == "unknown_id", "no campaign is called so"
+    assert client.post("/v1/campaigns/check", content=b"{}").status_code == 415
 
 
 def test_every_mistake_is_named_at_once(client):

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Request, Response
 
-from risk_sac import __version__
+from risk_sac import __version__, problem
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from service.api.access import Caller, CurrentCaller
 from service.api.answer_cache import keep
@@ -66,6 +66,13 @@ def post_campaign(
     """Queue a campaign: families × methods × seeds on one equal budget."""
     campaign = service.manager.submit(spec, project=caller.project, key=idempotency_key)
     return _accepted(campaign, service)
+
+
+@router.post("/check", status_code=204, responses=MALFORMED | NOT_JSON, openapi_extra=documented(CampaignSpec))
+def check_campaign(spec: PostedCampaign) -> Response:
+    """Say what is wrong with a campaign, as posting it would; nothing is kept, and no quota counts it."""
+    problem.check_campaign(spec)
+    return Response(status_code=204)
 
 
 @router.get("", response_model=CampaignPage, responses=TAGGED)
