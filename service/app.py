@@ -13,6 +13,7 @@ from risk_sac.execution.executors import executor_named
 from service.api.answer_cache import AnswerCache
 from service.api.answers.pages import Cursors
 from service.api.answers.problems import add_problem_handlers
+from service.api.compression import Compression
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
 from service.api.guards import add_guards
@@ -85,6 +86,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
     app.router.routes += page.routes()
     add_problem_handlers(app)
     app.add_middleware(AnswerCache)
+    app.add_middleware(Compression)
     add_guards(app, settings, made)
     app.add_middleware(Head)
     app.add_middleware(Observe, latencies=latencies)

@@ -16,7 +16,8 @@ from service.schemas.triage import PostedTriage
 DESCRIPTION = """Finds scenarios in which an automated driving system fails.
 
 Post a campaign, follow it, read what it found. All errors are problem details (RFC 9457) that name the field, with a
-`reason` that does not change when messages do. Whatever answers GET answers HEAD, too."""
+`reason` that does not change when messages do. Whatever answers GET answers HEAD, too. Text of 2 kB and more travels
+packed where `Accept-Encoding` names gzip."""
 
 
 def openapi(app: FastAPI) -> dict[str, Any]:

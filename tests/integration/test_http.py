@@ -121,3 +121,56 @@ def test_who_leaves_in_the_middle_of_a_body_is_counted_as_such(serve, path, kind
     assert 'status="500"' not in service.client.get("/metrics").text
     service.stop()
     assert "Traceback" not in service.log.read_text()
+
+
+def raw(client, path, **headers):
+    """The answer as it travelled, with its body still packed."""
+    with client.stream("GET", path, headers={"accept-encoding": ""} | headers) as response:
+        return response, b"".join(response.iter_raw())
+
+
+@pytest.mark.parametrize("path", ["/openapi.json", "/v1/families", "CAMPAIGN", "CAMPAIGN/table"])
+def test_large_text_is_packed_for_those_who_can_unpack_it(client, campaign, path):
+    path = path.replace("CAMPAIGN", f"/v1/campaigns/{campaign}")
+    plain, body = raw(client, path)
+    assert plain.status_code == 200
+    assert len(body) >= 2000
+    for accepted in ("gzip", "br, gzip;q=0.5", "GZIP"):
+        packed, content = raw(client, path, **{"accept-encoding": accepted})
+        assert packed.headers["content-encoding"] == "gzip", accepted
+        assert gzip.decompress(content) == body
+        assert int(packed.headers["content-length"]) == len(content) < len(body)
+        assert packed.headers.get("etag") == plain.headers.get("etag")
+    for response in (plain, packed):
+        assert "Accept-Encoding" in response.headers["vary"]
+    for refused in ("", "gzip;q=0", "identity", "br", "xgzip"):
+        unpacked, content = raw(client, path, **{"accept-encoding": refused})
+        assert "content-encoding" not in unpacked.headers, refused
+        assert content == body
+    if "etag" in packed.headers:
+        same, content = raw(client, path, **{"accept-encoding": "gzip", "if-none-match": packed.headers["etag"]})
+        assert (same.status_code, content) == (304, b"")
+        assert same.headers["vary"] == packed.headers["vary"]
+        assert "content-encoding" not in same.headers
+
+
+def test_what_is_small_or_packed_already_travels_as_it_is(client, campaign):
+    for path in ("/healthz", "/", "/docs/favicon.png", "/nothing"):
+        response, content = raw(client, path, **{"accept-encoding": "gzip"})
+        assert "content-encoding" not in response.headers, path
+        assert int(response.headers["content-length"]) == len(content)
+
+
+def test_a_stream_of_events_is_not_packed(client, campaign):
+    response, content = raw(client, f"/v1/campaigns/{campaign}/events", **{"accept-encoding": "gzip"})
+    assert "content-encoding" not in response.headers
+    assert content.startswith(b"retry: ")
+
+
+def test_a_head_says_what_travels(client, campaign):
+    for accepted in ("gzip", ""):
+        headers = {"accept-encoding": accepted}
+        got, _ = raw(client, f"/v1/campaigns/{campaign}", **headers)
+        head = client.head(f"/v1/campaigns/{campaign}", headers=headers)
+        for name in ("content-encoding", "content-length", "etag", "vary"):
+            assert head.headers.get(name) == got.headers.get(name), name

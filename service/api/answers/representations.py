@@ -28,6 +28,11 @@ def accepted(accept: str, offered: Sequence[str]) -> str:
     return best
 
 
+def takes(accept_encoding: str, encoding: str) -> bool:
+    """Whether an Accept-Encoding header names an encoding, and not to refuse it."""
+    return dict(map(_range, accept_encoding.split(","))).get(encoding, 0.0) > 0.0
+
+
 def _range(part: str) -> tuple[str, float]:
     """`text/*;q=0.5` -> ("text/*", 0.5)."""
     name, *parameters = part.split(";")

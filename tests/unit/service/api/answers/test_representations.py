@@ -1,7 +1,7 @@
 import pytest
 from fastapi import HTTPException, Request
 
-from service.api.answers.representations import accepted, caching, entity_tag, has
+from service.api.answers.representations import accepted, caching, entity_tag, has, takes
 
 OFFERED = ("application/json", "text/markdown", "text/csv")
 BROWSER = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,*/*;q=0.8"
@@ -57,3 +57,13 @@ def test_what_has_no_tag_is_not_to_be_kept_by_one():
 def test_a_tag_is_among_those_that_the_client_has(sent, there):
     headers = [] if sent is None else [(b"if-none-match", sent.encode())]
     assert has(Request({"type": "http", "headers": headers}), entity_tag("7")) is there
+
+
+@pytest.mark.parametrize("header", ["gzip", "br, GZip", "gzip;q=0.001", "deflate;q=0.5 , gzip ; q=1"])
+def test_an_encoding_that_is_named_is_taken(header):
+    assert takes(header, "gzip")
+
+
+@pytest.mark.parametrize("header", ["", "br", "xgzip", "gzip;q=0", "br, gzip;q=0.0", "*;q=0", ",,"])
+def test_an_encoding_that_is_not_named_or_refused_is_not_taken(header):
+    assert not takes(header, "gzip")
