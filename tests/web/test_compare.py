@@ -59,7 +59,7 @@ def test_the_numbers_of_a_report_are_the_services(
         for name, text in zip(("ecr", "pcr"), shown[4:], strict=True):
             estimate = cell["estimates"][name]
             assert numbers(text) == per_cent(estimate["mean"], estimate["low"], estimate["high"])
-        funnel = page.get_by_role("region", name=f"Funnel of {cell['method']}")
+        funnel = page.get_by_role("group", name=f"Funnel of {cell['method']}")
         assert funnel.locator("b").all_inner_texts() == [
             str(cell[name]) for name in ("raw_collisions", "failures", "distinct_failures", "distinct_preventable")
         ]
@@ -119,7 +119,7 @@ def test_two_campaigns_stand_beside_each_other(
         for total in service.get(one, "/results")["totals"]:
             _check_total(row_of(page, f"{one} {total['method']}", total["family"]), "AB"[at], total)
     posted = dict.fromkeys(("families", "methods", "seeds", "budget.episodes"))
-    differing = page.get_by_role("region", name="What was posted differently", exact=True).last
+    differing = page.get_by_role("region", name="Differing fields")
     assert [row.inner_text() for row in differing.locator("tbody th").all()] == list(posted)
     expect(differing.get_by_role("row", name="budget.episodes")).to_contain_text("60")
     saved = _saved(page, page.get_by_role("button", name="CSV"), tmp_path)

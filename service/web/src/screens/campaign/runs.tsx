@@ -59,7 +59,7 @@ function Card({ run, campaign, away, hide }: { run: Run; campaign: Body<"Campaig
         <Figure name="PCR" value={run.metrics ? `${number(100 * (run.metrics.pcr ?? NaN), 1)} %` : "–"} />
       </dl>
       <p class="small faint">
-        {count(run.raw_collisions)} contacts, {count(run.rejected)} scenes refused
+        {count(run.raw_collisions)} contact{run.raw_collisions === 1 ? "" : "s"}, {count(run.rejected)} refused scene{run.rejected === 1 ? "" : "s"}
         {run.attempts > 1 && <span class="warn"> · attempt {run.attempts}</span>}
       </p>
       {run.reason && <p class="small bad breaking">{run.reason}</p>}

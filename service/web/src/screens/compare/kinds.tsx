@@ -6,11 +6,12 @@ import { count } from "../../ui/text";
 
 interface Found {
   campaign: string;
+  family: string;
   overview: Body<"Overview">;
   cells: Body<"Cell">[];
 }
 
-export function Kinds({ campaign, overview, cells }: Found) {
+export function Kinds({ campaign, family, overview, cells }: Found) {
   const most = Math.max(1, ...cells.flatMap((cell) => Object.values(cell.signatures)));
   if (!overview.clusters.length) return <p class="faint">No method has found a valid failure.</p>;
   return (
@@ -22,7 +23,7 @@ export function Kinds({ campaign, overview, cells }: Found) {
         The distinct ones are as various as {overview.vendi.toFixed(1)} that have nothing in common (Vendi score). They lie in {overview.covered} of the taxonomy's{" "}
         {count(overview.cells)} cells.
       </p>
-      <div class="scroll" tabIndex={0} role="region" aria-label="Kinds of failures">
+      <div class="scroll" tabIndex={0} role="region" aria-label={`Kinds of failures: ${family}`}>
         <table class="kinds">
           <thead>
             <tr>

@@ -10,14 +10,15 @@ import { niceEnd } from "./scale";
 interface Compared {
   /** What the rows are: "Method". */
   what: string;
+  family: string;
   rows: Row[];
 }
 
-export function Methods({ what, rows }: Compared) {
+export function Methods({ what, family, rows }: Compared) {
   const ends = { ecr: end(rows.map((row) => row.ecr)), pcr: end(rows.map((row) => row.pcr)) };
   const most = Math.max(1, ...rows.map((row) => row.distinct_failures));
   return (
-    <div class="scroll" tabIndex={0} role="region" aria-label={`${what}s compared`}>
+    <div class="scroll" tabIndex={0} role="region" aria-label={`${what}s compared: ${family}`}>
       <table class="methods">
         <thead>
           <tr>
@@ -95,12 +96,12 @@ export function Funnels({ rows }: { rows: Row[] }) {
   return (
     <div class="funnels">
       {rows.map((row) => (
-        <section key={row.key} aria-label={`Funnel of ${row.name}`}>
+        <div key={row.key} role="group" aria-label={`Funnel of ${row.name}`}>
           <h3>
             <Sample mark={row.mark} /> {row.name}
           </h3>
           <Funnel counts={row} most={most} />
-        </section>
+        </div>
       ))}
     </div>
   );
@@ -120,12 +121,12 @@ const MEASURES: [string, string, (row: Row) => string][] = [
   ["steps", "environment steps", (row) => count(row.more.environment_steps)],
 ];
 
-export function Measures({ what, rows }: Compared) {
+export function Measures({ what, family, rows }: Compared) {
   const known = MEASURES.filter(([, , value]) => rows.some((row) => value(row) !== "–"));
   return (
     <details>
       <summary>More measures</summary>
-      <div class="scroll" tabIndex={0} role="region" aria-label="More measures">
+      <div class="scroll" tabIndex={0} role="region" aria-label={`More measures: ${family}`}>
         <table>
           <thead>
             <tr>

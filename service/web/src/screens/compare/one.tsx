@@ -121,18 +121,18 @@ function Family({ id, table, family, phase }: { id: string; table: Table; family
         Family {family}
         {phase === "evaluation" && <span class="faint">, the frozen policies</span>}
       </h2>
-      <Methods what="Method" rows={rows} />
+      <Methods what="Method" family={family} rows={rows} />
       <Funnels rows={rows} />
-      <Measures what="Method" rows={rows} />
-      <Tests tests={headline} reference={headline[0]?.reference ?? table.reference} caption={`Declared beforehand: ${headline[0]?.metric}`} />
-      <Tests tests={tests} reference={table.reference} caption={`${table.reference} against the others`} />
+      <Measures what="Method" family={family} rows={rows} />
+      <Tests tests={headline} family={family} reference={headline[0]?.reference ?? table.reference} caption={`Declared beforehand: ${headline[0]?.metric}`} />
+      <Tests tests={tests} family={family} reference={table.reference} caption={`${table.reference} against the others`} />
       {phase === "search" && (
         <section class="block">
           <h3>What a budget finds</h3>
           <Figures campaign={id} names={(name) => name === `preventable_found_${family}` || name === `distinct_found_${family}`} columns />
         </section>
       )}
-      {phase === "search" && overview && <Kinds campaign={id} overview={overview} cells={cells} />}
+      {phase === "search" && overview && <Kinds campaign={id} family={family} overview={overview} cells={cells} />}
     </section>
   );
 }

@@ -61,9 +61,9 @@ export function Several({ ids }: { ids: string[] }) {
         return (
           <section key={family} class="card family" aria-labelledby={`family-${family}`}>
             <h2 id={`family-${family}`}>Family {family}</h2>
-            <Methods what="Campaign" rows={rows} />
+            <Methods what="Campaign" family={family} rows={rows} />
             <Funnels rows={rows} />
-            <Measures what="Campaign" rows={rows} />
+            <Measures what="Campaign" family={family} rows={rows} />
           </section>
         );
       })}
@@ -100,7 +100,7 @@ function Specs({ found }: { found: Found[] }) {
       {differing.length === 0 ? (
         <p class="faint">Nothing but the label.</p>
       ) : (
-        <div class="scroll" tabIndex={0} role="region" aria-label="What was posted differently">
+        <div class="scroll" tabIndex={0} role="region" aria-label="Differing fields">
           <table class="specs">
             <thead>
               <tr>

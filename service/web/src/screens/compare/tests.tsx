@@ -19,14 +19,15 @@ const WORDS: Record<string, string> = {
 
 interface Tested {
   tests: Test[];
+  family: string;
   reference: string;
   caption: string;
 }
 
-export function Tests({ tests, reference, caption }: Tested) {
+export function Tests({ tests, family, reference, caption }: Tested) {
   if (!tests.length) return null;
   const tested = tests.some((test) => test.p !== null);
-  const table = <TestTable tests={tests} caption={caption} />;
+  const table = <TestTable tests={tests} caption={`${caption}: ${family}`} />;
   if (tested) {
     return (
       <section class="block">

@@ -1,0 +1,233 @@
+"""The screen of one campaign: what it has found, how it goes on, and what can be done with it."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from tests.server import Service, servers
+from tests.web.conftest import LONG_MS, PHONE
+
+STEPS = ("raw_collisions", "failures", "distinct_failures", "distinct_preventable")
+
+
+def funnel(page: Page) -> list[str]:
+    return page.get_by_role("list", name="Funnel").locator("b").all_inner_texts()
+
+
+def card(page: Page, run: str) -> Locator:
+    return page.locator(f"article[data-run='{run}']")
+
+
+def plot(page: Page, title: str) -> Locator:
+    return page.get_by_role("group", name=re.compile(f"^{title} over episodes"))
+
+
+def test_the_numbers_on_the_screen_are_the_services(
+    page_at: Callable[..., Page], service: Service, campaign: str, check_axe: Callable[[Page], None]
+) -> None:
+    page = page_at(f"campaigns/{campaign}")
+    expect(page.get_by_role("heading", name="night <b>7</b>")).to_be_visible()
+    plot(page, "Sliding ECR").wait_for()
+    seen = service.get(campaign)
+    assert funnel(page) == [str(seen["progress"][name]) for name in STEPS]
+    expect(page.locator("[data-field='done']")).to_have_text(str(seen["progress"]["episodes_done"]))
+    for run in seen["runs"]:
+        shown = dict(
+            zip(card(page, run["id"]).locator("dt").all_inner_texts(), _values(card(page, run["id"])), strict=True)
+        )
+        assert [shown[name] for name in ("valid", "distinct", "preventable")] == [str(run[name]) for name in STEPS[1:]]
+        for name in ("ecr", "pcr"):
+            assert _number(shown[name.upper()]) == pytest.approx(100 * run["metrics"][name], abs=0.0501)
+        expect(card(page, run["id"])).to_contain_text(f"{run['raw_collisions']} contacts")
+    check_axe(page)
+
+
+def test_the_pointer_reads_the_curves_of_the_service(
+    page_at: Callable[..., Page], service: Service, campaign: str
+) -> None:
+    page = page_at(f"campaigns/{campaign}")
+    curves = {run["family"]: run for run in service.get(campaign, "/curves", points=200)["runs"]}
+    for title, name, written in (
+        ("Sliding ECR", "window_ecr", lambda value: 100 * value),
+        ("Distinct failures", "distinct", float),
+    ):
+        area = plot(page, title)
+        area.focus()
+        area.press("ArrowRight")  # from the newest episode nowhere: the pointer comes to it
+        shown = area.get_by_role("status")
+        expect(shown).to_contain_text("Episode 60")
+        for family, run in curves.items():
+            line = shown.locator("span", has_text=f"archive, {family}").last.inner_text()
+            assert _number(line.removeprefix(f"archive, {family}")) == pytest.approx(written(run[name][-1]), abs=0.0501)
+        area.press("ArrowLeft")
+        expect(shown).to_contain_text("Episode 59")
+
+
+def test_a_drag_zooms_all_curves_and_a_double_click_shows_all_again(
+    page_at: Callable[..., Page], campaign: str
+) -> None:
+    page = page_at(f"campaigns/{campaign}")
+    area = plot(page, "Sliding ECR").locator(".u-over")
+    area.scroll_into_view_if_needed()
+    box = area.bounding_box()
+    page.mouse.move(box["x"] + 0.25 * box["width"], box["y"] + 40)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.75 * box["width"], box["y"] + 40, steps=4)
+    page.mouse.up()
+    expect(page.get_by_role("button", name="Show all")).to_have_count(3)
+    area.dblclick()
+    expect(page.get_by_role("button", name="Show all")).to_have_count(0)
+
+
+def test_a_run_is_hidden_by_the_legend_and_by_its_card(page_at: Callable[..., Page], campaign: str) -> None:
+    page = page_at(f"campaigns/{campaign}")
+    entry = page.get_by_role("group", name="Runs in the curves").get_by_role("button", name="archive, low")
+    area = plot(page, "Sliding ECR")
+    entry.click()
+    expect(entry).to_have_attribute("aria-pressed", "false")
+    expect(card(page, "low-archive-601").get_by_role("button", name="Hidden")).to_be_visible()
+    area.focus()
+    area.press("ArrowLeft")
+    expect(area.get_by_role("status")).not_to_contain_text("low")
+    card(page, "low-archive-601").get_by_role("button", name="Hidden").click()
+    expect(entry).to_have_attribute("aria-pressed", "true")
+
+
+def test_a_running_campaign_is_followed_to_its_end_without_a_reload(
+    page_at: Callable[..., Page], service: Service
+) -> None:
+    running = service.post(label="live", families=["low"], methods=["random"], seeds=[5], budget={"episodes": 40})
+    page = page_at(f"campaigns/{running}")
+    page.evaluate("window.neverReloaded = true")
+    expect(page.get_by_text("running", exact=True).first).to_be_visible(timeout=LONG_MS)
+    plot(page, "Realism cost").wait_for()  # begins with the first episode
+    expect(page.get_by_text("succeeded", exact=True).first).to_be_visible(timeout=LONG_MS)
+    ended = service.wait(running)
+    expect(page.locator("[data-field='done']")).to_have_text("40")
+    assert funnel(page) == [str(ended["progress"][name]) for name in STEPS]
+    area = plot(page, "Realism cost")
+    area.focus()
+    area.press("ArrowRight")
+    expect(area.get_by_role("status")).to_contain_text("Episode 40")
+    expect(page.get_by_role("button", name="Delete")).to_be_visible()
+    assert page.evaluate("window.neverReloaded")
+
+
+def test_events_draw_curves_that_equal_those_of_the_service(page_at: Callable[..., Page], service: Service) -> None:
+    running = service.post(families=["low"], methods=["archive"], seeds=[601], budget={"episodes": 60})
+    page = page_at(f"campaigns/{running}", allowed=("ERR_FAILED",))
+    plot(page, "Sliding ECR").wait_for()
+    page.route("**/curves?*", lambda route: route.abort())  # from here on by events alone
+    area = plot(page, "Distinct failures")
+    service.wait(running)
+    curve = service.get(running, "/curves", points=200)["runs"][0]
+    area.focus()
+    for _ in range(3):  # the newest may be drawn a moment later
+        area.press("ArrowRight")
+    expect(area.get_by_role("status")).to_contain_text("Episode 60")
+    expect(area.get_by_role("status").locator("span b")).to_have_text(str(curve["distinct"][-1]))
+
+
+def test_cancelling_asks_first(page_at: Callable[..., Page], service: Service) -> None:
+    running = service.post(families=["low"], methods=["random"], seeds=[6], budget={"episodes": 5000})
+    page = page_at(f"campaigns/{running}")
+    page.get_by_role("button", name="Cancel").click()
+    question = page.get_by_role("dialog", name="Cancel this campaign?")
+    page.keyboard.press("Escape")
+    expect(question).to_have_count(0)
+    assert service.get(running)["state"] in ("queued", "running")
+    page.get_by_role("button", name="Cancel").click()
+    question.get_by_role("button", name="Cancel the campaign").click()
+    expect(page.get_by_text("cancelled", exact=True).first).to_be_visible(timeout=LONG_MS)
+    assert service.wait(running)["state"] == "cancelled"
+    page.get_by_role("button", name="Delete").click()
+    page.get_by_role("button", name="Delete for good").click()
+    expect(page).to_have_url(re.compile("#/campaigns$"))
+    assert service.client.get(f"/v1/campaigns/{running}").status_code == 404
+
+
+def test_a_campaign_comes_back_with_its_server(new_page: Callable[..., Page], tmp_path: Path) -> None:
+    with servers(tmp_path) as start:
+        service = start()
+        running = service.post(budget={"episodes": 100_000})
+        page = new_page(allowed=("ERR_", "Failed to load"))
+        page.goto(f"{service.client.base_url}/page/#/campaigns/{running}")
+        done = page.locator("[data-field='done']")
+        expect(done).not_to_have_text("0")
+        service.stop()
+        expect(page.get_by_text("The service does not answer").first).to_be_visible()
+        before = done.inner_text()  # what was said last stays
+        assert before != "0"
+        service.start()
+        expect(page.get_by_text("The service does not answer")).to_have_count(0)
+        expect(done).not_to_have_text(before)
+
+
+def test_nobody_asks_for_anything_while_the_page_is_hidden(page_at: Callable[..., Page], service: Service) -> None:
+    running = service.post(families=["low"], methods=["random"], seeds=[7], budget={"episodes": 5000})
+    page = page_at(f"campaigns/{running}")
+    plot(page, "Sliding ECR").wait_for()
+    hide = "to => { Object.defineProperty(document, 'hidden', {value: to, configurable: true});"
+    hide += " document.dispatchEvent(new Event('visibilitychange')); }"
+    asked: list[str] = []
+    page.evaluate(hide, True)
+    page.on("request", lambda request: asked.append(request.url))
+    done = service.get(running)["progress"]["episodes_done"]
+    service.wait_for(running, lambda seen: seen["progress"]["episodes_done"] > done + 20)
+    assert asked == []
+    with page.expect_request("**/events?newest=*"):
+        page.evaluate(hide, False)
+    service.client.post(f"/v1/campaigns/{running}/cancel")
+    service.wait(running)
+
+
+def test_what_was_posted_can_be_taken_away(
+    page_at: Callable[..., Page], service: Service, campaign: str, tmp_path: Path
+) -> None:
+    page = page_at(f"campaigns/{campaign}")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Spec JSON").click()
+    download.value.save_as(tmp_path / "spec.json")
+    assert json.loads((tmp_path / "spec.json").read_text()) == service.get(campaign, "/spec")
+    expect(page.get_by_role("link", name="Clone")).to_have_attribute("href", f"#/new?from={campaign}")
+    expect(page.get_by_role("link", name="Compare methods")).to_have_attribute(
+        "href", f"#/campaigns/{campaign}/compare"
+    )
+
+
+def test_the_log_of_a_run_is_read_on_demand(page_at: Callable[..., Page], campaign: str) -> None:
+    page = page_at(f"campaigns/{campaign}")
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    run = card(page, "low-archive-601")
+    run.wait_for()
+    assert not any("/log" in url for url in asked)
+    run.get_by_text("Log", exact=True).click()
+    expect(run.get_by_role("region", name="Log of archive, low")).to_be_visible()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_a_phone(
+    scheme: str, page_at: Callable[..., Page], campaign: str, check_axe: Callable[[Page], None]
+) -> None:
+    page = page_at(f"campaigns/{campaign}", viewport=PHONE, color_scheme=scheme)
+    plot(page, "Sliding ECR").wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    check_axe(page)
+
+
+def test_a_campaign_that_never_was_says_so(page_at: Callable[..., Page]) -> None:
+    page = page_at("campaigns/unknown", allowed=("404",))
+    expect(page.get_by_role("alert")).to_contain_text("unknown")
+
+
+def _values(run: Locator) -> list[str]:
+    return run.locator("dd").all_inner_texts()
+
+
+def _number(text: str) -> float:
+    return float(text.replace("%", "").strip())
