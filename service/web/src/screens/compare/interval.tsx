@@ -21,7 +21,7 @@ export function Interval({ estimate: { mean, low, high }, from, to, mark, label 
   return (
     <svg class="interval" role="img" aria-label={label} height="18">
       <line class="interval-axis" x1="0" x2="100%" y1="9" y2="9" />
-      {from < 0 && <line class="interval-zero" x1={x(0)} x2={x(0)} y1="0" y2="18" />}
+      {from < 0 && <line class="interval-zero" x1={x(0)} x2={x(0)} y1="3" y2="15" />}
       {low !== null && high !== null && (
         <g stroke={colour} stroke-width="2">
           <line x1={x(low)} x2={x(high)} y1="9" y2="9" />

@@ -23,12 +23,12 @@ export function Methods({ what, family, rows }: Compared) {
         <thead>
           <tr>
             <th scope="col">{what}</th>
-            <th scope="col" class="number">Runs</th>
-            <th scope="col" class="number">Episodes</th>
             <th scope="col">Distinct</th>
             <th scope="col">Preventable</th>
             <Axis name="ECR" end={ends.ecr} />
             <Axis name="PCR" end={ends.pcr} />
+            <th scope="col" class="number">Runs</th>
+            <th scope="col" class="number">Episodes</th>
           </tr>
         </thead>
         <tbody>
@@ -37,12 +37,12 @@ export function Methods({ what, family, rows }: Compared) {
               <th scope="row">
                 <Sample mark={row.mark} /> {row.name}
               </th>
-              <td class="number">{row.runs}</td>
-              <td class="number">{count(row.episodes)}</td>
               <Bar value={row.distinct_failures} most={most} />
               <Bar value={row.distinct_preventable} most={most} />
               <Rate name="ECR" row={row} estimate={row.ecr} end={ends.ecr} />
               <Rate name="PCR" row={row} estimate={row.pcr} end={ends.pcr} />
+              <td class="number">{row.runs}</td>
+              <td class="number">{count(row.episodes)}</td>
             </tr>
           ))}
         </tbody>

@@ -42,7 +42,7 @@ export function Tests({ tests, family, reference, caption }: Tested) {
       <p class="faint">
         {tests.some((test) => test.pairs)
           ? `Nothing can be tested: ${reference} and another method need two seeds in common.`
-          : "Nothing can be tested: too few runs have gone so far."}
+          : "Nothing can be tested: too few runs have searched for so long."}
       </p>
       {tests.some((test) => test.difference !== null) && (
         <details>
