@@ -1,5 +1,6 @@
 /** The colours that stages and plots are drawn with, by their names in the style sheet. */
 
+import { useMemo } from "preact/hooks";
 import { useColours } from "../ui/theme";
 import type { Part } from "./recording";
 
@@ -39,6 +40,8 @@ export const PART_COLOURS: Record<Part, Colour> = {
   background: "--background-car",
 };
 
+/** The same object until a colour changes, so that nothing is made anew for it. */
 export function useInk(): Ink {
-  return useColours(NAMES);
+  const colours = useColours(NAMES);
+  return useMemo(() => colours, [Object.values(colours).join()]);
 }

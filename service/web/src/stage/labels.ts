@@ -1,5 +1,6 @@
 /** Names and numbers beside the bodies, placed so that they do not cover each other. */
 
+import { contactOf } from "./contact";
 import { dangerousAt, marginsAt, ttcAt } from "./risk";
 import { pixelX, pixelY, present, seen, type Scene } from "./scene";
 
@@ -80,13 +81,18 @@ function drawLabel(scene: Scene, i: number, count: number, sides: Sides): number
   return count;
 }
 
-/** Bodies that matter, and what stands in the corners. */
+/** Bodies that matter, the contact, and what stands in the corners. */
 function reserved(scene: Scene): number {
   const { recording, poses, camera, view } = scene;
   take(0, 0, 0, 130, 52);
   take(1, view.width - 180, 0, view.width, 68);
   take(2, 0, view.height - 36, 190, view.height);
   let count = 3;
+  if (scene.original) {
+    const [x, y] = contactOf(scene);
+    const [px, py] = [pixelX(scene, x), pixelY(scene, y)];
+    take(count++, px - 8, py - 8, px + 8, py + 8);
+  }
   for (let i = 0; i < recording.actors && count < MOST / 2; i++) {
     if (recording.parts[i] === "background" || !present(scene, i)) continue;
     const [cos, sin] = [Math.abs(Math.cos(poses[3 * i + 2]!)), Math.abs(Math.sin(poses[3 * i + 2]!))];

@@ -37,7 +37,6 @@ function drawTrail(scene: Scene, actor: number, beads: boolean): void {
   const { ctx, recording, ink, instant, poses, camera } = scene;
   ctx.save();
   ctx.strokeStyle = ctx.fillStyle = ink[PART_COLOURS[recording.parts[actor]!]];
-  ctx.lineCap = "round";
   ctx.lineWidth = Math.max(2, Math.min(recording.width_m[actor]! * camera.scale * 0.22, 6));
   const length = TRAIL_STEPS / PIECES;
   for (let piece = 0; piece < PIECES; piece++) {

@@ -1,14 +1,13 @@
 /** One picture of the stage, from the ground up. */
 
 import { drawBodies } from "./bodies";
+import { drawContact } from "./contact";
 import { roundLength } from "./geometry";
-import { posesAt } from "./interpolate";
 import { drawLabels, signed, type Sides } from "./labels";
 import { drawPaths } from "./paths";
-import type { Recording } from "./recording";
 import { drawRisk } from "./risk";
 import { drawGround } from "./roads";
-import { pixelX, pixelY, type Scene } from "./scene";
+import type { Scene } from "./scene";
 import { drawShade, drawSightLines } from "./sight";
 
 export function drawPicture(scene: Scene, sides: Sides): void {
@@ -25,40 +24,6 @@ export function drawPicture(scene: Scene, sides: Sides): void {
   drawScaleBar(scene);
   drawTime(scene);
   drawSignal(scene);
-}
-
-const CONTACT = new WeakMap<Recording, [number, number]>();
-
-/** Where ego and striker touched, on the map. */
-function contactOf({ recording, collision }: Scene): [number, number] {
-  let place = CONTACT.get(recording);
-  if (place === undefined) {
-    const poses = new Float64Array(3 * recording.actors);
-    posesAt(recording, { index: recording.steps - 1, share: 0 }, poses);
-    const [along, across] = [collision.contact_x_m ?? Number.NaN, collision.contact_y_m ?? Number.NaN];
-    const [cos, sin] = [Math.cos(poses[2]!), Math.sin(poses[2]!)];
-    place = [poses[0]! + along * cos - across * sin, poses[1]! + along * sin + across * cos];
-    CONTACT.set(recording, place);
-  }
-  return place;
-}
-
-function drawContact(scene: Scene): void {
-  if (!scene.original) return;
-  const { ctx, ink } = scene;
-  const [x, y] = contactOf(scene);
-  const [px, py] = [pixelX(scene, x), pixelY(scene, y)];
-  ctx.save();
-  ctx.strokeStyle = ink["--text"];
-  ctx.lineWidth = 1.5;
-  ctx.beginPath();
-  ctx.arc(px, py, 7, 0, 2 * Math.PI);
-  for (const [dx, dy] of [[1, 1], [1, -1]] as const) {
-    ctx.moveTo(px - 4 * dx, py - 4 * dy);
-    ctx.lineTo(px + 4 * dx, py + 4 * dy);
-  }
-  ctx.stroke();
-  ctx.restore();
 }
 
 function drawScaleBar({ ctx, view, camera, ink }: Scene): void {
@@ -88,7 +53,7 @@ function drawTime({ ctx, time_s, ink, recording }: Scene): void {
   halo(ctx, ink["--ground"], `${signed(time_s, 2)} s`, 14, 26);
   ctx.font = "12px system-ui, sans-serif";
   ctx.fillStyle = ink["--faint"];
-  halo(ctx, ink["--ground"], ended ? "the recording ended with the contact" : time_s <= 0 ? "to the contact" : "after the contact", 14, 43);
+  halo(ctx, ink["--ground"], ended ? "the recording ended with the contact" : Math.abs(time_s) < 0.005 ? "at the contact" : time_s < 0 ? "to the contact" : "after the contact", 14, 43);
   ctx.restore();
 }
 

@@ -69,12 +69,13 @@ function drawMotion(scene: Scene, actor: number, ttc: number | null): void {
   ctx.restore();
 }
 
-/** A bar ahead of the ego, as long as the margin along its way: red where it lacks, hatched where that is dangerous. */
+/** A bar ahead of the ego, as long as the margin along its way: of warning where it lacks, red and hatched where RSS calls that dangerous. */
 function drawMargin(scene: Scene, striker: number): void {
   const { ctx, recording, poses, camera, ink } = scene;
   const margin = marginsAt(scene, striker).along;
   if (margin === null) return;
-  const colour: Colour = margin < 0 ? "--bad" : "--good";
+  const dangerous = dangerousAt(scene, striker);
+  const colour: Colour = dangerous ? "--bad" : margin < 0 ? "--warn" : "--good";
   const length = Math.abs(margin) * camera.scale;
   const width = recording.width_m[0]! * camera.scale;
   ctx.save();
@@ -82,14 +83,14 @@ function drawMargin(scene: Scene, striker: number): void {
   ctx.rotate(-poses[2]!);
   ctx.translate((recording.length_m[0]! * camera.scale) / 2, 0);
   ctx.fillStyle = ctx.strokeStyle = ink[colour];
-  ctx.globalAlpha = 0.16;
+  ctx.globalAlpha = dangerous ? 0.18 : 0.1;
   ctx.fillRect(0, -width / 2, length, width);
   ctx.globalAlpha = 0.9;
   ctx.lineWidth = 1.5;
   ctx.beginPath();
   ctx.rect(0, -width / 2, length, width);
   ctx.stroke();
-  if (dangerousAt(scene, striker)) {
+  if (dangerous) {
     ctx.clip();
     ctx.globalAlpha = 0.5;
     ctx.beginPath();
