@@ -1,6 +1,6 @@
 /** The actors: bodies to scale, each part with a colour and a mark of its own, dashed while the ego does not see it. */
 
-import { PART_COLOURS } from "./ink";
+import { PART_COLOURS } from "./colours";
 import { pixelX, pixelY, present, seen, type Scene } from "./scene";
 
 const LEAST_PERSON_PX = 6; // a person's half width is 0.25 m: too few pixels to be seen

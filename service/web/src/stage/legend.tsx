@@ -1,6 +1,7 @@
 /** What the colours and marks on the stage mean. */
 
-import { useInk, PART_COLOURS, type Colour } from "./ink";
+import { PART_COLOURS, type Colour } from "./colours";
+import { useInk } from "./ink";
 import type { Part } from "./recording";
 
 const PARTS: [Part, string][] = [

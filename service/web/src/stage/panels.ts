@@ -1,7 +1,7 @@
 /** What the plots below a stage show of a recording: a panel for each kind of measurement. */
 
 import { words } from "../ui/text";
-import type { Colour } from "./ink";
+import type { Colour } from "./colours";
 import type { Recording } from "./recording";
 import { TTC_CAP_S } from "./risk";
 

@@ -1,6 +1,6 @@
 /** Where everybody came from, and where ego and striker will go. */
 
-import { PART_COLOURS } from "./ink";
+import { PART_COLOURS } from "./colours";
 import { pixelX, pixelY, type Scene } from "./scene";
 
 const TRAIL_STEPS = 30; // 3 s

@@ -3,7 +3,8 @@
 import { useEffect, useRef } from "preact/hooks";
 import uPlot from "uplot";
 import type { Clock } from "./clock";
-import { useInk, type Colour, type Ink } from "./ink";
+import type { Colour, Ink } from "./colours";
+import { useInk } from "./ink";
 import { instantAt } from "./interpolate";
 import type { Curve, Panel } from "./panels";
 import type { Mark } from "./transport";

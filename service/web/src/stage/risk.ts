@@ -1,7 +1,7 @@
 /** What the risk measures say of ego and striker: where both would be by their present motion, and the RSS margin. */
 
 import { velocityAt } from "./interpolate";
-import { PART_COLOURS, type Colour } from "./ink";
+import { PART_COLOURS, type Colour } from "./colours";
 import { pixelX, pixelY, present, type Scene } from "./scene";
 
 /** At this or later there is no collision course; `risk_sac.risk.ttc` caps it so. */

@@ -2,7 +2,7 @@
 
 import type { Camera, View } from "./camera";
 import { projectX, projectY } from "./camera";
-import type { Ink } from "./ink";
+import type { Ink } from "./colours";
 import type { Instant, Poses } from "./interpolate";
 import type { Collision, Recording } from "./recording";
 import type { RoadPaths } from "./roads";

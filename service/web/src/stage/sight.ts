@@ -1,7 +1,7 @@
 /** What the ego can see: the ground in view, shadows behind bodies, and a line of sight to each other actor. */
 
 import { corners, entry, shadow } from "./geometry";
-import { PART_COLOURS } from "./ink";
+import { PART_COLOURS } from "./colours";
 import { pixelX, pixelY, present, seen, type Scene } from "./scene";
 
 const body = new Float64Array(8);
