@@ -41,12 +41,13 @@ function Optional({ field, path }: { field: Field; path: Path }) {
   const there = value !== null;
   const begin = () => change(filled(shape, preset === null || preset === undefined ? blank(shape) : preset));
   return (
-    <div class="optional">
+    <div class={shape.kind === "object" ? "optional whole" : "optional"}>
       <label class="check">
         <input id={`${id}-there`} type="checkbox" checked={there} onChange={() => (there ? change(null) : begin())} />
-        {there ? `${title}:` : `${title}: none`}
+        {there ? title : `${title}: none`}
       </label>
-      {there ? <SchemaField field={{ ...field, optional: false, title: `${title} ` }} path={path} /> : about && <p class="help">{about}</p>}
+      {about && (!there || shape.kind === "object") && <p class="help">{about}</p>}
+      {there && (shape.kind === "object" ? <Fields shape={shape} path={path} /> : <Leaf field={{ ...field, title: `${title}, value` }} path={path} />)}
     </div>
   );
 }
@@ -228,9 +229,20 @@ export function Choices({ field, path, abouts = {} }: { field: Field; path: Path
       <Wrongs id={id} wrong={wrong} />
       {options.map((option) => (
         <label key={option} class={value.includes(option) ? "choice-card on" : "choice-card"}>
-          <input type="checkbox" checked={value.includes(option)} onChange={() => change(toggle(option))} />
+          <input
+            type="checkbox"
+            aria-label={option}
+            aria-describedby={abouts[option] ? `${id}-${option}` : undefined}
+            checked={value.includes(option)}
+            onChange={() => change(toggle(option))}
+          />
           <span>
-            <b>{option}</b> {abouts[option] && <span class="small">{abouts[option] as string}</span>}
+            <b>{option}</b>
+            {abouts[option] && (
+              <span class="small" id={`${id}-${option}`}>
+                {abouts[option] as string}
+              </span>
+            )}
           </span>
         </label>
       ))}

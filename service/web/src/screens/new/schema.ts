@@ -100,12 +100,13 @@ function resolved(schema: Schema, schemas: Record<string, Schema>): Schema {
 }
 
 const UNITS: Record<string, string> = { mps: "m/s", mps2: "m/s²", m: "m", s: "s", rad: "rad" };
+const LONG: Record<string, string> = { accel: "acceleration", cpu: "CPU time", odd: "ODD", ttc: "TTC", rss: "RSS", td: "TD", sac: "SAC", ddpg: "DDPG" };
 
-/** `reaction_time_s` -> "Reaction time" and "s". */
+/** `reaction_time_s` -> "Reaction time" and "s"; `ttc_scale_s` -> "TTC scale" and "s". */
 export function titleOf(name: string): [title: string, unit: string] {
   const cut = name.lastIndexOf("_");
   const unit = cut > 0 ? UNITS[name.slice(cut + 1)] : undefined;
-  const said = words(unit === undefined ? name : name.slice(0, cut));
+  const said = words(unit === undefined ? name : name.slice(0, cut)).replaceAll(/[a-z]+/g, (word) => LONG[word] ?? word);
   return [said.charAt(0).toUpperCase() + said.slice(1), unit ?? ""];
 }
 

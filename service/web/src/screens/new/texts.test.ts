@@ -1,0 +1,71 @@
+import { describe, expect, it } from "vitest";
+import { bodyOf } from "./body";
+import { faultOf, inserted, pointed } from "./formula";
+import { numbersOf, numbersText } from "./numbers";
+import { costOf } from "./presets";
+import type { Shape } from "./schema";
+import { curl, quoted } from "./shell";
+
+describe("numbers", () => {
+  it.each<[string, number[] | null]>([
+    ["0, 1, 2", [0, 1, 2]],
+    ["0-2 7;9", [0, 1, 2, 7, 9]],
+    ["64, 64", [64, 64]],
+    ["", []],
+    ["0-", null],
+    ["5-3", null],
+    ["0-99999999", null],
+    ["a", null],
+  ])("of %j", (text, wanted) => expect(numbersOf(text)).toEqual(wanted));
+
+  it.each<[number[], string]>([
+    [[0, 1, 2, 3], "0-3"],
+    [[0, 1], "0, 1"],
+    [[64, 64], "64, 64"],
+    [[0, 1, 2, 7], "0-2, 7"],
+    [[], ""],
+  ])("of %j as a text, which reads back the same", (numbers, wanted) => {
+    expect(numbersText(numbers)).toBe(wanted);
+    expect(numbersOf(wanted)).toEqual(numbers);
+  });
+});
+
+describe("a fault in a formula", () => {
+  it("has the column and the reason of the service's message", () => {
+    expect(faultOf("column 0: unknown character 'ß'")).toEqual({ column: 0, why: "unknown character 'ß'" });
+    expect(faultOf("requirement 'a': column 16: '=' is not supported")).toEqual({ column: 16, why: "'=' is not supported" });
+    expect(faultOf("String should have at least 1 character")).toEqual({ column: null, why: "String should have at least 1 character" });
+  });
+
+  it("has a caret under its column, also behind the last character", () => {
+    expect(pointed("a >== 3", 4)).toBe("a >== 3\n    ^");
+    expect(pointed("a >", 99)).toBe("a >\n   ^");
+    expect(pointed("a\tb", 2)).toBe("a b\n  ^");
+  });
+});
+
+it("a signal goes where the cursor is, with a gap where it needs one", () => {
+  expect(inserted("not", "ttc_s", 3, 3)).toEqual(["not ttc_s", 9]);
+  expect(inserted("(x)", "ttc_s", 1, 2)).toEqual(["(ttc_s)", 6]);
+});
+
+it("a shell takes any text for one word", () => {
+  expect(quoted("it's $HOME `x`")).toBe(String.raw`'it'\''s $HOME ` + "`x`'");
+  expect(curl("http://h/v1", "{}", true)).toBe(
+    `curl 'http://h/v1' \\\n  -H "authorization: Bearer $RISK_SAC_KEY" \\\n  -H 'content-type: application/json' \\\n  -d '{}'`,
+  );
+});
+
+it("a campaign costs what all its runs do", () => {
+  const spec = { families: ["low", "mixed"], methods: ["random"], seeds: [0, 1, 2], budget: { episodes: 10, evaluation_episodes: 5 } };
+  expect(costOf(spec)).toEqual({ runs: 6, episodes: 90 });
+});
+
+it("a perfect ego is sent without the delay and the sensor that it has no use for", () => {
+  const plain: Shape = { kind: "text", most: 99, pattern: "" };
+  const field = (name: string, shape: Shape, preset?: string) => ({ name, shape, preset, optional: false, title: "", unit: "", about: "" });
+  const ego: Shape = { kind: "object", about: "", fields: [field("profile", plain, "default"), field("reaction_time_s", plain, "0.5")] };
+  const shape: Shape = { kind: "object", about: "", fields: [field("ego", ego)] };
+  expect(bodyOf(shape, { ego: { profile: "perfect", reaction_time_s: "0.1" } })).toEqual({ ego: { profile: "perfect" } });
+  expect(bodyOf(shape, { ego: { profile: "careful", reaction_time_s: "0.1" } })).toEqual({ ego: { profile: "careful", reaction_time_s: "0.1" } });
+});

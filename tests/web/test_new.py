@@ -1,0 +1,241 @@
+"""The form of a new campaign: what it sends is what it shows, and what is wrong stands beside its field."""
+
+import json
+import re
+import shlex
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+import yaml
+from playwright.sync_api import Locator, Page, Request, Route, expect
+
+from risk_sac.config import CampaignSpec
+from tests.server import Service
+from tests.web.conftest import CAMPAIGN, PHONE
+
+HOSTILE = "</pre><script>alert('1')</script> yes: \"no\" #\\ \u2028"
+
+
+def source(page: Page, form: str) -> str:
+    """What the page shows as curl or as YAML."""
+    page.get_by_role("button", name=form, exact=True).click()
+    return str(page.get_by_role("region", name=f"The campaign as {form}").inner_text())
+
+
+def curl_body(page: Page) -> dict[str, Any]:
+    words = shlex.split(source(page, "curl"))
+    assert words[:2] == ["curl", page.url.split("/page/")[0] + "/v1/campaigns"]
+    body: dict[str, Any] = json.loads(words[words.index("-d") + 1])
+    return body
+
+
+def opened(page: Page, title: str) -> Locator:
+    group = page.locator("details.group").filter(has=page.locator("summary", has_text=title)).first
+    group.locator("summary").first.click()
+    return group
+
+
+def small(page: Page, label: str = "") -> None:
+    """Fills in three episodes of random search."""
+    page.get_by_label("Label", exact=True).fill(label)
+    page.get_by_role("checkbox", name="archive", exact=True).uncheck()
+    page.get_by_label("Episodes", exact=True).fill("3")
+
+
+def test_what_is_shown_is_what_is_sent_and_what_the_api_then_has(
+    page_at: Callable[..., Page], service: Service
+) -> None:
+    page = page_at("new")
+    small(page, HOSTILE)
+    wanted = {"label": HOSTILE, "families": ["low"], "methods": ["random"], "budget": {"episodes": 3}}
+    assert curl_body(page) == wanted  # and nothing that is the default anyway
+    assert yaml.safe_load(source(page, "YAML")) == wanted
+    shown = shlex.split(source(page, "curl"))[-1]
+    with page.expect_request(lambda each: each.method == "POST" and each.url.endswith("/v1/campaigns")) as sent:
+        page.get_by_role("button", name="Start the campaign").click()
+    request: Request = sent.value
+    assert request.post_data == shown
+    assert re.fullmatch("[0-9a-f]{32}", request.headers["idempotency-key"])
+    expect(page).to_have_url(re.compile("#/campaigns/c[0-9a-f]+$"))
+    stored = service.get(page.url.rsplit("/", 1)[1])
+    assert CampaignSpec.model_validate_json(json.dumps(stored["spec"])) == CampaignSpec.model_validate_json(shown)
+    assert page.locator("main script").count() == 0
+
+
+def test_an_answer_that_was_lost_starts_no_second_campaign(page_at: Callable[..., Page], service: Service) -> None:
+    page = page_at("new", allowed=("ERR_", "Failed to load"))
+    small(page, "only one")
+
+    def lose(route: Route) -> None:
+        route.fetch()
+        route.abort()
+
+    page.route("**/v1/campaigns", lose, times=1)
+    page.get_by_role("button", name="Start the campaign").click()
+    expect(page.get_by_text("Trying again cannot start it twice.")).to_be_visible()
+    page.get_by_role("button", name="Start the campaign").click()
+    expect(page).to_have_url(re.compile("#/campaigns/c[0-9a-f]+$"))
+    assert len(service.client.get("/v1/campaigns", params={"label": "only one"}).json()["items"]) == 1
+
+
+def test_a_refusal_stands_beside_its_field(page_at: Callable[..., Page], service: Service) -> None:
+    page = page_at("new", allowed=("422",))
+    before = len(service.client.get("/v1/campaigns").json()["items"])
+    page.get_by_label("Episodes", exact=True).fill("0")
+    page.get_by_role("checkbox", name="low", exact=True).uncheck()
+    page.get_by_role("button", name="Start the campaign").click()
+    episodes = page.locator(".field", has=page.get_by_label("Episodes", exact=True))
+    expect(episodes.get_by_role("alert")).to_contain_text("greater than or equal to 1")
+    expect(page.get_by_label("Episodes", exact=True)).to_have_attribute("aria-invalid", "true")
+    expect(page.get_by_role("group", name="Families").get_by_role("alert")).to_contain_text("at least 1 item")
+    page.get_by_role("button", name="budget.episodes").click()
+    expect(page.get_by_label("Episodes", exact=True)).to_be_focused()
+    page.get_by_label("Episodes", exact=True).fill("3")
+    page.get_by_role("checkbox", name="low", exact=True).check()
+    expect(page.locator(".is-wrong")).to_have_count(0)
+    assert len(service.client.get("/v1/campaigns").json()["items"]) == before
+
+
+def test_a_wrong_value_opens_the_group_that_hides_it(page_at: Callable[..., Page]) -> None:
+    page = page_at("new", allowed=("422",))
+    learner = opened(page, "Learner")
+    agent = opened(page, "Agent")
+    agent.get_by_label("Batch size").fill("0")
+    expect(agent.get_by_role("alert")).to_contain_text("greater than or equal to 1")
+    expect(learner.locator("summary").first).to_contain_text("1 wrong")
+    learner.get_by_role("button", name="Back to the defaults").first.click()
+    expect(page.locator(".is-wrong")).to_have_count(0)
+
+
+def test_a_formula_is_checked_while_it_is_written_and_the_fault_has_a_caret(page_at: Callable[..., Page]) -> None:
+    page = page_at("new", allowed=("422",))
+    opened(page, "Requirements")
+    page.get_by_role("button", name="Add a requirement").click()
+    formula = page.get_by_label("Formula")
+    formula.fill("ttc_s >== 3")
+    expect(page.locator(".fault pre")).to_have_text("ttc_s >== 3\n        ^")
+    expect(page.locator(".fault")).to_contain_text("Column 8: '=' is not supported")
+    expect(formula).to_have_attribute("aria-invalid", "true")
+    formula.fill("")
+    page.get_by_role("button", name="rss_margin").click()
+    expect(formula).to_be_focused()
+    page.keyboard.type(" >= 1")
+    expect(formula).to_have_value("rss_margin >= 1")
+    expect(page.get_by_role("status")).to_contain_text("The service would take it")
+    expect(page.locator(".fault")).to_have_count(0)
+    assert curl_body(page)["requirements"] == [{"name": "mine_1", "formula": "rss_margin >= 1", "scale": 1}]
+
+
+def test_a_campaign_is_cloned_with_all_that_it_was_given(
+    page_at: Callable[..., Page], service: Service, campaign: str
+) -> None:
+    page = page_at(f"new?from={campaign}")
+    expect(page.get_by_label("Label", exact=True)).to_have_value(CAMPAIGN["label"])
+    assert curl_body(page) == CAMPAIGN
+    assert page.locator("main b", has_text="7").filter(has_not_text="archive").count() == 0
+
+
+def test_what_an_earlier_campaign_set_deep_down_is_cloned_too(
+    page_at: Callable[..., Page], service: Service
+) -> None:
+    given = {
+        "label": "deep",
+        "families": ["low"],
+        "methods": ["random"],
+        "seeds": [3, 4, 5],
+        "budget": {"episodes": 1, "cpu_s": 50.5},
+        "ego": {"profile": "careful", "sensor": {"range_m": 60.0}},
+        "odd": {"environment": {"friction": {"low": 0.7, "high": 0.9}}},
+        "requirements": [{"name": "mine", "formula": "ttc_s >= 1", "scale": 2.0, "shapes": False}],
+        "learner": {"agent": {"hidden_sizes": [32, 32], "actor_learning_rate": 1e-7}},
+    }
+    posted = service.post(**given)
+    page = page_at(f"new?from={posted}")
+    page.get_by_role("region", name="The campaign as curl").wait_for()
+    assert curl_body(page) == given
+    assert yaml.safe_load(source(page, "YAML")) == given
+    expect(page.get_by_label("Seeds")).to_have_value("3-5")
+    service.client.post(f"/v1/campaigns/{posted}/cancel")
+
+
+def test_a_range_of_the_odd_is_moved_by_keys_and_by_numbers(page_at: Callable[..., Page], service: Service) -> None:
+    page = page_at("new")
+    odd = opened(page, "Operational design domain")
+    friction = service.client.get("/v1/families").json()["items"][0]["odd"]["environment"]["friction"]
+    low = odd.get_by_role("spinbutton", name="Friction, lowest")
+    expect(low).to_have_value(str(friction["low"]))
+    odd.get_by_role("slider", name="Friction, lowest").focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowRight")
+    expect(low).to_have_value("0.62")
+    odd.get_by_role("spinbutton", name="Friction, highest").fill("0.5")
+    page.keyboard.press("Tab")
+    assert curl_body(page)["odd"] == {"environment": {"friction": {"low": 0.62, "high": 0.62}}}  # they meet
+    expect(page.get_by_text("Narrows friction")).to_be_visible()
+    odd.get_by_role("button", name="As the family has it").click()
+    assert "odd" not in curl_body(page)
+
+
+def test_a_slider_is_dragged_by_its_thumb(page_at: Callable[..., Page]) -> None:
+    page = page_at("new")
+    odd = opened(page, "Operational design domain")
+    track = odd.get_by_role("slider", name="Visibility, highest")
+    track.scroll_into_view_if_needed()
+    box = track.bounding_box()
+    assert box is not None
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + box["width"] - 8, middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] / 2, middle, steps=5)
+    page.mouse.up()
+    visibility = curl_body(page)["odd"]["environment"]["visibility_m"]
+    assert visibility["low"] == 100
+    assert 900 <= visibility["high"] <= 1200
+
+
+def test_presets_fill_the_form_and_the_cost_follows(page_at: Callable[..., Page]) -> None:
+    page = page_at("new")
+    page.get_by_label("Label", exact=True).fill("mine")
+    page.get_by_role("button", name="Compare methods").click()
+    expect(page.get_by_role("button", name="Compare methods")).to_have_attribute("aria-pressed", "true")
+    body = curl_body(page)
+    runs = len(body["families"]) * len(body["methods"]) * len(body["seeds"])
+    expect(page.locator(".tile").first).to_contain_text(f"{runs * body['budget']['episodes']:,}")
+    assert body["label"] == "mine"
+    page.get_by_label("Seeds").fill("0-4")
+    expect(page.locator(".tile").first).to_contain_text(f"{runs // 3 * 5 * body['budget']['episodes']:,}")
+
+
+def test_a_perfect_ego_has_neither_delay_nor_sensor(page_at: Callable[..., Page]) -> None:
+    page = page_at("new")
+    ego = opened(page, "Ego")
+    expect(ego.get_by_label("Reaction time")).to_be_visible()
+    ego.get_by_label("Profile").select_option("perfect")
+    expect(ego.get_by_label("Reaction time")).to_have_count(0)
+    assert curl_body(page)["ego"] == {"profile": "perfect"}
+
+
+def test_an_unknown_campaign_to_clone_is_told(page_at: Callable[..., Page]) -> None:
+    page = page_at("new?from=c0", allowed=("404",))
+    expect(page.get_by_role("alert")).to_contain_text("c0")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_all_of_the_form_keeps_the_rules_of_accessibility(
+    scheme: str, page_at: Callable[..., Page], check_axe: Callable[[Page], None]
+) -> None:
+    page = page_at("new", color_scheme=scheme, allowed=("422",))
+    for title in ("Ego", "Operational design domain", "Requirements", "Learner", "Agent"):
+        opened(page, title)
+    page.get_by_role("button", name="Add a requirement").click()
+    page.get_by_label("Formula").fill("ttc_s >== 3")
+    page.locator(".fault pre").wait_for()
+    check_axe(page)
+
+
+def test_a_phone_shows_all_of_the_form_without_scrolling_sideways(page_at: Callable[..., Page]) -> None:
+    page = page_at("new", viewport=PHONE)
+    for title in ("Ego", "Operational design domain", "Requirements", "Learner", "Agent"):
+        opened(page, title)
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
