@@ -136,9 +136,7 @@ def test_a_campaign_is_cloned_with_all_that_it_was_given(
     assert page.locator("main b", has_text="7").filter(has_not_text="archive").count() == 0
 
 
-def test_what_an_earlier_campaign_set_deep_down_is_cloned_too(
-    page_at: Callable[..., Page], service: Service
-) -> None:
+def test_what_an_earlier_campaign_set_deep_down_is_cloned_too(page_at: Callable[..., Page], service: Service) -> None:
     given = {
         "label": "deep",
         "families": ["low"],
@@ -235,7 +233,10 @@ def test_all_of_the_form_keeps_the_rules_of_accessibility(
 
 
 def test_a_phone_shows_all_of_the_form_without_scrolling_sideways(page_at: Callable[..., Page]) -> None:
-    page = page_at("new", viewport=PHONE)
+    page = page_at("new", viewport=PHONE, allowed=("422",))
     for title in ("Ego", "Operational design domain", "Requirements", "Learner", "Agent"):
         opened(page, title)
+    page.get_by_role("button", name="Add a requirement").click()
+    page.get_by_label("Formula").fill("ttc_s >== 3 and " + "ttc_s > 1 and " * 20 + "ttc_s > 1")
+    page.locator(".fault pre").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

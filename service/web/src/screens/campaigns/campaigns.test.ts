@@ -33,7 +33,7 @@ describe("the order of the list", () => {
 });
 
 describe("a sparkline", () => {
-  const run = (episodes: number[], window_ecr: (number | null)[]) => ({ run_id: "r", method: "m", episodes, window_ecr });
+  const run = (episodes: number[], window_ecr: (number | null)[]) => ({ episodes, window_ecr });
 
   it("is the mean over the runs that had begun", () => {
     const line = spark([run([1, 2, 4], [0, 0.2, 0.4]), run([2, 4], [0.4, null])], 4);

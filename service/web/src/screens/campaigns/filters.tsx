@@ -23,7 +23,7 @@ export function FilterBar({ filters, families, methods, change }: Choices) {
     <Choice title={title} value={filters[name] ?? ""} options={options} choose={(value) => change({ ...filters, [name]: value })} />
   );
   return (
-    <search class="row filters">
+    <search class="row campaign-filters">
       {choice("state", "State", STATES)}
       {choice("family", "Family", families)}
       {choice("method", "Method", methods)}
@@ -60,7 +60,7 @@ function Choice(props: { title: string; value: string; options: readonly string[
 
 function Field({ title, children }: { title: string; children: ComponentChildren }) {
   return (
-    <label class="row filter">
+    <label class="row campaign-filter">
       {title} {children}
     </label>
   );

@@ -70,7 +70,7 @@ export function CampaignsScreen({ query }: { query: URLSearchParams }) {
                 choose={setChosen}
                 ask={(verb, campaigns) => setDoubt({ verb, campaigns })}
               />
-              <p class="row below small">
+              <p class="row campaigns-below small">
                 <span class="faint">
                   {count(items.length)} {items.length === 1 ? "campaign" : "campaigns"}
                   {more && ", and there are older ones"}
@@ -114,9 +114,9 @@ interface Chosen {
 function Choice({ chosen, forget, ask }: Chosen) {
   const over = chosen.filter(ended);
   const active = chosen.filter((each) => !ended(each));
-  if (chosen.length === 0) return <p class="small faint choice">Select several to compare them.</p>;
+  if (chosen.length === 0) return <p class="small faint campaign-choice">Select several to compare them.</p>;
   return (
-    <div class="row choice" role="group" aria-label="With those selected">
+    <div class="row campaign-choice" role="group" aria-label="With those selected">
       <b>{count(chosen.length)} selected</b>
       {chosen.length > 1 && (
         <a class="button primary" href={`#/compare?ids=${chosen.map((each) => each.id).join()}`}>

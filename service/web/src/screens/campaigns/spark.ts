@@ -1,6 +1,8 @@
 /** A campaign's ECR as a line that fits a cell of the table. */
 
-import type { Curve } from "./wire";
+import type { Body } from "../../api/types";
+
+type Curve = Pick<Body<"RunCurves">, "episodes" | "window_ecr">;
 
 export interface Spark {
   /** Share of the episodes, from 0 to 1. */

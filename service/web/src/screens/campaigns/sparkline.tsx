@@ -2,11 +2,11 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { get } from "../../api/client";
+import type { Body } from "../../api/types";
 import { percent } from "../../ui/text";
 import { ended, type Listed } from "./listed";
 import { usePolled } from "./polled";
 import { path, spark, type Spark } from "./spark";
-import type { Curves } from "./wire";
 
 const WIDTH = 96;
 const HEIGHT = 22;
@@ -18,10 +18,10 @@ const AGAIN_MS = 5000;
 export function Sparkline({ campaign, learners }: { campaign: Listed; learners: readonly string[] }) {
   const place = useRef<HTMLSpanElement>(null);
   const seen = useSeen(place);
-  const [curves, setCurves] = useState<Curves>();
+  const [curves, setCurves] = useState<Body<"Curves">>();
   usePolled(seen ? campaign.id : null, async (left) => {
     try {
-      setCurves(await get<Curves>(`v1/campaigns/${campaign.id}/curves?points=${POINTS}`, left));
+      setCurves(await get<Body<"Curves">>(`v1/campaigns/${campaign.id}/curves?points=${POINTS}`, left));
     } catch {
       return null; // the number beside it says as much; a lost connection is the list's to tell
     }

@@ -1,6 +1,6 @@
 /** The list as a table: one row for each campaign, and heads that sort. */
 
-import type { ComponentChildren } from "preact";
+import { Fragment, type ComponentChildren } from "preact";
 import { address } from "../../router";
 import { count, moment, percent, seconds } from "../../ui/text";
 import { ended, type Listed } from "./listed";
@@ -134,7 +134,9 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
         </span>
         {campaign.reason && <span class="reason small">{campaign.reason}</span>}
       </td>
-      <td class="wraps">{campaign.families.join(", ")}</td>
+      <td class="wraps">
+        <Several names={campaign.families} />
+      </td>
       <td class="wraps" title={campaign.methods.join(", ")}>
         <Several names={campaign.methods} />
       </td>
@@ -160,10 +162,20 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
 
 const MOST_NAMES = 3;
 
-function Several({ names }: { names: readonly string[] }): ComponentChildren {
+/** A name is not broken at its hyphens. */
+function Several({ names }: { names: readonly string[] }) {
   const left = names.length - MOST_NAMES;
-  if (left <= 1) return names.join(", ");
-  return `${names.slice(0, MOST_NAMES).join(", ")} and ${left} more`;
+  const shown = left <= 1 ? names : names.slice(0, MOST_NAMES);
+  return (
+    <>
+      {shown.map((name, i) => (
+        <Fragment key={name}>
+          <span class="name">{name + (i < shown.length - 1 ? "," : "")}</span>{" "}
+        </Fragment>
+      ))}
+      {left > 1 && <span class="name">and {left} more</span>}
+    </>
+  );
 }
 
 function Bar({ done, total, name }: { done: number; total: number; name: string }) {
