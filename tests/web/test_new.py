@@ -31,7 +31,7 @@ def curl_body(page: Page) -> dict[str, Any]:
 
 
 def opened(page: Page, title: str) -> Locator:
-    group = page.locator("details.group").filter(has=page.locator("summary", has_text=title)).first
+    group = page.locator(f"details.group:has(> summary > .group-title:text-is('{title}'))")
     group.locator("summary").first.click()
     return group
 
