@@ -22,7 +22,7 @@ interface Props {
 
 export function Controls({ table, all, filters, change, resetAll }: Props) {
   return (
-    <form class="filters" role="search" aria-label="Filter failures" onSubmit={(event) => event.preventDefault()}>
+    <form class="failure-filters" role="search" aria-label="Filter failures" onSubmit={(event) => event.preventDefault()}>
       {SHOWN[filters.tab].map((facet) => (
         <FacetChoice key={facet} {...{ table, all, facet }} chosen={filters[facet]} choose={(value) => change({ [facet]: value })} />
       ))}

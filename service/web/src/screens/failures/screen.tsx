@@ -20,12 +20,12 @@ export function FailuresScreen({ campaign, query }: { campaign: string; query: U
   const ended = about.value === undefined || ENDED.includes(about.value.state);
   const asked = useAsked<FailureTable>(`${path}/failure-table?tier=raw`, () => (ended ? null : RUNNING_MS));
   return (
-    <>
+    <div class="failures">
       <Head campaign={campaign} about={about.value} query={query} table={asked.value} />
       <Shown asked={asked} what="failures">
         {(table) => (table.ids.length ? <Explorer campaign={campaign} query={query} table={table} /> : <NothingFound about={about.value} />)}
       </Shown>
-    </>
+    </div>
   );
 }
 

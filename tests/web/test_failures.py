@@ -1,0 +1,409 @@
+"""The screen of failures: cards, plots and filters over what the service found."""
+
+import json
+import random
+import re
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, Route, expect
+
+from tests.server import Service
+from tests.web.conftest import LONG_MS, PHONE
+
+HOSTILE = '"><img src=x onerror="window.hacked=1"></script><script>window.hacked=1</script>'
+expect.set_options(timeout=LONG_MS)
+
+
+@pytest.fixture
+def table(service: Service, campaign: str) -> dict[str, Any]:
+    """What the service says of all contacts."""
+    return dict(service.client.get(f"/v1/campaigns/{campaign}/failure-table?tier=raw").json())
+
+
+@pytest.fixture
+def screen(page_at: Callable[..., Page], campaign: str) -> Callable[..., Page]:
+    """The screen with a query, once its cards are there."""
+
+    def opened(query: str = "", **options: object) -> Page:
+        page = page_at(f"campaigns/{campaign}/failures{query}", **options)
+        expect(page.get_by_role("status").first).to_contain_text(" of ")
+        return page
+
+    return opened
+
+
+def shown(page: Page) -> tuple[int, int]:
+    """How many failures there are now, of how many."""
+    found = re.match(r"([\d,]+) of ([\d,]+)", page.locator(".found-head p").inner_text())
+    assert found
+    return int(found[1].replace(",", "")), int(found[2].replace(",", ""))
+
+
+def wait_for(page: Page, number: int) -> None:
+    """Until so many failures are left."""
+    expect(page.locator(".found-head p b")).to_have_text(f"{number:,}")
+
+
+def distinct_of(table: dict[str, Any]) -> list[int]:
+    return [i for i, distinct in enumerate(table["distinct"]) if distinct]
+
+
+def valid_of(table: dict[str, Any]) -> list[int]:
+    return [i for i, valid in enumerate(table["valid"]) if valid]
+
+
+def test_cards_match_the_api(screen: Callable[..., Page], table: dict[str, Any], campaign: str) -> None:
+    page = screen("?sort=newest")
+    distinct = distinct_of(table)
+    assert shown(page) == (len(distinct), len(distinct))
+    newest = distinct[-1]
+    card = page.locator(".cards li").first
+    expect(card).to_have_attribute("aria-posinset", "1")
+    expect(card).to_have_attribute("aria-setsize", str(len(distinct)))
+    link = card.get_by_role("link")
+    assert link.get_attribute("href") == f"#/campaigns/{campaign}/failures/{table['ids'][newest]}"
+    assert link.get_attribute("title") == table["kinds"][table["kind"][newest]]["name"]
+    expect(card).to_contain_text(f"{table['relative_speed_mps'][newest]:.1f} m/s")
+    expect(card).to_contain_text(table["striker"][newest].replace("_", " "))
+    often = Counter(table["kind"][i] for i in valid_of(table))
+    expect(card).to_contain_text(f"{often[table['kind'][newest]]} ×")
+    words = {"careful": "preventable", "ideal": "only by full braking", "unavoidable": "unavoidable"}
+    expect(card).to_contain_text(words[table["grade"][newest]])
+
+    page.get_by_label("every failure").check()
+    wait_for(page, len(valid_of(table)))
+
+
+def test_a_card_opens_the_replay_and_back_finds_the_same_place(screen: Callable[..., Page], campaign: str) -> None:
+    page = screen("?every=1&sort=closing", viewport={"width": 1000, "height": 500})
+    page.mouse.wheel(0, 600)
+    card = page.locator(".cards li a[data-go]").nth(4)
+    to = card.get_attribute("href")
+    card.click()
+    expect(page.locator(".cards")).to_have_count(0)
+    assert page.url.endswith(f"{to}")
+    page.go_back()
+    expect(page.locator(f'.cards a[href="{to}"]')).to_be_in_viewport()
+    assert "sort=closing" in page.url
+
+
+def test_filters_survive_a_reload(screen: Callable[..., Page], table: dict[str, Any]) -> None:
+    page = screen()
+    page.get_by_label("every failure").check()
+    page.get_by_role("combobox", name="Family").select_option("mixed")
+    page.get_by_role("combobox", name="Order").select_option("closing")
+    page.get_by_role("combobox", name="Horizontal axis").select_option("scene.friction")
+    mixed = [i for i in valid_of(table) if table["families"][i] == "mixed"]
+    wait_for(page, len(mixed))
+    word = table["kinds"][table["kind"][mixed[0]]]["name"].split(",")[0].split(" ")[0]
+    page.get_by_role("searchbox", name="Text").fill(word)
+    left = [i for i in mixed if word in table["kinds"][table["kind"][i]]["name"]]
+    wait_for(page, len(left))
+    expect(page).to_have_url(re.compile(f"q={word}"))
+    links = [link.get_attribute("href") for link in page.locator(".cards a[data-go]").all()]
+    fastest = max(left, key=lambda i: table["relative_speed_mps"][i])
+    assert links[0] is not None
+    assert links[0].endswith(table["ids"][fastest])
+
+    page.reload()
+    wait_for(page, len(left))
+    assert [link.get_attribute("href") for link in page.locator(".cards a[data-go]").all()] == links
+    expect(page.get_by_role("combobox", name="Family")).to_have_value("mixed")
+    expect(page.get_by_role("combobox", name="Horizontal axis")).to_have_value("scene.friction")
+
+    page.get_by_role("button", name="Reset", exact=True).click()
+    wait_for(page, len(valid_of(table)))
+
+
+def test_filters_that_leave_nothing_can_be_reset(screen: Callable[..., Page], table: dict[str, Any]) -> None:
+    page = screen("?q=nobody+says+so")
+    expect(page.get_by_text("No failure passes all the filters.")).to_be_visible()
+    page.get_by_role("button", name="Reset the filters").click()
+    wait_for(page, len(distinct_of(table)))
+
+
+def test_ranges_by_numbers_filter(screen: Callable[..., Page], table: dict[str, Any]) -> None:
+    page = screen("?every=1&family=low")
+    page.get_by_text("Ranges by numbers").click()
+    low = [i for i in valid_of(table) if table["families"][i] == "low"]
+    speeds = sorted(table["relative_speed_mps"][i] for i in low)
+    least = round(speeds[len(speeds) // 2], 2)
+    page.get_by_label("closing speed, m/s: at least").fill(str(least))
+    page.get_by_label("closing speed, m/s: at least").press("Enter")
+    fast = [i for i in low if table["relative_speed_mps"][i] >= least]
+    wait_for(page, len(fast))
+    scenes = table["scenes"]["low"]
+    column = scenes["names"].index("friction")
+    friction = {failure: row[column] for failure, row in zip(scenes["of"], scenes["rows"], strict=True)}
+    most = round(sorted(friction[i] for i in fast)[len(fast) // 2], 3)
+    page.get_by_label("friction: at most").fill(str(most))
+    page.get_by_label("friction: at most").press("Enter")
+    both = [i for i in fast if friction[i] <= most]
+    wait_for(page, len(both))
+    page.reload()
+    wait_for(page, len(both))
+    page.get_by_role("button", name="Clear the range of friction").click()
+    wait_for(page, len(fast))
+    page.get_by_role("button", name="Clear all").click()
+    wait_for(page, len(low))
+
+
+def test_dragging_along_an_axis_filters_and_a_click_lets_go(screen: Callable[..., Page], table: dict[str, Any]) -> None:
+    page = screen("?every=1")
+    page.locator(".lines").scroll_into_view_if_needed()
+    box = page.locator(".lines").bounding_box()
+    assert box
+    y = box["y"] + 15  # closing speed is the first axis
+    page.mouse.move(box["x"] + box["width"] / 2, y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] - 12, y + 3, steps=4)
+    page.mouse.up()
+    expect(page).to_have_url(re.compile("brush=closing"))
+    brush = re.search(r"brush=closing%3A([\d.]+)%3A([\d.]+)", page.url)
+    assert brush
+    low, high = map(float, brush.groups())
+    wait_for(page, sum(low <= table["relative_speed_mps"][i] <= high for i in valid_of(table)))
+    page.mouse.click(box["x"] + 30, y)
+    wait_for(page, len(valid_of(table)))
+    assert "brush" not in page.url
+
+
+def test_the_scatter_plot_says_what_the_pointer_is_at(screen: Callable[..., Page], table: dict[str, Any]) -> None:
+    page = screen()
+    page.locator(".cards li").first.hover()
+    expect(page.locator(".ring")).to_be_visible()
+    ring = page.locator(".ring").bounding_box()
+    assert ring
+    page.mouse.move(ring["x"] + 8, ring["y"] + 8)
+    expect(page.locator(".tip")).to_contain_text("closing speed")
+    page.mouse.click(ring["x"] + 8, ring["y"] + 8)
+    expect(page).to_have_url(re.compile("failures/(low|mixed)-"))
+
+
+def test_refused_contacts_by_rule(screen: Callable[..., Page], table: dict[str, Any]) -> None:
+    page = screen()
+    page.get_by_role("link", name="Refused contacts").click()
+    refused = [i for i, valid in enumerate(table["valid"]) if not valid]
+    wait_for(page, len(refused))
+    rules = Counter(rule for i in refused for rule in table["refused_by"][i])
+    counts = [int(each) for each in page.locator(".bars b").all_inner_texts()]
+    assert counts == sorted(rules.values(), reverse=True)
+    page.locator(".bars button").first.click()
+    wait_for(page, counts[0])
+    expect(page.locator(".bars button").first).to_have_attribute("aria-pressed", "true")
+    assert f"rule={max(rules, key=lambda rule: rules[rule])}" in page.url or counts.count(counts[0]) > 1
+    page.reload()
+    wait_for(page, counts[0])
+
+
+def note(page: Page, state: str, comment: str) -> None:
+    page.locator(".cards li").first.get_by_role("button", name="Triage").click()
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_label(state).check()
+    dialog.get_by_label("Comment").fill(comment)
+    dialog.get_by_role("button", name="Save").click()
+    expect(dialog).to_have_count(0)
+
+
+def test_triage_is_kept_and_seen_by_others(screen: Callable[..., Page]) -> None:
+    page = screen("?sort=newest")
+    note(page, "Confirmed", f"look at this: {HOSTILE}")
+    first = page.locator(".cards li").first
+    expect(first.get_by_role("button", name="Triage: Confirmed")).to_be_visible()
+    page.get_by_role("combobox", name="Triage").select_option("confirmed")
+    wait_for(page, 1)
+    page.reload()
+    wait_for(page, 1)
+    for other in (page, screen("?sort=newest")):
+        other.get_by_role("button", name="Triage: Confirmed").click()
+        dialog = other.get_by_role("dialog")
+        expect(dialog.get_by_label("Comment")).to_have_value(f"look at this: {HOSTILE}")
+        expect(dialog.get_by_label("Confirmed")).to_be_checked()
+        assert other.evaluate("window.hacked") is None
+        other.keyboard.press("Escape")
+        expect(dialog).to_have_count(0)
+    page.get_by_role("button", name="Reset", exact=True).click()
+    note(page, "New", "")
+    expect(first.get_by_role("button", name="Triage: New")).to_be_visible()
+
+
+def test_triage_that_is_refused_is_taken_back_and_can_be_sent_again(screen: Callable[..., Page]) -> None:
+    page = screen("?sort=newest", allowed=("503", "404"))
+
+    def refuse(route: Route) -> None:
+        if route.request.method != "PUT":
+            route.fallback()
+            return
+        problem = {"status": 503, "title": "x", "detail": "The database cannot be written.", "reason": "store"}
+        route.fulfill(status=503, content_type="application/problem+json", body=json.dumps(problem))
+
+    page.route("**/triage", refuse)
+    page.locator(".cards li").first.get_by_role("button", name="Triage").click()
+    dialog = page.get_by_role("dialog")
+    dialog.get_by_label("Fixed").check()
+    dialog.get_by_label("Comment").fill("kept while refused")
+    dialog.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("alert")).to_contain_text("The database cannot be written.")
+    expect(page.locator(".cards li").first).to_contain_text("New")
+    expect(dialog.get_by_label("Comment")).to_have_value("kept while refused")
+    dialog.get_by_role("button", name="Cancel").click()
+    expect(dialog).to_have_count(0)
+
+
+def test_keys_go_from_card_to_card(screen: Callable[..., Page], table: dict[str, Any]) -> None:
+    page = screen("?every=1")
+    last = len(valid_of(table))
+    page.locator(".cards a[data-go]").first.focus()
+    page.keyboard.press("ArrowRight")
+    expect(page.locator('.cards li[aria-posinset="2"] a')).to_be_focused()
+    page.keyboard.press("End")
+    expect(page.locator(f'.cards li[aria-posinset="{last}"] a')).to_be_focused()
+    expect(page.locator(f'.cards li[aria-posinset="{last}"]')).to_be_in_viewport()
+    page.keyboard.press("Home")
+    expect(page.locator('.cards li[aria-posinset="1"] a')).to_be_focused()
+
+
+def test_hostile_text_is_shown_and_runs_nothing(new_page: Callable[..., Page], service: Service, campaign: str) -> None:
+    page = new_page(allowed=("404",))
+    hostile = synthetic(12)
+    for column in ("striker", "methods", "run_ids"):
+        hostile[column] = [HOSTILE] * 12
+    hostile["families"] = ["low"] * 12
+    hostile["broke"] = [[HOSTILE]] * 12
+    hostile["kinds"] = [{**kind, "name": f"{HOSTILE} {n}"} for n, kind in enumerate(hostile["kinds"])]
+    page.route("**/failure-table*", lambda route: route.fulfill(json=hostile))
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures?q=onerror")
+    wait_for(page, sum(hostile["distinct"]))
+    expect(page.locator(".cards li").first).to_contain_text("<img src=x")
+    expect(page.locator(".crumbs")).to_contain_text("<b>7</b>")
+    page.locator(".cards li").first.hover()
+    expect(page.locator(".tip")).to_contain_text("<img src=x")
+    page.get_by_role("link", name="Refused contacts").click()
+    expect(page.locator(".cards li").first).to_contain_text("<script>")
+    assert page.evaluate("window.hacked") is None
+
+
+def test_what_to_see_while_nothing_was_found(new_page: Callable[..., Page], service: Service, campaign: str) -> None:
+    page = new_page()
+    about = service.client.get(f"/v1/campaigns/{campaign}").json() | {"state": "running"}
+    page.route(f"**/v1/campaigns/{campaign}", lambda route: route.fulfill(json=about))
+    page.route("**/failure-table*", lambda route: route.fulfill(json=synthetic(0)))
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures")
+    expect(page.get_by_role("heading", name="Nothing has been found yet")).to_be_visible()
+    expect(page.get_by_role("main")).to_contain_text("episodes are done")
+
+
+def test_a_lost_service_is_told_and_comes_back(new_page: Callable[..., Page], service: Service, campaign: str) -> None:
+    page = new_page(allowed=("ERR_FAILED",))
+    page.route("**/v1/**", lambda route: route.abort())
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures")
+    expect(page.get_by_text("The service does not answer.").first).to_be_visible()
+    page.unroute("**/v1/**")
+    expect(page.locator(".cards li").first).to_be_visible()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("query", ["?every=1&family=mixed&brush=closing:1:", "?tab=refused"])
+def test_everybody_can_use_it(
+    screen: Callable[..., Page], check_axe: Callable[[Page], None], query: str, scheme: str
+) -> None:
+    page = screen(query, color_scheme=scheme)
+    page.get_by_text("Ranges by numbers").click()
+    check_axe(page)
+    page.locator(".cards li").first.get_by_role("button", name="Triage").click()
+    expect(page.get_by_role("dialog").get_by_label("Comment")).to_be_visible()
+    check_axe(page)
+
+
+def test_a_phone_shows_it_without_scrolling_sideways(screen: Callable[..., Page]) -> None:
+    page = screen(viewport=PHONE)
+    page.get_by_role("button", name="Plots").click()
+    expect(page.locator(".scatter canvas")).to_be_visible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def test_ten_thousand_failures(new_page: Callable[..., Page], service: Service, campaign: str) -> None:
+    page = new_page(allowed=("404",))
+    body = json.dumps(synthetic(15_000))
+    page.route("**/failure-table*", lambda route: route.fulfill(body=body, content_type="application/json"))
+    page.route("**/thumbnail.svg", lambda route: route.fulfill(body=PICTURE, content_type="image/svg+xml"))
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures")
+    wait_for(page, 10_000)
+    there = page.evaluate(SINCE_ANSWER)
+    print(f"\n10,000 failures: cards {there:.0f} ms after the table's last byte")
+    assert page.locator(".cards li").count() < 60
+    began = time.perf_counter()
+    page.get_by_role("combobox", name="Grade").select_option("careful")
+    expect(page).to_have_url(re.compile("grade=careful"))
+    print(f"a filter: {1000 * (time.perf_counter() - began):.0f} ms")
+    page.get_by_role("combobox", name="Grade").select_option("")
+    wait_for(page, 10_000)
+    page.locator(".cards a[data-go]").first.focus()
+    page.keyboard.press("End")
+    expect(page.locator('.cards li[aria-posinset="10000"] a')).to_be_focused()
+    expect(page.locator('.cards li[aria-posinset="10000"] img')).to_be_visible()
+    assert page.locator(".cards li").count() < 60
+
+
+PICTURE = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 240 150"><path d="M0 75H240" stroke="#888"/></svg>'
+SINCE_ANSWER = """() => new Promise((done) => requestAnimationFrame(() => {
+  const table = performance.getEntriesByType('resource').find((each) => each.name.includes('failure-table'));
+  done(performance.now() - table.responseEnd);
+}))"""
+
+
+def synthetic(size: int) -> dict[str, Any]:
+    """A table of so many contacts as the service sends it, of which two in three are valid and distinct."""
+    rng = random.Random(7)
+    valid = [i % 3 != 2 for i in range(size)]
+    kinds = [f"cut-in, {where}, in a lane; ego goes straight, brakes" for where in ("ahead", "alongside")]
+
+    def drawn(low: float, high: float) -> list[float]:
+        return [round(rng.uniform(low, high), 4) for _ in range(size)]
+
+    return {
+        "ids": [f"low-archive-{601 + i % 4}-train-{i}" for i in range(size)],
+        "run_ids": [f"low-archive-{601 + i % 4}" for i in range(size)],
+        "families": ["low"] * size,
+        "methods": ["archive"] * size,
+        "seeds": [601 + i % 4 for i in range(size)],
+        "indices": list(range(size)),
+        "phases": ["train"] * size,
+        "valid": valid,
+        "grade": [rng.choice(["careful", "ideal", "unavoidable"]) if each else None for each in valid],
+        "distinct": valid,
+        "kind": [rng.randrange(len(kinds)) for _ in range(size)],
+        "striker": [rng.choice(["left", "right"]) for _ in range(size)],
+        "striker_kind": ["vehicle"] * size,
+        "conflict_type": ["cut_in"] * size,
+        "conflict_s": drawn(1, 5),
+        "time_s": drawn(5, 9),
+        "visible_for_s": drawn(0, 8),
+        "ego_speed_mps": drawn(2, 16),
+        "other_speed_mps": drawn(2, 18),
+        "relative_speed_mps": drawn(0, 12),
+        "lateral_offset_m": drawn(-2, 2),
+        "min_ttc_s": drawn(0, 1),
+        "min_rss_margin_m": drawn(-9, 0),
+        "min_robustness": drawn(-1, 0.3),
+        "ego_peak_braking_mps2": drawn(0, 9),
+        "hidden": [False] * size,
+        "ego_response": ["braking"] * size,
+        "ground": ["lane"] * size,
+        "broke": [["speeding"] if i % 5 == 0 else [] for i in range(size)],
+        "refused_by": [[] if each else ["no_sideswipe"] for each in valid],
+        "repeats": ["verified" if each else None for each in valid],
+        "triage": ["new"] * size,
+        "kinds": [{"signature": each, "name": each, "failures": 1, "distinct": 1, "preventable": 0} for each in kinds],
+        "scenes": {
+            "low": {
+                "names": ["ego_speed_mps", "lead_gap_m", "friction"],
+                "rows": [list(row) for row in zip(drawn(8, 16), drawn(8, 50), drawn(0.6, 1), strict=True)],
+                "of": list(range(size)),
+            }
+        },
+    }
