@@ -26,7 +26,7 @@ export function Card({ campaign, table, at, often, triage }: Props) {
   return (
     <article class="failure">
       <Thumbnail campaign={campaign} id={id} />
-      <div class="over">
+      <div class="judged">
         {table.valid[at] ? <GradeTag grade={table.grade[at] ?? "none"} /> : <Refusal rules={table.refused_by[at]!} />}
         <Repeats repeats={table.repeats[at]!} />
       </div>
@@ -39,7 +39,7 @@ export function Card({ campaign, table, at, often, triage }: Props) {
       <dl class="measures">
         <Measure name="closing" value={number(table.relative_speed_mps[at], 1)} unit="m/s" />
         <Measure name="from conflict" value={number(reactionOf(table, at), 1)} unit="s" />
-        {table.valid[at] && <Measure name="of this kind" value={`${often}`} unit="×" />}
+        {table.valid[at] && <Measure name="of this kind" value={`${often}`} unit="" />}
       </dl>
       <div class="foot small">
         <span class="faint" title={`${words(table.striker[at]!)} (${table.striker_kind[at]}), ${id}`}>
@@ -85,7 +85,7 @@ function Measure({ name, value, unit }: { name: string; value: string; unit: str
     <div>
       <dt>{name}</dt>
       <dd>
-        {value} <span class="unit">{unit}</span>
+        {value} {unit && <span class="unit">{unit}</span>}
       </dd>
     </div>
   );

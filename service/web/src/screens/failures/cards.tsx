@@ -8,7 +8,7 @@ import { moved, rowsInView, type Grid } from "./rows";
 import type { FailureTable } from "./wire";
 
 const LEAST_PX = 262;
-const HEIGHT_PX = 296; // as in failures.css
+const HEIGHT_PX = 334; // as in failures.css
 const GAP_PX = 14;
 const left = new Map<string, number>(); // address -> how far it was scrolled, for whoever comes back from a replay
 

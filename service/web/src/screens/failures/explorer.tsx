@@ -13,7 +13,7 @@ import { inTab, isNarrowed, oftenOf, passing, queryOf, read, reset, type Filters
 import { Parallel } from "./parallel";
 import { RefusedBy } from "./refused";
 import { Scatter } from "./scatter";
-import { sorted, SORTS, type Sort } from "./sorting";
+import { sorted, SORTS, SORTS_OF, type Sort } from "./sorting";
 import { TriageDialog, noted, useNoting } from "./triage";
 import type { FailureTable } from "./wire";
 
@@ -88,10 +88,10 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
             )}
             <label class="sort">
               Order{" "}
-              <select value={asked.sort} onChange={(event) => change({ sort: event.currentTarget.value as Sort })}>
-                {Object.entries(SORTS).map(([sort, words]) => (
+              <select value={SORTS_OF[asked.tab].includes(asked.sort) ? asked.sort : "closing"} onChange={(event) => change({ sort: event.currentTarget.value as Sort })}>
+                {SORTS_OF[asked.tab].map((sort) => (
                   <option key={sort} value={sort}>
-                    {words}
+                    {SORTS[sort]}
                   </option>
                 ))}
               </select>

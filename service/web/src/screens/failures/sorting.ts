@@ -15,6 +15,12 @@ export const SORTS = {
   rare: "rarest",
 } as const;
 
+/** Refused contacts have no grade, and are of no kind that counts. */
+export const SORTS_OF: Record<"failures" | "refused", readonly Sort[]> = {
+  failures: ["grade", "closing", "reaction", "newest", "often", "rare"],
+  refused: ["closing", "reaction", "newest"],
+};
+
 const RANKS: Record<string, number> = { careful: 0, ideal: 1, unavoidable: 2 };
 const UNGRADED = 3;
 
