@@ -10,7 +10,7 @@ import type { FailureTable } from "./wire";
 const LEAST_PX = 262;
 const HEIGHT_PX = 334; // as in failures.css
 const GAP_PX = 14;
-const left = new Map<string, number>(); // address -> how far it was scrolled, for whoever comes back from a replay
+const left = new Map<string, number>(); // place -> how far it was scrolled, for whoever comes back from a replay
 
 interface Props {
   campaign: string;
@@ -20,9 +20,11 @@ interface Props {
   shown: readonly number[];
   hovered: Signal<number | null>;
   triage: (failure: number) => void;
+  /** The address, with all filters: what is scrolled to is remembered by it. */
+  place: string;
 }
 
-export function Cards({ campaign, table, often, shown, hovered, triage }: Props) {
+export function Cards({ campaign, table, often, shown, hovered, triage, place }: Props) {
   const list = useRef<HTMLUListElement>(null);
   const { width } = useSize(list);
   const [top, viewHeight] = useView(list);
@@ -31,7 +33,7 @@ export function Cards({ campaign, table, often, shown, hovered, triage }: Props)
   const grid: Grid = { size: shown.length, width, least: LEAST_PX, height: HEIGHT_PX, gap: GAP_PX };
   const rows = rowsInView(grid, top, viewHeight);
   const cardWidth = (width - GAP_PX * (rows.columns - 1)) / rows.columns;
-  useComingBack(width > 0);
+  useComingBack(width > 0, place);
   useEffect(() => {
     if (wanted.current === null) return;
     const link = list.current!.querySelector<HTMLElement>(`[data-at="${wanted.current}"] [data-go]`);
@@ -67,14 +69,14 @@ export function Cards({ campaign, table, often, shown, hovered, triage }: Props)
         drawn.map((at) => {
           const [row, column] = [Math.floor(at / rows.columns), at % rows.columns];
           const failure = shown[at]!;
-          const place = `translate(${column * (cardWidth + GAP_PX)}px, ${row * (HEIGHT_PX + GAP_PX)}px)`;
+          const shift = `translate(${column * (cardWidth + GAP_PX)}px, ${row * (HEIGHT_PX + GAP_PX)}px)`;
           return (
             <li
               key={table.ids[failure]}
               data-at={at}
               aria-setsize={shown.length}
               aria-posinset={at + 1}
-              style={{ width: `${cardWidth}px`, transform: place }}
+              style={{ width: `${cardWidth}px`, transform: shift }}
               onPointerEnter={() => hovered.set(failure)}
               onFocusIn={() => hovered.set(failure)}
             >
@@ -118,14 +120,13 @@ function bringIntoView(list: HTMLElement, row: number): void {
 }
 
 /** Scrolls to where one was before one went to a replay. */
-function useComingBack(ready: boolean): void {
+function useComingBack(ready: boolean, place: string): void {
+  const latest = useRef(place);
+  latest.current = place;
   useEffect(() => {
     if (!ready) return;
-    const address = location.hash;
-    const before = left.get(address);
+    const before = left.get(place);
     if (before !== undefined) scrollTo(0, before);
-    const keep = () => location.hash === address && left.set(address, scrollY);
-    addEventListener("scroll", keep, { passive: true });
-    return () => removeEventListener("scroll", keep);
+    return () => void left.set(latest.current, scrollY); // runs while the cards are still there
   }, [ready]);
 }

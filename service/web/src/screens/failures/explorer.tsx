@@ -29,7 +29,8 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
   const [open, setOpen] = useState<number | null>(null);
   const hovered = useMemo(() => signal<number | null>(null), []);
   const filters = dragged ? { ...asked, brushes: dragged } : asked;
-  const show = (next: Filters) => replace(address(["campaigns", campaign, "failures"], queryOf(next)));
+  const place = (some: Filters) => address(["campaigns", campaign, "failures"], queryOf(some));
+  const show = (next: Filters) => replace(place(next));
   const change = (changed: Partial<Filters>) => show({ ...asked, ...changed });
   const brush = (brushes: Brushes, done: boolean) => {
     setDragged(done ? null : brushes);
@@ -101,7 +102,7 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
             </button>
           </div>
           {shown.length ? (
-            <Cards {...{ campaign, table, often, shown, hovered }} triage={setOpen} />
+            <Cards {...{ campaign, table, often, shown, hovered }} triage={setOpen} place={place(asked)} />
           ) : (
             <Nothing filters={filters} all={all.length} resetAll={() => show(reset(asked))} />
           )}
