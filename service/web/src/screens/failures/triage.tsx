@@ -6,7 +6,7 @@ import { send } from "../../api/client";
 import { Failed, Loading } from "../../ui/states";
 import { moment } from "../../ui/text";
 import { TRIAGE } from "./naming";
-import type { FailureTable, Triage, TriageState } from "./wire";
+import type { FailureTable, Note, Triage, TriageState } from "./wire";
 
 const LONGEST = 2000;
 
@@ -21,7 +21,7 @@ export function noted(table: FailureTable, notes: Notes): FailureTable {
 
 interface Refused {
   failure: string;
-  triage: Triage;
+  triage: Note;
   error: Error;
 }
 
@@ -29,7 +29,7 @@ export interface Noting {
   notes: Notes;
   /** What the service refused last, to be mended and sent again. */
   refused: Refused | null;
-  save: (failure: string, triage: Triage) => void;
+  save: (failure: string, triage: Note) => void;
   forgive: () => void;
 }
 
@@ -43,7 +43,7 @@ export function useNoting(campaign: string): Noting {
       else next.set(failure, state);
       return next;
     });
-  const save = async (failure: string, triage: Triage) => {
+  const save = async (failure: string, triage: Note) => {
     const before = notes.get(failure);
     setRefused(null);
     note(failure, triage.state);
@@ -62,16 +62,16 @@ interface DialogProps {
   failure: string;
   /** What was sent and refused, to begin with; else what the service has is read first. */
   refused: Refused | null;
-  save: (triage: Triage) => void;
+  save: (triage: Note) => void;
   close: () => void;
 }
 
 export function TriageDialog({ campaign, failure, refused, save, close }: DialogProps) {
   const dialog = useRef<HTMLDialogElement>(null);
   const path = `v1/campaigns/${encodeURIComponent(campaign)}/failures/${encodeURIComponent(failure)}`;
-  const asked = useAsked<{ triage?: Triage | null }>(refused ? null : path);
+  const asked = useAsked<{ triage: Triage | null }>(refused ? null : path);
   useEffect(() => dialog.current!.showModal(), []);
-  const begun = refused?.triage ?? (asked.value && (asked.value.triage ?? { state: "new", comment: "" }));
+  const begun: Begun | undefined = refused?.triage ?? (asked.value && (asked.value.triage ?? { state: "new", comment: "" }));
   return (
     <dialog ref={dialog} class="card triage" aria-labelledby="triage-title" onClose={close} onClick={(event) => event.target === dialog.current && close()}>
       <h2 id="triage-title">Triage</h2>
@@ -87,7 +87,10 @@ export function TriageDialog({ campaign, failure, refused, save, close }: Dialog
   );
 }
 
-function TriageForm({ begun, error, save, close }: { begun: Triage; error: Error | undefined; save: (triage: Triage) => void; close: () => void }) {
+/** What the form begins with: when it was changed is known only of what the service has. */
+type Begun = Note & Partial<Triage>;
+
+function TriageForm({ begun, error, save, close }: { begun: Begun; error: Error | undefined; save: (triage: Note) => void; close: () => void }) {
   const [state, setState] = useState<TriageState>(begun.state);
   const [comment, setComment] = useState(begun.comment);
   const submit = (event: Event) => {

@@ -6,9 +6,6 @@ export type FailureTable = Body<"FailureTable">;
 export type TriageState = FailureTable["triage"][number];
 export type Grade = Body<"Grade">;
 
-/** Not in `openapi.yaml` yet. */
-export interface Triage {
-  state: TriageState;
-  comment: string;
-  changed_at?: string;
-}
+export type Triage = Body<"Triage">;
+/** What a person says; the service adds when. */
+export type Note = Pick<Triage, "state" | "comment">;
