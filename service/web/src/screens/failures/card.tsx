@@ -4,7 +4,8 @@ import { address } from "../../router";
 import { number, words } from "../../ui/text";
 import { reactionOf } from "./features";
 import { GradeTag, Mark } from "./grade";
-import { halves, refusal, TRIAGE } from "./naming";
+import { refusal } from "../../ui/verdicts";
+import { halves, TRIAGE } from "./naming";
 import { useThumbnail } from "./thumbnails";
 import type { FailureTable } from "./wire";
 

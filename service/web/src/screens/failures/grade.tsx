@@ -1,7 +1,7 @@
 /** A grade as its mark and its words. */
 
 import { FILLED, PATHS } from "./marks";
-import { GRADE_WORDS, type GradeName } from "./naming";
+import { GRADE_WORDS, type GradeName } from "../../ui/verdicts";
 
 export function Mark({ grade }: { grade: GradeName }) {
   return (

@@ -1,6 +1,6 @@
 /** Marks of the grades: a shape and a colour each, so that either tells them apart. */
 
-import type { GradeName } from "./naming";
+import type { GradeName } from "../../ui/verdicts";
 
 type Outline = (context: CanvasRenderingContext2D | Path2D, r: number) => void;
 

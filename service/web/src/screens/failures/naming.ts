@@ -1,43 +1,9 @@
-/** Grades, rules and states in words; the words are those of the service's `caption.py` and README. */
+/** What can be filtered by, in words. */
 
 import { words } from "../../ui/text";
+import { GRADE_WORDS, refusal, type GradeName } from "../../ui/verdicts";
 import type { Facet } from "./filters";
 import type { TriageState } from "./wire";
-
-export const GRADES = ["careful", "ideal", "unavoidable", "none"] as const;
-export type GradeName = (typeof GRADES)[number];
-
-interface GradeWords {
-  short: string;
-  long: string;
-}
-
-export const GRADE_WORDS: Record<GradeName, GradeWords> = {
-  careful: { short: "preventable", long: "A careful driver would have prevented it" },
-  ideal: { short: "only by full braking", long: "Only full braking at once would have prevented it" },
-  unavoidable: { short: "unavoidable", long: "Not even full braking at once would have prevented it" },
-  none: { short: "not graded", long: "No reference driver was asked" },
-};
-
-/** Why a contact was refused: what a rule found. */
-const RULES: Record<string, string> = {
-  no_teleport: "somebody was teleported",
-  no_spawn_overlap: "bodies overlapped at the start",
-  conflict_after_release: "the conflict began less than 1 s after the release",
-  inside_limits: "an adversary left its limits",
-  inside_grip: "the striker drove beyond the road's grip",
-  solid_bodies: "a body passed through another one before",
-  ego_model_saw: "SUMO does not list the collision",
-  repeats: "it went another way when replayed",
-  not_from_behind: "the ego was struck from behind",
-  ego_moving: "the ego stood",
-  no_sideswipe: "the adversary swiped the ego's side",
-  seen_before: "the ego could never see the striker",
-};
-
-export function refusal(rule: string): string {
-  return Object.hasOwn(RULES, rule) ? RULES[rule]! : words(rule);
-}
 
 export const TRIAGE: Record<TriageState, string> = {
   new: "New",

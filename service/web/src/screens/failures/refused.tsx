@@ -2,7 +2,7 @@
 
 import { useMemo } from "preact/hooks";
 import { tally } from "./filters";
-import { refusal } from "./naming";
+import { refusal } from "../../ui/verdicts";
 import type { FailureTable } from "./wire";
 
 interface Props {

@@ -7,7 +7,7 @@ import { number } from "../../ui/text";
 import { usePaint, useSize, type Size } from "./canvas";
 import { titled, type Feature } from "./features";
 import { stamp } from "./marks";
-import { GRADES, GRADE_WORDS, type GradeName } from "./naming";
+import { GRADES, GRADE_WORDS, type GradeName } from "../../ui/verdicts";
 import { Mark } from "./grade";
 import { domain, linear, ticks, tickText, type Scale } from "./scale";
 import type { FailureTable } from "./wire";

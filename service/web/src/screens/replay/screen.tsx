@@ -18,6 +18,7 @@ import { Stage } from "../../stage/stage";
 import { KeyList, Transport } from "../../stage/transport";
 import { Empty, Shown } from "../../ui/states";
 import { words } from "../../ui/text";
+import { GRADE_WORDS } from "../../ui/verdicts";
 import { Actors } from "./actors";
 import { Take } from "./take";
 import { Verdict } from "./verdict";
@@ -68,7 +69,7 @@ function Head({ campaign, failure, query, known }: Props & { known: Body<"Failur
         <a href={`${address(["campaigns", campaign, "failures"])}${listed.query && `?${listed.query}`}`}>Failures</a> / {failure}
       </nav>
       <h1>{signature ? capital(signature) : `Failure ${failure}`}</h1>
-      {known && <span class={`tag ${known.collision?.judgement?.grade ?? ""}`}>{known.collision?.judgement?.grade ?? words(known.outcome)}</span>}
+      {known && <Grade failure={known} />}
       <span class="actions">
         {neighbour(query.get("prev") ?? listed.previous, "Previous")}
         {neighbour(query.get("next") ?? listed.next, "Next")}
@@ -129,4 +130,9 @@ function Replay({ campaign, path, known, series, collision, query }: { campaign:
 
 function capital(text: string): string {
   return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+function Grade({ failure }: { failure: Body<"Failure"> }) {
+  const grade = failure.collision?.judgement?.grade;
+  return <span class={`tag ${grade ?? ""}`}>{grade ? GRADE_WORDS[grade].short : words(failure.outcome)}</span>;
 }

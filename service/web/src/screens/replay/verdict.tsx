@@ -72,8 +72,8 @@ function Drivers({ drivers }: { drivers: Record<string, Body<"ReferenceOutcome">
 
 /** What somebody noted about it, where the service keeps such notes. */
 function Triage({ failure }: { failure: Failure }) {
-  const triage = (failure as { triage?: { state: string; comment: string } | null }).triage;
-  if (!triage) return null;
+  const { triage } = failure;
+  if (triage === null) return null;
   return (
     <p class="verdict-triage">
       <span class="tag">{triage.state}</span> {triage.comment}

@@ -2,16 +2,11 @@
 
 import type { Body } from "../../api/types";
 import { number, words } from "../../ui/text";
+import { GRADE_WORDS, refusal } from "../../ui/verdicts";
 
 type Failure = Body<"Failure">;
 type Collision = Body<"Collision">;
 type Judgement = Body<"Judgement">;
-
-export const GRADES: Record<Body<"Grade">, string> = {
-  careful: "A careful driver would have prevented it.",
-  ideal: "Only full braking at once would have prevented it.",
-  unavoidable: "Not even full braking at once would have prevented it.",
-};
 
 const CONFLICTS: Record<string, string> = {
   cut_in: "a cut-in",
@@ -36,31 +31,15 @@ const BROKE: Record<string, string> = {
   pedestrian_on_red: "walked on red",
 };
 
-/** A rule that a contact did not pass, as what is wrong with it. */
-const RULES: Record<string, string> = {
-  no_teleport: "the simulator moved somebody by a jump",
-  no_spawn_overlap: "bodies overlapped at the start",
-  conflict_after_release: "the conflict began less than 1 s after the release",
-  inside_limits: "an adversary left its limits",
-  inside_grip: "the striker drove beyond the friction of the road",
-  solid_bodies: "somebody passed through another body",
-  ego_model_saw: "SUMO's boxes do not agree with the contact",
-  repeats: "it went another way when it was replayed",
-  not_from_behind: "the ego was struck from behind",
-  ego_moving: "the ego stood, or nearly",
-  no_sideswipe: "the adversary swiped the ego's side",
-  seen_before: "the striker could never be seen",
-};
-
 export function verdictOf({ collision, outcome }: Failure): string {
   const grade = collision?.judgement?.grade;
-  if (grade) return GRADES[grade];
+  if (grade) return `${GRADE_WORDS[grade].long}.`;
   return outcome === "failure" ? "It counts as a failure; nobody judged who would have prevented it." : "It is refused as a failure.";
 }
 
 /** Names of the rules that refused it, with what each means. */
 export function refusals(collision: Collision): string[] {
-  return Object.entries(collision.verdicts).flatMap(([rule, passed]) => (passed ? [] : [RULES[rule] ?? words(rule)]));
+  return Object.entries(collision.verdicts).flatMap(([rule, passed]) => (passed ? [] : [refusal(rule)]));
 }
 
 export function contactOf(collision: Collision): string {
@@ -88,7 +67,7 @@ export function responseOf(judgement: Judgement, peak: number | null): string {
   const response = { none: "does not brake", late_braking: "brakes late", braking: "brakes", standing: "stands", starting: "starts" };
   const goes = manoeuvre[judgement.ego_manoeuvre as keyof typeof manoeuvre] ?? words(judgement.ego_manoeuvre);
   const does = response[judgement.ego_response as keyof typeof response] ?? words(judgement.ego_response);
-  const hardest = peak === null || peak < 0.05 ? "" : `, by ${number(peak, 1)} m/s² at most`;
+  const hardest = peak === null || peak < 0.05 ? "" : `; its hardest braking was ${number(peak, 1)} m/s²`;
   const never = judgement.unresponsive ? " It saw a collision course for 1.5 s or more, and never braked." : "";
   return `The ego ${goes} and ${does}${hardest}.${never}`;
 }
