@@ -28,8 +28,12 @@ class Compression:
             return
 
         async def send_with_vary(message: Message) -> None:
-            if message["type"] == "http.response.start" and message["status"] == 304:
-                MutableHeaders(raw=message["headers"]).add_vary_header("Accept-Encoding")  # as what still holds said
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(raw=message["headers"])
+                # Of all that may be kept: a 304 says the same as what still holds, and does not know whether that was
+                # packed.
+                if "etag" in headers and "Accept-Encoding" not in headers.get("vary", ""):
+                    headers.add_vary_header("Accept-Encoding")
             await send(message)
 
         # Starlette looks for the word alone, in small letters, and would not see that it is refused.

@@ -236,7 +236,7 @@ def test_a_failure_that_does_not_repeat_gets_no_bundle(
 ) -> None:
     run = bundle.parent / "elsewhere"
     contact = read_results(run).contacts[0]
-    monkeypatch.setattr("risk_sac.failures.collect.actions_of", lambda series: series["actions"][-3:])
+    monkeypatch.setattr("risk_sac.failures.play.actions_of", lambda series: series["actions"][-3:])
     assert main(["bundle", str(run), contact.id, "--out", str(tmp_path / "a.npz")]) == 1
     assert "does not repeat here" in capsys.readouterr().err.replace("\n", " ")
     assert not (tmp_path / "a.npz").exists()

@@ -37,7 +37,7 @@ export function hasKey(): boolean {
 export async function call(path: string, init: RequestInit = {}): Promise<Response> {
   const headers = new Headers(init.headers);
   const key = sessionStorage.getItem(KEY);
-  if (key !== null) headers.set("Authorization", `Bearer ${key}`);
+  if (key !== null && !headers.has("Authorization")) headers.set("Authorization", `Bearer ${key}`);
   let response: Response;
   try {
     response = await fetch(BASE + path, { ...init, headers });

@@ -1,18 +1,18 @@
 /** Asks for the API key, where the service wants one. */
 
 import { useRef, useState } from "preact/hooks";
-import { get, setKey } from "../api/client";
+import { call, setKey } from "../api/client";
 
 export function Login() {
   const input = useRef<HTMLInputElement>(null);
   const [refused, setRefused] = useState("");
   const enter = async (event: Event) => {
     event.preventDefault();
-    setKey(input.current!.value.trim());
+    const key = input.current!.value.trim();
     try {
-      await get("v1/campaigns?limit=1");
+      await call("v1/campaigns?limit=1", { headers: { Authorization: `Bearer ${key}` } });
+      setKey(key);
     } catch (error) {
-      setKey(null);
       setRefused((error as Error).message);
     }
   };
