@@ -114,7 +114,7 @@ class AnswerCache:
         """Keep an answer in place of an older one, or nothing if there is none; the oldest answers make room for it."""
         if asked in self._answers:
             self._bytes -= _size(asked, self._answers.pop(asked)[1])
-        if answer is not None:
+        if answer is not None and _size(asked, answer) <= MOST_BYTES // 2:  # else all others would make room for it
             self._answers[asked] = number, answer
             self._bytes += _size(asked, answer)
         while self._bytes > MOST_BYTES:

@@ -34,6 +34,8 @@ class Compression:
                 # packed.
                 if "etag" in headers and "Accept-Encoding" not in headers.get("vary", ""):
                     headers.add_vary_header("Accept-Encoding")
+                if headers.get("content-encoding") == "gzip" and headers.get("etag", "W/")[:2] != "W/":
+                    headers["etag"] = f"W/{headers['etag']}"  # a file's own tag is that of its bytes
             await send(message)
 
         # Starlette looks for the word alone, in small letters, and would not see that it is refused.

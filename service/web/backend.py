@@ -63,7 +63,7 @@ def build_page() -> None:
     environment = os.environ | {"PATH": path}
     # No script calls npm: that of the package is none that a shell finds.
     for command in (
-        ["--prefer-offline", "--no-audit", "--no-fund", "--loglevel=error", "ci"],
+        ["--include=dev", "--prefer-offline", "--no-audit", "--no-fund", "--loglevel=error", "ci"],
         ["run", "--silent", "check"],
         ["run", "--silent", "build"],
     ):

@@ -11,7 +11,7 @@ from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from service.api.access import Caller, CurrentCaller
 from service.api.answer_cache import keep
 from service.api.answers.pages import Cursor, Limit
-from service.api.answers.representations import Representation, caching, entity_tag
+from service.api.answers.representations import Representation, caching, entity_tag, has
 from service.api.answers.responses import (
     ACCEPTED,
     INVALID,
@@ -175,6 +175,8 @@ def _kept(
     # The revision that was read, which may be newer. A body depends on it, on the version and on one setting.
     tag = entity_tag(campaign.revision, __version__, str(service.settings.max_workers))
     headers = caching(tag) | _retry_after(campaign, service)
+    if has(request, tag):  # before the body is made, which of many episodes takes seconds
+        return Response(status_code=304, headers=headers)
     representation = Representation(body(campaign).model_dump_json().encode(), tag, headers)
     keep(request, representation, revision, campaign_id)
     return representation.response(request)

@@ -9,6 +9,7 @@ from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse
 
 from risk_sac import __version__
+from service.api.answers.representations import accepted
 from service.schemas.entrance import Entrance
 
 ASSETS = Path(str(files("fastapi_offline"))) / "static"
@@ -22,7 +23,8 @@ router = APIRouter()
 @router.get("/", tags=["operations"], response_model=Entrance)
 async def get_entrance(request: Request) -> Entrance | Response:
     """Where to go from here; a browser is sent to the page."""
-    if "text/html" in request.headers.get("accept", ""):
+    accept = request.headers.get("accept", "")
+    if "text/html" in accept and accepted(accept, ("application/json", "text/html")) == "text/html":
         return RedirectResponse("page/", status_code=303, headers={"Vary": "Accept"})
     return Entrance(version=__version__)
 

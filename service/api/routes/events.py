@@ -91,13 +91,13 @@ def _start(
     store: Store, campaign_id: str, project: str | None, event_id: str | None, newest: int | None
 ) -> tuple[int | None, bool]:
     """Where to begin, None where nothing is left to tell; and whether the campaign has ended."""
-    campaign = store.campaign(campaign_id, project)
+    store.campaign(campaign_id, project)  # that the caller may know of it
     position = _position(store, campaign_id, event_id, newest)
     if position is None:
         raise invalid_field(
             "Last-Event-ID", event_id, "the id of an event of this campaign, unchanged; else leave it out"
         )
-    ended = campaign.state.final
+    ended = store.campaign(campaign_id, project).state.final  # after the position: what is told later counts as such
     told = ended and not store.events(campaign_id, after=position, limit=1).items
     return None if told else position, ended
 
