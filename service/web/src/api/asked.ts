@@ -2,6 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { get } from "./client";
+import { paced } from "./pace";
 
 export interface Asked<T> {
   value: T | undefined;
@@ -25,10 +26,12 @@ export function useAsked<T>(path: string | null, everyMs: (value: T) => number |
     let timer: ReturnType<typeof setTimeout>;
     const ask = async () => {
       let wait: number | null = null;
+      const began = performance.now();
       try {
         const value = await get<T>(path, left.signal);
         setState({ path, value });
         wait = pace.current(value);
+        if (wait !== null) wait = paced(wait, performance.now() - began);
       } catch (error) {
         if (left.signal.aborted) return;
         setState((before) => ({ path, value: before.path === path ? before.value : undefined, error: error as Error }));

@@ -3,6 +3,7 @@
 import { useEffect, useRef, useState } from "preact/hooks";
 import { get, Problem } from "../../api/client";
 import { follow, type ServerEvent } from "../../api/events";
+import { paced } from "../../api/pace";
 import type { Body } from "../../api/types";
 import { LiveCurves, POINTS, WINDOW, type Curve } from "./curves";
 
@@ -11,7 +12,6 @@ export type Found = Body<"Episode">;
 
 const REDRAW_MS = 250; // at most four times a second, however fast the search is
 const PACE_MS = 2000; // between two looks at the state
-const SHARE = 20; // and so many times as long as the last look took, so that a busy service is left alone
 const NEWEST = 6; // failures shown
 
 export interface Live {
@@ -84,7 +84,7 @@ class Watch {
         over = error instanceof Problem && error.status < 500; // asking again would not help
       }
       if (over) this.stop(); // the stream has nothing more to tell
-      else await this.pause(Math.max(PACE_MS, SHARE * (performance.now() - began)));
+      else await this.pause(paced(PACE_MS, performance.now() - began));
     }
   }
 

@@ -1,6 +1,7 @@
 /** Asking again and again, but not while nobody looks. */
 
 import { useEffect, useRef, useState } from "preact/hooks";
+import { paced } from "../../api/pace";
 
 /**
  * @param key what is asked for: with another one it is asked at once; null to ask nothing.
@@ -16,10 +17,12 @@ export function usePolled(key: string | null, ask: (left: AbortSignal) => Promis
     const left = new AbortController();
     let timer: ReturnType<typeof setTimeout>;
     const round = async () => {
+      const began = performance.now();
       const wait = await latest.current(left.signal);
+      const took = performance.now() - began;
       if (left.signal.aborted) return;
       if (wait === null) whenSeen();
-      else timer = setTimeout(next, wait);
+      else timer = setTimeout(next, paced(wait, took));
     };
     const whenSeen = () => document.addEventListener("visibilitychange", next, { once: true, signal: left.signal });
     const next = () => (document.hidden ? whenSeen() : round());
