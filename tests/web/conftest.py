@@ -31,9 +31,9 @@ CAMPAIGN = {
 }
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator["Browser"]:
-    """One browser for all tests of a process."""
+    """One browser for a module's tests, and no longer: its event loop would be in the way of others' tests."""
     with sync_playwright() as playwright:
         # Containers have no sandbox of their own to give; what is opened here is ours alone.
         browser = playwright.chromium.launch(executable_path=EXECUTABLE, args=["--no-sandbox"])
