@@ -1,18 +1,25 @@
 """Episodes played once more, from their records and the actions that were recorded.
 
-`python -m risk_sac.failures.replay FOLDER...` does it with the distinct failures of runs, and prints a line of JSON for
-each run: a process in which nothing was searched before.
+`python -m risk_sac.failures.replay TIMES JOBS FOLDER...` does it with the distinct failures of runs, `TIMES` over, each
+time in a process of its own, `JOBS` of them at once. Each prints a line of JSON for each run. In the process that
+they are forked from nothing was searched and SUMO was never started. It has read the libraries, once for all of them,
+which costs more than what is played.
 """
 
 import json
+import multiprocessing
+import signal
 import sys
 from contextlib import closing
 from pathlib import Path
+
+import numpy as np
 
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene, RiskSacError, SimulationError
 from risk_sac.failures.play import play
 from risk_sac.failures.trajectory import actions_of, trajectory_digest
+from risk_sac.risk.soft_min import soft_min
 from risk_sac.run_folder.results import FAILURES, read_results, series_name
 from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import distinct_failures
@@ -35,7 +42,8 @@ def _replay_all(folder: Path) -> list[int]:
     return same
 
 
-def _main(folders: list[Path]) -> None:
+def _tell(folders: list[Path]) -> None:
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     for folder in folders:
         try:
             line = {"folder": str(folder), "same": _replay_all(folder)}
@@ -44,5 +52,23 @@ def _main(folders: list[Path]) -> None:
         print(json.dumps(line), flush=True)  # noqa: T201 - to whoever started it
 
 
+def _main(times: int, jobs: int, folders: list[Path]) -> int:
+    """The greatest exit status of the processes."""
+    soft_min(np.zeros(1), 1.0)  # the first call of any compiled function loads what all of them need
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # and daemons end with their parent's exit
+    fork, statuses = multiprocessing.get_context("fork"), [0]
+    for first in range(0, times, jobs):
+        processes = [
+            fork.Process(target=_tell, args=(folders,), daemon=True) for _ in range(first, min(first + jobs, times))
+        ]
+        for process in processes:
+            process.start()
+        for process in processes:
+            process.join()
+            statuses.append(abs(process.exitcode or 0))
+    return max(statuses)
+
+
 if __name__ == "__main__":
-    _main([Path(argument) for argument in sys.argv[1:]])
+    times, jobs, *folders = sys.argv[1:]
+    sys.exit(_main(int(times), int(jobs), [Path(folder) for folder in folders]))

@@ -7,7 +7,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -58,40 +57,41 @@ def verify(
             episodes = {episode.index: Repetition(times=0, same=0) for episode in distinct_failures(results)}
             missing[folder] = Verified(digest=results.digest, code=code, versions=versions(), episodes=episodes)
     failed = [folder for folder, verified in missing.items() if verified.episodes]
-    with ThreadPoolExecutor(max(jobs, 1)) as threads:
-        for same in threads.map(lambda _: _same(failed, stopping), range(times if failed else 0)):
-            for folder in failed:
-                if folder in same and folder in missing:
-                    missing[folder] = _counted(missing[folder], same[folder])
-                else:
-                    missing.pop(folder, None)
+    told = _replayed(failed, times, max(jobs, 1), stopping) if failed else {}
+    for folder in failed:
+        if len(told[folder]) == times:
+            missing[folder] = replace(missing[folder], episodes=_counted(missing[folder].episodes, told[folder]))
+        else:
+            del missing[folder]
     for folder, verified in missing.items():
         write_verified(folder, verified)
     return found | missing
 
 
-def _counted(verified: Verified, same: Collection[int]) -> Verified:
-    """With one more replay, of which these episodes were the same."""
-    episodes = {
-        index: Repetition(times=before.times + 1, same=before.same + (index in same))
-        for index, before in verified.episodes.items()
-    }
-    return replace(verified, episodes=episodes)
+def _counted(episodes: Collection[int], told: Sequence[Collection[int]]) -> Mapping[int, Repetition]:
+    """How often each episode was the same; `told` are those that were, by replay."""
+    return {index: Repetition(times=len(told), same=sum(index in same for same in told)) for index in episodes}
 
 
-def _same(folders: Sequence[Path], stopping: Callable[[], bool]) -> Mapping[Path, Collection[int]]:
-    """By run, the failures that were the same in a fresh process; of a run that was not replayed nothing."""
-    command = [sys.executable, "-m", "risk_sac.failures.replay", *map(str, folders)]
-    with tempfile.TemporaryFile("w+") as told, subprocess.Popen(command, stdout=told) as process:
+def _replayed(
+    folders: Sequence[Path], times: int, jobs: int, stopping: Callable[[], bool]
+) -> Mapping[Path, Sequence[Collection[int]]]:
+    """By run, the failures that were the same, for each process that has replayed it to the end."""
+    command = [sys.executable, "-m", "risk_sac.failures.replay", str(times), str(jobs), *map(str, folders)]
+    with tempfile.TemporaryFile("w+") as output, subprocess.Popen(command, stdout=output) as process:
         while process.poll() is None:
             if stopping():
                 process.terminate()
+                process.wait()
             time.sleep(POLL_S)
         if process.returncode != 0:
             logger.warning("replaying failures ended with status %d", process.returncode)
-        told.seek(0)
-        lines = [json.loads(line) for line in told if line.endswith("\n")]
+        output.seek(0)
+        lines = [json.loads(line) for line in output if line.endswith("\n")]
     for line in lines:
         if "error" in line:
             logger.warning("the failures of %s cannot be replayed: %s", line["folder"], line["error"])
-    return {Path(line["folder"]): line["same"] for line in lines if "same" in line}
+    return {
+        folder: [line["same"] for line in lines if line["folder"] == str(folder) and "same" in line]
+        for folder in folders
+    }
