@@ -1,8 +1,10 @@
 /** What a component asks of the API: loading, then there or refused; asked again as often as it says. */
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { get } from "./client";
-import { paced } from "./pace";
+import { usePolled } from "./polled";
+
+const LOST_MS = 2000; // nobody answers: until somebody does
 
 export interface Asked<T> {
   value: T | undefined;
@@ -17,38 +19,17 @@ export interface Asked<T> {
  */
 export function useAsked<T>(path: string | null, everyMs: (value: T) => number | null = () => null): Asked<T> {
   const [state, setState] = useState<{ path: string | null; value?: T; error?: Error }>({ path });
-  const [turn, setTurn] = useState(0);
-  const pace = useRef(everyMs);
-  pace.current = everyMs;
-  useEffect(() => {
-    if (path === null) return;
-    const left = new AbortController();
-    let timer: ReturnType<typeof setTimeout>;
-    const ask = async () => {
-      let wait: number | null = null;
-      const began = performance.now();
-      try {
-        const value = await get<T>(path, left.signal);
-        setState({ path, value });
-        wait = pace.current(value);
-        if (wait !== null) wait = paced(wait, performance.now() - began);
-      } catch (error) {
-        if (left.signal.aborted) return;
-        setState((before) => ({ path, value: before.path === path ? before.value : undefined, error: error as Error }));
-        if (error instanceof TypeError) wait = 2000; // nobody answers: until somebody does
-      }
-      if (wait !== null && !left.signal.aborted) timer = setTimeout(ask, wait);
-    };
-    ask();
-    return () => {
-      left.abort();
-      clearTimeout(timer);
-    };
-  }, [path, turn]);
+  const again = usePolled(path, async (left) => {
+    try {
+      const value = await get<T>(path!, left);
+      setState({ path, value });
+      return everyMs(value);
+    } catch (error) {
+      if (left.aborted) return null;
+      setState((before) => ({ path, value: before.path === path ? before.value : undefined, error: error as Error }));
+      return error instanceof TypeError ? LOST_MS : null;
+    }
+  });
   const current = state.path === path; // what was asked before is not shown for what is asked now
-  return {
-    value: current ? state.value : undefined,
-    error: current ? state.error : undefined,
-    again: () => setTurn((n) => n + 1),
-  };
+  return { value: current ? state.value : undefined, error: current ? state.error : undefined, again };
 }

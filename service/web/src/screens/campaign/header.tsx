@@ -2,11 +2,11 @@
 
 import { useState } from "preact/hooks";
 import { download, send } from "../../api/client";
+import { ended } from "../../api/ended";
 import type { Body } from "../../api/types";
 import { address, go } from "../../router";
 import { count, moment, seconds, words } from "../../ui/text";
 import { Confirm } from "../../ui/confirm";
-import { ended } from "./live";
 
 type Campaign = Body<"Campaign">;
 

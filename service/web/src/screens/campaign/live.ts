@@ -2,6 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { get, Problem } from "../../api/client";
+import { ended } from "../../api/ended";
 import { follow, type ServerEvent } from "../../api/events";
 import { paced } from "../../api/pace";
 import type { Body } from "../../api/types";
@@ -20,12 +21,6 @@ export interface Live {
   /** The newest valid failures since the page was opened, or a little earlier; the newest first. */
   found: Found[];
   error?: Error;
-}
-
-const FINAL = new Set(["succeeded", "failed", "cancelled"]);
-
-export function ended(campaign: Pick<Campaign, "state">): boolean {
-  return FINAL.has(campaign.state);
 }
 
 /** Follows a campaign until it ends; while nobody looks at the page, nothing is asked for. */

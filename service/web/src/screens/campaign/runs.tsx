@@ -2,6 +2,7 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { call } from "../../api/client";
+import { usePolled } from "../../api/polled";
 import type { Body } from "../../api/types";
 import { count, number, seconds } from "../../ui/text";
 import { markOf, runName } from "./look";
@@ -99,25 +100,16 @@ function Tail({ path, going, name }: { path: string; going: boolean; name: strin
   const box = useRef<HTMLPreElement>(null);
   const [text, setText] = useState<string>();
   const [refused, setRefused] = useState("");
-  useEffect(() => {
-    const left = new AbortController();
-    let timer: ReturnType<typeof setTimeout>;
-    const ask = async () => {
-      try {
-        if (!document.hidden) setText(await (await call(path, { signal: left.signal })).text());
-        setRefused("");
-      } catch (error) {
-        if (left.signal.aborted) return;
-        setRefused(error instanceof TypeError ? "The service does not answer." : (error as Error).message);
-      }
-      if (going && !left.signal.aborted) timer = setTimeout(ask, AGAIN_MS);
-    };
-    ask();
-    return () => {
-      left.abort();
-      clearTimeout(timer);
-    };
-  }, [path, going]);
+  usePolled(`${path} ${going}`, async (left) => {
+    try {
+      setText(await (await call(path, { signal: left })).text());
+      setRefused("");
+    } catch (error) {
+      if (left.aborted) return null;
+      setRefused(error instanceof TypeError ? "The service does not answer." : (error as Error).message);
+    }
+    return going ? AGAIN_MS : null;
+  });
   useEffect(() => {
     if (box.current) box.current.scrollTop = box.current.scrollHeight; // the newest line
   }, [text]);

@@ -2,12 +2,13 @@
 
 import { useCallback, useState } from "preact/hooks";
 import { Problem } from "../../api/client";
+import { ended } from "../../api/ended";
 import { Empty, Failed, Loading } from "../../ui/states";
 import { count, number } from "../../ui/text";
 import { Charts } from "./charts";
 import { Funnel } from "./funnel";
 import { Header } from "./header";
-import { ended, useLive } from "./live";
+import { useLive } from "./live";
 import { Newest } from "./newest";
 import { Runs } from "./runs";
 import "./campaign.css";

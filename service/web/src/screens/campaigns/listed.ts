@@ -3,17 +3,13 @@
 import { useState } from "preact/hooks";
 import { get } from "../../api/client";
 import type { Asked } from "../../api/asked";
+import { ended } from "../../api/ended";
+import { usePolled } from "../../api/polled";
 import type { Body } from "../../api/types";
-import { usePolled } from "./polled";
 
 export type Listed = Body<"CampaignSummary">;
 
 const AGAIN_MS = 2000;
-const ENDED: readonly Body<"State">[] = ["succeeded", "failed", "cancelled"];
-
-export function ended(campaign: Listed): boolean {
-  return ENDED.includes(campaign.state);
-}
 
 interface List {
   items: Listed[];
@@ -33,11 +29,11 @@ export function useListed(filters: Record<string, string>, pages: number): Asked
     try {
       const value = await pagesOf(filters, pages, left);
       setState({ asked, value });
-      return value.items.every(ended) ? null : AGAIN_MS;
+      return value.items.every(ended) ? "seen" : AGAIN_MS;
     } catch (error) {
       if (left.aborted) return null;
       setState((before) => ({ asked, value: before.asked === asked ? before.value : undefined, error: error as Error }));
-      return error instanceof TypeError ? AGAIN_MS : null;
+      return error instanceof TypeError ? AGAIN_MS : "seen";
     }
   });
   const current = state.asked === asked;

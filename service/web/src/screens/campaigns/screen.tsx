@@ -3,13 +3,14 @@
 import { useState } from "preact/hooks";
 import { useAsked } from "../../api/asked";
 import { send } from "../../api/client";
+import { ended } from "../../api/ended";
 import type { Body } from "../../api/types";
 import { address, replace } from "../../router";
 import { Confirm } from "../../ui/confirm";
 import { Empty, Shown } from "../../ui/states";
 import { count } from "../../ui/text";
 import { FilterBar, filtersOf, type Filters } from "./filters";
-import { ended, useListed, type Listed } from "./listed";
+import { useListed, type Listed } from "./listed";
 import { orderOf, sorted, textOf, type Order } from "./order";
 import { CampaignTable, nameOf } from "./table";
 import "./campaigns.css";

@@ -2,10 +2,11 @@
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { get } from "../../api/client";
+import { ended } from "../../api/ended";
+import { usePolled } from "../../api/polled";
 import type { Body } from "../../api/types";
 import { percent } from "../../ui/text";
-import { ended, type Listed } from "./listed";
-import { usePolled } from "./polled";
+import type { Listed } from "./listed";
 import { path, spark, type Spark } from "./spark";
 
 const WIDTH = 96;

@@ -1,9 +1,10 @@
 /** The list as a table: one row for each campaign, and heads that sort. */
 
 import { Fragment, type ComponentChildren } from "preact";
+import { ended } from "../../api/ended";
 import { address } from "../../router";
 import { count, moment, percent, seconds } from "../../ui/text";
-import { ended, type Listed } from "./listed";
+import type { Listed } from "./listed";
 import { clicked, type Column, type Order } from "./order";
 import { Sparkline } from "./sparkline";
 

@@ -1,12 +1,13 @@
 /** Campaigns beside each other: what each found so far, family by family, and in what they were posted differently. */
 
-import { useEffect, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { get, save } from "../../api/client";
+import { ended } from "../../api/ended";
+import { usePolled } from "../../api/polled";
 import type { Body } from "../../api/types";
 import { address } from "../../router";
 import { Empty, Failed, Loading } from "../../ui/states";
 import { COLOURS, type Mark } from "../campaign/look";
-import { ended } from "../campaign/live";
 import { differences } from "./differences";
 import { csv, json, markdown, type Line } from "./export";
 import { Funnels, Measures, Methods } from "./methods";
@@ -151,26 +152,17 @@ function mark(campaign: number, method: number): Mark {
 
 /** All of them, each with what is wrong with it; asked again while one goes on. */
 function useAll(ids: string[]): One[] | undefined {
-  const [all, setAll] = useState<One[]>();
-  useEffect(() => {
-    const left = new AbortController();
-    let timer: ReturnType<typeof setTimeout>;
-    const look = async () => {
-      const now = await Promise.all(ids.map((id) => one(id, left.signal)));
-      if (left.signal.aborted) return;
-      const lost = now.some((each) => each.error instanceof TypeError);
-      setAll((before) => (lost && before ? before : now)); // what was said last stays
-      if (lost) timer = setTimeout(look, LOST_MS);
-      else if (now.some(({ campaign }) => campaign && !ended(campaign))) timer = setTimeout(look, AGAIN_MS);
-    };
-    setAll(undefined);
-    look();
-    return () => {
-      left.abort();
-      clearTimeout(timer);
-    };
-  }, [ids.join(",")]);
-  return all;
+  const asked = ids.join(",");
+  const [state, setState] = useState<{ asked: string; all: One[] }>();
+  usePolled(asked, async (left) => {
+    const all = await Promise.all(ids.map((id) => one(id, left)));
+    if (left.aborted) return null;
+    const lost = all.some((each) => each.error instanceof TypeError);
+    setState((before) => (lost && before?.asked === asked ? before : { asked, all })); // what was said last stays
+    if (lost) return LOST_MS;
+    return all.some(({ campaign }) => campaign && !ended(campaign)) ? AGAIN_MS : null;
+  });
+  return state?.asked === asked ? state.all : undefined;
 }
 
 async function one(id: string, signal: AbortSignal): Promise<One> {

@@ -3,6 +3,7 @@
 import "./failures.css";
 import { useMemo } from "preact/hooks";
 import { useAsked } from "../../api/asked";
+import { ended } from "../../api/ended";
 import type { Body } from "../../api/types";
 import { address } from "../../router";
 import { Empty, Shown } from "../../ui/states";
@@ -12,13 +13,12 @@ import { queryOf, read, reset } from "./filters";
 import type { FailureTable } from "./wire";
 
 const RUNNING_MS = 5000;
-const ENDED: readonly string[] = ["succeeded", "failed", "cancelled"];
 
 export function FailuresScreen({ campaign, query }: { campaign: string; query: URLSearchParams }) {
   const path = `v1/campaigns/${encodeURIComponent(campaign)}`;
-  const about = useAsked<Body<"Campaign">>(path, ({ state }) => (ENDED.includes(state) ? null : RUNNING_MS));
-  const ended = about.value === undefined || ENDED.includes(about.value.state);
-  const asked = useAsked<FailureTable>(`${path}/failure-table?tier=raw`, () => (ended ? null : RUNNING_MS));
+  const about = useAsked<Body<"Campaign">>(path, (campaign) => (ended(campaign) ? null : RUNNING_MS));
+  const over = about.value !== undefined && ended(about.value);
+  const asked = useAsked<FailureTable>(`${path}/failure-table?tier=raw`, () => (over ? null : RUNNING_MS));
   return (
     <div class="failures">
       <Head campaign={campaign} about={about.value} query={query} table={asked.value} />
@@ -85,7 +85,7 @@ function funnelOf({ valid, distinct, grade }: FailureTable): [string, number, st
 }
 
 function NothingFound({ about }: { about: Body<"Campaign"> | undefined }) {
-  const running = about && !ENDED.includes(about.state);
+  const running = about && !ended(about);
   return (
     <Empty>
       <h2>{running ? "Nothing has been found yet" : "Nothing was found"}</h2>
