@@ -10,6 +10,7 @@ import json
 import multiprocessing
 import signal
 import sys
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -20,33 +21,33 @@ from risk_sac.errors import InfeasibleScene, RiskSacError, SimulationError
 from risk_sac.failures.play import play
 from risk_sac.failures.trajectory import actions_of, trajectory_digest
 from risk_sac.risk.soft_min import soft_min
-from risk_sac.run_folder.results import FAILURES, read_results, series_name
+from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
 from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import distinct_failures
 from risk_sac.types import Scene
 
 
-def _replay_all(folder: Path) -> list[int]:
+def _same(folder: Path, results: Results, env: RiskSacEnv) -> list[int]:
     """The distinct failures of a run that are the same again."""
-    results, same = read_results(folder), []
-    with closing(RiskSacEnv.of(results.spec)) as env:
-        for episode in distinct_failures(results):
-            recorded = read_series(folder / FAILURES / series_name(episode.index))
-            try:
-                scene = Scene(env.problem.family.name, episode.scene)
-                again = play(env, scene, episode.seed, actions_of(recorded)).series
-            except (InfeasibleScene, SimulationError):
-                continue
-            if trajectory_digest(again) == trajectory_digest(recorded):
-                same.append(episode.index)
+    same = []
+    for episode in distinct_failures(results):
+        recorded = read_series(folder / FAILURES / series_name(episode.index))
+        try:
+            scene = Scene(env.problem.family.name, episode.scene)
+            again = play(env, scene, episode.seed, actions_of(recorded)).series
+        except (InfeasibleScene, SimulationError):
+            continue
+        if trajectory_digest(again) == trajectory_digest(recorded):
+            same.append(episode.index)
     return same
 
 
-def _tell(folders: list[Path]) -> None:
+def _tell(runs: Mapping[Path, tuple[Results, RiskSacEnv]]) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    for folder in folders:
+    for folder, (results, env) in runs.items():
         try:
-            line = {"folder": str(folder), "same": _replay_all(folder)}
+            with closing(env):
+                line = {"folder": str(folder), "same": _same(folder, results, env)}
         except (RiskSacError, OSError, KeyError) as error:  # a key: of a series from before there was a release
             line = {"folder": str(folder), "error": f"{type(error).__name__}: {error}"}
         print(json.dumps(line), flush=True)  # noqa: T201 - to whoever started it
@@ -54,12 +55,14 @@ def _tell(folders: list[Path]) -> None:
 
 def _main(times: int, jobs: int, folders: list[Path]) -> int:
     """The greatest exit status of the processes."""
+    found = {folder: read_results(folder) for folder in folders}
+    runs = {folder: (results, RiskSacEnv.of(results.spec)) for folder, results in found.items()}
     soft_min(np.zeros(1), 1.0)  # the first call of any compiled function loads what all of them need
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # and daemons end with their parent's exit
     fork, statuses = multiprocessing.get_context("fork"), [0]
     for first in range(0, times, jobs):
         processes = [
-            fork.Process(target=_tell, args=(folders,), daemon=True) for _ in range(first, min(first + jobs, times))
+            fork.Process(target=_tell, args=(runs,), daemon=True) for _ in range(first, min(first + jobs, times))
         ]
         for process in processes:
             process.start()
