@@ -3,7 +3,8 @@
 RiskSacError
 ├── ConfigError            a setting is unknown, out of range or contradicts another
 │   ├── OddError           an ODD empties the scene space or contradicts itself
-│   └── FormulaError       a requirement cannot be parsed or monitored online
+│   ├── FormulaError       a requirement cannot be parsed or monitored online
+│   └── MapError           a map is none that a pattern could be placed on, or has no such place
 ├── SceneError             a scene is not a point of its family's space
 │   └── InfeasibleScene    C_hard: the scene's first frame is physically impossible
 ├── SimulationError        libsumo refused a command or died
@@ -39,6 +40,10 @@ class FormulaError(ConfigError):
     def __init__(self, message: str, *, field: str = "", position: int | None = None) -> None:
         super().__init__(message, field=field)
         self.position = position
+
+
+class MapError(ConfigError):
+    """A map cannot be read, or a pattern does not fit where it is wanted."""
 
 
 class SceneError(RiskSacError):

@@ -13,7 +13,7 @@ from risk_sac.errors import ConfigError, OddError
 from risk_sac.observation_layout import observation_size
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import check_requirements
-from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import GRAVITY_MPS2, limits_from_odd
 from risk_sac.scenario.odd import intersect, narrow, requirements_from_odd
@@ -44,7 +44,7 @@ class Problem:
           FormulaError: a user's requirement cannot be monitored online.
           ConfigError: a user's requirement takes the name of a shipped one, or the run takes too much memory.
         """
-        family = FAMILIES[spec.family]
+        family = family_named(spec.family)
         odd = intersect(family.odd, spec.odd)
         if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
             raise OddError(

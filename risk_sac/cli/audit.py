@@ -3,10 +3,9 @@
 import argparse
 import os
 from pathlib import Path
-from typing import get_args
 
 from risk_sac.cli.console import OK, Board, Commands, console, progress_bar
-from risk_sac.config import FamilyName
+from risk_sac.config import SHIPPED
 
 
 def add_audit(commands: Commands) -> None:
@@ -16,7 +15,7 @@ def add_audit(commands: Commands) -> None:
         help="controls beside the search: nobody attacks, chance attacks, better and worse egos; resumable",
     )
     audit.set_defaults(command=_audit)
-    audit.add_argument("--families", nargs="+", choices=get_args(FamilyName), default=list(get_args(FamilyName)))
+    audit.add_argument("--families", nargs="+", choices=SHIPPED, default=list(SHIPPED))
     audit.add_argument("--episodes", type=int, default=400, metavar="N", help="of each ego (default: %(default)s)")
     audit.add_argument(
         "--idle-episodes", type=int, default=2000, metavar="N", help="with all actions 0 (default: %(default)s)"

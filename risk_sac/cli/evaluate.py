@@ -5,12 +5,12 @@ import os
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, complain, console, progress_bar
 from risk_sac.cli.text import counted
-from risk_sac.config import METHODS, FamilyName
+from risk_sac.config import METHODS, SHIPPED
 from risk_sac.config.spec_file import read_campaign
 from risk_sac.run_folder.verified import TIMES
 
@@ -40,7 +40,7 @@ def add_evaluate(commands: Commands) -> None:
 
 def _evaluate(options: argparse.Namespace) -> int:
     methods = [name for name, method in METHODS.items() if not method.needs]
-    defaults = {"families": get_args(FamilyName), "methods": methods, "seeds": range(SEEDS)}
+    defaults = {"families": SHIPPED, "methods": methods, "seeds": range(SEEDS)}
     defaults = {name: list(values) for name, values in defaults.items()}
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS), defaults)
     from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds

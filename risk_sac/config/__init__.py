@@ -1,7 +1,7 @@
 """Every setting of the system, as frozen pydantic models with unit and meaning by each field."""
 
 from risk_sac.config.base import Interval, Settings
-from risk_sac.config.campaign import Budget, CampaignSpec, FamilyName, Requirement, RunSpec
+from risk_sac.config.campaign import FAMILY_NAME, SHIPPED, Budget, CampaignSpec, FamilyName, Requirement, RunSpec
 from risk_sac.config.ego import CarFollowing, EgoConfig, SensorConfig
 from risk_sac.config.learner import (
     AgentConfig,
@@ -18,7 +18,9 @@ from risk_sac.config.methods import METHODS, Method, MethodName
 from risk_sac.config.odd import CrossingType, DynamicElements, Environment, Odd, Scenery, SignalType
 
 __all__ = [
+    "FAMILY_NAME",
     "METHODS",
+    "SHIPPED",
     "AgentConfig",
     "Budget",
     "CampaignSpec",

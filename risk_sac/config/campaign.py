@@ -4,7 +4,8 @@ The same `CampaignSpec` is the REST body, the CLI's YAML and the stored record.
 """
 
 import hashlib
-from typing import Annotated, Literal, Self
+import re
+from typing import Annotated, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
@@ -14,7 +15,10 @@ from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import MethodName
 from risk_sac.config.odd import Odd
 
-FamilyName = Literal["low", "mixed", "dense"]
+SHIPPED = ("low", "mixed", "dense")
+FAMILY_NAME = re.compile(r"^(low|mixed|dense|(car_following|crossing|junction)_[0-9a-f]{12})$")
+FamilyName = Annotated[str, StringConstraints(pattern=FAMILY_NAME)]
+"""A shipped family, or a pattern at a place of a map; the digits are of the place."""
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
 MOST_EPISODES = 2_000_000  # of a campaign; the database takes about 1.2 KB for each
 Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]

@@ -11,7 +11,7 @@ import numpy as np
 
 import sumo_nets
 from risk_sac.config import FamilyName
-from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.families import family_named
 from risk_sac.types import Floats
 
 Use = Literal["lane", "sidewalk", "crossing", "junction"]
@@ -27,9 +27,8 @@ class Surface:
 
 def roads_of(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Surface]:
     """The surfaces of a scene's net; none for a scene from before its family had all the parameters it has now."""
-    if not set(FAMILIES[family].space.names) <= scene.keys():
-        return ()
-    return _shipped(FAMILIES[family].layout(scene).net)
+    found = family_named(family)
+    return _shipped(found.layout(scene).net) if set(found.space.names) <= scene.keys() else ()
 
 
 @cache  # there are a few nets, and they stay as they are

@@ -16,7 +16,7 @@ from risk_sac.records import RECORDED, EpisodeRecord, Phase, RunMetrics
 from risk_sac.run_folder.episode_json import records_from_lines
 from risk_sac.run_folder.results import EPISODES, Results, read_results
 from risk_sac.run_folder.verified import Verified, read_verified
-from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.families import family_named
 
 
 class Found(NamedTuple):
@@ -55,7 +55,7 @@ class FinishedRun:
         """The metrics of each phase that has episodes."""
         found: dict[Phase, RunMetrics] = {}
         for phase in RECORDED:
-            accumulator = MetricsAccumulator(FAMILIES[self.spec.family].horizon_steps)
+            accumulator = MetricsAccumulator(family_named(self.spec.family).horizon_steps)
             records = self.phase(phase)
             for record in records:
                 accumulator.add(record)
@@ -66,7 +66,7 @@ class FinishedRun:
     @cached_property
     def found(self) -> tuple[Found, ...]:
         """What the search had found after each of its episodes."""
-        tally, found = Tally(horizon_steps=FAMILIES[self.spec.family].horizon_steps), []
+        tally, found = Tally(horizon_steps=family_named(self.spec.family).horizon_steps), []
         for record in self.phase("search"):
             tally.add(record)
             found.append(Found(tally.distinct_preventable, tally.distinct_failures, len(tally.kinds)))

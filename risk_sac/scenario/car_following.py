@@ -1,62 +1,82 @@
-"""Car following, the family `low`: a leader and two neighbours on a straight three-lane road.
+"""Car following: a leader, and on either side a neighbour where there is a lane, brake, adapt their speed and cut in.
 
-Source: RISK-SAC, Sec. IV-A.2. Coordinates are those of the net in `sumo_nets/low/`.
+Source: RISK-SAC, Sec. IV-A.2.
 """
 
 from collections.abc import Mapping
 
-from risk_sac.scenario.family import EGO, Family, friction, initial_speed, road_odd
+from risk_sac.scenario.family import EGO, Family, at_most, friction, initial_speed, offset_of, road_odd
 from risk_sac.scenario.layout import Layout, VehicleStart
+from risk_sac.scenario.place import Stretch, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.scenario.starting import surroundings, vehicle
 from risk_sac.types import Role
 
 VEHICLE_LENGTH_M = 4.6
+BEHIND_M, AHEAD_M = 15.0, 25.0  # of the neighbours' fronts from the ego's
+LEAST_FOLLOWING_M, MOST_FOLLOWING_M = 10.0, 40.0  # gap behind the ego
+CLEAR_M = 1.0  # that a track has left behind whoever is last on it
+DISTANT_M = 60.0  # beyond the leader
+LEAST_BEHIND_M = 8.0  # room that a place must have behind the ego
 
 
-def _layout(xi: Mapping[str, float]) -> Layout:
-    """Three lanes, ego in the middle; leader and both neighbours attack, two vehicles follow."""
-    start = 200.0
+def family(name: str, place: Stretch) -> Family:
+    """The family that this pattern is at a place."""
+    followed = place.ego.room_m >= LEAST_FOLLOWING_M + 2 * VEHICLE_LENGTH_M + CLEAR_M
+    beside = {side: track for side, track in (("left", place.left), ("right", place.right)) if track is not None}
 
-    def car(id_: str, role: Role, lane: int, offset_m: float, speed_mps: float) -> VehicleStart:
-        return VehicleStart(
-            id=id_, role=role, route=("road",), lane=lane, position_m=start + offset_m, speed_mps=speed_mps
+    def layout(xi: Mapping[str, float]) -> Layout:
+        ego_speed = xi["ego_speed_mps"]
+
+        def car(id_: str, role: Role, track: Track, ahead_m: float, speed_mps: float) -> VehicleStart:
+            return vehicle(id_, role, track, -ahead_m, speed_mps, lead_m=0.0)
+
+        lead_m = xi["lead_gap_m"] + VEHICLE_LENGTH_M
+        vehicles = [car("lead", Role.ADVERSARY, place.ego, lead_m, xi["lead_speed_mps"])]
+        for side, track in beside.items():
+            vehicles.append(car(side, Role.ADVERSARY, track, xi[f"{side}_offset_m"], xi[f"{side}_speed_mps"]))
+        if followed:
+            behind_m = -xi["follower_gap_m"] - VEHICLE_LENGTH_M
+            vehicles.append(car("follower", Role.BACKGROUND, place.ego, behind_m, ego_speed))
+        distant_m = xi["lead_gap_m"] + DISTANT_M
+        vehicles.append(car("distant", Role.BACKGROUND, place.ego, distant_m, xi["lead_speed_mps"]))
+        return Layout(
+            ego=car(EGO, Role.EGO, place.ego, 0.0, ego_speed), vehicles=tuple(vehicles), **surroundings(place, xi)
         )
 
-    ego_speed = xi["ego_speed_mps"]
-    return Layout(
-        net="low/low.net.xml",
-        ego=car(EGO, Role.EGO, 1, 0.0, ego_speed),
-        vehicles=(
-            car("lead", Role.ADVERSARY, 1, xi["lead_gap_m"] + VEHICLE_LENGTH_M, xi["lead_speed_mps"]),
-            car("left", Role.ADVERSARY, 2, xi["left_offset_m"], xi["left_speed_mps"]),
-            car("right", Role.ADVERSARY, 0, xi["right_offset_m"], xi["right_speed_mps"]),
-            car("follower", Role.BACKGROUND, 1, -xi["follower_gap_m"] - VEHICLE_LENGTH_M, ego_speed),
-            car("distant", Role.BACKGROUND, 1, xi["lead_gap_m"] + 60.0, xi["lead_speed_mps"]),
+    return Family(
+        name=name,
+        summary=place.summary,
+        horizon_steps=150,
+        space=SceneSpace(name, _parameters(place, beside, followed=followed)),
+        odd=road_odd(
+            lanes=place.lanes,
+            limit_mps=place.speed_limit_mps,
+            signals=("none",) if place.signal is None else ("fixed_time",),
+            crossings=("none",),
         ),
-        friction=xi["friction"],
+        vehicles=("lead", *beside),
+        pedestrians=(),
+        layout=layout,
     )
 
 
-LOW = Family(
-    name="low",
-    summary="Straight three-lane urban road: a lead vehicle and two neighbours brake, adapt speed and cut in.",
-    horizon_steps=150,
-    space=SceneSpace(
-        "low",
-        (
-            initial_speed("ego_speed_mps", 8, 16.6, "initial speed of the ego"),
-            Parameter("lead_gap_m", "m", 8, 50, "gap from the ego's front to the leader's rear"),
-            initial_speed("lead_speed_mps", 6, 16.6, "initial speed of the leader"),
-            Parameter("left_offset_m", "m", -15, 25, "left neighbour's front relative to the ego's"),
-            initial_speed("left_speed_mps", 6, 16.6, "initial speed of the left neighbour"),
-            Parameter("right_offset_m", "m", -15, 25, "right neighbour's front relative to the ego's"),
-            initial_speed("right_speed_mps", 6, 16.6, "initial speed of the right neighbour"),
-            Parameter("follower_gap_m", "m", 10, 40, "gap from the follower's front to the ego's rear"),
-            friction(),
-        ),
-    ),
-    odd=road_odd(lanes=3, limit_mps=16.67, signals=("none",), crossings=("none",)),
-    vehicles=("lead", "left", "right"),
-    pedestrians=(),
-    layout=_layout,
-)
+def _parameters(place: Stretch, beside: Mapping[str, Track], *, followed: bool) -> tuple[Parameter, ...]:
+    limit = place.speed_limit_mps
+    found = [
+        initial_speed("ego_speed_mps", 8, limit, "initial speed of the ego"),
+        Parameter("lead_gap_m", "m", 8, 50, "gap from the ego's front to the leader's rear"),
+        initial_speed("lead_speed_mps", 6, limit, "initial speed of the leader"),
+    ]
+    for side, track in beside.items():
+        low_m = -at_most(BEHIND_M, track.room_m - VEHICLE_LENGTH_M - CLEAR_M)
+        meaning = f"{side} neighbour's front relative to the ego's"
+        found += [
+            Parameter(f"{side}_offset_m", "m", low_m, AHEAD_M, meaning),
+            initial_speed(f"{side}_speed_mps", 6, limit, f"initial speed of the {side} neighbour"),
+        ]
+    if followed:
+        high_m = at_most(MOST_FOLLOWING_M, place.ego.room_m - 2 * VEHICLE_LENGTH_M - CLEAR_M)
+        meaning = "gap from the follower's front to the ego's rear"
+        found.append(Parameter("follower_gap_m", "m", LEAST_FOLLOWING_M, high_m, meaning))
+    return (*found, *offset_of(place.signal), friction())

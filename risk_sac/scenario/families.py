@@ -1,8 +1,43 @@
-"""The scenario families that are shipped."""
+"""The families that are shipped: each pattern at a place on a net of ours. And what any other name stands for."""
 
-from risk_sac.scenario.car_following import LOW
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from risk_sac.config import SHIPPED
+from risk_sac.scenario import car_following, hidden_pedestrian, junction
 from risk_sac.scenario.family import Family
-from risk_sac.scenario.hidden_pedestrian import MIXED
-from risk_sac.scenario.junction import DENSE
+from risk_sac.scenario.library import kept
+from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Place, Stretch
 
-FAMILIES: dict[str, Family] = {family.name: family for family in (LOW, MIXED, DENSE)}
+
+def family_at(name: str, place: Place) -> Family:
+    """A place's pattern, as a family with this name."""
+    match place:
+        case Stretch():
+            return car_following.family(name, place)
+        case CrossingPlace():
+            return hidden_pedestrian.family(name, place)
+        case JunctionPlace():
+            return junction.family(name, place)
+
+
+def _shipped(name: str) -> Family:
+    return family_at(name, PLACES.validate_json((Path(str(files("sumo_nets"))) / name / "place.json").read_bytes()))
+
+
+FAMILIES: dict[str, Family] = {name: _shipped(name) for name in SHIPPED}
+
+
+def family_named(name: str) -> Family:
+    """A shipped family, or one at a place that the library keeps.
+
+    Raises:
+      ConfigError: the library keeps none of this name.
+    """
+    return FAMILIES[name] if name in FAMILIES else _kept(name)
+
+
+@cache  # a name holds a digest of what it stands for
+def _kept(name: str) -> Family:
+    return family_at(name, kept(name))

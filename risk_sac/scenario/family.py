@@ -1,10 +1,12 @@
-"""What a scenario family is, and what the shipped ones have in common."""
+"""What a scenario family is, and what all patterns have in common."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from risk_sac.config import CrossingType, DynamicElements, Environment, FamilyName, Interval, Odd, Scenery, SignalType
 from risk_sac.scenario.layout import Layout
+from risk_sac.scenario.place import Signal
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 LEAD_IN_S = 1.5  # in which SUMO drives everybody, before the adversaries are released to the policy
@@ -35,15 +37,45 @@ def friction() -> Parameter:
     return Parameter("friction", "1", 0.6, 1.0, "tyre-road friction coefficient", "environment.friction")
 
 
-def initial_speed(name: str, low: float, high: float, meaning: str) -> Parameter:
-    """Of a vehicle, m/s; that of the ego, by its name, is bounded apart from the others'."""
+def top_speed(limit_mps: float) -> float:
+    """The highest initial speed on a road, to a tenth of a m/s, so that it is within the limit."""
+    return math.floor(limit_mps * 10 + 1e-9) / 10
+
+
+def initial_speed(name: str, low: float, limit_mps: float, meaning: str) -> Parameter:
+    """Of a vehicle, m/s; that of the ego, by its name, is bounded apart from the others'.
+
+    Args:
+      name: of the parameter.
+      low: the lowest, where half the limit is no lower.
+      limit_mps: of the road.
+      meaning: of the parameter.
+    """
     odd = "dynamic.ego_speed_mps" if name.startswith("ego") else "dynamic.vehicle_speed_mps"
-    return Parameter(name, "m/s", low, high, meaning, odd)
+    high = top_speed(limit_mps)
+    return Parameter(name, "m/s", at_most(low, high / 2), at_most(high, high), meaning, odd)
 
 
-def walking_speed(low: float, high: float) -> Parameter:
-    """Of the pedestrian, m/s."""
-    return Parameter("pedestrian_speed_mps", "m/s", low, high, "initial walking speed", "dynamic.pedestrian_speed_mps")
+def walking(offset: str) -> tuple[Parameter, ...]:
+    """Of the pedestrian: along the road, from the kerb, and how fast."""
+    return (
+        Parameter("pedestrian_offset_m", "m", -1.9, 1.9, offset),
+        Parameter("pedestrian_setback_m", "m", 0.3, 5, "pedestrian's distance from the kerb"),
+        Parameter("pedestrian_speed_mps", "m/s", 0, 2.0, "initial walking speed", "dynamic.pedestrian_speed_mps"),
+    )
+
+
+def offset_of(signal: Signal | None) -> tuple[Parameter, ...]:
+    """Where in its cycle the signal is, if there is one."""
+    if signal is None:
+        return ()
+    meaning = "position in the signal's cycle at the start"
+    return (Parameter("signal_offset_s", "s", 0, signal.cycle_s, meaning),)
+
+
+def at_most(usual: float, room: float) -> float:
+    """The usual bound, or what a place has room for, to a tenth."""
+    return usual if usual <= room else math.floor(room * 10 + 1e-9) / 10
 
 
 def road_odd(

@@ -1,107 +1,108 @@
-"""A hidden pedestrian, the family `mixed`: a crossing, and a vehicle that stands between who walks and who drives.
+"""A hidden pedestrian at a crossing, and a vehicle that stands between who walks and who drives.
 
-Source: RISK-SAC, Sec. IV-A.2. Coordinates are those of the net in `sumo_nets/mixed/`.
+Source: RISK-SAC, Sec. IV-A.2.
 """
 
-import math
 from collections.abc import Mapping
 
-from risk_sac.scenario.family import EGO, LEAD_IN_S, Family, friction, initial_speed, road_odd, walking_speed
-from risk_sac.scenario.layout import Area, Body, Layout, PedestrianStart, VehicleStart
+from risk_sac.config import CrossingType, SignalType
+from risk_sac.scenario.family import (
+    EGO,
+    LEAD_IN_S,
+    Family,
+    at_most,
+    friction,
+    initial_speed,
+    offset_of,
+    road_odd,
+    top_speed,
+    walking,
+)
+from risk_sac.scenario.layout import Body, Layout, VehicleStart
+from risk_sac.scenario.place import CrossingPlace, Site
 from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.scenario.starting import pedestrian, surroundings, vehicle
 from risk_sac.types import Role
 
-KERB_M = 6.55  # of the road from its axis: two lanes of 3.3 m each, and 5 cm inside
-ZEBRA_M, SIGNAL_M = 300.0, 700.0  # centres of the two crossings on the mixed road
-CROSSING_HALF_WIDTH_M = 2.0
+NEAREST_M, FARTHEST_M = 25.0, 90.0  # the ego from the crossing
+FOLLOWING_M = 25.0  # from the ego's front to its follower's
+BODY_M = 8.0
+OCCLUDER_MPS = 12.0
+ONCOMING, ONCOMING_MPS = 4, 10.0
+ONCOMING_M, SPACING_M = 60.0, 30.0  # the first of them from the crossing, and the others from one another
 
 
-def _layout(xi: Mapping[str, float]) -> Layout:
-    """Ego in the left of two lanes, an occluder in the right one, a pedestrian at the right kerb (Fig. 2)."""
-    signalised = xi["crossing"] >= 0.5
-    centre = SIGNAL_M if signalised else ZEBRA_M
-    edge, after, start = ("e2", "e3", 302.0) if signalised else ("e1", "e2", 0.0)
-    stop_line = centre - CROSSING_HALF_WIDTH_M - start
-    oncoming_edge, oncoming_after, oncoming_length = ("w3", "w2", 298.0) if signalised else ("w2", "w1", 396.0)
+def family(name: str, place: CrossingPlace) -> Family:
+    """The family that this pattern is at a place."""
 
-    def car(id_: str, role: Role, lane: int, before_m: float, speed_mps: float, body: Body = "car") -> VehicleStart:
-        return VehicleStart(
-            id=id_,
-            role=role,
-            route=(edge, after),
-            lane=lane,
-            position_m=stop_line - before_m - LEAD_IN_S * speed_mps,
-            speed_mps=speed_mps,
-            body=body,
+    def layout(xi: Mapping[str, float]) -> Layout:
+        site = place.sites[-1] if xi.get("crossing", 1.0) >= 0.5 else place.sites[0]
+        ego_m, ego_mps = xi["ego_distance_m"], xi["ego_speed_mps"]
+        truck: Body = "truck"
+        occluder_m, occluder_mps = xi["occluder_distance_m"], xi["occluder_speed_mps"]
+        return Layout(
+            ego=vehicle(EGO, Role.EGO, site.ego, ego_m, ego_mps),
+            vehicles=(
+                vehicle("occluder", Role.ADVERSARY, site.occluder, occluder_m, occluder_mps, body=truck),
+                vehicle("follower", Role.BACKGROUND, site.ego, ego_m + FOLLOWING_M, ego_mps),
+                *_oncoming(site),
+            ),
+            pedestrians=(pedestrian(site.walk, xi),),
+            **surroundings(place, xi),
         )
 
-    return Layout(
-        net="mixed/mixed.net.xml",
-        ego=car(EGO, Role.EGO, 2, xi["ego_distance_m"], xi["ego_speed_mps"]),
-        vehicles=(
-            car("occluder", Role.ADVERSARY, 1, xi["occluder_distance_m"], xi["occluder_speed_mps"], "truck"),
-            car("follower", Role.BACKGROUND, 2, xi["ego_distance_m"] + 25.0, xi["ego_speed_mps"]),
-            *(
-                VehicleStart(
-                    id=f"oncoming_{i}",
-                    role=Role.BACKGROUND,
-                    route=(oncoming_edge, oncoming_after),
-                    lane=1 + i % 2,
-                    position_m=oncoming_length - 60.0 - 30.0 * i,
-                    speed_mps=10.0,
-                )
-                for i in range(4)
-            ),
+    return Family(
+        name=name,
+        summary=place.summary,
+        horizon_steps=150,
+        space=SceneSpace(name, _parameters(place)),
+        odd=road_odd(
+            lanes=place.lanes,
+            limit_mps=place.speed_limit_mps,
+            signals=tuple(sorted({_SIGNALS[site.signalised] for site in place.sites})),
+            crossings=tuple(sorted({_CROSSINGS[site.signalised] for site in place.sites})),
         ),
-        pedestrians=(
-            PedestrianStart(
-                id="pedestrian",
-                role=Role.ADVERSARY,
-                x_m=centre + xi["pedestrian_offset_m"],
-                y_m=-KERB_M - xi["pedestrian_setback_m"] - LEAD_IN_S * xi["pedestrian_speed_mps"],
-                heading_rad=math.pi / 2,
-                speed_mps=xi["pedestrian_speed_mps"],
-            ),
-        ),
-        crossings=tuple(
-            Area(c - CROSSING_HALF_WIDTH_M, c + CROSSING_HALF_WIDTH_M, -KERB_M, KERB_M) for c in (ZEBRA_M, SIGNAL_M)
-        ),
-        roadway=(Area(0.0, 1000.0, -KERB_M, KERB_M),),
-        signal="signal",
-        signal_offset_s=xi["signal_offset_s"],
-        friction=xi["friction"],
+        vehicles=("occluder",),
+        pedestrians=("pedestrian",),
+        layout=layout,
     )
 
 
-MIXED = Family(
-    name="mixed",
-    summary="Zebra or signalised crossing: a pedestrian steps out from behind a vehicle in the adjacent lane.",
-    horizon_steps=150,
-    space=SceneSpace(
-        "mixed",
-        (
-            Parameter(
-                "crossing",
-                "1",
-                0,
-                1,
-                "zebra below 0.5, signalised from 0.5",
-                "scenery.crossing_types",
-                ("zebra", "signalised"),
-            ),
-            initial_speed("ego_speed_mps", 6, 13.8, "initial speed of the ego"),
-            Parameter("ego_distance_m", "m", 25, 90, "ego's front to the crossing's near edge"),
-            Parameter("occluder_distance_m", "m", 0.5, 25, "occluder's front to the crossing's near edge"),
-            initial_speed("occluder_speed_mps", 0, 12, "initial speed of the occluder"),
-            Parameter("pedestrian_offset_m", "m", -1.9, 1.9, "pedestrian along the road from the crossing's axis"),
-            Parameter("pedestrian_setback_m", "m", 0.3, 5, "pedestrian's distance from the kerb"),
-            walking_speed(0, 2.0),
-            Parameter("signal_offset_s", "s", 0, 38, "position in the signal's cycle at the start"),
-            friction(),
-        ),
-    ),
-    odd=road_odd(lanes=2, limit_mps=13.89, signals=("fixed_time", "none"), crossings=("signalised", "zebra")),
-    vehicles=("occluder",),
-    pedestrians=("pedestrian",),
-    layout=_layout,
-)
+_SIGNALS: dict[bool, SignalType] = {False: "none", True: "fixed_time"}
+_CROSSINGS: dict[bool, CrossingType] = {False: "zebra", True: "signalised"}
+
+
+def room_wanted_m(limit_mps: float) -> float:
+    """Before a crossing on the ego's track, at the least."""
+    return NEAREST_M + FOLLOWING_M + BODY_M + LEAD_IN_S * top_speed(limit_mps)
+
+
+def _oncoming(site: Site) -> list[VehicleStart]:
+    found = []
+    for i in range(ONCOMING if site.oncoming else 0):
+        track = site.oncoming[i % len(site.oncoming)]
+        if track.room_m >= ONCOMING_M + SPACING_M * i + BODY_M:
+            id_, lead_m = f"oncoming_{i}", SPACING_M * i
+            found.append(vehicle(id_, Role.BACKGROUND, track, ONCOMING_M, ONCOMING_MPS, lead_m))
+    return found
+
+
+def _parameters(place: CrossingPlace) -> tuple[Parameter, ...]:
+    limit = place.speed_limit_mps
+    kinds = []
+    if len(place.sites) > 1:
+        odd, kinds_of = "scenery.crossing_types", ("zebra", "signalised")
+        kinds.append(Parameter("crossing", "1", 0, 1, "zebra below 0.5, signalised from 0.5", odd, kinds_of))
+    lead_m = LEAD_IN_S * top_speed(limit)
+    ego_m = at_most(FARTHEST_M, min(site.ego.room_m for site in place.sites) - FOLLOWING_M - BODY_M - lead_m)
+    occluder_m = at_most(25, min(site.occluder.room_m for site in place.sites) - BODY_M - lead_m)
+    return (
+        *kinds,
+        initial_speed("ego_speed_mps", 6, limit, "initial speed of the ego"),
+        Parameter("ego_distance_m", "m", NEAREST_M, ego_m, "ego's front to the crossing's near edge"),
+        Parameter("occluder_distance_m", "m", 0.5, occluder_m, "occluder's front to the crossing's near edge"),
+        initial_speed("occluder_speed_mps", 0, min(OCCLUDER_MPS, limit), "initial speed of the occluder"),
+        *walking("pedestrian along the road from the crossing's axis"),
+        *offset_of(place.signal),
+        friction(),
+    )

@@ -1,140 +1,116 @@
-"""A junction, the family `dense`: turning and crossing vehicles and a pedestrian at a signalised intersection.
+"""A junction: turning and crossing vehicles, background traffic, and a pedestrian where there is a crossing.
 
-Source: RISK-SAC, Sec. IV-A.2. Coordinates are those of the net in `sumo_nets/dense/`.
+Source: RISK-SAC, Sec. IV-A.2.
 """
 
-import math
 from collections.abc import Mapping
 
-from risk_sac.scenario.family import EGO, LEAD_IN_S, Family, friction, initial_speed, road_odd, walking_speed
-from risk_sac.scenario.layout import Area, Layout, PedestrianStart, VehicleStart
+from risk_sac.scenario.family import (
+    LEAD_IN_S,
+    Family,
+    at_most,
+    friction,
+    initial_speed,
+    offset_of,
+    road_odd,
+    top_speed,
+    walking,
+)
+from risk_sac.scenario.layout import Layout, VehicleStart
+from risk_sac.scenario.place import JunctionPlace, Leg
 from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.scenario.starting import pedestrian, surroundings, vehicle
 from risk_sac.types import Role
 
-LEFT, STRAIGHT, RIGHT = range(3)
-APPROACH_M = 230.4  # length of each approach
-KERB_M = 8.05  # of its roads from their axis: half the median, two lanes, and 5 cm inside
-NEAR_M, FAR_M = 15.6, 19.6  # its crossings' edges from the centre
-CORNER_M = 10.5  # half the square in the middle of the intersection that turning vehicles sweep
-_LEG_AFTER = {
-    "south": ("west", "north", "east"),  # destination after a left turn, straight on, a right turn
-    "north": ("east", "south", "west"),
-    "west": ("north", "east", "south"),
-    "east": ("south", "west", "north"),
+NEAREST_M, FARTHEST_M = 10.0, 90.0  # whoever attacks, and the ego, from the stop line
+LEAST_RANGE_M = 10.0  # of those distances at a place
+BODY_M = 4.6
+STREAM_MPS, STREAM_M = 9.0, 30.0
+WIDEST_GAP_M = 40.0  # of the background
+WHO = {
+    "ego": "the ego",
+    "oncoming": "the oncoming vehicle",
+    "from_left": "the vehicle from the left",
+    "from_right": "the vehicle from the right",
 }
 
 
-def _turn(value: float) -> int:
-    """Third of [0, 1] -> LEFT, STRAIGHT, RIGHT."""
-    return min(int(value * 3), RIGHT)
+def family(name: str, place: JunctionPlace) -> Family:
+    """The family that this pattern is at a place."""
 
+    def layout(xi: Mapping[str, float]) -> Layout:
+        background = [
+            vehicle(f"{stream.name}_{i}", Role.BACKGROUND, stream.track, STREAM_M + i_gap, STREAM_MPS)
+            for stream in place.streams
+            for i, i_gap in enumerate((xi["background_gap_m"], 2 * xi["background_gap_m"]))
+        ]
+        return Layout(
+            ego=_approaching(place.ego, Role.EGO, xi),
+            vehicles=(*(_approaching(leg, Role.ADVERSARY, xi) for leg in place.others), *background),
+            pedestrians=() if place.walk is None else (pedestrian(place.walk, xi),),
+            **surroundings(place, xi),
+        )
 
-def _approach(
-    id_: str, role: Role, leg: str, turn: int, before_m: float, speed_mps: float, lane: int | None = None
-) -> VehicleStart:
-    return VehicleStart(
-        id=id_,
-        role=role,
-        route=(f"from_{leg}", f"to_{_LEG_AFTER[leg][turn]}"),
-        lane=lane or (1 if turn == RIGHT else 2),
-        position_m=APPROACH_M - before_m - LEAD_IN_S * speed_mps,
-        speed_mps=speed_mps,
+    signalised = place.signal is not None
+    return Family(
+        name=name,
+        summary=place.summary,
+        horizon_steps=150,
+        space=SceneSpace(name, _parameters(place)),
+        odd=road_odd(
+            lanes=place.lanes,
+            limit_mps=place.speed_limit_mps,
+            signals=("fixed_time",) if signalised else ("none",),
+            crossings=("none",) if place.walk is None else ("signalised",) if signalised else ("zebra",),
+        ),
+        vehicles=tuple(leg.name for leg in place.others),
+        pedestrians=() if place.walk is None else ("pedestrian",),
+        layout=layout,
     )
 
 
-def _layout(xi: Mapping[str, float]) -> Layout:
-    """Ego from the south; adversaries oncoming and from both sides, a pedestrian at the near crossing."""
-    gap = xi["background_gap_m"]
-    background = [
-        _approach(f"{leg}_{i}", Role.BACKGROUND, leg, STRAIGHT, before_m, 9.0, lane=1)
-        for leg in ("north", "west", "east", "south")
-        for i, before_m in enumerate((30.0 + gap, 30.0 + 2 * gap))
+def room_wanted_m(limit_mps: float) -> float:
+    """Before a stop line, at the least."""
+    return NEAREST_M + LEAST_RANGE_M + BODY_M + LEAD_IN_S * top_speed(limit_mps)
+
+
+def room_of_a_stream_m() -> float:
+    """Before the stop line of a road with background traffic."""
+    return STREAM_M + 2 * WIDEST_GAP_M + BODY_M + LEAD_IN_S * STREAM_MPS
+
+
+def _approaching(leg: Leg, role: Role, xi: Mapping[str, float]) -> VehicleStart:
+    track = leg.turns[_choice(xi.get(f"{leg.name}_turn", 0.0), len(leg.turns))]
+    return vehicle(leg.name, role, track, xi[f"{leg.name}_distance_m"], xi[f"{leg.name}_speed_mps"])
+
+
+def _choice(value: float, options: int) -> int:
+    """Which of the equal parts of [0, 1] a value lies in, from 0."""
+    return min(int(value * options), options - 1)
+
+
+def _parameters(place: JunctionPlace) -> tuple[Parameter, ...]:
+    found = [parameter for leg in (place.ego, *place.others) for parameter in _leg_parameters(leg)]
+    if place.walk is not None:
+        found += walking("pedestrian across the near crossing's axis")
+    if place.streams:
+        meaning = "spacing of the background vehicles"
+        found.append(Parameter("background_gap_m", "m", 15, WIDEST_GAP_M, meaning))
+    return (*found, *offset_of(place.signal), friction())
+
+
+def _leg_parameters(leg: Leg) -> list[Parameter]:
+    who, options = WHO.get(leg.name, leg.name.replace("_", " ")), len(leg.turns)
+    found = []
+    if options == 3:
+        meaning = f"{who} turns left below 1/3, right above 2/3, else goes straight"
+        found.append(Parameter(f"{leg.name}_turn", "1", 0, 1, meaning))
+    elif options > 1:
+        found.append(Parameter(f"{leg.name}_turn", "1", 0, 1, f"which of {options} ways {who} goes, from the left"))
+    room_m = min(track.room_m for track in leg.turns)
+    high_m = at_most(FARTHEST_M, room_m - BODY_M - LEAD_IN_S * top_speed(leg.speed_limit_mps))
+    return [
+        *found,
+        Parameter(f"{leg.name}_distance_m", "m", NEAREST_M, high_m, f"{who}'s front to its stop line"),
+        initial_speed(f"{leg.name}_speed_mps", 5, leg.speed_limit_mps, f"initial speed of {who}"),
     ]
-    return Layout(
-        net="dense/dense.net.xml",
-        ego=_approach(EGO, Role.EGO, "south", _turn(xi["ego_turn"]), xi["ego_distance_m"], xi["ego_speed_mps"]),
-        vehicles=(
-            _approach(
-                "oncoming",
-                Role.ADVERSARY,
-                "north",
-                _turn(xi["oncoming_turn"]),
-                xi["oncoming_distance_m"],
-                xi["oncoming_speed_mps"],
-            ),
-            _approach(
-                "from_left",
-                Role.ADVERSARY,
-                "west",
-                _turn(xi["from_left_turn"]),
-                xi["from_left_distance_m"],
-                xi["from_left_speed_mps"],
-            ),
-            _approach(
-                "from_right",
-                Role.ADVERSARY,
-                "east",
-                _turn(xi["from_right_turn"]),
-                xi["from_right_distance_m"],
-                xi["from_right_speed_mps"],
-            ),
-            *background,
-        ),
-        pedestrians=(
-            PedestrianStart(
-                id="pedestrian",
-                role=Role.ADVERSARY,
-                x_m=KERB_M + xi["pedestrian_setback_m"] + LEAD_IN_S * xi["pedestrian_speed_mps"],
-                y_m=-(NEAR_M + FAR_M) / 2 + xi["pedestrian_offset_m"],
-                heading_rad=math.pi,
-                speed_mps=xi["pedestrian_speed_mps"],
-            ),
-        ),
-        crossings=(
-            Area(-KERB_M, KERB_M, NEAR_M, FAR_M),
-            Area(-KERB_M, KERB_M, -FAR_M, -NEAR_M),
-            Area(NEAR_M, FAR_M, -KERB_M, KERB_M),
-            Area(-FAR_M, -NEAR_M, -KERB_M, KERB_M),
-        ),
-        roadway=(
-            Area(-KERB_M, KERB_M, -250.0, 250.0),
-            Area(-250.0, 250.0, -KERB_M, KERB_M),
-            Area(-CORNER_M, CORNER_M, -CORNER_M, CORNER_M),
-        ),
-        junctions=(Area(-NEAR_M, NEAR_M, -NEAR_M, NEAR_M),),
-        signal="centre",
-        signal_offset_s=xi["signal_offset_s"],
-        friction=xi["friction"],
-    )
-
-
-def _approach_parameters(name: str, who: str) -> tuple[Parameter, ...]:
-    turn = Parameter(f"{name}_turn", "1", 0, 1, f"{who} turns left below 1/3, right above 2/3, else goes straight")
-    distance = Parameter(f"{name}_distance_m", "m", 10, 90, f"{who}'s front to its stop line")
-    return turn, distance, initial_speed(f"{name}_speed_mps", 5, 13.8, f"initial speed of {who}")
-
-
-DENSE = Family(
-    name="dense",
-    summary="Signalised four-leg intersection: turning and crossing vehicles, background traffic, a pedestrian.",
-    horizon_steps=150,
-    space=SceneSpace(
-        "dense",
-        (
-            *_approach_parameters("ego", "the ego"),
-            *_approach_parameters("oncoming", "the oncoming vehicle"),
-            *_approach_parameters("from_left", "the vehicle from the left"),
-            *_approach_parameters("from_right", "the vehicle from the right"),
-            Parameter("pedestrian_offset_m", "m", -1.9, 1.9, "pedestrian across the near crossing's axis"),
-            Parameter("pedestrian_setback_m", "m", 0.3, 5, "pedestrian's distance from the kerb"),
-            walking_speed(0, 2.0),
-            Parameter("background_gap_m", "m", 15, 40, "spacing of the background vehicles"),
-            Parameter("signal_offset_s", "s", 0, 56, "position in the signal's cycle at the start"),
-            friction(),
-        ),
-    ),
-    odd=road_odd(lanes=2, limit_mps=13.89, signals=("fixed_time",), crossings=("signalised",)),
-    vehicles=("oncoming", "from_left", "from_right"),
-    pedestrians=("pedestrian",),
-    layout=_layout,
-)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from risk_sac.scenario.ground import Area
 from risk_sac.types import Role
 
 Body = Literal["car", "truck"]
@@ -33,29 +34,11 @@ class PedestrianStart:
     speed_mps: float
 
 
-@dataclass(frozen=True, slots=True)
-class Area:
-    """An axis-aligned rectangle of ground."""
-
-    x_low_m: float
-    x_high_m: float
-    y_low_m: float
-    y_high_m: float
-
-    def contains(self, x_m: float, y_m: float) -> bool:
-        """Whether the point lies in the area."""
-        return self.x_low_m <= x_m <= self.x_high_m and self.y_low_m <= y_m <= self.y_high_m
-
-    def grown(self, by_m: float) -> "Area":
-        """The area with a border added on every side."""
-        return Area(self.x_low_m - by_m, self.x_high_m + by_m, self.y_low_m - by_m, self.y_high_m + by_m)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
     """Everything a simulator needs to set up one episode."""
 
-    net: str  # file below sumo_nets/
+    net: str  # file below sumo_nets/, or anywhere
     ego: VehicleStart
     vehicles: tuple[VehicleStart, ...]
     pedestrians: tuple[PedestrianStart, ...] = ()

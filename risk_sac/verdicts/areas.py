@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from risk_sac.scenario.layout import Area
+from risk_sac.scenario.ground import Area
 from risk_sac.types import Bools, Floats
 
 KERB_STEPS = 10  # looks within the time ahead
@@ -14,12 +14,10 @@ def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.
     """Which points lie in any of the areas, or no further than `margin_m` outside one."""
     found = np.zeros(np.shape(x_m), dtype=np.bool_)
     for area in areas:
-        found |= (
-            (x_m >= area.x_low_m - margin_m)
-            & (x_m <= area.x_high_m + margin_m)
-            & (y_m >= area.y_low_m - margin_m)
-            & (y_m <= area.y_high_m + margin_m)
-        )
+        here = np.ones(np.shape(x_m), dtype=np.bool_)
+        for nx, ny, c in area.sides:
+            here &= nx * x_m + ny * y_m <= c + margin_m
+        found |= here
     return found
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.scenario.layout import Area
+from risk_sac.scenario.ground import Area
 from risk_sac.types import STEP_S, Bools, Floats, Frame
 
 Letters = NDArray[np.uint8]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from risk_sac.scenario.layout import Area
+from risk_sac.scenario.ground import Area
 from risk_sac.types import STEP_S, Floats, Kind, Role
 from risk_sac.verdicts.course import touches
 from risk_sac.verdicts.evidence import Evidence, Ground
@@ -18,8 +18,8 @@ STREET = Ground(
     friction=1.0,
     speed_limit_mps=13.89,
     lane_width_m=LANE_M,
-    crossings=(Area(98.0, 102.0, -6.6, 6.6),),
-    roadway=(Area(-1000.0, 1000.0, -6.6, 6.6),),
+    crossings=(Area.box(98.0, 102.0, -6.6, 6.6),),
+    roadway=(Area.box(-1000.0, 1000.0, -6.6, 6.6),),
 )
 Motion = Callable[[float], tuple[float, float, float]]  # time from the release -> x, y, heading
 
@@ -120,7 +120,7 @@ def _first_contact(poses: Floats, sizes: Floats) -> int:
 def mirrored(evidence: Evidence) -> Evidence:
     """The same seen in a mirror along the x axis: left is right."""
     areas = {
-        name: tuple(Area(a.x_low_m, a.x_high_m, -a.y_high_m, -a.y_low_m) for a in getattr(evidence.ground, name))
+        name: tuple(Area(tuple((nx, -ny, c) for nx, ny, c in a.sides)) for a in getattr(evidence.ground, name))
         for name in ("crossings", "junctions", "roadway")
     }
     return replace(

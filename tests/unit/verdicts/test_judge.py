@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ConflictType, Grade, Judgement
-from risk_sac.scenario.layout import Area
+from risk_sac.scenario.ground import Area
 from risk_sac.types import Kind, Role
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import DEFINITIONS, judge
@@ -138,7 +138,7 @@ def test_an_ego_that_changes_lanes() -> None:
 )
 def test_grounds(x: float, where: str) -> None:
     evidence = stage(straight(20.0, 0.0, 0.0, 12.0), straight(x, 0.0, 0.0, 0.0), kinds=WALKING)
-    junctions = (Area(115.0, 130.0, -10.0, 10.0),)
+    junctions = (Area.box(115.0, 130.0, -10.0, 10.0),)
     assert judged(replace(evidence, ground=replace(evidence.ground, junctions=junctions))).ground == where
 
 

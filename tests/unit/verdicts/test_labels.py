@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.scenario.layout import Area
+from risk_sac.scenario.ground import Area
 from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
@@ -19,7 +19,7 @@ from tests.unit.verdicts.staged import (
     straight,
 )
 
-JUNCTION = (Area(45.0, 75.0, -15.0, 15.0),)
+JUNCTION = (Area.box(45.0, 75.0, -15.0, 15.0),)
 
 
 def labels(evidence: Evidence) -> tuple[str, ...]:

@@ -1,0 +1,128 @@
+"""Pieces of ground: convex polygons in any orientation. Whatever is bent or hollow is made of several."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from risk_sac.types import Floats
+
+Point = tuple[float, float]
+SAME_POINT_M = 1e-6
+ON_THE_EDGE_M2 = 1e-9  # twice the area of a triangle that counts as none
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """A convex polygon: where nx·x + ny·y <= c for each of its sides, (nx, ny) the side's unit normal outwards."""
+
+    sides: tuple[tuple[float, float, float], ...]  # nx, ny, c of each
+
+    @classmethod
+    def of(cls, corners: Sequence[Sequence[float]]) -> "Area":
+        """With these corners, counter-clockwise, of a convex polygon."""
+        sides = []
+        for (x, y), (to_x, to_y) in zip(corners, [*corners[1:], corners[0]], strict=True):
+            dx, dy = to_x - x, to_y - y
+            length = math.hypot(dx, dy)
+            if length > SAME_POINT_M:
+                nx, ny = dy / length, -dx / length
+                sides.append((nx, ny, nx * x + ny * y))
+        return cls(tuple(sides))
+
+    @classmethod
+    def box(cls, x_low_m: float, x_high_m: float, y_low_m: float, y_high_m: float) -> "Area":
+        """A rectangle along the axes."""
+        return cls.of([(x_low_m, y_low_m), (x_high_m, y_low_m), (x_high_m, y_high_m), (x_low_m, y_high_m)])
+
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Whether the point lies in the area."""
+        return all(nx * x_m + ny * y_m <= c for nx, ny, c in self.sides)
+
+    def grown(self, by_m: float) -> "Area":
+        """The area with a border added on every side."""
+        return Area(tuple((nx, ny, c + by_m) for nx, ny, c in self.sides))
+
+
+def ribbon(line: Sequence[Point], width_m: float) -> list[list[Point]]:
+    """The quadrangles, counter-clockwise, of a ribbon along a line; at bends they share a slanting side.
+
+    Args:
+      line: its middle, two points or more.
+      width_m: from side to side.
+    """
+    points = np.array(_without_repeats(line), dtype=np.float64)
+    if len(points) < 2:
+        return []
+    steps = np.diff(points, axis=0)
+    steps /= np.hypot(*steps.T)[:, None]
+    left = np.column_stack((-steps[:, 1], steps[:, 0]))
+    across = np.concatenate((left[:1], (left[:-1] + left[1:]) / 2, left[-1:]))
+    # So that the ribbon keeps its width round a bend; a hairpin's corner would run away.
+    across /= np.maximum((across * across).sum(axis=1), 0.25)[:, None]
+    a, b = points + across * width_m / 2, points - across * width_m / 2
+    quads = []
+    for i in range(len(points) - 1):
+        corners = [_point(b[i]), _point(b[i + 1]), _point(a[i + 1]), _point(a[i])]
+        quads += [corners] if is_convex(corners) else triangles(corners)
+    return quads
+
+
+def triangles(outline: Sequence[Point]) -> list[list[Point]]:
+    """A simple polygon of any shape as triangles, counter-clockwise; none if it has no area.
+
+    Source: ear clipping, after Meisters, "Polygons have ears" (1975).
+    """
+    ring = _without_repeats(outline)
+    if len(ring) > 1 and math.dist(ring[0], ring[-1]) < SAME_POINT_M:
+        ring = ring[:-1]
+    if _doubled_area(ring) < 0:
+        ring = ring[::-1]
+    found = []
+    while len(ring) > 2:
+        ear = next((i for i in range(len(ring)) if _is_ear(ring, i)), None)
+        if ear is None:  # it crosses itself: what is left has no inside that all would agree on
+            break
+        corner = [ring[ear - 1], ring[ear], ring[(ear + 1) % len(ring)]]
+        if _doubled_area(corner) > ON_THE_EDGE_M2:
+            found.append(corner)
+        del ring[ear]
+    return found
+
+
+def is_convex(corners: Sequence[Point]) -> bool:
+    """Whether a polygon turns left, or not at all, at every corner, and so is convex and counter-clockwise."""
+    n = len(corners)
+    turns = (_doubled_area([corners[i - 1], corners[i], corners[(i + 1) % n]]) for i in range(n))
+    return all(turn >= -ON_THE_EDGE_M2 for turn in turns)
+
+
+def areas(polygons: Iterable[Sequence[Sequence[float]]]) -> tuple[Area, ...]:
+    """Of convex polygons."""
+    return tuple(Area.of(polygon) for polygon in polygons)
+
+
+def _is_ear(ring: Sequence[Point], i: int) -> bool:
+    corner = [ring[i - 1], ring[i], ring[(i + 1) % len(ring)]]
+    doubled = _doubled_area(corner)
+    if doubled <= ON_THE_EDGE_M2:
+        return doubled >= -ON_THE_EDGE_M2  # a corner that lies on a line can be cut off as well
+    ear = Area.of(corner)
+    return not any(p not in corner and ear.contains(*p) for p in ring)
+
+
+def _doubled_area(ring: Sequence[Point]) -> float:
+    return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
+
+
+def _without_repeats(line: Sequence[Point]) -> list[Point]:
+    kept: list[Point] = []
+    for point in line:
+        if not kept or math.dist(kept[-1], point) >= SAME_POINT_M:
+            kept.append(point)
+    return kept
+
+
+def _point(values: Floats) -> Point:
+    return float(values[0]), float(values[1])

@@ -1,0 +1,85 @@
+"""The folder of places on nets of users': each with a piece of its net, under a name that holds both's digest.
+
+`RISK_SAC_PLACES` says where it is. Campaigns name the places of maps like families, so whoever plays or draws an
+episode needs the folder that its place was kept in.
+"""
+
+import hashlib
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+from risk_sac.config import FAMILY_NAME
+from risk_sac.errors import ConfigError
+from risk_sac.scenario.place import PLACES, Place
+
+VARIABLE = "RISK_SAC_PLACES"
+NET, PLACE = "net.xml", "place.json"
+DIGITS = 12
+
+
+def library() -> Path:
+    """The folder; it may not be there yet."""
+    told = os.environ.get(VARIABLE)
+    if told:
+        return Path(told)
+    cache = os.environ.get("XDG_CACHE_HOME")
+    return (Path(cache) if cache else Path.home() / ".cache") / "risk-sac" / "places"
+
+
+def keep(place: Place, net: bytes) -> str:
+    """Puts a place into the library, unless it is there.
+
+    Args:
+      place: to be kept; the file that it names is not.
+      net: the piece of a net around it, which takes that file's place.
+
+    Returns:
+      The name of the family that it is.
+
+    Raises:
+      OSError: the folder cannot be written.
+    """
+    text = place.model_copy(update={"net": NET}).model_dump_json().encode()
+    name = f"{place.pattern}_{_digest(text, net)}"
+    folder = library() / name
+    if not folder.is_dir():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        new = Path(tempfile.mkdtemp(prefix=".new-", dir=folder.parent))
+        new.chmod(0o755)
+        (new / NET).write_bytes(net)
+        (new / PLACE).write_bytes(text)
+        try:
+            new.rename(folder)
+        except OSError:  # somebody else was quicker
+            shutil.rmtree(new)
+            if not folder.is_dir():
+                raise
+    return name
+
+
+def kept(name: str) -> Place:
+    """A place of the library.
+
+    Raises:
+      ConfigError: it keeps none of this name, or what it keeps is not what was put there.
+    """
+    folder = library() / name
+    try:
+        if not FAMILY_NAME.fullmatch(name):
+            raise FileNotFoundError
+        text, net = (folder / PLACE).read_bytes(), (folder / NET).read_bytes()
+    except OSError:
+        wanted = f"wanted low, mixed, dense, or one that lies in {library()} ({VARIABLE} names another folder)"
+        raise ConfigError(f"there is no place {name!r}; {wanted}", field="family") from None
+    if not name.endswith(f"_{_digest(text, net)}"):
+        raise ConfigError(f"the place {name!r} in {library()} is damaged; find it on its map anew", field="family")
+    return PLACES.validate_json(text).model_copy(update={"net": str((folder / NET).absolute())})
+
+
+def _digest(text: bytes, net: bytes) -> str:
+    digest = hashlib.sha256(text)
+    digest.update(b"\0")
+    digest.update(net)
+    return digest.hexdigest()[:DIGITS]

@@ -1,0 +1,278 @@
+"""A SUMO net as the finders need it: lanes, how they lead on, and who has to watch out for whom.
+
+Only what is said in the file is read, so it has to be a net of the present format, as netconvert writes it.
+Source: https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html
+"""
+
+import math
+import xml.etree.ElementTree as ET
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from risk_sac.errors import MapError
+from risk_sac.scenario.ground import Point
+
+DRIVER = "passenger"  # the class of every vehicle of ours
+TURNAROUND = "t"
+DEFAULT_WIDTH_M = 3.2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lane:
+    """A lane, also one inside a junction."""
+
+    id: str
+    edge: str
+    index: int
+    length_m: float
+    width_m: float
+    limit_mps: float
+    line: tuple[Point, ...]
+    drivable: bool
+
+    @property
+    def way_in_rad(self) -> float:
+        """Direction in which it begins."""
+        return _direction(self.line[0], self.line[1])
+
+    @property
+    def way_out_rad(self) -> float:
+        """Direction in which it ends."""
+        return _direction(self.line[-2], self.line[-1])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edge:
+    """A road in one direction; those inside junctions are kept by their lanes alone."""
+
+    id: str
+    start: str  # junctions
+    end: str
+    lanes: tuple[Lane, ...]
+
+    @cached_property
+    def drivable(self) -> tuple[Lane, ...]:
+        """Its lanes for cars, from right to left."""
+        return tuple(lane for lane in self.lanes if lane.drivable)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Link:
+    """How a lane leads on to another, across a junction."""
+
+    source: Lane
+    target: Lane
+    inside: tuple[Lane, ...]  # the lanes between them
+    signal: str | None
+    index: int | None  # among the links of its junction
+
+    @property
+    def inside_m(self) -> float:
+        """Length of the way across the junction."""
+        return sum(lane.length_m for lane in self.inside)
+
+    @property
+    def turn_rad(self) -> float:
+        """How far it turns to the left."""
+        return wrapped(self.target.way_in_rad - self.source.way_out_rad)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Junction:
+    """A junction that is not one inside another."""
+
+    id: str
+    type: str
+    x_m: float
+    y_m: float
+    outline: tuple[Point, ...]
+    foes: Mapping[int, str]  # of each link by its index: SUMO's row of bits, the last is link 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Crossing:
+    """A pedestrian crossing."""
+
+    id: str
+    junction: str
+    edges: tuple[str, ...]  # that it crosses
+    line: tuple[Point, ...]
+    width_m: float
+    signal: str | None
+
+
+@dataclass(eq=False)
+class Net:
+    """All of it; edges, junctions and crossings by id."""
+
+    edges: dict[str, Edge] = field(default_factory=dict)
+    junctions: dict[str, Junction] = field(default_factory=dict)
+    crossings: list[Crossing] = field(default_factory=list)
+    onward: dict[str, list[Link]] = field(default_factory=lambda: defaultdict(list))  # by the lane they come from
+    back: dict[str, list[Link]] = field(default_factory=lambda: defaultdict(list))  # by the lane they lead to
+    cycles_s: dict[str, float] = field(default_factory=dict)  # of the signals
+    inside: dict[str, list[Lane]] = field(default_factory=lambda: defaultdict(list))  # drivable, by junction
+
+    @cached_property
+    def arriving(self) -> Mapping[str, list[Edge]]:
+        """Edges with a lane for cars, by the junction at their end."""
+        found = defaultdict(list)
+        for edge in self.edges.values():
+            if edge.drivable:
+                found[edge.end].append(edge)
+        return found
+
+    @cached_property
+    def crossings_of(self) -> Mapping[tuple[str, str], list[Crossing]]:
+        """By junction and by an edge that they cross."""
+        found = defaultdict(list)
+        for crossing in self.crossings:
+            for edge in crossing.edges:
+                found[crossing.junction, edge].append(crossing)
+        return found
+
+    def are_foes(self, one: Link, other: Link) -> bool:
+        """Whether two links of a junction cross or meet, by what the net says."""
+        junction = self.junctions[self.edges[one.source.edge].end]
+        if one.index is None or other.index is None:
+            return False
+        return _bit(junction.foes, one.index, other.index) or _bit(junction.foes, other.index, one.index)
+
+    def lane(self, id_: str) -> Lane:
+        """A lane outside junctions."""
+        edge, _, index = id_.rpartition("_")
+        return self.edges[edge].lanes[int(index)]
+
+
+def read_net(path: Path) -> Net:
+    """Reads a net.
+
+    Raises:
+      MapError: it is no net on which anything could be found; the message says why.
+      OSError: it cannot be read.
+    """
+    try:
+        root = ET.parse(path).getroot()  # a net that we, the sandbox or netconvert have written
+    except ET.ParseError as error:
+        raise MapError(f"{path.name} is no XML: {error}") from error
+    if root.tag != "net":
+        raise MapError(f"the root of {path.name} is <{root.tag}>; wanted <net>: convert it first")
+    if root.get("lefthand", "false").lower() in ("true", "1"):
+        raise MapError('the net has left-hand traffic (lefthand="true"); wanted right-hand traffic')
+    try:
+        net = _net(root)
+    except (KeyError, ValueError, IndexError, TypeError) as error:
+        raise MapError(f"{path.name} is no net of the present format ({error!r}); run netconvert over it") from error
+    if not any(edge.drivable for edge in net.edges.values()):
+        raise MapError(f"none of the {len(net.edges)} edges has a lane for passenger cars")
+    if not net.onward:
+        raise MapError("no lane leads on to another: the net has no <connection> of a lane for passenger cars")
+    return net
+
+
+def wrapped(angle_rad: float) -> float:
+    """The same angle within ±π."""
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi
+
+
+def _net(root: ET.Element) -> Net:
+    net, inner = Net(), {}
+    crossings = []
+    for edge in root.iter("edge"):
+        function = edge.get("function", "normal")
+        lanes = tuple(_lane(edge.attrib["id"], lane.attrib) for lane in edge.iter("lane"))
+        if function == "internal":
+            inner |= {lane.id: lane for lane in lanes}
+            net.inside[edge.attrib["id"].rpartition("_")[0][1:]] += [lane for lane in lanes if lane.drivable]
+        elif function == "crossing" and lanes:
+            crossings.append((edge, lanes[0]))
+        elif function == "normal":
+            net.edges[edge.attrib["id"]] = Edge(edge.attrib["id"], edge.attrib["from"], edge.attrib["to"], lanes)
+    index_of = {}
+    for junction in root.iter("junction"):
+        if junction.get("type") != "internal":
+            net.junctions[junction.attrib["id"]] = _junction(junction)
+            index_of |= {lane: i for i, lane in enumerate(junction.get("intLanes", "").split())}
+    lights = _link(net, root, inner, index_of)
+    for edge, lane in crossings:
+        id_ = edge.attrib["id"]
+        at = id_.rpartition("_")[0][1:]
+        net.crossings.append(
+            Crossing(id_, at, tuple(edge.get("crossingEdges", "").split()), lane.line, lane.width_m, lights.get(id_))
+        )
+    for light in root.iter("tlLogic"):  # of several programmes, SUMO runs the last
+        net.cycles_s[light.attrib["id"]] = sum(float(phase.attrib["duration"]) for phase in light.iter("phase"))
+    return net
+
+
+def _link(net: Net, root: ET.Element, inner: Mapping[str, Lane], index_of: Mapping[str, int]) -> dict[str, str]:
+    """Notes how lanes lead on; returns the signal of each crossing."""
+    lights, follows, outer = {}, {}, []
+    for c in root.iter("connection"):
+        a, source = c.attrib, f"{c.attrib['from']}_{c.attrib['fromLane']}"
+        if source in inner:
+            follows[source] = a.get("via")
+        elif a["from"] in net.edges and a["to"] in net.edges:
+            outer.append((a, source))
+        elif "tl" in a:
+            lights[a["to"]] = a["tl"]
+    for a, source in outer:
+        one, other = net.lane(source), net.lane(f"{a['to']}_{a['toLane']}")
+        if a.get("dir") == TURNAROUND or not (one.drivable and other.drivable):
+            continue
+        inside, index, via = [], None, a.get("via")
+        while via in inner and len(inside) < 10:
+            inside.append(inner[via])
+            index = index_of.get(via, index)
+            via = follows.get(via)
+        link = Link(one, other, tuple(inside), a.get("tl"), index)
+        net.onward[one.id].append(link)
+        net.back[other.id].append(link)
+    return lights
+
+
+def _lane(edge: str, a: Mapping[str, str]) -> Lane:
+    line = _line(a["shape"])
+    return Lane(
+        id=a["id"],
+        edge=edge,
+        index=int(a["index"]),
+        length_m=float(a["length"]),
+        width_m=float(a.get("width", DEFAULT_WIDTH_M)),
+        limit_mps=float(a["speed"]),
+        line=line if len(line) > 1 else (line[0], (line[0][0] + 1e-3, line[0][1])),
+        drivable=_admits(a.get("allow"), a.get("disallow")),
+    )
+
+
+def _admits(allow: str | None, disallow: str | None) -> bool:
+    if allow is not None:
+        return bool({DRIVER, "all"} & set(allow.split()))
+    return not {DRIVER, "all"} & set((disallow or "").split())
+
+
+def _junction(junction: ET.Element) -> Junction:
+    a = junction.attrib
+    foes = {int(request.attrib["index"]): request.attrib["foes"] for request in junction.iter("request")}
+    return Junction(a["id"], a.get("type", ""), float(a["x"]), float(a["y"]), _line(a.get("shape", "")), foes)
+
+
+def _line(shape: str) -> tuple[Point, ...]:
+    return tuple((float(x), float(y)) for x, y, *_ in (point.split(",") for point in shape.split()))
+
+
+def _direction(a: Point, b: Point) -> float:
+    return math.atan2(b[1] - a[1], b[0] - a[0])
+
+
+def _bit(rows: Mapping[int, str], row: int, column: int) -> bool:
+    bits = rows.get(row, "")
+    return column < len(bits) and bits[-1 - column] == "1"
+
+
+def drivable_lanes(edges: Iterable[Edge]) -> list[Lane]:
+    """All lanes for cars."""
+    return [lane for edge in edges for lane in edge.drivable]

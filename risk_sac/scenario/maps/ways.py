@@ -1,0 +1,123 @@
+"""Ways through a net, lane by lane: what leads to a place, and what leads on from it."""
+
+from dataclasses import dataclass
+
+from risk_sac.scenario.maps.net import Edge, Lane, Link, Net
+from risk_sac.scenario.place import Piece, Track
+
+DRIVEN_S = 18.0  # an episode and a bit: nobody may come to the end of the map before it is over
+BEFORE_M = 160.0  # of road before a reference that anybody could start on
+PIECES_M = 160.0  # beyond a reference
+TRIES = 300  # lanes that are looked at for a way on
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """Lanes and the links between them."""
+
+    lanes: tuple[Lane, ...]
+    links: tuple[Link, ...]  # one fewer
+
+
+def way_on(net: Net, first: Lane, seconds: float, through: Link | None = None) -> Way | str:
+    """The straightest way on from a lane that takes so long at the speed limits, no edge of it twice.
+
+    Args:
+      net: where.
+      first: where it begins.
+      seconds: how long it has to be.
+      through: the first link, where it is given.
+
+    Returns:
+      The way; or what is in the way.
+    """
+    search = _Search(net, seconds)
+    if search.extend([first], [], first.length_m / first.limit_mps, through):
+        return Way(tuple(search.lanes), tuple(search.links))
+    return (
+        f"the longest way on that was found ends with edge {search.farthest!r} after {search.reached_s:.0f} s of "
+        f"driving; wanted {seconds:.0f} s"
+    )
+
+
+class _Search:
+    def __init__(self, net: Net, seconds: float) -> None:
+        self._net, self._seconds, self._tries = net, seconds, TRIES
+        self.lanes: list[Lane] = []
+        self.links: list[Link] = []
+        self.farthest, self.reached_s = "", 0.0
+
+    def extend(self, lanes: list[Lane], links: list[Link], gone_s: float, through: Link | None = None) -> bool:
+        """Depth first, the straightest way first."""
+        if gone_s > self.reached_s or not self.farthest:
+            self.farthest, self.reached_s = lanes[-1].edge, gone_s
+        if gone_s >= self._seconds and through is None:
+            self.lanes, self.links = lanes, links
+            return True
+        been = {lane.edge for lane in lanes}
+        following = [through] if through else sorted(self._net.onward.get(lanes[-1].id, ()), key=_bend)
+        for link in following:
+            if link.target.edge in been or self._tries == 0:
+                continue
+            self._tries -= 1
+            inside_s = sum(lane.length_m / lane.limit_mps for lane in link.inside)
+            after_s = gone_s + inside_s + link.target.length_m / link.target.limit_mps
+            if self.extend([*lanes, link.target], [*links, link], after_s):
+                return True
+        return False
+
+
+def way_back(net: Net, last: Lane, metres: float) -> Way:
+    """The straightest way to a lane, up to so much of it before that lane; shorter where the map ends."""
+    lanes, links, length_m = [last], [], 0.0
+    while length_m < metres:
+        been = {lane.edge for lane in lanes}
+        before = [link for link in net.back.get(lanes[0].id, ()) if link.source.edge not in been]
+        if not before:
+            break
+        link = min(before, key=_bend)
+        lanes.insert(0, link.source)
+        links.insert(0, link)
+        length_m += link.source.length_m + link.inside_m
+    return Way(tuple(lanes), tuple(links))
+
+
+def track(net: Net, on: Way, reference_m: float) -> Track:
+    """The track of a way, with the lanes that lead to it.
+
+    Args:
+      net: where.
+      on: its first lane has the reference.
+      reference_m: from the beginning of that lane.
+    """
+    back = way_back(net, on.lanes[0], BEFORE_M - reference_m)
+    been = {lane.edge for lane in on.lanes}
+    first = next((i + 1 for i in reversed(range(len(back.lanes) - 1)) if back.lanes[i].edge in been), 0)
+    lanes, links = [*back.lanes[first:], *on.lanes[1:]], [*back.links[first:], *on.links]
+    own = len(back.lanes) - 1 - first
+    reach_m = [0.0] * len(lanes)
+    reach_m[own] = reference_m
+    for i in reversed(range(own)):
+        reach_m[i] = reach_m[i + 1] + links[i].inside_m + lanes[i].length_m
+    for i in range(own + 1, len(lanes)):
+        reach_m[i] = reach_m[i - 1] - lanes[i - 1].length_m - links[i - 1].inside_m
+    pieces = tuple(
+        Piece(edge=lane.edge, lane=lane.index, reach_m=round(reach, 2), length_m=lane.length_m)
+        for lane, reach in zip(lanes, reach_m, strict=True)
+    )
+    most = max(i for i, piece in enumerate(pieces) if i <= own or piece.reach_m > -PIECES_M)
+    return Track(pieces=pieces[: most + 1], onward=tuple(piece.edge for piece in pieces[most + 1 :]))
+
+
+def edges_on(*tracks: Track) -> set[str]:
+    """All edges that somebody may come to."""
+    return {piece.edge for track in tracks for piece in track.pieces} | {e for track in tracks for e in track.onward}
+
+
+def edge_of(net: Net, lane: Lane) -> Edge:
+    """The edge of a lane outside junctions."""
+    return net.edges[lane.edge]
+
+
+def _bend(link: Link) -> float:
+    return abs(link.turn_rad)
