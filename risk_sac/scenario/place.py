@@ -23,6 +23,7 @@ class Piece(Settings):
     reach_m: float
     """From the beginning of the lane to the reference; negative beyond it."""
     length_m: float
+    limit_mps: float
 
 
 class Track(Settings):
@@ -38,8 +39,8 @@ class Track(Settings):
         """How far before the reference the track begins."""
         return self.pieces[0].reach_m
 
-    def start(self, before_m: float, lead_m: float = 0.0) -> tuple[tuple[str, ...], int, float]:
-        """Route, lane and position of a front bumper `before_m`, and `lead_m` more, before the reference.
+    def start(self, before_m: float, lead_m: float = 0.0) -> tuple[tuple[str, ...], Piece, float]:
+        """Route, lane, and position on it of a front bumper `before_m`, and `lead_m` more, before the reference.
 
         Nobody can start inside a junction: who would, starts at its entry.
         """
@@ -48,7 +49,7 @@ class Track(Settings):
             first -= 1
         piece = self.pieces[first]
         position_m = min(max(piece.reach_m - before_m - lead_m, 0.0), piece.length_m)
-        return tuple(each.edge for each in self.pieces[first:]) + self.onward, piece.lane, position_m
+        return tuple(each.edge for each in self.pieces[first:]) + self.onward, piece, position_m
 
 
 class Walk(Settings):

@@ -60,9 +60,15 @@ def vehicle(
       lead_m: what it drives until the release; at its speed if not given.
       body: its size.
     """
-    route, lane, position_m = track.start(before_m, LEAD_IN_S * speed_mps if lead_m is None else lead_m)
+    route, piece, position_m = track.start(before_m, LEAD_IN_S * speed_mps if lead_m is None else lead_m)
     return VehicleStart(
-        id=id_, role=role, route=route, lane=lane, position_m=position_m, speed_mps=speed_mps, body=body
+        id=id_,
+        role=role,
+        route=route,
+        lane=piece.lane,
+        position_m=position_m,
+        speed_mps=min(speed_mps, piece.limit_mps),  # SUMO refuses who would begin faster
+        body=body,
     )
 
 

@@ -7,7 +7,7 @@ Source: https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html
 import math
 import xml.etree.ElementTree as ET
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -44,7 +44,7 @@ class Lane:
         return _direction(self.line[-2], self.line[-1])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Edge:
     """A road in one direction; those inside junctions are kept by their lanes alone."""
 
@@ -168,8 +168,9 @@ def read_net(path: Path) -> Net:
         raise MapError(f"{path.name} is no net of the present format ({error!r}); run netconvert over it") from error
     if not any(edge.drivable for edge in net.edges.values()):
         raise MapError(f"none of the {len(net.edges)} edges has a lane for passenger cars")
-    if not net.onward:
-        raise MapError("no lane leads on to another: the net has no <connection> of a lane for passenger cars")
+    starts = {edge.start for edge in net.edges.values() if edge.drivable}
+    if not net.onward and any(edge.end in starts for edge in net.edges.values()):
+        raise MapError("roads meet, but no lane leads on to another: the net lacks its <connection> elements")
     return net
 
 
@@ -271,8 +272,3 @@ def _direction(a: Point, b: Point) -> float:
 def _bit(rows: Mapping[int, str], row: int, column: int) -> bool:
     bits = rows.get(row, "")
     return column < len(bits) and bits[-1 - column] == "1"
-
-
-def drivable_lanes(edges: Iterable[Edge]) -> list[Lane]:
-    """All lanes for cars."""
-    return [lane for edge in edges for lane in edge.drivable]

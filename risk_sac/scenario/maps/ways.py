@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from risk_sac.scenario.maps.net import Edge, Lane, Link, Net
+from risk_sac.scenario.maps.net import Lane, Link, Net
 from risk_sac.scenario.place import Piece, Track
 
 DRIVEN_S = 18.0  # an episode and a bit: nobody may come to the end of the map before it is over
@@ -101,10 +101,7 @@ def track(net: Net, on: Way, reference_m: float) -> Track:
         reach_m[i] = reach_m[i + 1] + links[i].inside_m + lanes[i].length_m
     for i in range(own + 1, len(lanes)):
         reach_m[i] = reach_m[i - 1] - lanes[i - 1].length_m - links[i - 1].inside_m
-    pieces = tuple(
-        Piece(edge=lane.edge, lane=lane.index, reach_m=round(reach, 2), length_m=lane.length_m)
-        for lane, reach in zip(lanes, reach_m, strict=True)
-    )
+    pieces = tuple(_piece(lane, reach) for lane, reach in zip(lanes, reach_m, strict=True))
     most = max(i for i, piece in enumerate(pieces) if i <= own or piece.reach_m > -PIECES_M)
     return Track(pieces=pieces[: most + 1], onward=tuple(piece.edge for piece in pieces[most + 1 :]))
 
@@ -114,9 +111,9 @@ def edges_on(*tracks: Track) -> set[str]:
     return {piece.edge for track in tracks for piece in track.pieces} | {e for track in tracks for e in track.onward}
 
 
-def edge_of(net: Net, lane: Lane) -> Edge:
-    """The edge of a lane outside junctions."""
-    return net.edges[lane.edge]
+def _piece(lane: Lane, reach_m: float) -> Piece:
+    reach_m, length_m = round(reach_m, 2), lane.length_m
+    return Piece(edge=lane.edge, lane=lane.index, reach_m=reach_m, length_m=length_m, limit_mps=lane.limit_mps)
 
 
 def _bend(link: Link) -> float:

@@ -6,12 +6,12 @@ import pytest
 from risk_sac.config import EgoConfig
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
-from risk_sac.scenario.junction import APPROACH_M
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Kind, Role, Scene
 
 UNITS = {"m", "m/s", "s", "1"}
+APPROACH_M = 230.4  # length of the roads to the intersection of dense
 SUFFIXES = {"_m": "m", "_mps": "m/s", "_s": "s"}
 
 each_family = pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)

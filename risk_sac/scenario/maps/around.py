@@ -1,0 +1,82 @@
+"""The ground around a place: crossings, lanes and junctions as convex polygons."""
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+from risk_sac.scenario.ground import Point, ribbon, triangles
+from risk_sac.scenario.maps.net import Crossing, Lane, Net
+from risk_sac.scenario.place import Ground, Signal, Walk
+
+CROSSINGS_M = 60.0  # so far from a place a crossing is told of
+WALKED_M = 40.0  # so far a pedestrian may get in an episode
+JUNCTIONS_M = 120.0
+KERB_M = 0.05  # of the crossing before its ends: whoever stands at the kerb is on the road's edge
+LEGS = 3  # of a junction where ways can cross
+
+
+def ground_around(net: Net, x_m: float, y_m: float, *, walked: bool) -> Ground:
+    """What verdicts have to know of the ground around a point; without pedestrians, the junctions alone."""
+    junctions = [
+        triangle
+        for junction in net.junctions.values()
+        if math.hypot(junction.x_m - x_m, junction.y_m - y_m) <= JUNCTIONS_M and len(junction.foes) >= LEGS
+        for triangle in triangles(junction.outline)
+    ]
+    if not walked:
+        return Ground(junctions=_rounded(junctions))
+    crossings = [
+        quad
+        for crossing in net.crossings
+        if _near(crossing.line, x_m, y_m, CROSSINGS_M)
+        for quad in ribbon(crossing.line, crossing.width_m)
+    ]
+    lanes = [lane for edge in net.edges.values() for lane in edge.drivable if _near(lane.line, x_m, y_m, WALKED_M)]
+    for junction in net.junctions.values():
+        if math.hypot(junction.x_m - x_m, junction.y_m - y_m) <= 3 * WALKED_M:
+            lanes += [lane for lane in net.inside.get(junction.id, ()) if _near(lane.line, x_m, y_m, WALKED_M)]
+    return Ground(
+        crossings=_rounded(crossings),
+        roadway=_rounded(_roadway(lanes, x_m, y_m)),
+        junctions=_rounded(junctions),
+    )
+
+
+def walk_over(crossing: Crossing, driven_rad: float) -> Walk:
+    """From the kerb on the right of who drives in a direction, over a crossing."""
+    right = (math.sin(driven_rad), -math.cos(driven_rad))
+    (x0, y0), (x1, y1) = crossing.line[0], crossing.line[-1]
+    line = crossing.line if (x0 - x1) * right[0] + (y0 - y1) * right[1] >= 0.0 else crossing.line[::-1]
+    (x, y), (to_x, to_y) = line[0], line[1]
+    length = math.hypot(to_x - x, to_y - y)
+    along_x, along_y = (to_x - x) / length, (to_y - y) / length
+    return Walk(x_m=x + KERB_M * along_x, y_m=y + KERB_M * along_y, along_x=along_x, along_y=along_y)
+
+
+def signal_of(net: Net, ids: Iterable[str | None]) -> Signal | None:
+    """The first of the signals that are there."""
+    for id_ in ids:
+        if id_ is not None and net.cycles_s.get(id_, 0.0) > 0.0:
+            return Signal(id=id_, cycle_s=net.cycles_s[id_])
+    return None
+
+
+def _roadway(lanes: Sequence[Lane], x_m: float, y_m: float) -> list[list[Point]]:
+    quads = (quad for lane in lanes for quad in ribbon(lane.line, lane.width_m))
+    return [quad for quad in quads if _near((*quad, quad[0]), x_m, y_m, WALKED_M)]
+
+
+def _near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> bool:
+    """Whether a line comes so near to a point."""
+    for (ax, ay), (bx, by) in pairwise(line):
+        dx, dy = bx - ax, by - ay
+        square = dx * dx + dy * dy
+        share = 0.0 if square == 0.0 else min(max(((x_m - ax) * dx + (y_m - ay) * dy) / square, 0.0), 1.0)
+        if math.hypot(ax + share * dx - x_m, ay + share * dy - y_m) <= within_m:
+            return True
+    return False
+
+
+def _rounded(polygons: Iterable[Sequence[Point]]) -> tuple[tuple[Point, ...], ...]:
+    """To a millimetre."""
+    return tuple(tuple((round(x, 3), round(y, 3)) for x, y in polygon) for polygon in polygons)

@@ -1,0 +1,103 @@
+"""Cuts the piece of a net around a place out of it, so that an episode does not load a town.
+
+Every junction that somebody may come to stays as it is, with all its roads, ways and signals; where the piece ends,
+junctions become dead ends. Nothing is computed anew, so who yields to whom is what it was.
+"""
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Set
+from pathlib import Path
+
+from risk_sac.errors import MapError
+from risk_sac.scenario.maps.found import Fit
+from risk_sac.scenario.maps.net import Net
+from risk_sac.scenario.maps.ways import edges_on
+from risk_sac.scenario.place import CrossingPlace, JunctionPlace, Place, Stretch, Track
+
+AROUND_M = 100.0  # so far from a place roads stay although nobody drives there: a picture shows them
+
+
+def read_tree(path: Path) -> ET.Element:
+    """The net's file, for `cut`.
+
+    Raises:
+      MapError: it is no XML.
+    """
+    try:
+        return ET.parse(path).getroot()
+    except ET.ParseError as error:
+        raise MapError(f"{path.name} is no XML: {error}") from error
+
+
+def cut(net: Net, root: ET.Element, fit: Fit) -> bytes:
+    """The file of the piece around a place; `root` stays as it is."""
+    driven = edges_on(*tracks(fit.place))
+    crossed = {net.edges[id_].end for id_ in driven} | {net.edges[id_].start for id_ in driven}
+    near = {
+        id_ for id_, j in net.junctions.items() if math.hypot(j.x_m - fit.spot.x_m, j.y_m - fit.spot.y_m) <= AROUND_M
+    }
+    whole = crossed | near
+    edges = {edge.id for edge in net.edges.values() if edge.start in whole or edge.end in whole}
+    touched = {junction for id_ in edges for junction in (net.edges[id_].start, net.edges[id_].end)}
+    # A junction of which all roads are there anyway is whole as well.
+    cut_through = {j for edge in net.edges.values() if edge.id not in edges for j in (edge.start, edge.end)}
+    return _written(root, edges, touched, touched - cut_through, net)
+
+
+def tracks(place: Place) -> list[Track]:
+    """All tracks that somebody may start on."""
+    match place:
+        case Stretch():
+            return [track for track in (place.ego, place.left, place.right) if track is not None]
+        case CrossingPlace():
+            return [track for site in place.sites for track in (site.ego, site.occluder, *site.oncoming)]
+        case JunctionPlace():
+            legs = [track for leg in (place.ego, *place.others) for track in leg.turns]
+            return legs + [stream.track for stream in place.streams]
+
+
+def _written(root: ET.Element, edges: Set[str], touched: Set[str], whole: Set[str], net: Net) -> bytes:
+    def at(edge: str) -> str:
+        """The junction at the end of an edge, or the one that it is inside of."""
+        return _inside_of(edge) if edge.startswith(":") else net.edges[edge].end if edge in net.edges else ""
+
+    links = [link for link in root.iter("connection") if at(link.attrib["from"]) in whole]
+    lights = {link.get("tl") for link in links}
+    out = ET.Element(root.tag, root.attrib)
+    out.extend([child for child in root if child.tag in ("location", "type")])
+    for edge in root.iter("edge"):
+        id_ = edge.attrib["id"]
+        if _inside_of(id_) in whole if id_.startswith(":") else id_ in edges:
+            out.append(_bare(edge))
+    # Of several programmes with one name, SUMO runs the last.
+    out.extend({light.attrib["id"]: light for light in root.iter("tlLogic") if light.get("id") in lights}.values())
+    for junction in root.iter("junction"):
+        id_ = junction.attrib["id"]
+        if (_inside_of(_inside_of(id_), "") if id_.startswith(":") else id_) in whole:
+            out.append(junction)
+        elif id_ in touched:
+            out.append(_dead_end(junction, edges))
+    out.extend(links)
+    out.extend(r for r in root.iter("roundabout") if set(r.get("edges", "").split()) <= edges)
+    return ET.tostring(out, encoding="utf-8", xml_declaration=True)
+
+
+def _inside_of(id_: str, colon: str = ":") -> str:
+    """The junction that something is inside of, such as "J" of ":J_3" or ":J_w0"."""
+    return id_.removeprefix(colon).rpartition("_")[0]
+
+
+def _bare(edge: ET.Element) -> ET.Element:
+    """An edge whose lanes say nothing of the lanes of others, which may be cut off."""
+    if edge.find("lane/*") is None:
+        return edge
+    bare = ET.Element(edge.tag, edge.attrib)
+    bare.extend(ET.Element(lane.tag, lane.attrib) for lane in edge.iter("lane"))
+    return bare
+
+
+def _dead_end(junction: ET.Element, edges: Set[str]) -> ET.Element:
+    arriving = [lane for lane in junction.get("incLanes", "").split() if lane.rpartition("_")[0] in edges]
+    kept = {name: junction.attrib[name] for name in ("id", "x", "y", "shape") if name in junction.attrib}
+    return ET.Element("junction", kept | {"type": "dead_end", "incLanes": " ".join(arriving), "intLanes": ""})

@@ -1,0 +1,179 @@
+"""Where on a net the junction pattern fits: a road to a junction whose ways are crossed or joined by another's.
+
+Whose ways cross is what the net says: the foe bits of its links.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from risk_sac.scenario import junction
+from risk_sac.scenario.maps.around import signal_of, walk_over
+from risk_sac.scenario.maps.find_stretch import check_limit
+from risk_sac.scenario.maps.found import NoFit, Spot
+from risk_sac.scenario.maps.net import Edge, Link, Net, wrapped
+from risk_sac.scenario.maps.ways import DRIVEN_S, Way, track, way_on
+from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
+
+ATTACKERS = ("oncoming", "from_left", "from_right")
+ONCOMING_RAD, BESIDE_RAD = math.radians(135.0), math.radians(45.0)
+ONWARD_S = 8.0  # of driving that an attacker's way goes on behind the junction
+FEWEST_ROADS = 2  # that lead to a junction
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """A road to a junction, with the ways on from it: from left to right, one for each road they lead to."""
+
+    edge: Edge
+    links: tuple[Link, ...]
+
+    @property
+    def driven_rad(self) -> float:
+        """Direction in which it comes to the junction."""
+        return self.links[0].source.way_out_rad
+
+
+def spots(net: Net) -> Iterator[Spot]:
+    """Every road to a junction that another one leads to as well."""
+    for arriving in net.arriving.values():
+        if len(arriving) >= FEWEST_ROADS:
+            for edge in arriving:
+                x, y = edge.drivable[-1].line[-1]
+                yield Spot(pattern="junction", id=edge.id, x_m=x, y_m=y)
+
+
+def place(net: Net, spot: Spot) -> JunctionPlace:
+    """The junction at the end of a road.
+
+    Raises:
+      NoFit: nothing crosses, or there is no room to come from or to go on to.
+    """
+    edge = net.edges[spot.id]
+    at = net.junctions[edge.end]
+    own = approach(net, edge)
+    ego, why = leg(net, own, "ego", DRIVEN_S)
+    if ego is None:
+        raise NoFit(why)
+    others = _others(net, own)
+    legs, whys = {}, []
+    for name, other in others.items():
+        found, why = leg(net, other, name, ONWARD_S)
+        if found is not None:
+            legs[name] = found
+        else:
+            whys.append(why)
+    if not legs:
+        raise NoFit("; ".join(whys) or f"no way across {at.id!r} crosses or joins one of those from {edge.id!r}")
+    approaches = {name: other for name, other in others.items() if name in legs} | {"ego": own}
+    crossing = next(iter(net.crossings_of.get((at.id, edge.id), ())), None)
+    streams = [(name, stream(net, found)) for name, found in approaches.items()]
+    return JunctionPlace(
+        net="",
+        summary=f"Junction {at.id!r} from {edge.id!r}: {_listed([junction.WHO[name] for name in legs])} "
+        f"{'crosses or turns' if len(legs) == 1 else 'cross or turn'}"
+        f"{', and a pedestrian walks' if crossing is not None else ''}.",
+        lanes=len(edge.drivable),
+        speed_limit_mps=max(each.speed_limit_mps for each in (ego, *legs.values())),
+        lane_width_m=own.links[0].source.width_m,
+        signal=signal_of(net, [link.signal for link in own.links]),
+        ego=ego,
+        others=tuple(legs.values()),
+        streams=tuple(Stream(name=f"{name}_road", track=found) for name, found in streams if found is not None),
+        walk=None if crossing is None else walk_over(crossing, own.driven_rad),
+    )
+
+
+def approach(net: Net, edge: Edge) -> Approach:
+    """The ways on from a road: to each road that follows, from the leftmost lane that leads there.
+
+    Raises:
+      NoFit: it is a dead end.
+    """
+    by_target: dict[str, Link] = {}
+    for lane in edge.drivable:  # from right to left, so that the leftmost stays
+        for link in net.onward.get(lane.id, ()):
+            by_target[link.target.edge] = link
+    if not by_target:
+        raise NoFit(f"{edge.id!r} leads nowhere: none of its lanes for cars has a connection at {edge.end!r}")
+    return Approach(edge, tuple(sorted(by_target.values(), key=lambda link: -link.turn_rad)))
+
+
+def leg(net: Net, road: Approach, name: str, onward_s: float) -> tuple[Leg | None, str]:
+    """Where somebody comes from and may go to; or why nobody can."""
+    tracks, why = [], ""
+    limit_mps = road.links[0].source.limit_mps
+    try:
+        check_limit(road.links[0].source)
+    except NoFit as error:
+        return None, str(error)
+    wanted_m = junction.room_wanted_m(limit_mps)
+    for link in road.links:
+        found = turn(net, link, onward_s)
+        if isinstance(found, str):
+            why = why or found
+        elif found.room_m < wanted_m:
+            why = why or f"{road.edge.id!r} can be come from for {found.room_m:.0f} m; wanted {wanted_m:.0f} m"
+        else:
+            tracks.append(found)
+    if not tracks:
+        return None, why
+    return Leg(name=name, speed_limit_mps=limit_mps, turns=tuple(tracks)), ""
+
+
+def turn(net: Net, link: Link, onward_s: float) -> Track | str:
+    """The track over a link, or what is in the way."""
+    length_m = link.source.length_m
+    way = way_on(net, link.source, onward_s + length_m / link.source.limit_mps, through=link)
+    return track(net, way, length_m) if isinstance(way, Way) else way
+
+
+def stream(net: Net, road: Approach) -> Track | None:
+    """Straight on from the rightmost lane, where a lane is left beside it."""
+    if len(road.edge.drivable) < 2:
+        return None
+    links = [link for lane in road.edge.drivable[:1] for link in net.onward.get(lane.id, ())]
+    if not links:
+        return None
+    found = turn(net, min(links, key=lambda link: abs(link.turn_rad)), ONWARD_S)
+    return found if isinstance(found, Track) and found.room_m >= junction.room_of_a_stream_m() else None
+
+
+def _others(net: Net, own: Approach) -> Mapping[str, Approach]:
+    """The roads with a way that is a foe of the ego's; of several from one side, the one squarest to it."""
+    best: dict[str, tuple[float, Approach]] = {}
+    for edge in net.arriving[own.edge.end]:
+        if edge is own.edge:
+            continue
+        try:
+            other = approach(net, edge)
+        except NoFit:
+            continue
+        foes = _foes(net, own.links, edge)
+        if not foes:
+            continue
+        name, off_rad = _side(own, other)
+        if name not in best or off_rad < best[name][0]:
+            best[name] = off_rad, other
+    return {name: best[name][1] for name in ATTACKERS if name in best}
+
+
+def _foes(net: Net, own: Sequence[Link], edge: Edge) -> bool:
+    return any(net.are_foes(one, link) for one in own for lane in edge.drivable for link in net.onward.get(lane.id, ()))
+
+
+def _side(own: Approach, other: Approach) -> tuple[str, float]:
+    """From where another road comes, and by how much not quite from there."""
+    relative = wrapped(other.driven_rad - own.driven_rad)
+    if abs(relative) > ONCOMING_RAD:
+        return "oncoming", math.pi - abs(relative)
+    if abs(relative) < BESIDE_RAD:  # it joins the ego's road, as a ramp does
+        x, y = own.links[0].source.line[-1]
+        to_x, to_y = other.links[0].source.line[-1]
+        across = (to_y - y) * math.cos(own.driven_rad) - (to_x - x) * math.sin(own.driven_rad)
+        return "from_left" if across > 0.0 else "from_right", math.pi / 2 - abs(relative)
+    return "from_right" if relative > 0.0 else "from_left", abs(math.pi / 2 - abs(relative))
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -1,0 +1,95 @@
+"""Where on a net car following fits: on a lane that can be driven on for an episode, with room behind the ego."""
+
+from collections.abc import Iterator
+
+from risk_sac.scenario.car_following import LEAST_BEHIND_M
+from risk_sac.scenario.maps.around import signal_of
+from risk_sac.scenario.maps.found import NoFit, Spot
+from risk_sac.scenario.maps.net import Edge, Lane, Link, Net
+from risk_sac.scenario.maps.ways import DRIVEN_S, Way, track, way_on
+from risk_sac.scenario.place import Stretch, Track
+
+SLOWEST_MPS, FASTEST_MPS = 5.0, 60.0
+SHORTEST_M = 20.0  # of an edge that counts as a road of its own
+BESIDE_S = 6.0  # of driving that a neighbour's lane has to lead on
+SIGNAL_S = 12.0  # of driving within which a signal matters
+
+
+def spots(net: Net) -> Iterator[Spot]:
+    """Every road for cars that is long enough to count."""
+    for edge in net.edges.values():
+        if edge.drivable and edge.drivable[0].length_m >= SHORTEST_M:
+            lane = edge.drivable[len(edge.drivable) // 2]
+            x, y = lane.line[len(lane.line) // 2]
+            yield Spot(pattern="car_following", id=edge.id, x_m=x, y_m=y)
+
+
+def place(net: Net, spot: Spot) -> Stretch:
+    """Car following on a road.
+
+    Raises:
+      NoFit: it has no room.
+    """
+    edge = net.edges[spot.id]
+    check_limit(edge.drivable[0])
+    reference_m = round(edge.drivable[0].length_m / 2, 2)
+    own, way = _lane_to_drive(net, edge, reference_m)
+    ego = track(net, way, reference_m)
+    if ego.room_m < LEAST_BEHIND_M:
+        raise NoFit(f"there are {ego.room_m:.0f} m behind the ego; wanted {LEAST_BEHIND_M:.0f} m")
+    signals = [link.signal for link in _soon(way, own.length_m - reference_m)]
+    sides = {lane.index - own.index: _beside(net, lane, reference_m) for lane in edge.drivable}
+    beside = ["left"] * (sides.get(1) is not None) + ["right"] * (sides.get(-1) is not None)
+    return Stretch(
+        net="",
+        summary=f"Car following on {edge.id!r}: who is ahead{' and ' + ' and '.join(beside) if beside else ''} brakes, "
+        f"adapts speed{' and cuts in' if beside else ''}.",
+        lanes=len(edge.drivable),
+        speed_limit_mps=own.limit_mps,
+        lane_width_m=own.width_m,
+        signal=signal_of(net, signals),
+        ego=ego,
+        left=sides.get(1),
+        right=sides.get(-1),
+    )
+
+
+def check_limit(lane: Lane) -> None:
+    """Refuses roads on which nobody drives as a car does.
+
+    Raises:
+      NoFit: the limit is too low or too high.
+    """
+    if not SLOWEST_MPS <= lane.limit_mps <= FASTEST_MPS:
+        wanted = f"wanted {SLOWEST_MPS:g} to {FASTEST_MPS:g} m/s"
+        raise NoFit(f"the speed limit of {lane.edge!r} is {lane.limit_mps:g} m/s; {wanted}")
+
+
+def _lane_to_drive(net: Net, edge: Edge, reference_m: float) -> tuple[Lane, Way]:
+    """The lane nearest to the middle that leads on for an episode."""
+    middle = edge.drivable[len(edge.drivable) // 2].index
+    why = ""
+    for lane in sorted(edge.drivable, key=lambda lane: abs(lane.index - middle)):
+        way = way_on(net, lane, DRIVEN_S + reference_m / lane.limit_mps)
+        if isinstance(way, Way):
+            return lane, way
+        why = why or way
+    raise NoFit(why)
+
+
+def _beside(net: Net, lane: Lane, reference_m: float) -> Track | None:
+    way = way_on(net, lane, BESIDE_S + reference_m / lane.limit_mps)
+    if not isinstance(way, Way):
+        return None
+    found = track(net, way, reference_m)
+    return found if found.room_m >= LEAST_BEHIND_M else None
+
+
+def _soon(way: Way, left_m: float) -> list[Link]:
+    found, gone_s = [], left_m / way.lanes[0].limit_mps
+    for link, lane in zip(way.links, way.lanes[1:], strict=True):
+        if gone_s > SIGNAL_S:
+            break
+        found.append(link)
+        gone_s += lane.length_m / lane.limit_mps
+    return found

@@ -1,0 +1,67 @@
+"""Finds the places of a map."""
+
+from collections.abc import Collection, Iterator
+from types import ModuleType
+
+from risk_sac.errors import MapError
+from risk_sac.scenario.maps import find_crossing, find_junction, find_stretch
+from risk_sac.scenario.maps.around import ground_around
+from risk_sac.scenario.maps.found import Fit, Misfit, NoFit, Pattern, Spot, Survey
+from risk_sac.scenario.maps.net import Net
+from risk_sac.scenario.place import CrossingPlace, JunctionPlace
+
+FINDERS: dict[Pattern, ModuleType] = {
+    "car_following": find_stretch,
+    "crossing": find_crossing,
+    "junction": find_junction,
+}
+
+
+def survey(net: Net, patterns: Collection[Pattern] = tuple(FINDERS)) -> Survey:
+    """All places where patterns fit, without their ground, and why elsewhere they do not."""
+    fits, misfits = [], []
+    for spot in _spots(net, patterns):
+        try:
+            fits.append(Fit(spot, FINDERS[spot.pattern].place(net, spot)))
+        except NoFit as error:
+            misfits.append(Misfit(spot, str(error)))
+    return Survey(tuple(fits), tuple(misfits))
+
+
+def place_at(net: Net, pattern: Pattern, id_: str) -> Fit:
+    """One place, with its ground.
+
+    Raises:
+      MapError: the map has no such spot, or the pattern does not fit there; the message says why.
+    """
+    spot = next((spot for spot in _spots(net, (pattern,)) if spot.id == id_), None)
+    if spot is None:
+        raise MapError(_nowhere(net, pattern, id_), field="place")
+    try:
+        return with_ground(net, Fit(spot, FINDERS[pattern].place(net, spot)))
+    except NoFit as error:
+        raise MapError(f"{pattern} does not fit at {id_!r}: {error}", field="place") from error
+
+
+def with_ground(net: Net, fit: Fit) -> Fit:
+    """The same, with what verdicts have to know of the ground around it."""
+    place = fit.place
+    walked = isinstance(place, CrossingPlace) or (isinstance(place, JunctionPlace) and place.walk is not None)
+    ground = ground_around(net, fit.spot.x_m, fit.spot.y_m, walked=walked)
+    return Fit(fit.spot, place.model_copy(update={"ground": ground}))
+
+
+def _spots(net: Net, patterns: Collection[Pattern]) -> Iterator[Spot]:
+    for pattern in patterns:
+        yield from FINDERS[pattern].spots(net)
+
+
+def _nowhere(net: Net, pattern: Pattern, id_: str) -> str:
+    if id_ not in net.edges:
+        return f"the map has no edge {id_!r}; a place is named by the edge that leads to it, or on which it is"
+    what = {
+        "car_following": "a road for cars, and long enough to count",
+        "crossing": "a road for cars that ends at a crossing",
+        "junction": "a road to a junction that another one leads to as well",
+    }
+    return f"{pattern} does not fit at {id_!r}: wanted {what[pattern]}"

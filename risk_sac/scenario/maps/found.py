@@ -1,0 +1,57 @@
+"""What a search of a map comes to."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from risk_sac.scenario.maps.net import Net
+from risk_sac.scenario.place import Place
+
+Pattern = Literal["car_following", "crossing", "junction"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spot:
+    """Somewhere on a map that a pattern might be placed."""
+
+    pattern: Pattern
+    id: str  # such as an edge, or a junction and one of its edges: what a user names it by
+    x_m: float
+    y_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A spot where a pattern fits."""
+
+    spot: Spot
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """A spot where a pattern does not fit, and why."""
+
+    spot: Spot
+    why: str
+
+
+class NoFit(Exception):
+    """Why a pattern does not fit; for the finders alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """All places of a map, and why elsewhere there is none; in the order of the net."""
+
+    fits: tuple[Fit, ...]
+    misfits: tuple[Misfit, ...]
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Places by pattern."""
+        return Counter(fit.spot.pattern for fit in self.fits)
+
+
+Placer = Callable[[Net, Spot], Place]
