@@ -7,7 +7,7 @@ import hashlib
 import re
 from typing import Annotated, Self
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import Field, StringConstraints, WithJsonSchema, model_validator
 
 from risk_sac.config.base import Settings
 from risk_sac.config.ego import EgoConfig
@@ -16,8 +16,15 @@ from risk_sac.config.methods import MethodName
 from risk_sac.config.odd import Odd
 
 SHIPPED = ("low", "mixed", "dense")
-FAMILY_NAME = re.compile(r"^(low|mixed|dense|(car_following|crossing|junction)_[0-9a-f]{12})$")
-FamilyName = Annotated[str, StringConstraints(pattern=FAMILY_NAME)]
+PLACED = r"(car_following|crossing|junction)_[0-9a-f]{12}"
+FAMILY_NAME = re.compile(rf"^({'|'.join(SHIPPED)}|{PLACED})$")
+FamilyName = Annotated[
+    str,
+    StringConstraints(pattern=FAMILY_NAME),
+    WithJsonSchema(
+        {"anyOf": [{"type": "string", "enum": list(SHIPPED)}, {"type": "string", "pattern": f"^{PLACED}$"}]}
+    ),
+]
 """A shipped family, or a pattern at a place of a map; the digits are of the place."""
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
 MOST_EPISODES = 2_000_000  # of a campaign; the database takes about 1.2 KB for each

@@ -1,5 +1,6 @@
 """Where vehicles are on their roads: along the path they take, and how far they may move aside."""
 
+from itertools import takewhile
 from typing import NamedTuple
 
 import libsumo
@@ -9,6 +10,7 @@ from risk_sac.scenario.layout import Layout
 from risk_sac.sim.paths import HEADING, STATION, Along, Paths, X, Y
 from risk_sac.types import Floats
 
+CAR = "passenger"  # the class of all vehicles of ours
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 
 
@@ -80,12 +82,13 @@ def _widths(route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
     edge, _, index = lane.rpartition("_")
     widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
     own = int(index)
-    return sum(widths[:own]), sum(widths[own + 1 :]), libsumo.lane.getWidth(lane)
+    right, left = takewhile(bool, reversed(widths[:own])), takewhile(bool, widths[own + 1 :])
+    return sum(right), sum(left), libsumo.lane.getWidth(lane)
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
-    """Width of a lane, m; 0 if vehicles may not use it or it does not lead to the route's next edge."""
-    if libsumo.lane.getAllowed(lane) == ("pedestrian",):
+    """Width of a lane, m; 0 if cars may not use it or it does not lead to the route's next edge."""
+    if not _admits_cars(lane):
         return 0.0
     edge = lane.rpartition("_")[0]
     if edge in route[:-1]:
@@ -94,3 +97,8 @@ def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
             return 0.0
     width: float = libsumo.lane.getWidth(lane)
     return width
+
+
+def _admits_cars(lane: str) -> bool:
+    allowed = libsumo.lane.getAllowed(lane)  # nothing: everybody but those who are disallowed
+    return CAR in allowed if allowed else CAR not in libsumo.lane.getDisallowed(lane)

@@ -80,7 +80,7 @@ def _written(root: ET.Element, edges: Set[str], touched: Set[str], whole: Set[st
             out.append(_dead_end(junction, edges))
     out.extend(links)
     out.extend(r for r in root.iter("roundabout") if set(r.get("edges", "").split()) <= edges)
-    return ET.tostring(out, encoding="utf-8", xml_declaration=True)
+    return ET.tostring(out, encoding="unicode").encode()
 
 
 def _inside_of(id_: str, colon: str = ":") -> str:

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from itertools import pairwise
 
-from risk_sac.scenario.family import top_speed
-from risk_sac.scenario.hidden_pedestrian import BODY_M, LEAD_IN_S, room_wanted_m
+from risk_sac.scenario.family import LEAD_IN_S, top_speed
+from risk_sac.scenario.hidden_pedestrian import BODY_M, room_wanted_m
 from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.find_stretch import check_limit

@@ -180,7 +180,7 @@ def wrapped(angle_rad: float) -> float:
 
 
 def _net(root: ET.Element) -> Net:
-    net, inner = Net(), {}
+    net, inner = Net(), dict[str, Lane]()
     crossings = []
     for edge in root.iter("edge"):
         function = edge.get("function", "normal")
@@ -192,7 +192,7 @@ def _net(root: ET.Element) -> Net:
             crossings.append((edge, lanes[0]))
         elif function == "normal":
             net.edges[edge.attrib["id"]] = Edge(edge.attrib["id"], edge.attrib["from"], edge.attrib["to"], lanes)
-    index_of = {}
+    index_of: dict[str, int] = {}
     for junction in root.iter("junction"):
         if junction.get("type") != "internal":
             net.junctions[junction.attrib["id"]] = _junction(junction)
@@ -211,11 +211,11 @@ def _net(root: ET.Element) -> Net:
 
 def _link(net: Net, root: ET.Element, inner: Mapping[str, Lane], index_of: Mapping[str, int]) -> dict[str, str]:
     """Notes how lanes lead on; returns the signal of each crossing."""
-    lights, follows, outer = {}, {}, []
+    lights, follows, outer = dict[str, str](), dict[str, str](), []
     for c in root.iter("connection"):
         a, source = c.attrib, f"{c.attrib['from']}_{c.attrib['fromLane']}"
         if source in inner:
-            follows[source] = a.get("via")
+            follows[source] = a.get("via", "")
         elif a["from"] in net.edges and a["to"] in net.edges:
             outer.append((a, source))
         elif "tl" in a:
@@ -224,12 +224,12 @@ def _link(net: Net, root: ET.Element, inner: Mapping[str, Lane], index_of: Mappi
         one, other = net.lane(source), net.lane(f"{a['to']}_{a['toLane']}")
         if a.get("dir") == TURNAROUND or not (one.drivable and other.drivable):
             continue
-        inside, index, via = [], None, a.get("via")
-        while via in inner and len(inside) < 10:
-            inside.append(inner[via])
-            index = index_of.get(via, index)
-            via = follows.get(via)
-        link = Link(one, other, tuple(inside), a.get("tl"), index)
+        inside, via = [], a.get("via", "")
+        while via in inner and via not in inside:
+            inside.append(via)
+            via = follows.get(via, "")
+        index = next((index_of[lane] for lane in inside if lane in index_of), None)
+        link = Link(one, other, tuple(inner[lane] for lane in inside), a.get("tl"), index)
         net.onward[one.id].append(link)
         net.back[other.id].append(link)
     return lights

@@ -69,7 +69,7 @@ class _Search:
 
 def way_back(net: Net, last: Lane, metres: float) -> Way:
     """The straightest way to a lane, up to so much of it before that lane; shorter where the map ends."""
-    lanes, links, length_m = [last], [], 0.0
+    lanes, links, length_m = [last], list[Link](), 0.0
     while length_m < metres:
         been = {lane.edge for lane in lanes}
         before = [link for link in net.back.get(lanes[0].id, ()) if link.source.edge not in been]

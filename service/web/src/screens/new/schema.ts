@@ -62,6 +62,7 @@ export function shapeOf(schema: Schema, schemas: Record<string, Schema>): Shape 
     const fields = Object.entries(known.properties).map(([name, each]) => fieldOf(name, each, schemas));
     return { kind: "object", about: oneLine(known.description), fields };
   }
+  if (known.anyOf?.[0]) return shapeOf(known.anyOf[0], schemas); // the others are what a form does not offer
   if (known.enum) return { kind: "choice", options: known.enum };
   if (known.type === "array") {
     const { items = {}, minItems = 0, maxItems = Infinity } = known;
