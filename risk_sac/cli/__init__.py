@@ -11,6 +11,7 @@ from risk_sac.cli.campaigns import add_campaigns
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
 from risk_sac.cli.evaluate import add_evaluate
 from risk_sac.cli.keys import add_keys
+from risk_sac.cli.places import add_places
 from risk_sac.cli.regress import add_regress
 from risk_sac.cli.replay import add_bundle, add_replay
 from risk_sac.cli.run import add_run
@@ -22,6 +23,7 @@ from risk_sac.errors import ConfigError, RiskSacError
 
 COMMANDS = (
     add_run,
+    add_places,
     add_evaluate,
     add_audit,
     add_show,

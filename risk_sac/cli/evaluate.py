@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, complain, console, progress_bar
+from risk_sac.cli.on_map import add_map_flags, families_on_map
 from risk_sac.cli.text import counted
 from risk_sac.config import METHODS, SHIPPED
 from risk_sac.config.spec_file import read_campaign
@@ -26,6 +27,7 @@ def add_evaluate(commands: Commands) -> None:
         "evaluate", help="compare methods over seeds, with tables and figures; the same command again goes on with it"
     )
     evaluate.set_defaults(command=_evaluate)
+    add_map_flags(evaluate, several=True)
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
     evaluate.add_argument("--jobs", type=int, metavar="N", help="runs at a time (default: one per core)")
     evaluate.add_argument(
@@ -42,6 +44,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     methods = [name for name, method in METHODS.items() if not method.needs]
     defaults = {"families": SHIPPED, "methods": methods, "seeds": range(SEEDS)}
     defaults = {name: list(values) for name, values in defaults.items()}
+    options.families = families_on_map(options) or options.families
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS), defaults)
     from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
 

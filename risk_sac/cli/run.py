@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.table import Table
 
 from risk_sac.cli.console import INTERRUPTED, OK, Commands, console, or_dash, progress_bar
+from risk_sac.cli.on_map import add_map_flags, families_on_map
 from risk_sac.cli.text import counted
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.config.spec_file import read_spec
@@ -19,6 +20,7 @@ def add_run(commands: Commands) -> None:
     run = commands.add_parser("run", help="one run without a server; the same command again goes on with it")
     run.set_defaults(command=_run)
     run.add_argument("--family", metavar="low|mixed|dense", help="scenario family")
+    add_map_flags(run, several=False)
     run.add_argument("--method", metavar="NAME", help=f"one of {', '.join(METHODS)} (default: risk-sac)")
     run.add_argument("--episodes", type=int, metavar="N", help="search episodes (default: 300)")
     run.add_argument("--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)")
@@ -32,6 +34,9 @@ def add_run(commands: Commands) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     names = ("family", "method", "seed", "episodes", "evaluation_episodes", "cpu_s")
+    families = families_on_map(options)
+    if families:
+        options.family = families[0]
     spec = read_spec(options.spec, {name: getattr(options, name) for name in names})
     from risk_sac.execution.runs import run  # here, because loading torch takes seconds
 

@@ -28,6 +28,7 @@ FamilyName = Annotated[
 """A shipped family, or a pattern at a place of a map; the digits are of the place."""
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
 MOST_EPISODES = 2_000_000  # of a campaign; the database takes about 1.2 KB for each
+MOST_FAMILIES = 100  # of a campaign
 Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 
 
@@ -86,7 +87,7 @@ class CampaignSpec(Settings):
     """Families × methods × seeds on one equal budget."""
 
     label: Annotated[str, Field(max_length=200)] = ""
-    families: Annotated[tuple[FamilyName, ...], Field(min_length=1, max_length=3)]
+    families: Annotated[tuple[FamilyName, ...], Field(min_length=1, max_length=MOST_FAMILIES)]
     methods: Annotated[tuple[MethodName, ...], Field(min_length=1, max_length=20)] = ("risk-sac",)
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1, max_length=100)] = (0,)
     budget: Budget = Budget()

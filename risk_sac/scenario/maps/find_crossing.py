@@ -10,7 +10,7 @@ from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot
 from risk_sac.scenario.maps.net import Lane, Link, Net
-from risk_sac.scenario.maps.ways import DRIVEN_S
+from risk_sac.scenario.maps.ways import AFTER_S
 from risk_sac.scenario.place import CrossingPlace, Site, Track
 
 OCCLUDED_S = 4.0  # of driving that the way of who hides the pedestrian goes on
@@ -64,7 +64,7 @@ def _lanes(net: Net, lanes: tuple[Lane, ...]) -> tuple[Lane, Track, Track, Link]
     """The leftmost lane that leads on for an episode and has one to its right that leads anywhere."""
     why = ""
     for right, own in reversed(list(pairwise(lanes))):
-        ego, because = _straight(net, own, DRIVEN_S)
+        ego, because = _straight(net, own, AFTER_S)
         occluder, hidden_because = _straight(net, right, OCCLUDED_S)
         if ego is None or occluder is None:
             why = why or because or hidden_because

@@ -12,7 +12,7 @@ from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot
 from risk_sac.scenario.maps.net import Edge, Link, Net, wrapped
-from risk_sac.scenario.maps.ways import DRIVEN_S, Way, track, way_on
+from risk_sac.scenario.maps.ways import AFTER_S, Way, track, way_on
 from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
 
 ATTACKERS = ("oncoming", "from_left", "from_right")
@@ -52,7 +52,7 @@ def place(net: Net, spot: Spot) -> JunctionPlace:
     edge = net.edges[spot.id]
     at = net.junctions[edge.end]
     own = approach(net, edge)
-    ego, why = leg(net, own, "ego", DRIVEN_S)
+    ego, why = leg(net, own, "ego", AFTER_S)
     if ego is None:
         raise NoFit(why)
     others = _others(net, own)

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from risk_sac.scenario.maps.net import Lane, Link, Net
 from risk_sac.scenario.place import Piece, Track
 
-DRIVEN_S = 18.0  # an episode and a bit: nobody may come to the end of the map before it is over
+DRIVEN_S = 17.0  # an episode and a bit: the ego may not come to the end of the map before it is over
+AFTER_S = 15.5  # the same behind a stop line: what is driven until the adversaries' release comes off
 BEFORE_M = 160.0  # of road before a reference that anybody could start on
 PIECES_M = 160.0  # beyond a reference
 TRIES = 300  # lanes that are looked at for a way on

@@ -1,0 +1,53 @@
+"""A map from above, with the places that were found on it."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+
+from risk_sac.canvas import canvas, picture
+from risk_sac.failures.from_above import SURFACE_COLOURS
+from risk_sac.failures.roads import read_surfaces
+from risk_sac.scenario.maps.found import Survey
+
+MARKS = {"car_following": ("o", "tab:blue"), "crossing": ("s", "tab:orange"), "junction": ("^", "tab:green")}
+SIZE_IN, DPI = (9.0, 8.0), 130
+NAMED = 60  # so many names can be told apart
+
+
+def map_png(net: Path, found: Survey) -> bytes:
+    """The picture of a whole map."""
+    (content,) = picture(partial(_figure, net, found), ["png"], DPI, {})
+    return content
+
+
+def _figure(net: Path, found: Survey) -> Figure:
+    figure = canvas(SIZE_IN)
+    axis = figure.subplots()
+    surfaces = read_surfaces(net)
+    for use, colour in SURFACE_COLOURS.items():
+        outlines = [surface.outline for surface in surfaces if surface.use == use]
+        axis.add_collection(PolyCollection(outlines, facecolors=colour, edgecolors="0.6", linewidths=0.2))
+    x = [misfit.spot.x_m for misfit in found.misfits]
+    y = [misfit.spot.y_m for misfit in found.misfits]
+    axis.scatter(x, y, s=5, color="0.5", marker="x", linewidths=0.5, label=f"does not fit ({len(x)})")
+    for pattern, (marker, colour) in MARKS.items():
+        spots = [fit.spot for fit in found.fits if fit.spot.pattern == pattern]
+        x, y = [spot.x_m for spot in spots], [spot.y_m for spot in spots]
+        axis.scatter(x, y, s=16, color=colour, marker=marker, alpha=0.8, label=f"{pattern} ({len(spots)})", zorder=3)
+    if len(found.fits) <= NAMED:
+        for x_m, y_m, names in _names(found):
+            axis.annotate(names, (x_m, y_m), (3, 3), textcoords="offset points", fontsize=5, zorder=4)
+    axis.autoscale()
+    axis.set_aspect("equal")
+    axis.set(xlabel="x, m", ylabel="y, m")
+    axis.legend(loc="best", fontsize=7)
+    return figure
+
+
+def _names(found: Survey) -> list[tuple[float, float, str]]:
+    """Each id once where several patterns fit."""
+    points = {fit.spot.id: (fit.spot.x_m, fit.spot.y_m) for fit in found.fits}
+    return [(x, y, id_) for id_, (x, y) in points.items() if np.isfinite((x, y)).all()]

@@ -1,0 +1,135 @@
+"""Maps in other formats, and SUMO's from earlier versions, become nets by SUMO's own netconvert.
+
+netconvert comes with the package `eclipse-sumo`, not with `libsumo`; on a machine without it, only nets of the present
+format can be read.
+"""
+
+import gzip
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from risk_sac.errors import MapError
+
+PRESENT = (1, 16)  # nets since then say all that is read
+HEAD_BYTES = 4096
+WALL_S = 120
+MOST_WARNINGS = 20
+_LONGEST = 300
+
+
+class Format(StrEnum):
+    """What a map is written in."""
+
+    NET = "net"
+    OSM = "osm"
+    OPENDRIVE = "OpenDRIVE"
+
+
+_OSM = (
+    "--geometry.remove --ramps.guess --junctions.join --tls.guess-signals --tls.discard-simple --tls.join "
+    "--tls.default-type static --sidewalks.guess --crossings.guess --walkingareas --no-turnarounds "
+    "--remove-edges.isolated --output.street-names --osm-files"
+)
+_OPENDRIVE = "--geometry.remove --tls.default-type static --no-turnarounds --opendrive-files"
+OPTIONS: dict[Format, tuple[str, ...]] = {
+    Format.NET: ("--sumo-net-file",),
+    Format.OSM: tuple(_OSM.split()),
+    Format.OPENDRIVE: tuple(_OPENDRIVE.split()),
+}
+ROOTS = {"net": Format.NET, "osm": Format.OSM, "OpenDRIVE": Format.OPENDRIVE}
+
+
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """A net that can be read, and what was remarked on the way to it."""
+
+    file: Path
+    warnings: tuple[str, ...]
+
+
+def present_net(file: Path, folder: Path) -> Converted:
+    """The map as a net of the present format: itself, where it is one, or a file in `folder`.
+
+    Args:
+      file: a net, an OSM extract or OpenDRIVE; by its content, gzipped or not, and not by its name.
+      folder: an existing one, to write to.
+
+    Raises:
+      MapError: it is none of them, or netconvert refuses it or is not there.
+      OSError: it cannot be read.
+    """
+    plain = _unpacked(file, folder)
+    format_, version = _told(plain)
+    if format_ is Format.NET and version >= PRESENT:
+        return Converted(plain, ())
+    out = folder / "converted.net.xml"
+    said = _run([netconvert(), *OPTIONS[format_], str(plain), "--output-file", str(out)], file.name)
+    warnings = [line[:_LONGEST] for line in re.findall(r"^Warning: (.*)$", said, re.MULTILINE)]
+    return Converted(out, tuple(warnings[:MOST_WARNINGS]))
+
+
+def netconvert() -> str:
+    """The program.
+
+    Raises:
+      MapError: it is not installed.
+    """
+    found = shutil.which("netconvert")
+    if found is None and (package := importlib.util.find_spec("sumo")) and package.submodule_search_locations:
+        found = shutil.which("netconvert", path=str(Path(package.submodule_search_locations[0]) / "bin"))
+    if found is None:
+        raise MapError("this map has to be converted, and netconvert is not installed; pip install eclipse-sumo")
+    return found
+
+
+def _unpacked(file: Path, folder: Path) -> Path:
+    with file.open("rb") as stream:
+        packed = stream.read(2) == b"\x1f\x8b"
+    if not packed:
+        return file
+    plain = folder / "unpacked.xml"
+    try:
+        with gzip.open(file) as source, plain.open("wb") as target:
+            shutil.copyfileobj(source, target)
+    except (EOFError, gzip.BadGzipFile) as error:
+        raise MapError(f"{file.name} is no whole gzip file: {error}") from error
+    return plain
+
+
+def _told(file: Path) -> tuple[Format, tuple[int, ...]]:
+    """Format and version, by the root element."""
+    with file.open("rb") as stream:
+        head = stream.read(HEAD_BYTES).decode("utf-8", "replace")
+        while (
+            "-->" not in head and "<!--" in head and (more := stream.read(HEAD_BYTES))
+        ):  # netconvert's own long header
+            head += more.decode("utf-8", "replace")
+        head += stream.read(HEAD_BYTES).decode("utf-8", "replace")
+    root = re.search(r"<([A-Za-z_][\w.-]*)([^>]*)", re.sub(r"<!--.*?-->", "", head, flags=re.DOTALL))
+    if root is None or root[1] not in ROOTS:
+        got = "no XML" if root is None else f"XML with the root <{root[1][:40]}>"
+        raise MapError(f"{file.name} is {got}; wanted <net> (SUMO), <osm> or <OpenDRIVE>")
+    version = re.search(r'version="(\d+)\.(\d+)', root[2])
+    return ROOTS[root[1]], (0,) if version is None else (int(version[1]), int(version[2]))
+
+
+def _run(command: Sequence[str], name: str) -> str:
+    """What netconvert says."""
+    folder = str(Path(command[0]).resolve().parents[1])  # where it finds its data of projections
+    environment = {"PATH": os.defpath, "SUMO_HOME": folder, "PROJ_LIB": f"{folder}/data/proj"}
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=WALL_S, env=environment, check=False)
+    except subprocess.TimeoutExpired:
+        raise MapError(f"converting {name} takes more than {WALL_S} s; wanted a smaller map") from None
+    said = done.stderr.decode("utf-8", "replace")
+    if done.returncode != 0:
+        errors = re.findall(r"^Error: (.*)$", said, re.MULTILINE)[:5]
+        raise MapError(f"netconvert cannot convert {name}: {'; '.join(errors)[:1000] or f'status {done.returncode}'}")
+    return said
