@@ -110,7 +110,13 @@ def code_digest() -> str:
 def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
     """The files that SUMO reads for an episode, with their SHA-256, as they are here."""
     net = Problem.from_spec(spec).family.layout(episode.scene).net
-    return {name: hashlib.sha256((files(WORLD) / name).read_bytes()).hexdigest() for name in (net, "vtypes.add.xml")}
+    contents = {name: (Path(str(files(WORLD))) / name).read_bytes() for name in (net, "vtypes.add.xml")}
+    return {_portable(name, spec): hashlib.sha256(content).hexdigest() for name, content in contents.items()}
+
+
+def _portable(name: str, spec: RunSpec) -> str:
+    """A file's name on any machine: below `sumo_nets/`, or below the library of places."""
+    return f"{spec.family}/{Path(name).name}" if Path(name).is_absolute() else name
 
 
 def bundle_bytes(bundle: Bundle) -> bytes:
