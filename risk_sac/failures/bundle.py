@@ -108,10 +108,21 @@ def code_digest() -> str:
 
 
 def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
-    """The files that SUMO reads for an episode, with their SHA-256, as they are here."""
+    """The files that SUMO reads for an episode, with their SHA-256, as they are here.
+
+    Raises:
+      ConfigError: one of them is gone.
+    """
     net = Problem.from_spec(spec).family.layout(episode.scene).net
-    contents = {name: (Path(str(files(WORLD))) / name).read_bytes() for name in (net, "vtypes.add.xml")}
-    return {_portable(name, spec): hashlib.sha256(content).hexdigest() for name, content in contents.items()}
+    found = {}
+    for name in (net, "vtypes.add.xml"):
+        try:
+            content = (Path(str(files(WORLD))) / name).read_bytes()
+        except FileNotFoundError as error:
+            message = f"{name}, which {episode.id_in(spec.id)} was found on, is gone"
+            raise ConfigError(message, field="BUNDLE") from error
+        found[_portable(name, spec)] = hashlib.sha256(content).hexdigest()
+    return found
 
 
 def _portable(name: str, spec: RunSpec) -> str:
@@ -133,7 +144,7 @@ def check_world(manifest: Manifest) -> None:
     """Refuses a failure that was found on another net, or with other vehicle types.
 
     Raises:
-      ConfigError: naming the file.
+      ConfigError: naming the file, also where it is gone.
     """
     for name, digest in world_of(manifest.spec, manifest.episode).items():
         if manifest.world.get(name) != digest:

@@ -43,7 +43,7 @@ def read_surfaces(net: Path) -> list[Surface]:
     """
     root = ET.parse(net).getroot()  # a net of ours, not one that a user sent
     surfaces = [
-        Surface("junction", _points(junction.get("shape", "")))
+        Surface("junction", points_of(junction.get("shape", "")))
         for junction in root.iter("junction")
         if junction.get("type") not in ("internal", "dead_end")
     ]
@@ -54,12 +54,12 @@ def read_surfaces(net: Path) -> list[Surface]:
         for lane in edge.iter("lane"):
             pedestrian = lane.get("allow") == "pedestrian"
             use: Use = "crossing" if function == "crossing" else "sidewalk" if pedestrian else "lane"
-            centre = _points(lane.get("shape", ""))
+            centre = points_of(lane.get("shape", ""))
             surfaces.append(Surface(use, _ribbon(centre, float(lane.get("width", "3.2")))))
     return surfaces
 
 
-def _points(shape: str) -> Floats:
+def points_of(shape: str) -> Floats:
     """`k x 2` of a net's "x,y x,y ..."; a height, where given, is dropped."""
     return np.array([[float(value) for value in point.split(",")[:2]] for point in shape.split()]).reshape(-1, 2)
 

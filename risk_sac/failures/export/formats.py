@@ -1,0 +1,147 @@
+"""The table of formats. Cheap to import: a format's module, and the packages that it needs, load when it is made."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, cast
+
+from risk_sac.errors import ConfigError
+
+if TYPE_CHECKING:
+    from risk_sac.failures.export.recorded import Recorded
+
+EXTRA = "export"  # of pyproject.toml: what has the packages
+ZIP = "application/zip"
+Files = Mapping[str, bytes]
+"""What an export is made of: name → content."""
+
+
+class FormatName(StrEnum):
+    """How a format is called: on the command line, over REST, and in the table."""
+
+    SUMO = "sumo"
+    OPENSCENARIO = "openscenario"
+    COMMONROAD = "commonroad"
+    MCAP = "mcap"
+    GIF = "gif"
+    PARQUET = "parquet"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """One row of the table."""
+
+    title: str  # in a menu
+    what: str  # in one sentence
+    of: Literal["failure", "episodes"]  # one failure, or all episodes of runs
+    module: str  # in this room; has `files`
+    packages: tuple[str, ...] = ()  # that it imports, beyond those that are always there
+    suffix: str = ".zip"  # of what is downloaded: several files, or the one that it is
+    media_type: str = ZIP
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Its packages that are not installed."""
+        return tuple(name for name in self.packages if find_spec(name) is None)
+
+
+FORMATS: Mapping[FormatName, Format] = {
+    FormatName.SUMO: Format(
+        title="SUMO",
+        what="net, vehicle types and a TraCI script that replays it in sumo or sumo-gui, and its FCD",
+        of="failure",
+        module="sumo",
+    ),
+    FormatName.OPENSCENARIO: Format(
+        title="OpenSCENARIO",
+        what="OpenSCENARIO XML 1.2 on an OpenDRIVE 1.7 road, signals included; the ego is free, or drives as recorded",
+        of="failure",
+        module="openscenario",
+        packages=("scenariogeneration", "sumo"),
+    ),
+    FormatName.COMMONROAD: Format(
+        title="CommonRoad",
+        what="CommonRoad XML 2020a with a planning problem for the ego, or with the ego as recorded",
+        of="failure",
+        module="commonroad",
+        packages=("commonroad",),
+    ),
+    FormatName.MCAP: Format(
+        title="MCAP",
+        what="a recording with foxglove schemas: roads, bodies, signals, distances, requirements",
+        of="failure",
+        module="mcap",
+        packages=("foxglove",),
+        suffix=".mcap",
+        media_type="application/octet-stream",
+    ),
+    FormatName.GIF: Format(
+        title="GIF",
+        what="an animation of the last seconds, seen from above",
+        of="failure",
+        module="gif",
+        suffix=".gif",
+        media_type="image/gif",
+    ),
+    FormatName.PARQUET: Format(
+        title="Parquet",
+        what="a table with a row for every episode of the runs, whatever its outcome",
+        of="episodes",
+        module="parquet",
+        packages=("pyarrow",),
+        suffix=".parquet",
+        media_type="application/vnd.apache.parquet",
+    ),
+}
+
+
+def of_failure(name: FormatName, failure: "Recorded") -> Files:
+    """A failure in a format.
+
+    Raises:
+      ConfigError: the format holds no single failure, or a package is missing, or the failure cannot be told in it.
+      SimulationError: of a format for which it is played again: it does not repeat here.
+    """
+    return cast("Callable[[Recorded], Files]", _maker(name, "failure"))(failure)
+
+
+def of_episodes(name: FormatName, runs: Sequence[Path]) -> Files:
+    """All episodes of runs in a format.
+
+    Args:
+      name: of the format.
+      runs: their folders.
+
+    Raises:
+      ConfigError: the format holds one failure alone, or a package is missing, or a folder holds no run.
+    """
+    return cast("Callable[[Sequence[Path]], Files]", _maker(name, "episodes"))(runs)
+
+
+def names(of: Literal["failure", "episodes"]) -> list[FormatName]:
+    """Those that hold one failure, or all episodes."""
+    return [name for name, format_ in FORMATS.items() if format_.of == of]
+
+
+def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
+    """Refuses a format that cannot hold what it is asked to, or that lacks a package.
+
+    Raises:
+      ConfigError: naming those that can, or what is missing.
+    """
+    format_ = FORMATS[name]
+    if format_.of != of:
+        what = "a single failure" if of == "failure" else "all episodes of runs"
+        raise ConfigError(f"{name} cannot hold {what}; {', '.join(names(of))} can", field="format")
+    if format_.missing:
+        told = ", ".join(format_.missing)
+        message = f"{name} needs {told}, which is not installed: pip install 'risk-sac[{EXTRA}]' brings it"
+        raise ConfigError(message, field="format")
+
+
+def _maker(name: FormatName, of: Literal["failure", "episodes"]) -> object:
+    check_carries(name, of)
+    return import_module(f"risk_sac.failures.export.{FORMATS[name].module}").files

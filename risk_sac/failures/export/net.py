@@ -1,0 +1,146 @@
+"""What the formats need of a SUMO net: lanes with their neighbours and successors, and the signals' programs."""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from risk_sac.failures.roads import points_of
+from risk_sac.types import Floats
+
+Use = Literal["road", "inside", "sidewalk", "crossing"]
+DEFAULT_WIDTH_M = 3.2  # of a lane without one, as in SUMO
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Head:
+    """A link's place in the letters of a signal."""
+
+    signal: str
+    index: int
+
+
+@dataclass(slots=True, kw_only=True)
+class Lane:
+    """A lane of a road, inside a junction, for walking, or a crossing."""
+
+    id: str
+    edge: str
+    index: int  # 0 is the rightmost
+    use: Use
+    centre: Floats  # `k x 2`, m
+    width_m: float
+    speed_mps: float
+    next: list[str] = field(default_factory=list)  # lanes that follow
+    heads: list[Head] = field(default_factory=list)  # at its end
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A signal that shows fixed letters for fixed times."""
+
+    phases: Sequence[tuple[float, str]]  # s, SUMO's letters of all links
+    offset_s: float
+
+    @property
+    def cycle_s(self) -> float:
+        """Until it begins anew."""
+        return sum(duration for duration, _ in self.phases)
+
+    def letters(self, time_s: float) -> str:
+        """What it shows a moment before this time since the start of its cycle, as SUMO's own step has it then."""
+        left = (time_s - 1e-6 - self.offset_s) % self.cycle_s
+        for duration, letters in self.phases:
+            if left < duration:
+                return letters
+            left -= duration
+        return self.phases[-1][1]
+
+
+@dataclass(frozen=True, slots=True)
+class Net:
+    """A road network."""
+
+    lanes: Mapping[str, Lane]
+    signals: Mapping[str, Program]
+
+    def neighbours(self, lane: Lane) -> tuple[Lane | None, Lane | None]:
+        """The lanes of the same edge to its right and to its left."""
+        right, left = (self.lanes.get(f"{lane.edge}_{lane.index + step}") for step in (-1, 1))
+        return right, left
+
+
+def read_net(file: Path) -> Net:
+    """Reads a net that SUMO has read before: one of ours, or one that was checked when it was uploaded."""
+    root = ET.parse(file).getroot()
+    lanes = {lane.id: lane for edge in root.iter("edge") for lane in _lanes(edge)}
+    for connection in root.iter("connection"):
+        _connect(lanes, connection)
+    signals = {
+        logic.get("id", ""): Program(
+            [(float(phase.get("duration", "0")), phase.get("state", "")) for phase in logic.iter("phase")],
+            float(logic.get("offset", "0")),
+        )
+        for logic in root.iter("tlLogic")
+    }
+    return Net(lanes, signals)
+
+
+def _lanes(edge: ET.Element) -> list[Lane]:
+    function = edge.get("function", "normal")
+    if function == "walkingarea":
+        return []
+    return [
+        Lane(
+            id=lane.get("id", ""),
+            edge=edge.get("id", ""),
+            index=int(lane.get("index", "0")),
+            use=_use(function, lane),
+            centre=points_of(lane.get("shape", "")),
+            width_m=float(lane.get("width", DEFAULT_WIDTH_M)),
+            speed_mps=float(lane.get("speed", "13.89")),
+        )
+        for lane in edge.iter("lane")
+    ]
+
+
+def _use(function: str, lane: ET.Element) -> Use:
+    if function == "crossing":
+        return "crossing"
+    if lane.get("allow") == "pedestrian":
+        return "sidewalk"
+    return "inside" if function == "internal" else "road"
+
+
+def _connect(lanes: Mapping[str, Lane], connection: ET.Element) -> None:
+    """Follows a connection by way of the lane inside the junction, if it has one."""
+    ends = [f"{connection.get(end)}_{connection.get(f'{end}Lane')}" for end in ("from", "to")]
+    signal, via = connection.get("tl"), connection.get("via")
+    head = None if signal is None else Head(signal=signal, index=int(connection.get("linkIndex", "0")))
+    if ends[1] in lanes and lanes[ends[1]].use == "crossing":
+        lanes[ends[1]].heads += [head] if head else []  # it comes from a walking area, which is no lane here
+    if ends[0] not in lanes:
+        return
+    start = lanes[ends[0]]
+    after = via or ends[1]
+    if after in lanes and after not in start.next:
+        start.next.append(after)
+    if head is not None:
+        start.heads.append(head)
+
+
+def boundaries(centre: Floats, width_m: float) -> tuple[Floats, Floats]:
+    """The left and the right edge of a lane, `k x 2` each.
+
+    Each point is moved across the bisector of the sides that meet there, as far as keeps both sides at half the width.
+    """
+    sides = np.diff(centre, axis=0)
+    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
+    normals = np.column_stack((-sides[:, 1], sides[:, 0]))
+    before, after = np.vstack((normals[:1], normals)), np.vstack((normals, normals[-1:]))
+    mitre = before + after
+    mitre /= (1.0 + (before * after).sum(axis=1, keepdims=True)).clip(min=0.5)
+    return centre + mitre * width_m / 2, centre - mitre * width_m / 2

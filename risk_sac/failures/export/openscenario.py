@@ -1,0 +1,158 @@
+"""ASAM OpenSCENARIO XML 1.2 on an OpenDRIVE road.
+
+A vehicle's place is that of its rear axle's middle on the ground, as the standard has it; its box says where the body
+is from there. Everybody but the ego follows its trajectory by the clock; the ego is free, and is asked to drive where it
+was going. The other file has the ego follow its own trajectory too.
+"""
+
+import xml.etree.ElementTree as ET
+from datetime import datetime
+
+import numpy as np
+from scenariogeneration import xosc
+
+from risk_sac.failures.export.beside import BESIDE, beside
+from risk_sac.failures.export.formats import Files
+from risk_sac.failures.export.opendrive import opendrive
+from risk_sac.failures.export.recorded import Actor, Recorded
+from risk_sac.failures.export.route import goal
+from risk_sac.failures.export.signals import colour, cycle
+from risk_sac.failures.export.xml import document
+from risk_sac.types import STEP_S
+
+VERSION = 2  # of OpenSCENARIO 1
+FREE, AS_RECORDED, ROADS = "failure.xosc", "failure-as-recorded.xosc", "roads.xodr"
+LACKS = (
+    "requirements and how far each was kept",
+    "what the ego sees",
+    "signals of pedestrian crossings, which netconvert leaves out of OpenDRIVE",
+    "friction",
+    "the ego's driver",
+)
+MADE = datetime(2000, 1, 1)  # a date is required; with a true one the same failure would be another file
+REAR_AXLE, FRONT_AXLE = 0.3, 0.3  # of a body's length, from its middle
+HEIGHTS_M = {"car": 1.5, "truck": 3.2, "pedestrian": 1.75}
+FASTEST_MPS, ACCEL_MPS2, DECEL_MPS2 = 60.0, 10.0, 12.0  # a body's; players check what they drive against it
+LAST_S = 20.0  # that a free ego may take
+
+
+def files(failure: Recorded) -> Files:
+    """Two scenarios, the roads, and what neither can say."""
+    roads = opendrive(failure.net_file, failure.name)
+    return {
+        FREE: _scenario(failure, roads, free=True),
+        AS_RECORDED: _scenario(failure, roads, free=False),
+        ROADS: roads,
+        BESIDE: beside(failure, LACKS),
+    }
+
+
+def _scenario(failure: Recorded, roads: bytes, *, free: bool) -> bytes:
+    end_s = failure.time_s[-1] + (LAST_S if free else 0.0)
+    entities, init = xosc.Entities(), xosc.Init()
+    for actor in failure.actors:
+        entities.add_scenario_object(actor.id, _body(actor))
+        init.add_init_action(actor.id, xosc.TeleportAction(_place(actor, 0)))
+        init.add_init_action(actor.id, _speed(actor))
+    if free:
+        x, y, heading = goal(failure)[1]
+        init.add_init_action(failure.ego.id, xosc.AcquirePositionAction(xosc.WorldPosition(x, y, 0, heading, 0, 0)))
+    act = xosc.Act("recorded", _at("begins", 0.0))
+    for actor in failure.others if free else failure.actors:
+        act.add_maneuver_group(_group(actor, leaves=len(actor.time_s) < failure.frames))
+    board = xosc.StoryBoard(init, _at("ends", end_s, "stop"))
+    board.add_act(act)
+    scenario = xosc.Scenario(
+        f"{failure.name}, the ego {'free' if free else 'as recorded'}; {BESIDE} has what is not in this file",
+        "RISK-SAC",
+        xosc.ParameterDeclarations(),
+        entities,
+        board,
+        _roads(failure, roads),
+        xosc.Catalog(),
+        osc_minor_version=VERSION,
+        creation_date=MADE,
+    )
+    return document(scenario.get_element())
+
+
+def _roads(failure: Recorded, roads: bytes) -> xosc.RoadNetwork:
+    """The road file, and what its signals show from the first frame on."""
+    network = xosc.RoadNetwork(ROADS)
+    drawn = {signal.get("id") for signal in ET.fromstring(roads).iter("signal")}
+    for id_ in failure.heads:
+        controller = xosc.TrafficSignalController(id_)
+        for number, (steps, letters) in enumerate(cycle(failure, id_)):
+            phase = xosc.Phase(f"{id_}-{number}", steps * STEP_S)
+            for index, letter in enumerate(letters):
+                if f"{id_}_{index}" in drawn:
+                    phase.add_signal_state(f"{id_}_{index}", colour(letter))
+            controller.add_phase(phase)
+        network.add_traffic_signal_controller(controller)
+    return network
+
+
+def _body(actor: Actor) -> xosc.Vehicle | xosc.Pedestrian:
+    if actor.pedestrian:
+        height = HEIGHTS_M["pedestrian"]
+        box = xosc.BoundingBox(actor.width_m, actor.length_m, height, 0, 0, height / 2)
+        return xosc.Pedestrian("pedestrian", 75, xosc.PedestrianCategory.pedestrian, box)
+    truck = actor.length_m > 6.0
+    height = HEIGHTS_M["truck" if truck else "car"]
+    box = xosc.BoundingBox(actor.width_m, actor.length_m, height, REAR_AXLE * actor.length_m, 0, height / 2)
+    wheel_m, track_m = (1.0, 2.0) if truck else (0.7, 1.6)
+    base_m = (REAR_AXLE + FRONT_AXLE) * actor.length_m
+    return xosc.Vehicle(
+        "truck" if truck else "car",
+        xosc.VehicleCategory.truck if truck else xosc.VehicleCategory.car,
+        box,
+        xosc.Axle(0.5, wheel_m, track_m, base_m, wheel_m / 2),
+        xosc.Axle(0.0, wheel_m, track_m, 0.0, wheel_m / 2),
+        FASTEST_MPS,
+        ACCEL_MPS2,
+        DECEL_MPS2,
+    )
+
+
+def _place(actor: Actor, frame: int) -> xosc.WorldPosition:
+    """Of the rear axle's middle; of a pedestrian, its own."""
+    heading = float(actor.heading_rad[frame])
+    back_m = 0.0 if actor.pedestrian else REAR_AXLE * actor.length_m
+    x, y = actor.x_m[frame] - back_m * np.cos(heading), actor.y_m[frame] - back_m * np.sin(heading)
+    return xosc.WorldPosition(float(x), float(y), 0, heading, 0, 0)
+
+
+def _speed(actor: Actor) -> xosc.AbsoluteSpeedAction:
+    at_once = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0)
+    return xosc.AbsoluteSpeedAction(float(actor.speed_mps[0]), at_once)
+
+
+def _group(actor: Actor, *, leaves: bool) -> xosc.ManeuverGroup:
+    """An actor that follows its trajectory, and is taken away where it left the net."""
+    trajectory = xosc.Trajectory(f"{actor.id} recorded", closed=False)
+    times = [float(t) for t in actor.time_s]
+    trajectory.add_shape(xosc.Polyline(times, [_place(actor, frame) for frame in range(len(times))]))
+    follow = xosc.FollowTrajectoryAction(
+        trajectory, xosc.FollowingMode.position, xosc.ReferenceContext.absolute, scale=1, offset=0
+    )
+    maneuver = xosc.Maneuver(f"{actor.id} drives")
+    maneuver.add_event(_event(f"{actor.id} follows", follow, 0.0))
+    if leaves:
+        maneuver.add_event(_event(f"{actor.id} leaves", xosc.DeleteEntityAction(actor.id), times[-1]))
+    group = xosc.ManeuverGroup(f"{actor.id} alone")
+    group.add_actor(actor.id)
+    group.add_maneuver(maneuver)
+    return group
+
+
+def _event(name: str, action: object, from_s: float) -> xosc.Event:
+    event = xosc.Event(name, xosc.Priority.parallel)
+    event.add_action(name, action)
+    event.add_trigger(_at(name, from_s))
+    return event
+
+
+def _at(name: str, time_s: float, point: str = "start") -> xosc.ValueTrigger:
+    """From a moment of the scenario's clock on."""
+    condition = xosc.SimulationTimeCondition(time_s, xosc.Rule.greaterOrEqual)
+    return xosc.ValueTrigger(name, 0, xosc.ConditionEdge.none, condition, triggeringpoint=point)

@@ -1,0 +1,181 @@
+"""A failure as the formats tell it: who was there, where everybody was in each frame, and what the signals showed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.errors import ConfigError
+from risk_sac.failures.bundle import WORLD, Bundle, Manifest, check_world
+from risk_sac.failures.export.net import Net, read_net
+from risk_sac.failures.trajectory import Series
+from risk_sac.problem import Problem
+from risk_sac.records import Collision
+from risk_sac.scenario.layout import Layout
+from risk_sac.types import STEP_S, Floats, Kind, Role
+
+PER_FRAME = ("x_m", "y_m", "heading_rad", "vx_mps", "vy_mps", "speed_mps", "accel_mps2", "visible")
+PER_ACTOR = ("kind", "role", "length_m", "width_m")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Actor:
+    """One of those who are there. All arrays have a row for each of the first frames, until it left the net."""
+
+    id: str
+    kind: Kind
+    role: Role
+    length_m: float
+    width_m: float
+    time_s: Floats  # since the first frame
+    x_m: Floats  # of the body's centre
+    y_m: Floats
+    heading_rad: Floats  # without jumps of 2π
+    speed_mps: Floats
+    vx_mps: Floats
+    vy_mps: Floats
+    accel_mps2: Floats
+
+    @property
+    def pedestrian(self) -> bool:
+        """Whether it walks."""
+        return self.kind is Kind.PEDESTRIAN
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A failure from its first frame, 1.5 s before the adversaries' release, to the contact."""
+
+    bundle: Bundle
+    problem: Problem
+    layout: Layout
+    net_file: Path
+
+    @classmethod
+    def of(cls, bundle: Bundle) -> "Recorded":
+        """Of a bundle, which may come from anybody.
+
+        Raises:
+          ConfigError: its net is gone or another one, or it lacks an array that every recording has.
+        """
+        manifest = bundle.manifest
+        check_world(manifest)
+        _check(manifest, bundle.series)
+        problem = Problem.from_spec(manifest.spec)
+        layout = problem.family.layout(manifest.episode.scene)
+        return cls(bundle, problem, layout, Path(str(files(WORLD) / layout.net)))
+
+    @property
+    def manifest(self) -> Manifest:
+        """What the bundle says of it."""
+        return self.bundle.manifest
+
+    @property
+    def series(self) -> Series:
+        """All arrays."""
+        return self.bundle.series
+
+    @property
+    def name(self) -> str:
+        """Its id, which makes the name of a file too."""
+        return self.manifest.id
+
+    @property
+    def collision(self) -> Collision:
+        """That it ends in."""
+        collision = self.manifest.episode.collision
+        if collision is None:
+            raise ConfigError(f"{self.name} ends without a contact, so that there is no failure in it", field="BUNDLE")
+        return collision
+
+    @cached_property
+    def actors(self) -> tuple[Actor, ...]:
+        """The ego first."""
+        return tuple(self._actor(column) for column in range(len(self.series["ids"])))
+
+    @property
+    def ego(self) -> Actor:
+        """The vehicle under test."""
+        return self.actors[0]
+
+    @property
+    def others(self) -> tuple[Actor, ...]:
+        """Everybody else."""
+        return self.actors[1:]
+
+    @property
+    def frames(self) -> int:
+        """How many there are, one every 0.1 s."""
+        return len(self.series["time_s"])
+
+    @property
+    def time_s(self) -> Floats:
+        """Of each frame, since the first."""
+        return np.arange(self.frames) * STEP_S
+
+    @property
+    def released_s(self) -> float:
+        """When the adversaries were released, since the first frame."""
+        return float(self.series["released_s"] - self.series["time_s"][0])
+
+    @cached_property
+    def net(self) -> Net:
+        """The roads."""
+        return read_net(self.net_file)
+
+    @cached_property
+    def heads(self) -> Mapping[str, NDArray[np.uint8]]:
+        """Of each signal, SUMO's letters, `frames x links`.
+
+        Recorded since the release; before it, and where nothing was recorded, from the signal's fixed program.
+        """
+        letters: dict[str, NDArray[np.uint8]] = {}
+        recorded, column = self.bundle.signal_heads, 0
+        for id_, program in sorted(self.net.signals.items()):
+            shown = [program.letters(self.offset_s(id_, frame)) for frame in range(self.frames)]
+            rows = np.array([list(text.encode()) for text in shown], dtype=np.uint8)
+            if recorded.size:
+                mine = recorded[:, column : column + rows.shape[1]]
+                rows[len(rows) - len(mine) :] = mine
+                column += rows.shape[1]
+            letters[id_] = rows
+        return letters
+
+    def offset_s(self, signal: str, frame: int) -> float:
+        """Where a signal is in its program at a frame, which may be one after the last."""
+        begins_s = self.layout.signal_offset_s if signal == self.layout.signal else 0.0
+        return begins_s + float(self.series["time_s"][0]) + frame * STEP_S
+
+    def _actor(self, column: int) -> Actor:
+        series = self.series
+        there = np.flatnonzero(np.isfinite(series["x_m"][:, column]))
+        last = int(there[-1]) + 1
+        per_frame = {
+            name: np.asarray(series[name][:last, column], dtype=np.float64) for name in PER_FRAME if name != "visible"
+        }
+        per_frame["heading_rad"] = np.unwrap(per_frame["heading_rad"])
+        return Actor(
+            id=str(series["ids"][column]),
+            kind=Kind(int(series["kind"][column])),
+            role=Role(int(series["role"][column])),
+            length_m=float(series["length_m"][column]),
+            width_m=float(series["width_m"][column]),
+            time_s=self.time_s[:last],
+            **per_frame,
+        )
+
+
+def _check(manifest: Manifest, series: Series) -> None:
+    """Refuses what no recording looks like."""
+    frames, actors = len(series["time_s"]), len(np.atleast_1d(series.get("ids", np.empty(0))))
+    wanted = dict.fromkeys(PER_FRAME, (frames, actors)) | dict.fromkeys(PER_ACTOR, (actors,))
+    for name, shape in wanted.items():
+        if name not in series or series[name].shape != shape or series[name].dtype.kind not in "fi":
+            raise ConfigError(f"{manifest.id} has no sound array {name}, so that nothing can be told of it", field="BUNDLE")
+    there = np.isfinite(series["x_m"])
+    if not actors or not there[0].all() or (there[1:] > there[:-1]).any():
+        raise ConfigError(f"{manifest.id} does not begin with everybody in place", field="BUNDLE")

@@ -1,0 +1,107 @@
+"""SUMO: net, vehicle types, and a script that has the `sumo` binary do what libsumo did, with equal states."""
+
+import json
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict
+from importlib.resources import files as resources
+from pathlib import Path
+
+import numpy as np
+
+from risk_sac.env import RiskSacEnv
+from risk_sac.errors import SimulationError
+from risk_sac.failures.export.beside import BESIDE, beside
+from risk_sac.failures.export.calls import Heard, VehicleState, tapped
+from risk_sac.failures.export.formats import Files
+from risk_sac.failures.export.recorded import Actor, Recorded
+from risk_sac.failures.export.xml import document
+from risk_sac.failures.play import repeated
+from risk_sac.types import STEP_S
+
+LACKS = ("pedestrians as persons of SUMO: they are points of their own dynamics", "what the ego sees", "requirements")
+NET, TYPES, CONFIGURATION, FCD = "net.net.xml", "vtypes.add.xml", "failure.sumocfg", "fcd.xml"
+ZOOM = 2500.0  # of sumo-gui, in which some 30 m are seen
+LONG = {"-n": "net-file", "-a": "additional-files"}
+HERE = {"net-file": NET, "additional-files": TYPES}  # where they lie in the export
+
+
+def files(failure: Recorded) -> Files:
+    """The files, once the failure was played again and every call heard.
+
+    Raises:
+      SimulationError: it does not repeat here.
+    """
+    manifest = failure.manifest
+    with tapped() as heard, closing(RiskSacEnv.of(manifest.spec)) as env:
+        repeated(env, manifest.spec, manifest.episode, failure.series)
+    heard = heard.first(failure.frames)
+    if len(heard.states) != failure.frames:
+        raise SimulationError(f"{failure.name} took {len(heard.states)} steps; wanted {failure.frames}")
+    types = Path(str(resources("sumo_nets") / TYPES))
+    return {
+        "replay.py": Path(__file__).with_name("sumo_replay.py").read_bytes(),
+        CONFIGURATION: _configuration(failure, heard),
+        NET: failure.net_file.read_bytes(),
+        TYPES: types.read_bytes(),
+        "commands.json": _commands(failure, heard),
+        FCD: _fcd(failure, heard),
+        BESIDE: beside(failure, LACKS),
+    }
+
+
+def _configuration(failure: Recorded, heard: Heard) -> bytes:
+    """The options that it was played with; sumo-gui opens it too."""
+    root = ET.Element("configuration")
+    root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot say of it, replay.py plays it "))
+    options = ET.SubElement(root, "options")
+    for name, value in _pairs(heard.options):
+        ET.SubElement(options, name, value=HERE.get(name, value))
+    return document(root)
+
+
+def _pairs(words: Sequence[str]) -> list[tuple[str, str]]:
+    """Names and values of a command line's options; that of a flag is true."""
+    pairs: list[tuple[str, str]] = []
+    for word in words:
+        if word.startswith("-") and not word.lstrip("-")[:1].isdigit():
+            pairs.append((LONG.get(word, word.removeprefix("--")), "true"))
+        else:
+            pairs[-1] = (pairs[-1][0], word)
+    return pairs
+
+
+def _commands(failure: Recorded, heard: Heard) -> bytes:
+    """What is told before each step, a line each."""
+    head = {"failure": failure.name, "ego": failure.ego.id, "striker": failure.collision.other_id, "zoom": ZOOM}
+    told = ",\n".join(json.dumps(calls) for calls in heard.calls)
+    return f'{json.dumps(head)[:-1]}, "commands": [\n{told}\n]}}\n'.encode()
+
+
+def _fcd(failure: Recorded, heard: Heard) -> bytes:
+    """Floating car data, as SUMO's own output has it, but in full precision."""
+    root = ET.Element("fcd-export")
+    root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot say of it "))
+    walkers = [actor for actor in failure.actors if actor.pedestrian]
+    for frame, states in enumerate(heard.states):
+        step = ET.SubElement(root, "timestep", time=f"{(frame + 1) * STEP_S:.2f}")
+        _vehicles(step, states)
+        for walker in walkers:
+            _person(step, walker, frame)
+    return document(root)
+
+
+def _vehicles(step: ET.Element, states: Sequence[VehicleState]) -> None:
+    for state in states:
+        ET.SubElement(step, "vehicle", {name: str(value) for name, value in asdict(state).items()})
+
+
+def _person(step: ET.Element, walker: Actor, frame: int) -> None:
+    state = {
+        "x": walker.x_m[frame],
+        "y": walker.y_m[frame],
+        "angle": (90.0 - np.degrees(walker.heading_rad[frame])) % 360.0,  # from north, clockwise
+        "speed": walker.speed_mps[frame],
+    }
+    ET.SubElement(step, "person", {"id": walker.id} | {name: repr(float(value)) for name, value in state.items()})
