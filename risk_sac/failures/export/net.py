@@ -21,6 +21,7 @@ class Head:
 
     signal: str
     index: int
+    turn: str  # SUMO's letter of where the link goes: s, l, r and others
 
 
 @dataclass(slots=True, kw_only=True)
@@ -118,8 +119,8 @@ def _use(function: str, lane: ET.Element) -> Use:
 def _connect(lanes: Mapping[str, Lane], connection: ET.Element) -> None:
     """Follows a connection by way of the lane inside the junction, if it has one."""
     ends = [f"{connection.get(end)}_{connection.get(f'{end}Lane')}" for end in ("from", "to")]
-    signal, via = connection.get("tl"), connection.get("via")
-    head = None if signal is None else Head(signal=signal, index=int(connection.get("linkIndex", "0")))
+    signal, via, turn = connection.get("tl"), connection.get("via"), connection.get("dir", "s").lower()
+    head = None if signal is None else Head(signal=signal, index=int(connection.get("linkIndex", "0")), turn=turn)
     if ends[1] in lanes and lanes[ends[1]].use == "crossing":
         lanes[ends[1]].heads += [head] if head else []  # it comes from a walking area, which is no lane here
     if ends[0] not in lanes:
