@@ -1,0 +1,235 @@
+"""MCAP with foxglove schemas: what was there, what was measured, and the moments that matter, on one clock.
+
+Such a file carries everything, so that nothing lies beside it: the JSON of the other formats is attached.
+"""
+
+import io
+import json
+import math
+from collections.abc import Iterator
+
+import foxglove
+import numpy as np
+from foxglove import Channel, Context, Schema
+from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
+from foxglove.messages import (
+    Color,
+    CubePrimitive,
+    CylinderPrimitive,
+    FrameTransform,
+    FrameTransforms,
+    KeyValuePair,
+    LinePrimitive,
+    LinePrimitiveLineType,
+    Log,
+    LogLevel,
+    Point3,
+    Pose,
+    Quaternion,
+    SceneEntity,
+    SceneEntityDeletion,
+    SceneEntityDeletionType,
+    SceneUpdate,
+    SpherePrimitive,
+    TextPrimitive,
+    Timestamp,
+    TriangleListPrimitive,
+    Vector3,
+)
+
+from risk_sac.failures.export.beside import BESIDE, beside
+from risk_sac.failures.export.formats import Files
+from risk_sac.failures.export.net import Lane, boundaries
+from risk_sac.failures.export.recorded import Actor, Recorded
+from risk_sac.failures.export.signals import colour
+from risk_sac.failures.sentence import sentence
+from risk_sac.types import Floats
+
+MAP, EGO = "map", "ego"  # frames of reference
+BLUE, ORANGE, GREY, WHITE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5, 0.5), (0.9, 0.9, 0.9)
+UNSEEN_ALPHA = 0.35  # of a body that the ego does not know of
+GROUND = {
+    "road": (0.25, 0.25, 0.27),
+    "inside": (0.25, 0.25, 0.27),
+    "sidewalk": (0.55, 0.55, 0.55),
+    "crossing": (0.8, 0.8, 0.8),
+}
+LIGHTS = {
+    "red": (1, 0, 0),
+    "red_yellow": (1, 0.5, 0),
+    "yellow": (1, 0.9, 0),
+    "green": (0, 0.8, 0),
+    "off": (0.2, 0.2, 0.2),
+}
+HEIGHTS_M = {True: 1.75, False: 1.5}  # of pedestrians, and of vehicles
+MEASURES = "risk_sac.Measures"
+
+
+def files(failure: Recorded) -> Files:
+    """One file."""
+    content, context = io.BytesIO(), Context()
+    options = foxglove.mcap.MCAPWriteOptions(compression_threads=0)
+    with foxglove.open_mcap(content, context=context, writer_options=options) as writer:
+        SceneUpdateChannel("/roads", context=context).log(_roads(failure), log_time=0)
+        actors, signals = SceneUpdateChannel("/actors", context=context), SceneUpdateChannel("/signals", context=context)
+        frames, measures = FrameTransformsChannel("/tf", context=context), _measures_channel(failure, context)
+        moments = LogChannel("/moments", context=context)
+        said = {frame: text for frame, text in _moments(failure)}
+        for frame, time_s in enumerate(failure.time_s):
+            at = round(float(time_s) * 1e9)
+            actors.log(_actors(failure, frame), log_time=at)
+            frames.log(_ego_frame(failure, frame), log_time=at)
+            measures.log(_measured(failure, frame), log_time=at)
+            if failure.heads:
+                signals.log(_signals(failure, frame), log_time=at)
+            if frame in said:
+                moments.log(Log(timestamp=_stamp(failure, frame), level=LogLevel.Info, message=said[frame], name="risk-sac"), log_time=at)
+        manifest = failure.manifest
+        writer.write_metadata("failure", {"id": failure.name, "digest": manifest.digest, "code": manifest.code, "beside": BESIDE})
+        writer.attach(log_time=0, create_time=0, name=BESIDE, media_type="application/json", data=beside(failure, ()))
+    return {f"{failure.name}.mcap": content.getvalue()}
+
+
+def _stamp(failure: Recorded, frame: int) -> Timestamp:
+    return Timestamp.from_epoch_secs(float(failure.time_s[frame]))
+
+
+def _paint(tone: tuple[float, float, float], alpha: float = 1.0) -> Color:
+    red, green, blue = tone
+    return Color(r=red, g=green, b=blue, a=alpha)
+
+
+def _turned(heading_rad: float) -> Quaternion:
+    return Quaternion(x=0, y=0, z=math.sin(heading_rad / 2), w=math.cos(heading_rad / 2))
+
+
+def _roads(failure: Recorded) -> SceneUpdate:
+    return SceneUpdate(entities=[_surface(lane) for lane in failure.net.lanes.values()])
+
+
+def _surface(lane: Lane) -> SceneEntity:
+    """A lane as a strip of triangles, with lines along a road's edges."""
+    left, right = boundaries(lane.centre, lane.width_m)
+    strip = np.stack((left, right), axis=1).reshape(-1, 2)
+    height = {"road": 0.0, "inside": 0.01, "sidewalk": 0.0, "crossing": 0.02}[lane.use]
+    corners = [strip[k + step] for k in range(len(strip) - 2) for step in (0, 1, 2)]
+    lines = [] if lane.use != "road" else [_line(left), _line(right)]
+    return SceneEntity(
+        frame_id=MAP,
+        id=lane.id,
+        triangles=[TriangleListPrimitive(points=_points(np.array(corners), height), color=_paint(GROUND[lane.use]))],
+        lines=lines,
+    )
+
+
+def _line(points: Floats) -> LinePrimitive:
+    return LinePrimitive(
+        type=LinePrimitiveLineType.LineStrip, points=_points(points, 0.03), thickness=0.12, color=_paint(WHITE)
+    )
+
+
+def _points(points: Floats, height_m: float) -> list[Point3]:
+    return [Point3(x=float(x), y=float(y), z=height_m) for x, y in points]
+
+
+def _actors(failure: Recorded, frame: int) -> SceneUpdate:
+    here = [actor for actor in failure.actors if frame < len(actor.time_s)]
+    gone = [actor for actor in failure.actors if frame == len(actor.time_s)]
+    deletions = [SceneEntityDeletion(type=SceneEntityDeletionType.MatchingId, id=actor.id) for actor in gone]
+    return SceneUpdate(entities=[_body(failure, actor, frame) for actor in here], deletions=deletions)
+
+
+def _body(failure: Recorded, actor: Actor, frame: int) -> SceneEntity:
+    column = failure.actors.index(actor)
+    seen = column == 0 or bool(failure.series["visible"][frame, column])
+    tone = BLUE if column == 0 else ORANGE if actor.id == failure.collision.other_id else GREY
+    paint = _paint(tone, 1.0 if seen else UNSEEN_ALPHA)
+    height = HEIGHTS_M[actor.pedestrian]
+    x, y, heading = (float(values[frame]) for values in (actor.x_m, actor.y_m, actor.heading_rad))
+    pose = Pose(position=Vector3(x=x, y=y, z=height / 2), orientation=_turned(heading))
+    size = Vector3(x=actor.length_m, y=actor.width_m, z=height)
+    above = Pose(position=Vector3(x=x, y=y, z=height + 0.8), orientation=_turned(0.0))
+    return SceneEntity(
+        timestamp=_stamp(failure, frame),
+        frame_id=MAP,
+        id=actor.id,
+        metadata=[
+            KeyValuePair(key="role", value=actor.role.name.lower()),
+            KeyValuePair(key="speed_mps", value=f"{actor.speed_mps[frame]:.3f}"),
+            KeyValuePair(key="seen_by_ego", value=str(seen).lower()),
+        ],
+        cubes=[] if actor.pedestrian else [CubePrimitive(pose=pose, size=size, color=paint)],
+        cylinders=[CylinderPrimitive(pose=pose, size=size, bottom_scale=1, top_scale=1, color=paint)] if actor.pedestrian else [],
+        texts=[TextPrimitive(pose=above, billboard=True, font_size=0.8, text=actor.id, color=paint)],
+    )
+
+
+def _signals(failure: Recorded, frame: int) -> SceneUpdate:
+    """A ball over the end of each lane for each of its heads."""
+    entities = []
+    for lane in failure.net.lanes.values():
+        for place, head in enumerate(lane.heads):
+            shown = colour(chr(failure.heads[head.signal][frame, head.index]))
+            x, y = (float(value) for value in lane.centre[-1])
+            pose = Pose(position=Vector3(x=x, y=y, z=4.0 + 0.7 * place), orientation=_turned(0.0))
+            ball = SpherePrimitive(pose=pose, size=Vector3(x=0.6, y=0.6, z=0.6), color=_paint(LIGHTS[shown]))
+            name = f"{head.signal}_{head.index}"
+            entities.append(SceneEntity(timestamp=_stamp(failure, frame), frame_id=MAP, id=name, spheres=[ball]))
+    return SceneUpdate(entities=entities)
+
+
+def _ego_frame(failure: Recorded, frame: int) -> FrameTransforms:
+    ego = failure.ego
+    moved = FrameTransform(
+        timestamp=_stamp(failure, frame),
+        parent_frame_id=MAP,
+        child_frame_id=EGO,
+        translation=Vector3(x=float(ego.x_m[frame]), y=float(ego.y_m[frame]), z=0),
+        rotation=_turned(float(ego.heading_rad[frame])),
+    )
+    return FrameTransforms(transforms=[moved])
+
+
+def _measures_channel(failure: Recorded, context: Context) -> Channel:
+    """JSON, whose schema names every number and its unit."""
+    number = {"type": ["number", "null"]}
+    names = ["ego_speed_mps", "ego_accel_mps2", "striker_distance_m", "striker_ttc_s", "least_ttc_s", "soft_min"]
+    properties = {name: number for name in names} | {"striker_seen": {"type": "boolean"}}
+    requirements = {str(name): number for name in failure.series["requirements"]}
+    properties |= {"robustness": {"type": "object", "properties": requirements}}
+    schema = {"title": MEASURES, "type": "object", "properties": properties}
+    described = Schema(name=MEASURES, encoding="jsonschema", data=json.dumps(schema).encode())
+    return Channel("/measures", message_encoding="json", schema=described, context=context)
+
+
+def _measured(failure: Recorded, frame: int) -> dict[str, object]:
+    series = failure.series
+    striker = [actor.id for actor in failure.actors].index(failure.collision.other_id)
+    names = [str(name) for name in series["requirements"]]
+    return {
+        "ego_speed_mps": _number(failure.ego.speed_mps[frame]),
+        "ego_accel_mps2": _number(failure.ego.accel_mps2[frame]),
+        "striker_distance_m": _number(series["distance_m"][frame, striker]),
+        "striker_ttc_s": _number(series["ttc_s"][frame, striker]),
+        "least_ttc_s": _number(series["least_ttc_s"][frame]),
+        "soft_min": _number(series["soft_min"][frame]),
+        "striker_seen": bool(series["visible"][frame, striker] == 1),
+        "robustness": {name: _number(series["robustness"][frame, i]) for i, name in enumerate(names)},
+    }
+
+
+def _number(value: float) -> float | None:
+    """As JSON has it: null for what is not finite."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _moments(failure: Recorded) -> Iterator[tuple[int, str]]:
+    """Frames and what happens in them."""
+    collision = failure.collision
+    released = round(failure.released_s * 10)
+    yield released, "the adversaries are released"
+    if collision.judgement is not None:
+        began = released + round(collision.judgement.conflict_s * 10)
+        if 0 <= began < failure.frames - 1:
+            yield began, f"the conflict begins: {collision.judgement.signature}"
+        yield failure.frames - 1, f"contact with {collision.other_id}: {sentence(failure.series, collision)}"
