@@ -1,0 +1,132 @@
+"""A GIF of the last seconds, seen from above: for a mail or a ticket, where nothing else can be opened.
+
+The ego is blue and its striker orange, as on the page; whom the ego does not know of is only outlined.
+"""
+
+import io
+from collections.abc import Iterator
+
+import numpy as np
+from PIL import Image, ImageColor, ImageDraw, ImageFont
+
+from risk_sac.failures.export.formats import Files
+from risk_sac.failures.export.recorded import Actor, Recorded
+from risk_sac.failures.export.signals import colour
+from risk_sac.failures.roads import Surface, read_surfaces
+from risk_sac.failures.sentence import sentence
+from risk_sac.types import STEP_S, Floats
+
+WIDTH, HEIGHT, FINE = 560, 340, 2  # px; drawn larger by `FINE`, and then made smooth
+VIEW_M = 56.0  # that the width shows
+LAST_S, HOLD_MS = 7.0, 2000  # before the contact, and how long the contact stays
+EASE = 0.06  # how fast the view follows the ego, so that it does not tremble
+GROUND = {"junction": "#dcdcdc", "lane": "#dcdcdc", "sidewalk": "#efefef", "crossing": "#c8c8c8"}
+PAPER, EDGE, INK = "#f8f8f6", "#bdbdbd", "#202020"
+EGO, STRIKER, OTHER = "#0072b2", "#d55e00", "#8a8a8a"
+LIGHTS = {"red": "#d00000", "red_yellow": "#e07000", "yellow": "#e0b000", "green": "#109010", "off": "#606060"}
+
+
+def files(failure: Recorded) -> Files:
+    """One file."""
+    first = max(failure.frames - round(LAST_S / STEP_S), 0)
+    surfaces = read_surfaces(failure.net_file)
+    middles = list(_middles(failure, first))
+    pictures = [_picture(failure, surfaces, frame, middle) for frame, middle in enumerate(middles, start=first)]
+    palette = _palette()
+    flat = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    step_ms = round(STEP_S * 1000)
+    content = io.BytesIO()
+    flat[0].save(
+        content,
+        "GIF",
+        save_all=True,
+        append_images=flat[1:],
+        duration=[step_ms] * (len(flat) - 1) + [HOLD_MS],
+        loop=0,
+        comment=f"{failure.name}: {_story(failure)}".replace("²", "2").encode("ascii", "replace"),
+    )
+    return {f"{failure.name}.gif": content.getvalue()}
+
+
+def _palette() -> Image.Image:
+    """All colours, and mixtures of each with each ground: chosen by how often they are seen, small bodies would lose theirs."""
+    tones = np.array([ImageColor.getrgb(tone) for tone in (EGO, STRIKER, OTHER, INK, "#ffffff", EDGE, *LIGHTS.values())])
+    grounds = np.array([ImageColor.getrgb(tone) for tone in (PAPER, *sorted(set(GROUND.values())))])
+    shares = np.array([0.0, 0.35, 0.7]).reshape(-1, 1, 1, 1)
+    mixed = tones[:, None] * (1.0 - shares) + grounds * shares
+    colours = np.unique(np.concatenate((grounds, np.rint(mixed).astype(int).reshape(-1, 3))), axis=0)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours.astype(np.uint8).tobytes())
+    return palette
+
+
+def _story(failure: Recorded) -> str:
+    collision = failure.collision
+    return sentence(failure.series, collision) if collision.judgement else f"contact with {collision.other_id}"
+
+
+def _middles(failure: Recorded, first: int) -> Iterator[Floats]:
+    """What each picture's middle shows: in the end the contact, before it what the ego had around it."""
+    path = np.column_stack((failure.ego.x_m, failure.ego.y_m))
+    middle = path[-1]
+    found = []
+    reach = np.array((WIDTH, HEIGHT)) / WIDTH * VIEW_M / 4  # the ego stays within the middle half
+    for place in path[: first - 1 if first else None : -1]:
+        middle = np.clip(middle + EASE * (place - middle), place - reach, place + reach)
+        found.append(middle)
+    return reversed(found)
+
+
+def _picture(failure: Recorded, surfaces: list[Surface], frame: int, middle: Floats) -> Image.Image:
+    picture = Image.new("RGB", (WIDTH * FINE, HEIGHT * FINE), PAPER)
+    pen = ImageDraw.Draw(picture)
+    scale = WIDTH * FINE / VIEW_M
+
+    def placed(points: Floats) -> list[tuple[float, float]]:
+        pixels = (points - middle) * (scale, -scale) + (WIDTH * FINE / 2, HEIGHT * FINE / 2)
+        return [(float(x), float(y)) for x, y in pixels]
+
+    for surface in surfaces:
+        pen.polygon(placed(surface.outline), fill=GROUND[surface.use], outline=EDGE)
+    for lane in failure.net.lanes.values():
+        for place, head in enumerate(lane.heads if lane.use != "crossing" else []):
+            shown = colour(chr(failure.heads[head.signal][frame, head.index]))
+            ((x, y),) = placed(lane.centre[-1:])
+            r = 0.35 * scale
+            x += 2.4 * r * (place - (len(lane.heads) - 1) / 2)
+            pen.ellipse((x - r, y - r, x + r, y + r), fill=LIGHTS[shown])
+    for column, actor in sorted(enumerate(failure.actors), key=lambda each: -each[0]):
+        if frame < len(actor.time_s):
+            tone = EGO if column == 0 else STRIKER if actor.id == failure.collision.other_id else OTHER
+            known = column == 0 or failure.series["visible"][frame, column] == 1
+            _body(pen, placed, actor, frame, tone, known=known)
+    picture = picture.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
+    _caption(ImageDraw.Draw(picture), failure, frame)
+    return picture
+
+
+def _body(pen: ImageDraw.ImageDraw, placed, actor: Actor, frame: int, tone: str, *, known: bool) -> None:
+    """A body, that of a vehicle with a light patch to the front; whom the ego does not know of is outlined."""
+    cos, sin = np.cos(actor.heading_rad[frame]), np.sin(actor.heading_rad[frame])
+    turn, half = np.array([(cos, sin), (-sin, cos)]), np.array((actor.length_m, actor.width_m)) / 2
+    middle = np.array((actor.x_m[frame], actor.y_m[frame]))
+
+    def part(*corners: tuple[float, float]) -> list[tuple[float, float]]:
+        return placed(np.array(corners) * half @ turn + middle)
+
+    fill = tone if known else None
+    if actor.pedestrian:
+        ring = np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
+        pen.polygon(placed(middle + 0.45 * np.column_stack((np.cos(ring), np.sin(ring)))), fill=fill, outline=tone, width=3)
+        return
+    pen.polygon(part((1, 1), (-1, 1), (-1, -1), (1, -1)), fill=fill, outline=tone, width=3)
+    pen.polygon(part((0.25, 0.7), (0.75, 0), (0.25, -0.7)), fill="#ffffff" if known else tone)
+
+
+def _caption(pen: ImageDraw.ImageDraw, failure: Recorded, frame: int) -> None:
+    left_s = (failure.frames - 1 - frame) * STEP_S
+    when = "contact" if left_s < STEP_S / 2 else f"{left_s:.1f} s before the contact"
+    line = f"{when}   ego {failure.ego.speed_mps[frame]:.1f} m/s"
+    pen.rectangle((0, HEIGHT - 22, WIDTH, HEIGHT), fill=PAPER)
+    pen.text((8, HEIGHT - 19), line, fill=INK, font=ImageFont.load_default(13))
+    pen.text((WIDTH - 8, HEIGHT - 17), failure.name, fill=OTHER, font=ImageFont.load_default(10), anchor="ra")
