@@ -10,6 +10,7 @@ from risk_sac.cli.audit import add_audit
 from risk_sac.cli.campaigns import add_campaigns
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
 from risk_sac.cli.evaluate import add_evaluate
+from risk_sac.cli.export import add_export
 from risk_sac.cli.keys import add_keys
 from risk_sac.cli.places import add_places
 from risk_sac.cli.regress import add_regress
@@ -31,6 +32,7 @@ COMMANDS = (
     add_clusters,
     add_bundle,
     add_replay,
+    add_export,
     add_minimise,
     add_region,
     add_regress,

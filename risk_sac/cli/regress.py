@@ -4,6 +4,7 @@ import argparse
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 from rich.box import SIMPLE_HEAD
@@ -16,10 +17,15 @@ from risk_sac.cli.text import EGO, counted, printable
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
-from risk_sac.failures.cases import Case, Regression
+from risk_sac.failures.cases import Regression
+from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names, of_failure
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import RESULTS, read_results
 from risk_sac.run_folder.verified import distinct_failures
+
+if TYPE_CHECKING:
+    from risk_sac.failures.bundle import Bundle
+    from risk_sac.failures.regress import Regressed
 
 
 def add_regress(commands: Commands) -> None:
@@ -40,14 +46,21 @@ def add_regress(commands: Commands) -> None:
     regress.add_argument("--baseline", type=Path, metavar="FILE.json", help="known cases, as --out wrote them")
     regress.add_argument("--out", type=Path, metavar="FILE.json", help="write the cases there")
     regress.add_argument("--junit", type=Path, metavar="FILE.xml", help="write a JUnit report there")
+    exports = "write what is neither fixed nor known there, as the other ego has it now: bundles, and --format"
+    regress.add_argument("--exports", type=Path, metavar="FOLDER", help=exports)
+    kinds = f"with --exports: {', '.join(names('failure'))}; see `risk-sac export --help`"
+    regress.add_argument("--format", type=FormatName, nargs="+", default=[], choices=names("failure"), metavar="FORMAT", help=kinds)
 
 
 def _regress(options: argparse.Namespace) -> int:
     ego = read_ego(options.ego)
     for file in filter(None, (options.out, options.junit)):
         file.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
+    for name in options.format:
+        check_carries(name, "failure")
     baseline = _read_baseline(options.baseline) if options.baseline else None
-    found = Regression(ego=ego, cases=tuple(_cases(options.failures, ego)))
+    regressed = list(_cases(options.failures, ego))
+    found = Regression(ego=ego, cases=tuple(each.case for each in regressed))
     if baseline is not None:
         found = found.beside(baseline)
     console.print(cases_table(found))
@@ -55,6 +68,8 @@ def _regress(options: argparse.Namespace) -> int:
         replace_file(options.out, found.model_dump_json(indent=2).encode())
     if options.junit is not None:
         replace_file(options.junit, junit(found))
+    if options.exports is not None:
+        _export(options.exports, options.format, [each.bundle for each, case in zip(regressed, found.cases, strict=True) if not case.passed])
     return OK if found.passed else FAILED
 
 
@@ -72,7 +87,23 @@ def cases_table(found: Regression) -> Table:
     return table
 
 
-def _cases(paths: list[Path], ego: EgoConfig) -> Iterator[Case]:
+def _export(folder: Path, formats: list[FormatName], bundles: list["Bundle"]) -> None:
+    """Bundles, and beside each the formats."""
+    from risk_sac.failures.bundle import write_bundle
+    from risk_sac.failures.export.recorded import Recorded
+    from risk_sac.failures.export.written import write
+
+    for bundle in bundles:
+        stem = f"{bundle.manifest.id}-{bundle.manifest.digest[:8]}"
+        write_bundle(folder / f"{stem}.npz", bundle)
+        for name in formats:
+            suffix = FORMATS[name].suffix
+            out = folder / f"{stem}{f'-{name}' if suffix == '.zip' else ''}{suffix}"
+            write(FORMATS[name], of_failure(name, Recorded.of(bundle)), out)
+    console.print(f"{counted(len(bundles), 'failure')} to look at: {folder}", soft_wrap=True)
+
+
+def _cases(paths: list[Path], ego: EgoConfig) -> Iterator["Regressed"]:
     """Of a whole set, all of which is read before the first is played, so that nothing is half done."""
     from risk_sac.failures.bundle import read_bundle  # here, for the simulator takes a second to load
     from risk_sac.failures.regress import regress, regress_run

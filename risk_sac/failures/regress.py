@@ -18,13 +18,13 @@ from risk_sac.agents.follower import ScriptFollower
 from risk_sac.config import METHODS, EgoConfig, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, InfeasibleScene, RiskSacError
-from risk_sac.failures.bundle import Bundle, check_world, code_digest, versions
+from risk_sac.failures.bundle import Bundle, check_world, code_digest, make_bundle, versions
 from risk_sac.failures.cases import Case, Verdict
 from risk_sac.failures.collect import policy_of, recorded_bundle
 from risk_sac.failures.play import Played, Policy, play
 from risk_sac.failures.trajectory import actions_of, trajectory_digest
 from risk_sac.failures.variants import alike
-from risk_sac.records import Collision
+from risk_sac.records import Collision, Outcome
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import distinct_failures
 from risk_sac.types import Floats, Scene
@@ -40,9 +40,17 @@ class _Ending(NamedTuple):
     verdict: Verdict
     reason: str
     found: str = ""  # signature of what happened instead
+    played: Played | None = None  # how it went, where the ego touched somebody
 
 
-def regress(bundle: Bundle, ego: EgoConfig) -> Case:
+class Regressed(NamedTuple):
+    """What became of an old failure."""
+
+    case: Case
+    bundle: Bundle  # of the contact that the other ego has now; where it has none that can be compared, the old failure
+
+
+def regress(bundle: Bundle, ego: EgoConfig) -> Regressed:
     """Plays one failure against another ego.
 
     Args:
@@ -52,7 +60,7 @@ def regress(bundle: Bundle, ego: EgoConfig) -> Case:
     manifest = bundle.manifest
     collision = manifest.episode.collision
     ending = _judge(bundle, collision, ego)
-    return Case(
+    case = Case(
         id=manifest.id,
         digest=manifest.digest,
         name=signature_of(collision) if collision else "no contact",
@@ -61,9 +69,26 @@ def regress(bundle: Bundle, ego: EgoConfig) -> Case:
         reason=ending.reason,
         found=ending.found,
     )
+    return Regressed(case, bundle if ending.played is None else _as_played(bundle, ego, ending.played))
 
 
-def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Case]:
+def _as_played(bundle: Bundle, ego: EgoConfig, played: Played) -> Bundle:
+    """The contact that another ego has in the scene of a failure, as a bundle of its own."""
+    assert played.collision is not None  # else there is nothing to show
+    changes = {
+        "collision": played.collision,
+        "outcome": Outcome.FAILURE if played.collision.valid else Outcome.DEGENERATE,
+        "reason": ", ".join(played.collision.broken),
+        "steps": len(actions_of(played.series)),
+        "risk_return": played.risk_return,
+        "mean_cost": played.mean_cost,
+    }
+    spec = bundle.manifest.spec.model_copy(update={"ego": ego})
+    episode = bundle.manifest.episode.model_copy(update=changes)
+    return make_bundle(spec, episode, played.series, played.signal_heads, bundle.policy)
+
+
+def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Regressed]:
     """Plays the distinct failures of a run against another ego, with the run's policy where it has one.
 
     Raises:
@@ -104,7 +129,7 @@ def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig) -> _Ending:
             first, second = attack(), attack()
             if trajectory_digest(first.series) != trajectory_digest(second.series):
                 return _Ending(Verdict.FLAKY, f"with {name} this ego went another way the second time")
-            endings[name] = _compared(first.collision, wanted)
+            endings[name] = _compared(first.collision, wanted)._replace(played=first if first.collision else None)
     except InfeasibleScene as error:
         return _Ending(Verdict.NOT_COMPARABLE, f"its scene is refused with this ego: {error.reason}")
     except RiskSacError as error:

@@ -315,8 +315,8 @@ def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run: Path
     manifest = bundle.manifest
     assert make_bundle(manifest.spec, manifest.episode, bundle.series, bundle.signal_heads, large).policy is None
     slower = EgoConfig(reaction_time_s=1.0)
-    (case,) = regress_run(tmp_path / "run", slower)
-    assert regress(kept, slower) == case  # the policy acts on from a file as it does from the run
+    (found,) = regress_run(tmp_path / "run", slower)
+    assert regress(kept, slower).case == found.case  # the policy acts on from a file as it does from the run
     (tmp_path / "run" / "checkpoint").unlink()
     assert policy_of(tmp_path / "run", results) is None
     with pytest.raises(ConfigError, match="has no checkpoint"):

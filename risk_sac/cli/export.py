@@ -1,0 +1,66 @@
+"""`risk-sac export`: a failure, or the episodes of runs, in a format of other tools."""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+from risk_sac.cli.console import OK, Commands, console
+from risk_sac.errors import ConfigError
+from risk_sac.failures.export.formats import FORMATS, Files, FormatName, check_carries, of_episodes, of_failure
+from risk_sac.run_folder.results import RESULTS
+
+
+def add_export(commands: Commands) -> None:
+    """Adds the command."""
+    formats = "\n".join(f"  {name:13}{format_.what}" for name, format_ in FORMATS.items())
+    export = commands.add_parser(
+        "export",
+        help="write a failure in a format that other tools read",
+        epilog=f"formats:\n{formats}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    export.set_defaults(command=_export)
+    source = "the bundle of a failure; of parquet: folders of runs, or folders that hold such"
+    export.add_argument("source", type=Path, nargs="+", metavar="BUNDLE", help=source)
+    export.add_argument("--format", type=FormatName, required=True, choices=list(FormatName), help="see below")
+    out = "the file; where a format is several files, a new folder, or a name that ends in .zip"
+    export.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
+
+
+def _export(options: argparse.Namespace) -> int:
+    name, format_ = options.format, FORMATS[options.format]
+    check_carries(name, format_.of)  # before anything is read
+    if format_.of == "episodes":
+        files = of_episodes(name, list(_runs(options.source)))
+    else:
+        if len(options.source) > 1:
+            raise ConfigError(f"got {len(options.source)} bundles; {name} holds one failure", field="BUNDLE")
+        files = _failure(name, options.source[0])
+    from risk_sac.failures.export.written import write
+
+    write(format_, files, options.out)
+    console.print(f"{format_.title}: {options.out}", soft_wrap=True)
+    return OK
+
+
+def _failure(name: FormatName, bundle: Path) -> Files:
+    from risk_sac.failures.bundle import read_bundle  # here, because loading the simulator takes a second
+    from risk_sac.failures.export.recorded import Recorded
+
+    if bundle.is_dir():
+        message = f"{bundle} is a folder, and {name} holds one failure; `risk-sac bundle RUN FAILURE --out FILE` makes its bundle"
+        raise ConfigError(message, field="BUNDLE")
+    return of_failure(name, Recorded.of(read_bundle(bundle)))
+
+
+def _runs(folders: list[Path]) -> Iterator[Path]:
+    """The folders of runs among some, and right below them.
+
+    Raises:
+      ConfigError: one holds none.
+    """
+    for folder in folders:
+        found = [folder] if (folder / RESULTS).exists() else sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
+        if not found:
+            raise ConfigError(f"{folder} holds no run; wanted the folder of a run, or one with such in it", field="BUNDLE")
+        yield from found

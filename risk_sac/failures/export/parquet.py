@@ -1,0 +1,95 @@
+"""Parquet: a row for every episode of runs, whatever its outcome; the columns are the fields of the records.
+
+A record within a record is a struct, and names with values are a map, so that a field that is declared once is a column
+of its own type here too.
+"""
+
+import io
+import types
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import pyarrow as pa
+from pyarrow import parquet
+from pydantic import BaseModel
+
+from risk_sac.errors import ConfigError
+from risk_sac.failures.export.formats import Files
+from risk_sac.records import EpisodeRecord
+from risk_sac.run_folder.episode_json import records_from_lines
+from risk_sac.run_folder.results import EPISODES, Results, read_results
+from risk_sac.run_folder.verified import read_verified
+
+NAME = "episodes.parquet"
+OF_THE_RUN = [pa.field(name, pa.string(), nullable=False) for name in ("id", "run_id", "family", "method", "ego")]
+SEED = pa.field("run_seed", pa.int64(), nullable=False)
+SPECS = b"risk_sac.specs"  # key of the file's metadata: a JSON object from run to its spec
+SCALARS: Mapping[Any, pa.DataType] = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.string()}
+
+
+def files(runs: Sequence[Path]) -> Files:
+    """One file, with a row group for each run.
+
+    Args:
+      runs: their folders; one that is still at work is told as far as it has come.
+
+    Raises:
+      ConfigError: a folder holds no run, or episodes of something else.
+      OSError: it cannot be read.
+    """
+    results = {folder: read_results(folder) for folder in runs}
+    specs = ", ".join(f'"{each.spec.id}": {each.spec.model_dump_json()}' for each in results.values())
+    schema = pa.schema([*OF_THE_RUN, SEED, *_type(EpisodeRecord)], metadata={SPECS: f"{{{specs}}}".encode()})
+    content = io.BytesIO()
+    with parquet.ParquetWriter(content, schema, compression="zstd") as writer:
+        for folder, each in results.items():
+            if rows := _rows(folder, each):
+                writer.write_table(pa.Table.from_pylist(rows, schema))
+    return {NAME: content.getvalue()}
+
+
+def _rows(folder: Path, results: Results) -> list[dict[str, Any]]:
+    """Of one run; failures that were found not to repeat are refused, as everywhere."""
+    try:
+        records = tuple(records_from_lines((folder / EPISODES).read_bytes()))
+    except ValueError as error:
+        raise ConfigError(f"{folder / EPISODES} was not written by a run: {error}", field="RESULTS") from error
+    spec = results.spec
+    verified = read_verified(folder, results.digest or "")
+    run = {"run_id": spec.id, "family": spec.family, "method": spec.method, "run_seed": spec.seed, "ego": spec.ego.model_dump_json()}
+    return [
+        {"id": record.id_in(spec.id), **run, **_plain(record.model_dump())}
+        for record in (verified.judged(records) if verified else records)
+    ]
+
+
+def _type(annotation: Any) -> pa.DataType:
+    """The column's type of a field."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _type(arguments[0])
+    if origin in (Union, types.UnionType):
+        return _type(next(each for each in arguments if each is not type(None)))
+    if origin is Literal:
+        return pa.string()
+    if origin is tuple:
+        return pa.list_(_type(arguments[0]))
+    if origin is not None and issubclass(origin, Mapping):
+        return pa.map_(_type(arguments[0]), _type(arguments[1]))
+    if issubclass(annotation, BaseModel):
+        fields = annotation.model_fields.items()
+        return pa.struct([pa.field(each.serialization_alias or name, _type(each.annotation)) for name, each in fields])
+    if issubclass(annotation, Enum):
+        return pa.string()
+    return SCALARS[annotation]
+
+
+def _plain(value: Any) -> Any:
+    """As pyarrow takes it: texts in place of enums."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value.value if isinstance(value, Enum) else value
