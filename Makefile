@@ -1,6 +1,6 @@
 # Everything runs in .venv, which the first target that needs it makes. Needs Python 3.11 or 3.12 and make.
 .DEFAULT_GOAL := help
-.PHONY: help install page demo test serve bench torture load lint openapi settings nets image smoke screenshots clean
+.PHONY: help install page demo test serve bench torture load lint openapi settings nets checkers examples image smoke screenshots clean
 
 BIN := .venv/bin
 PYTHON := $(BIN)/python
@@ -20,7 +20,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@python=$$($(FIND_PYTHON)); \
 	if [ -z "$$python" ]; then echo "make: found neither python3.11 nor python3.12; install one of them" >&2; exit 1; fi; \
 	test -x $(PYTHON) || "$$python" -m venv .venv
-	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,export]"
 	@echo "compiling, once: else it would be a part of the first searches' processor time"; set -e; \
 	folder=$$(mktemp -d); trap 'rm -r "$$folder"' EXIT; \
 	for run in "low --method archive --episodes 60" "mixed --method risk-sac --episodes 15"; do \
@@ -33,9 +33,22 @@ page: $(STAMP) ## build the web page anew, after a change of its sources
 demo: $(STAMP) ## start the service, run a campaign over REST, write results/demo.json; KEEP=1 goes on serving its page
 	$(PYTHON) -m service.demo $(if $(KEEP),--keep)
 
+# Checkers of the exports, whose pins are none of ours: numpy before 2, lxml before 6. One is compiled as it is installed.
+CHECKERS := .venv/checkers/.installed
+
+$(CHECKERS): tests/exports/checkers.txt | $(STAMP)
+	$(PYTHON) -m venv .venv/checkers
+	if .venv/checkers/bin/python -m pip install --quiet --disable-pip-version-check -r $<; then touch $@; \
+		else echo "the checkers of exports cannot be installed here; what needs them is left out of the tests" >&2; fi
+
+checkers: $(CHECKERS) ## make .venv/checkers: ASAM's checkers and CommonRoad's, which the tests put exports before
+
+examples: $(STAMP) ## write the examples of all export formats anew
+	$(PYTHON) -m risk_sac.failures.export.examples
+
 # By file: two processes would each make what the tests of a file share. In order: the long ones come first. By three
 # processes, on two cores too: a fifth of the tests' time they wait for servers.
-test: lint ## check the code and run the whole suite
+test: lint $(CHECKERS) ## check the code and run the whole suite
 	$(PYTHON) -m pytest -n 3 --dist loadscope --no-loadscope-reorder
 
 serve: $(STAMP) ## run the service on http://127.0.0.1:8000
