@@ -48,7 +48,7 @@ def _failure(name: FormatName, bundle: Path) -> Files:
     from risk_sac.failures.export.recorded import Recorded
 
     if bundle.is_dir():
-        message = f"{bundle} is a folder, and {name} holds one failure; `risk-sac bundle RUN FAILURE --out FILE` makes its bundle"
+        message = f"{bundle} is a folder; {name} holds one failure, whose bundle `risk-sac bundle RUN FAILURE` makes"
         raise ConfigError(message, field="BUNDLE")
     return of_failure(name, Recorded.of(read_bundle(bundle)))
 
@@ -62,5 +62,7 @@ def _runs(folders: list[Path]) -> Iterator[Path]:
     for folder in folders:
         found = [folder] if (folder / RESULTS).exists() else sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
         if not found:
-            raise ConfigError(f"{folder} holds no run; wanted the folder of a run, or one with such in it", field="BUNDLE")
+            raise ConfigError(
+                f"{folder} holds no run; wanted the folder of a run, or one with such in it", field="BUNDLE"
+            )
         yield from found

@@ -49,7 +49,9 @@ def add_regress(commands: Commands) -> None:
     exports = "write what is neither fixed nor known there, as the other ego has it now: bundles, and --format"
     regress.add_argument("--exports", type=Path, metavar="FOLDER", help=exports)
     kinds = f"with --exports: {', '.join(names('failure'))}; see `risk-sac export --help`"
-    regress.add_argument("--format", type=FormatName, nargs="+", default=[], choices=names("failure"), metavar="FORMAT", help=kinds)
+    regress.add_argument(
+        "--format", type=FormatName, nargs="+", default=[], choices=names("failure"), metavar="FORMAT", help=kinds
+    )
 
 
 def _regress(options: argparse.Namespace) -> int:
@@ -69,7 +71,11 @@ def _regress(options: argparse.Namespace) -> int:
     if options.junit is not None:
         replace_file(options.junit, junit(found))
     if options.exports is not None:
-        _export(options.exports, options.format, [each.bundle for each, case in zip(regressed, found.cases, strict=True) if not case.passed])
+        _export(
+            options.exports,
+            options.format,
+            [each.bundle for each, case in zip(regressed, found.cases, strict=True) if not case.passed],
+        )
     return OK if found.passed else FAILED
 
 

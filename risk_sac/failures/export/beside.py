@@ -35,8 +35,7 @@ def beside(failure: Recorded, lacks: tuple[str, ...]) -> bytes:
         "robustness": {str(name): series["robustness"][:, i] for i, name in enumerate(series["requirements"])},
         "soft_min": series["soft_min"],
         "to_the_ego": {
-            name: {id_: series[name][:, column] for column, id_ in enumerate(ids) if column}
-            for name in PER_OTHER
+            name: {id_: series[name][:, column] for column, id_ in enumerate(ids) if column} for name in PER_OTHER
         },
         "signals": {id_: [bytes(row).decode() for row in rows] for id_, rows in failure.heads.items()},
         "trajectory_digest": manifest.digest,

@@ -1,7 +1,7 @@
 """What libsumo is told during an episode, and what it makes of it: enough to have `sumo` itself do the same.
 
-`risk_sac.sim` calls libsumo as a module, so a tap on the module hears all of it, whoever says it; a list of commands kept
-here would lack the next one.
+`risk_sac.sim` calls libsumo as a module, so a tap on the module hears all of it, whoever says it; a list of commands
+kept here would lack the next one.
 """
 
 from collections.abc import Iterator

@@ -32,11 +32,11 @@ from commonroad.scenario.trajectory import Trajectory
 
 from risk_sac.failures.export.beside import BESIDE, beside
 from risk_sac.failures.export.formats import Files
+from risk_sac.failures.export.markup import document
 from risk_sac.failures.export.net import Head, Lane, Net, Use, boundaries
 from risk_sac.failures.export.recorded import Actor, Recorded
 from risk_sac.failures.export.route import goal
 from risk_sac.failures.export.signals import colour, cycle
-from risk_sac.failures.export.xml import document
 from risk_sac.types import STEP_S
 
 FREE, AS_RECORDED = "failure.xml", "failure-as-recorded.xml"
@@ -82,7 +82,9 @@ def files(failure: Recorded) -> Files:
 
 
 def _scenario(failure: Recorded, driven: tuple[Actor, ...]) -> bytes:
-    scenario = Scenario(STEP_S, ScenarioID(map_name="RiskSac", configuration_id=1, obstacle_behavior="T", prediction_id=1))
+    scenario = Scenario(
+        STEP_S, ScenarioID(map_name="RiskSac", configuration_id=1, obstacle_behavior="T", prediction_id=1)
+    )
     numbers = {id_: LANELETS + place for place, id_ in enumerate(failure.net.lanes)}
     scenario.add_objects(_roads(failure, numbers))
     scenario.add_objects([_obstacle(actor, ACTORS + failure.actors.index(actor)) for actor in driven])
@@ -105,7 +107,8 @@ def _scenario(failure: Recorded, driven: tuple[Actor, ...]) -> bytes:
 
 
 def _roads(failure: Recorded, numbers: dict[str, int]) -> LaneletNetwork:
-    network, net, lights = LaneletNetwork(), failure.net, {}
+    network, net = LaneletNetwork(), failure.net
+    lights: dict[Head, int] = {}
     for lane in net.lanes.values():
         for head in lane.heads:
             lights[head] = LIGHTS + len(lights)
@@ -152,7 +155,9 @@ def _light(failure: Recorded, lane: Lane, head: Head, number: int) -> TrafficLig
         for steps, letters in _merged(cycle(failure, head.signal), head.index)
     ]
     where = boundaries(lane.centre, lane.width_m)[1][-1]
-    return TrafficLight(number, where, TrafficLightCycle(elements, 0), direction=TURNS.get(head.turn, TrafficLightDirection.ALL))
+    return TrafficLight(
+        number, where, TrafficLightCycle(elements, 0), direction=TURNS.get(head.turn, TrafficLightDirection.ALL)
+    )
 
 
 def _merged(phases: list[tuple[int, str]], index: int) -> list[tuple[int, str]]:

@@ -4,7 +4,7 @@ The ego is blue and its striker orange, as on the page; whom the ego does not kn
 """
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import numpy as np
 from PIL import Image, ImageColor, ImageDraw, ImageFont
@@ -23,6 +23,8 @@ EASE = 0.06  # how fast the view follows the ego, so that it does not tremble
 GROUND = {"junction": "#dcdcdc", "lane": "#dcdcdc", "sidewalk": "#efefef", "crossing": "#c8c8c8"}
 PAPER, EDGE, INK = "#f8f8f6", "#bdbdbd", "#202020"
 EGO, STRIKER, OTHER = "#0072b2", "#d55e00", "#8a8a8a"
+Placed = Callable[[Floats], list[tuple[float, float]]]
+"""Pixels of points on the map."""
 LIGHTS = {"red": "#d00000", "red_yellow": "#e07000", "yellow": "#e0b000", "green": "#109010", "off": "#606060"}
 
 
@@ -30,7 +32,7 @@ def files(failure: Recorded) -> Files:
     """One file."""
     first = max(failure.frames - round(LAST_S / STEP_S), 0)
     surfaces = read_surfaces(failure.net_file)
-    middles = list(_middles(failure, first))
+    middles = _middles(failure, first)
     pictures = [_picture(failure, surfaces, frame, middle) for frame, middle in enumerate(middles, start=first)]
     palette = _palette()
     flat = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
@@ -49,8 +51,10 @@ def files(failure: Recorded) -> Files:
 
 
 def _palette() -> Image.Image:
-    """All colours, and mixtures of each with each ground: chosen by how often they are seen, small bodies would lose theirs."""
-    tones = np.array([ImageColor.getrgb(tone) for tone in (EGO, STRIKER, OTHER, INK, "#ffffff", EDGE, *LIGHTS.values())])
+    """All colours, and mixtures of each with each ground: chosen by how often they are seen, small bodies' are lost."""
+    tones = np.array(
+        [ImageColor.getrgb(tone) for tone in (EGO, STRIKER, OTHER, INK, "#ffffff", EDGE, *LIGHTS.values())]
+    )
     grounds = np.array([ImageColor.getrgb(tone) for tone in (PAPER, *sorted(set(GROUND.values())))])
     shares = np.array([0.0, 0.35, 0.7]).reshape(-1, 1, 1, 1)
     mixed = tones[:, None] * (1.0 - shares) + grounds * shares
@@ -65,16 +69,16 @@ def _story(failure: Recorded) -> str:
     return sentence(failure.series, collision) if collision.judgement else f"contact with {collision.other_id}"
 
 
-def _middles(failure: Recorded, first: int) -> Iterator[Floats]:
+def _middles(failure: Recorded, first: int) -> list[Floats]:
     """What each picture's middle shows: in the end the contact, before it what the ego had around it."""
     path = np.column_stack((failure.ego.x_m, failure.ego.y_m))
     middle = path[-1]
-    found = []
+    found: list[Floats] = []
     reach = np.array((WIDTH, HEIGHT)) / WIDTH * VIEW_M / 4  # the ego stays within the middle half
     for place in path[: first - 1 if first else None : -1]:
         middle = np.clip(middle + EASE * (place - middle), place - reach, place + reach)
         found.append(middle)
-    return reversed(found)
+    return found[::-1]
 
 
 def _picture(failure: Recorded, surfaces: list[Surface], frame: int, middle: Floats) -> Image.Image:
@@ -105,7 +109,7 @@ def _picture(failure: Recorded, surfaces: list[Surface], frame: int, middle: Flo
     return picture
 
 
-def _body(pen: ImageDraw.ImageDraw, placed, actor: Actor, frame: int, tone: str, *, known: bool) -> None:
+def _body(pen: ImageDraw.ImageDraw, placed: Placed, actor: Actor, frame: int, tone: str, *, known: bool) -> None:
     """A body, that of a vehicle with a light patch to the front; whom the ego does not know of is outlined."""
     cos, sin = np.cos(actor.heading_rad[frame]), np.sin(actor.heading_rad[frame])
     turn, half = np.array([(cos, sin), (-sin, cos)]), np.array((actor.length_m, actor.width_m)) / 2
@@ -117,7 +121,9 @@ def _body(pen: ImageDraw.ImageDraw, placed, actor: Actor, frame: int, tone: str,
     fill = tone if known else None
     if actor.pedestrian:
         ring = np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
-        pen.polygon(placed(middle + 0.45 * np.column_stack((np.cos(ring), np.sin(ring)))), fill=fill, outline=tone, width=3)
+        pen.polygon(
+            placed(middle + 0.45 * np.column_stack((np.cos(ring), np.sin(ring)))), fill=fill, outline=tone, width=3
+        )
         return
     pen.polygon(part((1, 1), (-1, 1), (-1, -1), (1, -1)), fill=fill, outline=tone, width=3)
     pen.polygon(part((0.25, 0.7), (0.75, 0), (0.25, -0.7)), fill="#ffffff" if known else tone)

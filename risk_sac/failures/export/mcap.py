@@ -7,6 +7,7 @@ import io
 import json
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import foxglove
 import numpy as np
@@ -71,10 +72,13 @@ def files(failure: Recorded) -> Files:
     options = foxglove.mcap.MCAPWriteOptions(compression_threads=0)
     with foxglove.open_mcap(content, context=context, writer_options=options) as writer:
         SceneUpdateChannel("/roads", context=context).log(_roads(failure), log_time=0)
-        actors, signals = SceneUpdateChannel("/actors", context=context), SceneUpdateChannel("/signals", context=context)
+        actors, signals = (
+            SceneUpdateChannel("/actors", context=context),
+            SceneUpdateChannel("/signals", context=context),
+        )
         frames, measures = FrameTransformsChannel("/tf", context=context), _measures_channel(failure, context)
         moments = LogChannel("/moments", context=context)
-        said = {frame: text for frame, text in _moments(failure)}
+        said = dict(_moments(failure))
         for frame, time_s in enumerate(failure.time_s):
             at = round(float(time_s) * 1e9)
             actors.log(_actors(failure, frame), log_time=at)
@@ -83,9 +87,14 @@ def files(failure: Recorded) -> Files:
             if failure.heads:
                 signals.log(_signals(failure, frame), log_time=at)
             if frame in said:
-                moments.log(Log(timestamp=_stamp(failure, frame), level=LogLevel.Info, message=said[frame], name="risk-sac"), log_time=at)
+                moments.log(
+                    Log(timestamp=_stamp(failure, frame), level=LogLevel.Info, message=said[frame], name="risk-sac"),
+                    log_time=at,
+                )
         manifest = failure.manifest
-        writer.write_metadata("failure", {"id": failure.name, "digest": manifest.digest, "code": manifest.code, "beside": BESIDE})
+        writer.write_metadata(
+            "failure", {"id": failure.name, "digest": manifest.digest, "code": manifest.code, "beside": BESIDE}
+        )
         writer.attach(log_time=0, create_time=0, name=BESIDE, media_type="application/json", data=beside(failure, ()))
     return {f"{failure.name}.mcap": content.getvalue()}
 
@@ -159,7 +168,9 @@ def _body(failure: Recorded, actor: Actor, frame: int) -> SceneEntity:
             KeyValuePair(key="seen_by_ego", value=str(seen).lower()),
         ],
         cubes=[] if actor.pedestrian else [CubePrimitive(pose=pose, size=size, color=paint)],
-        cylinders=[CylinderPrimitive(pose=pose, size=size, bottom_scale=1, top_scale=1, color=paint)] if actor.pedestrian else [],
+        cylinders=[CylinderPrimitive(pose=pose, size=size, bottom_scale=1, top_scale=1, color=paint)]
+        if actor.pedestrian
+        else [],
         texts=[TextPrimitive(pose=above, billboard=True, font_size=0.8, text=actor.id, color=paint)],
     )
 
@@ -192,9 +203,9 @@ def _ego_frame(failure: Recorded, frame: int) -> FrameTransforms:
 
 def _measures_channel(failure: Recorded, context: Context) -> Channel:
     """JSON, whose schema names every number and its unit."""
-    number = {"type": ["number", "null"]}
+    number: dict[str, Any] = {"type": ["number", "null"]}
     names = ["ego_speed_mps", "ego_accel_mps2", "striker_distance_m", "striker_ttc_s", "least_ttc_s", "soft_min"]
-    properties = {name: number for name in names} | {"striker_seen": {"type": "boolean"}}
+    properties: dict[str, Any] = dict.fromkeys(names, number) | {"striker_seen": {"type": "boolean"}}
     requirements = {str(name): number for name in failure.series["requirements"]}
     properties |= {"robustness": {"type": "object", "properties": requirements}}
     schema = {"title": MEASURES, "type": "object", "properties": properties}

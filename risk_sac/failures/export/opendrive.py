@@ -10,7 +10,7 @@ import numpy as np
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.beside import BESIDE
-from risk_sac.failures.export.xml import document
+from risk_sac.failures.export.markup import document
 
 WALL_S = 120.0  # a second suffices
 
@@ -42,7 +42,7 @@ def _netconvert(*options: str) -> None:
 
 
 def _as_of_1_7(root: ET.Element, name: str) -> ET.Element:
-    """netconvert writes 1.4 with some of what came later, which no version's schema takes as it stands."""
+    """What netconvert calls 1.4 has some of what came later, and no version's schema takes it as it stands."""
     header = root.find("header")
     assert header is not None
     header.attrib |= {"revMinor": "7", "name": name}

@@ -1,8 +1,8 @@
 """ASAM OpenSCENARIO XML 1.2 on an OpenDRIVE road.
 
 A vehicle's place is that of its rear axle's middle on the ground, as the standard has it; its box says where the body
-is from there. Everybody but the ego follows its trajectory by the clock; the ego is free, and is asked to drive where it
-was going. The other file has the ego follow its own trajectory too.
+is from there. Everybody but the ego follows its trajectory by the clock; the ego is free, and is asked to drive where
+it was going. The other file has the ego follow its own trajectory too.
 """
 
 import xml.etree.ElementTree as ET
@@ -13,11 +13,11 @@ from scenariogeneration import xosc
 
 from risk_sac.failures.export.beside import BESIDE, beside
 from risk_sac.failures.export.formats import Files
+from risk_sac.failures.export.markup import document
 from risk_sac.failures.export.opendrive import opendrive
 from risk_sac.failures.export.recorded import Actor, Recorded
 from risk_sac.failures.export.route import goal
 from risk_sac.failures.export.signals import colour, cycle
-from risk_sac.failures.export.xml import document
 from risk_sac.types import STEP_S
 
 VERSION = 2  # of OpenSCENARIO 1

@@ -58,7 +58,13 @@ def _rows(folder: Path, results: Results) -> list[dict[str, Any]]:
         raise ConfigError(f"{folder / EPISODES} was not written by a run: {error}", field="RESULTS") from error
     spec = results.spec
     verified = read_verified(folder, results.digest or "")
-    run = {"run_id": spec.id, "family": spec.family, "method": spec.method, "run_seed": spec.seed, "ego": spec.ego.model_dump_json()}
+    run = {
+        "run_id": spec.id,
+        "family": spec.family,
+        "method": spec.method,
+        "run_seed": spec.seed,
+        "ego": spec.ego.model_dump_json(),
+    }
     return [
         {"id": record.id_in(spec.id), **run, **_plain(record.model_dump())}
         for record in (verified.judged(records) if verified else records)

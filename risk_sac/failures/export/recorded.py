@@ -67,7 +67,7 @@ class Recorded:
         _check(manifest, bundle.series)
         problem = Problem.from_spec(manifest.spec)
         layout = problem.family.layout(manifest.episode.scene)
-        return cls(bundle, problem, layout, Path(str(files(WORLD) / layout.net)))
+        return cls(bundle, problem, layout, Path(str(files(WORLD))) / layout.net)
 
     @property
     def manifest(self) -> Manifest:
@@ -115,7 +115,7 @@ class Recorded:
     @property
     def time_s(self) -> Floats:
         """Of each frame, since the first."""
-        return np.arange(self.frames) * STEP_S
+        return np.arange(self.frames, dtype=np.float64) * STEP_S
 
     @property
     def released_s(self) -> float:
@@ -175,7 +175,9 @@ def _check(manifest: Manifest, series: Series) -> None:
     wanted = dict.fromkeys(PER_FRAME, (frames, actors)) | dict.fromkeys(PER_ACTOR, (actors,))
     for name, shape in wanted.items():
         if name not in series or series[name].shape != shape or series[name].dtype.kind not in "fi":
-            raise ConfigError(f"{manifest.id} has no sound array {name}, so that nothing can be told of it", field="BUNDLE")
+            raise ConfigError(
+                f"{manifest.id} has no sound array {name}, so that nothing can be told of it", field="BUNDLE"
+            )
     there = np.isfinite(series["x_m"])
     if not actors or not there[0].all() or (there[1:] > there[:-1]).any():
         raise ConfigError(f"{manifest.id} does not begin with everybody in place", field="BUNDLE")

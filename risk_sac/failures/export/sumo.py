@@ -15,8 +15,8 @@ from risk_sac.errors import SimulationError
 from risk_sac.failures.export.beside import BESIDE, beside
 from risk_sac.failures.export.calls import Heard, VehicleState, tapped
 from risk_sac.failures.export.formats import Files
+from risk_sac.failures.export.markup import document
 from risk_sac.failures.export.recorded import Actor, Recorded
-from risk_sac.failures.export.xml import document
 from risk_sac.failures.play import repeated
 from risk_sac.types import STEP_S
 

@@ -4,7 +4,7 @@
 
 It needs Python and a SUMO with its TraCI library: `pip install eclipse-sumo`, or an installation named by SUMO_HOME.
 The exit status is 0 if every vehicle is where it was, to the last bit, in every step, and 1 if not, as with another
-version of SUMO. With --gui the ego is blue and who strikes it orange; pedestrians, of whom SUMO knows nothing, are drawn.
+version of SUMO. With --gui the ego is blue and who strikes it orange. SUMO knows no pedestrians; they are drawn.
 """
 
 import argparse
@@ -13,15 +13,19 @@ import os
 import shutil
 import sys
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 if "SUMO_HOME" in os.environ:
     sys.path.append(str(Path(os.environ["SUMO_HOME"]) / "tools"))
 import traci
 
+Told = dict[str, Any]
+
 HERE = Path(__file__).resolve().parent
 BLUE, ORANGE = (0, 114, 178, 255), (213, 94, 0, 255)
-GETTERS = {
+GETTERS: dict[str, Callable[[str], float]] = {
     "x": lambda vehicle: traci.vehicle.getPosition(vehicle)[0],
     "y": lambda vehicle: traci.vehicle.getPosition(vehicle)[1],
     "angle": lambda vehicle: traci.vehicle.getAngle(vehicle),
@@ -31,16 +35,18 @@ GETTERS = {
 }
 
 
-def main():
+def main() -> int:
     """Replays it; the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--gui", action="store_true", help="in a window")
     parser.add_argument("--sumo", help="the binary (default: sumo, or sumo-gui, from the PATH)")
     parser.add_argument("--picture", help="with --gui: save a picture of the last step there")
     options = parser.parse_args()
-    binary = options.sumo or shutil.which("sumo-gui" if options.gui else "sumo")
+    name = "sumo-gui" if options.gui else "sumo"
+    homes = [str(Path(home) / "bin") for home in (os.environ.get("SUMO_HOME"), Path(sys.executable).parents[1]) if home]
+    binary = options.sumo or shutil.which(name) or shutil.which(name, path=os.pathsep.join(homes))
     if binary is None:
-        parser.error("there is no sumo on the PATH; name it by --sumo")
+        parser.error(f"there is no {name} on the PATH; name it by --sumo")
     told = json.loads((HERE / "commands.json").read_text())
     steps = list(ET.parse(HERE / "fcd.xml").getroot())
     command = [binary, "--configuration-file", str(HERE / "failure.sumocfg")]
@@ -50,22 +56,23 @@ def main():
     finally:
         traci.close()
     compared = sum(len(step.findall("vehicle")) for step in steps)
-    print(f"{len(steps)} steps, {compared} states of vehicles: largest difference {difference:g}; {missed} missing")
+    found = f"largest difference {difference:g}; {missed} missing"
+    print(f"{len(steps)} steps, {compared} states of vehicles: {found}")  # noqa: T201 - a program of its own
     return int(difference > 0 or missed > 0)
 
 
-def replay(told, steps, options):
+def replay(told: Told, steps: list[ET.Element], options: argparse.Namespace) -> tuple[float, int]:
     """The largest difference of any number, and how many vehicles were elsewhere than in the recording."""
     difference, missed = 0.0, 0
-    for commands, recorded in zip(told["commands"], steps):
+    for commands, recorded in zip(told["commands"], steps, strict=True):
         for domain, function, arguments, named in commands:
             getattr(getattr(traci, domain), function)(*arguments, **named)
         traci.simulationStep()
-        wanted = {vehicle.get("id"): vehicle for vehicle in recorded.findall("vehicle")}
+        wanted = {vehicle.attrib["id"]: vehicle for vehicle in recorded.findall("vehicle")}
         missed += len(wanted.keys() ^ set(traci.vehicle.getIDList()))
         for id_ in wanted.keys() & set(traci.vehicle.getIDList()):
             missed += traci.vehicle.getLaneID(id_) != wanted[id_].get("lane")
-            off = (abs(get(id_) - float(wanted[id_].get(name))) for name, get in GETTERS.items())
+            off = (abs(get(id_) - float(wanted[id_].attrib[name])) for name, get in GETTERS.items())
             difference = max(difference, *off)
         if options.gui:
             show(told, recorded)
@@ -75,7 +82,7 @@ def replay(told, steps, options):
     return difference, missed
 
 
-def show(told, recorded):
+def show(told: Told, recorded: ET.Element) -> None:
     """Colours, and the pedestrians of a step as octagons on the ground."""
     view = traci.gui.getIDList()[0]
     vehicles = traci.vehicle.getIDList()
@@ -86,7 +93,7 @@ def show(told, recorded):
     if told["striker"] in vehicles:
         traci.vehicle.setColor(told["striker"], ORANGE)
     for person in recorded.findall("person"):
-        x, y, id_ = float(person.get("x")), float(person.get("y")), person.get("id")
+        x, y, id_ = float(person.attrib["x"]), float(person.attrib["y"]), person.attrib["id"]
         ring = [(0.4, 0.15), (0.15, 0.4), (-0.15, 0.4), (-0.4, 0.15), (-0.4, -0.15), (-0.15, -0.4), (0.15, -0.4)]
         outline = [(x + dx, y + dy) for dx, dy in [*ring, (0.4, -0.15)]]
         if id_ in traci.polygon.getIDList():
