@@ -13,7 +13,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.config import METHODS, FamilyName, RewardConfig, RunSpec
+from risk_sac.config import FamilyName, RewardConfig, RunSpec, method_of
 from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.geometry import overlapping_pairs, relative_view
 from risk_sac.observation import Encoder
@@ -78,7 +78,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         Raises:
           ConfigError: the spec poses no problem that can be run.
         """
-        return cls(Problem.from_spec(spec), spec.learner.reward, controlled=METHODS[spec.method].agent != "none")
+        return cls(Problem.from_spec(spec), spec.learner.reward, controlled=method_of(spec.method).agent != "none")
 
     # The state of an episode, set by `_start`.
     layout: Layout  # where everybody started

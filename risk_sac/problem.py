@@ -125,7 +125,7 @@ def check_campaign(spec: CampaignSpec) -> None:
     """Refuses a campaign that could not run; see `Problem.from_spec` and `check_installed` for the errors."""
     for method in spec.methods:
         check_installed(method)
-    alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()
+    alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()  # the i.i.d. phase's among them
     for family in spec.families:
         first, *others = (run for run in alike if run.family == family)
         problem = Problem.from_spec(first)

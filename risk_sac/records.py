@@ -168,8 +168,9 @@ class Collision(Record):
         return self.valid and self.judgement is not None and self.judgement.grade is Grade.CAREFUL
 
 
-Phase = Literal["search", "evaluation"]
-RECORDED: Mapping[Phase, str] = {"search": "train", "evaluation": "evaluate"}  # as records and ids name a phase
+Phase = Literal["search", "evaluation", "iid"]
+# As records and ids name a phase. Of `iid` alone a bound on how often the ego fails may be drawn; nothing pools it.
+RECORDED: Mapping[Phase, str] = {"search": "train", "evaluation": "evaluate", "iid": "iid"}
 
 
 class EpisodeRecord(Record):
@@ -178,7 +179,7 @@ class EpisodeRecord(Record):
     index: int
     """0-based within the run, rejected scenes included."""
     phase: str
-    """train | evaluate"""
+    """train | evaluate | iid"""
     seed: int
     scene: Mapping[str, Real]
     outcome: Outcome
@@ -215,6 +216,11 @@ class EpisodeRecord(Record):
     def searching(self) -> bool:
         """Whether it belongs to the search, and not to the evaluation of the frozen policy."""
         return self.phase == RECORDED["search"]
+
+    @property
+    def evaluating(self) -> bool:
+        """Whether it belongs to the evaluation of the frozen policy, the second phase of a run that has one."""
+        return self.phase == RECORDED["evaluation"]
 
     def refused(self, rule: str) -> "EpisodeRecord":
         """The same episode, whose contact fails one more rule; without a contact, the episode itself."""

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from risk_sac.config import METHODS, RunSpec
+from risk_sac.config import RunSpec, method_of
 from risk_sac.env import RiskSacEnv
 from risk_sac.metrics import MetricsAccumulator, results_digest
-from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.records import EpisodeRecord, Phase, RunMetrics, SeriesFile
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import sha256
@@ -32,7 +32,7 @@ PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "num
 class RunSummary:
     """What a run leaves behind."""
 
-    metrics: RunMetrics  # of the search
+    metrics: RunMetrics  # of the search, or of the i.i.d. phase that the run is
     evaluation: RunMetrics | None  # of the frozen policy, if the budget has evaluation episodes
     digest: str  # of all records: the same spec gives the same digest
     finished: bool  # False when the observer ended it
@@ -63,7 +63,7 @@ class RunState:
         self.env = RiskSacEnv.of(spec)
         self.problem = self.env.problem
         self.searchers = Searchers(spec, self.problem, self.env.observation_size, self.env.action_size)
-        self.reward = TrainingReward(METHODS[spec.method], spec.learner)
+        self.reward = TrainingReward(method_of(spec.method), spec.learner)
         self.records: list[EpisodeRecord] = []
         self.series: dict[int, SeriesFile] = {}
         self._episode_cpu_s: list[float] = []
@@ -84,6 +84,13 @@ class RunState:
         budget, played = self.spec.budget, self._search.episodes
         spent = bool(played) and budget.cpu_s is not None and self._episode_cpu_s[played - 1] >= budget.cpu_s
         return played < budget.episodes and not spent
+
+    @property
+    def phase(self) -> Phase:
+        """That the next episode belongs to."""
+        if self.spec.iid:
+            return "iid"
+        return "search" if self.learning else "evaluation"
 
     @property
     def environment_steps(self) -> int:
@@ -153,7 +160,7 @@ class RunState:
         self.env.close()
 
     def _count(self, record: EpisodeRecord) -> RunMetrics:
-        return (self._search if record.phase == "train" else self._evaluation).add(record)
+        return (self._evaluation if record.evaluating else self._search).add(record)
 
 
 def _series(folder: Path, records: list[EpisodeRecord], digests: Mapping[int, str]) -> dict[int, SeriesFile]:

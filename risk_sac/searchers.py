@@ -10,7 +10,7 @@ from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.random import RandomAgent
 from risk_sac.agents.scripted import ScriptedAgent
-from risk_sac.config import METHODS, RunSpec
+from risk_sac.config import RunSpec, method_of
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, Outcome
 from risk_sac.scene_optimizer import (
@@ -18,6 +18,7 @@ from risk_sac.scene_optimizer import (
     ArchiveOptimizer,
     BotorchOptimizer,
     Encounter,
+    IidSampler,
     SceneOptimizer,
     SobolOptimizer,
 )
@@ -30,10 +31,12 @@ CONTROLS: Mapping[str, type[RandomAgent | ScriptedAgent]] = {
     "random": RandomAgent,
     "none": RandomAgent,
 }
-OPTIMIZERS: Mapping[str, type[BotorchOptimizer | ArchiveOptimizer | SobolOptimizer]] = {
+Sampler = type[BotorchOptimizer | ArchiveOptimizer | SobolOptimizer | IidSampler]
+OPTIMIZERS: Mapping[str, Sampler] = {
     "botorch": BotorchOptimizer,
     "archive": ArchiveOptimizer,
     "sobol": SobolOptimizer,
+    "iid": IidSampler,
 }
 STEP_COSTS = 1.0, 8.0  # of the guide and of a policy that learns as it acts; measured in processor time
 
@@ -57,19 +60,19 @@ class Searchers:
     """
 
     def __init__(self, spec: RunSpec, problem: Problem, observation_size: int, action_size: int) -> None:
-        method = METHODS[spec.method]
+        method = method_of(spec.method)
         self.agent: Actor  # Alg. 1, l. 2
         if method.agent in CONTROLS:
-            self.agent = CONTROLS[method.agent](action_size, spec.seed)
+            self.agent = CONTROLS[method.agent](action_size, spec.stream)
         elif method.agent == "scripts":
             self.agent = ScriptFollower(problem.family)
         else:
-            self.agent = Learner(observation_size, action_size, method, spec.learner, spec.seed)
+            self.agent = Learner(observation_size, action_size, method, spec.learner, spec.stream)
         self.scene_size = problem.space.dimension
         self._spec = spec
         self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
         self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if method.learns else None
-        self._turns = Turns(STEP_COSTS, spec.seed) if method.takes_turns else None
+        self._turns = Turns(STEP_COSTS, spec.stream) if method.takes_turns else None
         self._next = self._own
         self._episodes, self._failures = 0, 0  # of the search
 
@@ -134,7 +137,5 @@ class Searchers:
             self.next(learning=record.searching)
             self.add(record)
 
-    def _searcher(
-        self, actor: Actor, optimizer: type[BotorchOptimizer | ArchiveOptimizer | SobolOptimizer]
-    ) -> Searcher:
-        return Searcher(optimizer(self.scene_size + actor.genes, self._spec.learner.scenes, self._spec.seed), actor)
+    def _searcher(self, actor: Actor, optimizer: Sampler) -> Searcher:
+        return Searcher(optimizer(self.scene_size + actor.genes, self._spec.learner.scenes, self._spec.stream), actor)

@@ -17,7 +17,7 @@ import torch
 from risk_sac.agents.replay import Transition
 from risk_sac.config import RunSpec
 from risk_sac.errors import InfeasibleScene
-from risk_sac.records import Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
+from risk_sac.records import RECORDED, Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run import RunState, RunSummary
@@ -80,7 +80,7 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
     sampler and policy that generates scenarios.
     """
     env, agent, learning, index = run.env, run.searchers.agent, run.learning, len(run.records)
-    seed, playable = episode_seed(run.spec.seed, index), guard.begin(index)
+    seed, playable = episode_seed(run.spec.stream, index), guard.begin(index)
     optimizer, actor = run.searchers.next(learning=learning)
     point = optimizer.ask()  # Alg. 1, l. 4
     scene_size = run.searchers.scene_size
@@ -162,7 +162,7 @@ def _record(
     crashed = rejected == SIM_CRASH
     return EpisodeRecord(
         index=len(run.records),
-        phase="train" if run.learning else "evaluate",
+        phase=RECORDED[run.phase],
         seed=seed,
         scene=scene,
         outcome=outcome,
@@ -192,5 +192,5 @@ def _outcome(rejected: str, collision: Collision | None) -> tuple[Outcome, str]:
 
 
 def episode_seed(run_seed: int, index: int) -> int:
-    """Seed of one episode; the same for every method, so that methods meet the same background traffic."""
+    """Seed of one episode; the same for every search, so that methods meet the same background traffic."""
     return int(np.random.SeedSequence((run_seed, index)).generate_state(1)[0] >> 1)

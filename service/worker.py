@@ -179,7 +179,11 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, replays: int) -> F
     judged = read_run(folder)
     flaky = tuple(each.index for each in judged.records if each.collision and REPEATS in each.collision.broken)
     return last.model_copy(
-        update={"metrics": judged.metrics["search"], "evaluation": judged.metrics.get("evaluation"), "flaky": flaky}
+        update={
+            "metrics": judged.metrics["iid" if spec.iid else "search"],
+            "evaluation": judged.metrics.get("evaluation"),
+            "flaky": flaky,
+        }
     )
 
 

@@ -15,6 +15,7 @@ from risk_sac.cli.keys import add_keys
 from risk_sac.cli.places import add_places
 from risk_sac.cli.regress import add_regress
 from risk_sac.cli.replay import add_bundle, add_replay
+from risk_sac.cli.report import add_report
 from risk_sac.cli.run import add_run
 from risk_sac.cli.serve import add_serve
 from risk_sac.cli.show import add_show
@@ -36,6 +37,7 @@ COMMANDS = (
     add_minimise,
     add_region,
     add_regress,
+    add_report,
     add_serve,
     add_campaigns,
     add_keys,

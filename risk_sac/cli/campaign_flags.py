@@ -28,6 +28,10 @@ def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, method
     parser.add_argument(
         "--cpu-s", type=float, metavar="S", help="processor time after which a search ends (default: none)"
     )
+    parser.add_argument(
+        "--iid", type=int, metavar="N", help="end with N scenes that no search has chosen, for bounds (default: none)"
+    )
+    parser.add_argument("--iid-seed", type=int, metavar="S", help="of those scenes (default: 0)")
     parser.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags go first")
 
 
@@ -39,7 +43,15 @@ def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:
     """
     names = ("families", "methods", "episodes", "evaluation_episodes", "cpu_s")
     flags = {name: getattr(options, name) for name in names}
-    return flags | {"seeds": _seeds(options, seeds)}
+    return flags | {"seeds": _seeds(options, seeds), "iid": _iid(options)}
+
+
+def _iid(options: argparse.Namespace) -> dict[str, int] | None:
+    if options.iid is None:
+        if options.iid_seed is not None:
+            raise ConfigError("got it without --iid; wanted both", field="--iid-seed")
+        return None
+    return {"episodes": options.iid, "seed": options.iid_seed or 0}
 
 
 def _seeds(options: argparse.Namespace, default: int) -> list[int] | None:

@@ -60,7 +60,7 @@ def _regress(options: argparse.Namespace) -> int:
         file.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
     for name in options.format:
         check_carries(name, "failure")
-    baseline = _read_baseline(options.baseline) if options.baseline else None
+    baseline = read_baseline(options.baseline) if options.baseline else None
     regressed = list(_cases(options.failures, ego))
     found = Regression(ego=ego, cases=tuple(each.case for each in regressed))
     if baseline is not None:
@@ -129,10 +129,15 @@ def _cases(paths: list[Path], ego: EgoConfig) -> Iterator["Regressed"]:
         yield from regress_run(run, ego)
 
 
-def _read_baseline(file: Path) -> Regression:
+def read_baseline(file: Path, flag: str = "--baseline") -> Regression:
+    """The cases that `--out` wrote.
+
+    Raises:
+      ConfigError: of the flag; there are none.
+    """
     try:
         return Regression.model_validate_json(file.read_bytes())
     except FileNotFoundError as error:
-        raise ConfigError(f"there is no {file}", field="--baseline") from error
+        raise ConfigError(f"there is no {file}", field=flag) from error
     except ValidationError as error:
-        raise ConfigError(f"{file} was not written by `risk-sac regress`", field="--baseline") from error
+        raise ConfigError(f"{file} was not written by `risk-sac regress`", field=flag) from error

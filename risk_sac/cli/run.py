@@ -73,7 +73,7 @@ def _found(metrics: RunMetrics | None) -> str:
 
 def _summary(spec: RunSpec, results: Results) -> Table:
     """One column per phase."""
-    phases = {"search": results.metrics, "evaluation": results.evaluation}
+    phases = {"i.i.d." if spec.iid else "search": results.metrics, "evaluation": results.evaluation}
     columns = {name: _figures(metrics) for name, metrics in phases.items() if metrics is not None}
     title = f"{spec.family} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}"
     table = Table("", *columns, title=title)

@@ -1,7 +1,7 @@
 """Every setting of the system, as frozen pydantic models with unit and meaning by each field."""
 
 from risk_sac.config.base import Interval, Settings
-from risk_sac.config.campaign import FAMILY_NAME, SHIPPED, Budget, CampaignSpec, FamilyName, Requirement, RunSpec
+from risk_sac.config.campaign import FAMILY_NAME, SHIPPED, Budget, CampaignSpec, FamilyName, Iid, Requirement, RunSpec
 from risk_sac.config.ego import CarFollowing, EgoConfig, SensorConfig
 from risk_sac.config.learner import (
     AgentConfig,
@@ -14,11 +14,12 @@ from risk_sac.config.learner import (
     SceneOptimizerConfig,
     WarmStartConfig,
 )
-from risk_sac.config.methods import METHODS, Method, MethodName
+from risk_sac.config.methods import IID_METHODS, METHODS, IidName, Method, MethodName, RunMethod, method_of
 from risk_sac.config.odd import CrossingType, DynamicElements, Environment, Odd, Scenery, SignalType
 
 __all__ = [
     "FAMILY_NAME",
+    "IID_METHODS",
     "METHODS",
     "SHIPPED",
     "AgentConfig",
@@ -31,6 +32,8 @@ __all__ = [
     "EgoConfig",
     "Environment",
     "FamilyName",
+    "Iid",
+    "IidName",
     "Interval",
     "LagrangianConfig",
     "LearnerConfig",
@@ -40,6 +43,7 @@ __all__ = [
     "ReplayConfig",
     "Requirement",
     "RewardConfig",
+    "RunMethod",
     "RunSpec",
     "SacConfig",
     "SceneOptimizerConfig",
@@ -48,4 +52,5 @@ __all__ = [
     "Settings",
     "SignalType",
     "WarmStartConfig",
+    "method_of",
 ]

@@ -5,14 +5,14 @@ The same `CampaignSpec` is the REST body, the CLI's YAML and the stored record.
 
 import hashlib
 import re
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, StringConstraints, WithJsonSchema, model_validator
 
 from risk_sac.config.base import Settings
 from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
-from risk_sac.config.methods import MethodName
+from risk_sac.config.methods import IID_METHODS, MethodName, RunMethod
 from risk_sac.config.odd import Odd
 
 SHIPPED = ("low", "mixed", "dense")
@@ -60,11 +60,24 @@ class Budget(Settings):
         return self.episodes + self.evaluation_episodes
 
 
+class Iid(Settings):
+    """What a campaign ends with where it is to say how often its ego fails: scenes that no search has chosen.
+
+    Each is drawn from the ODD independently of all others, uniformly between the bounds of each parameter. They are
+    played with undisturbed traffic and, apart from it, with random adversaries, in runs of their own.
+    """
+
+    episodes: Annotated[int, Field(ge=1, le=100_000)] = 300
+    """Scenes of each family and each kind of traffic, those included that are refused before the first step."""
+    seed: Seed = 0
+    """Of scenes, actions and SUMO; no stream of a search is the same, whatever its seed."""
+
+
 class RunSpec(Settings):
     """One run: the unit of scheduling, checkpoint and retry."""
 
     family: FamilyName
-    method: MethodName
+    method: RunMethod
     seed: Seed
     budget: Budget = Budget()
     ego: EgoConfig = EgoConfig()
@@ -76,6 +89,19 @@ class RunSpec(Settings):
     def id(self) -> str:
         """Unique within its campaign."""
         return f"{self.family}-{self.method}-{self.seed}"
+
+    @property
+    def iid(self) -> bool:
+        """Whether it belongs to an i.i.d. phase, and searches nothing."""
+        return self.method in IID_METHODS
+
+    @property
+    def stream(self) -> int:
+        """What all its generators are seeded with: its seed; in an i.i.d. phase a number that no search has."""
+        if not self.iid:
+            return self.seed
+        drawn = hashlib.sha256(f"{self.family} {self.method} {self.seed}".encode()).digest()
+        return 2**31 + int.from_bytes(drawn[:4]) // 2
 
     @property
     def digest(self) -> str:
@@ -95,14 +121,17 @@ class CampaignSpec(Settings):
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
+    iid: Annotated[Iid | None, Field(exclude_if=lambda iid: iid is None)] = None  # else old digests would change
+    """Null: none, and nothing is said of how often the ego fails."""
 
     @model_validator(mode="after")
     def _within_reason(self) -> Self:
         runs = len(self.families) * len(self.methods) * len(self.seeds)
-        if runs * self.budget.total_episodes > MOST_EPISODES:
+        drawn = len(self.families) * len(IID_METHODS) * self.iid.episodes if self.iid else 0
+        if runs * self.budget.total_episodes + drawn > MOST_EPISODES:
             raise ValueError(
-                f"budget is {self.budget.total_episodes} episodes for each of {runs} runs; wanted at most "
-                f"{MOST_EPISODES} in all"
+                f"budget is {self.budget.total_episodes} episodes for each of {runs} runs"
+                f"{f', and {drawn} of the i.i.d. phase' if drawn else ''}; wanted at most {MOST_EPISODES} in all"
             )
         return self
 
@@ -123,11 +152,28 @@ class CampaignSpec(Settings):
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
 
     def runs(self) -> tuple[RunSpec, ...]:
-        """The runs in the order they are queued: seeds outermost, so that early results compare methods."""
-        shared = {name: getattr(self, name) for name in ("budget", "ego", "odd", "requirements", "learner")}
+        """All runs in the order they are queued: the i.i.d. phase, if there is one, at the end."""
+        return self.searches() + self.drawn()
+
+    def searches(self) -> tuple[RunSpec, ...]:
+        """Families × methods × seeds: seeds outermost, so that early results compare methods."""
         return tuple(
-            RunSpec(family=family, method=method, seed=seed, **shared)
+            RunSpec(family=family, method=method, seed=seed, budget=self.budget, **self._shared())
             for seed in self.seeds
             for family in self.families
             for method in self.methods
         )
+
+    def drawn(self) -> tuple[RunSpec, ...]:
+        """Of the i.i.d. phase: a run for each family and kind of traffic."""
+        if self.iid is None:
+            return ()
+        budget = Budget(episodes=self.iid.episodes)
+        return tuple(
+            RunSpec(family=family, method=method, seed=self.iid.seed, budget=budget, **self._shared())
+            for family in self.families
+            for method in IID_METHODS
+        )
+
+    def _shared(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in ("ego", "odd", "requirements", "learner")}

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from risk_sac.config.campaign import RunSpec
-from risk_sac.config.methods import METHODS
+from risk_sac.config.methods import method_of
 from risk_sac.errors import ConfigError
 
 MOST_BYTES = 2 * 2**30  # of a run, beside the 0.6 GB or so that any run takes for code
@@ -43,7 +43,7 @@ def demand_bytes(spec: RunSpec, observation_size: int, action_size: int, horizon
     replay: a row for each step of the search, up to the capacity, `IN_CHECKPOINT` times.
     batch: what enters and leaves each layer of four networks at once.
     """
-    method, agent, episodes = METHODS[spec.method], spec.learner.agent, spec.budget.episodes
+    method, agent, episodes = method_of(spec.method), spec.learner.agent, spec.budget.episodes
     demand = {"budget.episodes": EPISODE_BYTES * spec.budget.total_episodes}
     if not method.learns:
         return demand

@@ -1,5 +1,6 @@
 """The methods as rows of data: base agent × {lagrangian, shaping, replay} × scene sampler."""
 
+from collections.abc import Mapping
 from typing import Literal
 
 from risk_sac.config.base import Settings
@@ -19,6 +20,9 @@ MethodName = Literal[
     "random",
     "no-adversary",
 ]
+IidName = Literal["iid-undisturbed", "iid-random"]
+"""How the runs of a campaign's i.i.d. phase are made, see `Iid`; nobody posts them as methods."""
+RunMethod = Literal[MethodName, IidName]
 
 
 class Method(Settings):
@@ -33,8 +37,9 @@ class Method(Settings):
     shaping: bool = False
     """Whether robustness shapes the reward (Eq. 6-8)."""
     replay: Literal["uniform", "rper"] = "uniform"
-    scenes: Literal["botorch", "archive", "sobol"] = "sobol"
-    """`archive`: bred from those that led to distinct failures, together with the scripts' genes."""
+    scenes: Literal["botorch", "archive", "sobol", "iid"] = "sobol"
+    """`archive`: bred from those that led to distinct failures, together with the scripts' genes; `iid`: drawn one
+    independently of the other, uniformly over the ODD."""
     takes_turns: bool = False
     """Whether a learner's warm start goes on beside it: scripts and policy act in turn, by what they yield."""
     needs: str = ""
@@ -98,3 +103,24 @@ METHODS: dict[MethodName, Method] = {
     "random": Method(agent="random", summary="Control: Sobol scenes and random actions, held for a second on average."),
     "no-adversary": Method(agent="none", summary="Control: nobody attacks; what remains is the artefact rate."),
 }
+
+# What a bound may be drawn from: no search, and so none of METHODS.
+IID_METHODS: dict[IidName, Method] = {
+    "iid-undisturbed": Method(
+        agent="none",
+        scenes="iid",
+        summary="Fresh random scenes in which nobody attacks: SUMO drives all vehicles, pedestrians stand.",
+    ),
+    "iid-random": Method(
+        agent="random",
+        scenes="iid",
+        summary="Fresh random scenes with random adversaries, whose actions are held for a second on average.",
+    ),
+}
+
+_ALL: Mapping[str, Method] = dict([*METHODS.items(), *IID_METHODS.items()])
+
+
+def method_of(name: RunMethod) -> Method:
+    """The row of a run's method, of a search's or of an i.i.d. phase's."""
+    return _ALL[name]

@@ -8,7 +8,7 @@ from typing import Any, TypeVar, get_args
 import yaml
 from pydantic import ValidationError
 
-from risk_sac.config import Budget, CampaignSpec, EgoConfig, RunSpec
+from risk_sac.config import IID_METHODS, Budget, CampaignSpec, EgoConfig, RunSpec
 from risk_sac.errors import ConfigError
 
 T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)
@@ -27,8 +27,8 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
     """
     given = {name: value for name, value in flags.items() if value is not None}
     data = _with_budget({"method": "risk-sac", "seed": 0} if file is None else _read_yaml(file), given)
-    if data.keys() & {"label", *CAMPAIGN_ONLY.values()}:
-        return _only_run(data | {CAMPAIGN_ONLY[name]: [value] for name, value in given.items()})
+    if data.keys() & {"label", "iid", *CAMPAIGN_ONLY.values()}:
+        return _only_run(data, given)
     return _validate(RunSpec, data | given)
 
 
@@ -83,11 +83,17 @@ def _read_yaml(file: Path) -> dict[str, Any]:
     return data
 
 
-def _only_run(data: dict[str, Any]) -> RunSpec:
-    runs = _validate(CampaignSpec, data).runs()
-    if len(runs) > 1:
+def _only_run(data: dict[str, Any], picked: Mapping[str, Any]) -> RunSpec:
+    """The one run of a campaign that the flags leave, of its searches or, by its method's name, of its i.i.d. phase."""
+    if picked.get("method") in IID_METHODS:
+        drawn = _validate(CampaignSpec, data).drawn()
+        runs = [run for run in drawn if all(getattr(run, name) == value for name, value in picked.items())]
+    else:
+        runs = list(_validate(CampaignSpec, data | {CAMPAIGN_ONLY[k]: [v] for k, v in picked.items()}).searches())
+    if len(runs) != 1:
         raise ConfigError(
-            f"the campaign has {len(runs)} runs; wanted one: pick it with --family, --method and --seed", field="spec"
+            f"the campaign has {len(runs)} such runs; wanted one: pick it with --family, --method and --seed",
+            field="spec",
         )
     return runs[0]
 

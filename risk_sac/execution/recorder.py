@@ -59,7 +59,7 @@ class Recorder:
             self._contacts.append(Contact.of(self.results.spec.id, record))
         told = self.results.metrics.episodes if self.results.metrics else 0
         due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes > told
-        if due and record.searching:
+        if due and not record.evaluating:
             self._write(replace(self.results, metrics=metrics, contacts=tuple(self._contacts)))
         self._observer.episode(record, metrics, series)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from risk_sac.agents.learner import Learner
-from risk_sac.config import METHODS, RunSpec
+from risk_sac.config import RunSpec, method_of
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import CheckpointError
 from risk_sac.failures.bundle import Bundle, make_bundle
@@ -75,7 +75,7 @@ def policy_of(folder: Path, results: Results) -> FrozenPolicy | None:
     None of a method that learns none, of a run that goes on, and where no checkpoint fits.
     """
     spec = results.spec
-    if not METHODS[spec.method].learns or not results.finished:
+    if not method_of(spec.method).learns or not results.finished:
         return None
     with closing(RunState(spec, folder)) as run:
         try:

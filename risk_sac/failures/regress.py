@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.agents.follower import ScriptFollower
-from risk_sac.config import METHODS, EgoConfig, RunSpec
+from risk_sac.config import EgoConfig, RunSpec, method_of
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, InfeasibleScene, RiskSacError
 from risk_sac.failures.bundle import Bundle, check_world, code_digest, make_bundle, versions
@@ -97,7 +97,7 @@ def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Regressed]:
     """
     results = read_results(folder)
     policy = policy_of(folder, results)
-    if policy is None and METHODS[results.spec.method].learns:
+    if policy is None and method_of(results.spec.method).learns:
         message = f"{folder} has not finished, or has no checkpoint, so that its policy cannot act on; make bundles"
         raise ConfigError(message, field="--failures")
     for episode in distinct_failures(results):
@@ -119,7 +119,7 @@ def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig) -> _Ending:
                 return _Ending(Verdict.NOT_COMPARABLE, why)
         other = manifest.spec.model_copy(update={"ego": ego})
         actions = "recorded actions"
-        if METHODS[manifest.spec.method].learns and bundle.policy is None:
+        if method_of(manifest.spec.method).learns and bundle.policy is None:
             actions += ", without its policy,"
         attacks = {actions: partial(_play, other, bundle, bundle.policy)}
         if manifest.episode.script is not None:

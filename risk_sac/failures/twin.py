@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from risk_sac.config import METHODS, EgoConfig, RunSpec
+from risk_sac.config import EgoConfig, RunSpec, method_of
 from risk_sac.env import RiskSacEnv
 from risk_sac.failures.play import Played, play
 from risk_sac.failures.recording import Recording
@@ -50,6 +50,6 @@ def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoCon
     steps = min(len(actions) + round(AFTER_S / STEP_S), problem.family.horizon_steps)
     longer = np.zeros((steps, actions.shape[1]), dtype=actions.dtype)
     longer[: len(actions)] = actions[:steps]
-    attacked = changed is not None and METHODS[spec.method].agent != "none"
+    attacked = changed is not None and method_of(spec.method).agent != "none"
     with closing(RiskSacEnv(problem, spec.learner.reward, controlled=attacked)) as env:
         return play(env, Scene(spec.family, episode.scene), episode.seed, longer)

@@ -9,7 +9,7 @@ from risk_sac.metrics.accumulator import MetricsAccumulator
 from risk_sac.metrics.counts import COUNTS, Counts, Funnel, pooled_counts
 from risk_sac.metrics.digest import results_digest
 from risk_sac.metrics.features import FEATURES, outcome_features
-from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, wilson_interval
+from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, clopper_pearson, wilson_interval
 from risk_sac.metrics.metric import Kept, Metric, Ratio
 from risk_sac.metrics.pooling import Estimate, estimate, mean_over_runs, pooled_bins, pooled_signatures
 from risk_sac.metrics.rows import METRICS, RATIOS, MetricName
@@ -32,6 +32,7 @@ __all__ = [
     "Ratio",
     "Tally",
     "bootstrap_interval",
+    "clopper_pearson",
     "estimate",
     "mean_over_runs",
     "outcome_features",

@@ -1,4 +1,4 @@
-"""95 % intervals of a rate and of a mean. Pure."""
+"""95 % intervals of a rate and of a mean, and exact bounds of a rate. Pure."""
 
 import math
 from collections.abc import Sequence
@@ -8,6 +8,7 @@ import numpy as np
 from risk_sac.errors import NotFinite
 
 NORMAL_QUANTILE = 1.959963984540054  # two-sided 95 %
+CONFIDENCE = 0.95  # of each bound
 RESAMPLES = 10_000
 RESAMPLING_SEED = 0
 
@@ -32,6 +33,28 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     half = NORMAL_QUANTILE * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2)) / (1 + z2 / trials)
     # At rates of 0 and 1 the bound equals the rate; rounding must not push it past.
     return max(0.0, min(centre - half, rate)), min(1.0, max(centre + half, rate))
+
+
+def clopper_pearson(successes: int, trials: int) -> tuple[float, float]:
+    """Exact one-sided 95 % bounds of a rate, from trials that are independent and alike.
+
+    With the upper bound as the rate, no more than k successes come in 5 % of all cases; with the lower one, no fewer.
+    The rate is below the one with 95 % confidence, and above the other with 95 %; between both with 90 %.
+
+    Args:
+        successes: k, 0 <= k <= n.
+        trials: n; with 0 nothing is known.
+
+    Returns:
+        (low, high) within [0, 1]; 0 of 300 gives (0, 0.00994).
+
+    Source: Clopper & Pearson 1934, The use of confidence or fiducial limits illustrated in the case of the binomial.
+    """
+    from scipy.special import betaincinv  # here, because few ask for bounds, and every process of a server loads this
+
+    low = float(betaincinv(successes, trials - successes + 1, 1 - CONFIDENCE)) if successes else 0.0
+    high = float(betaincinv(successes + 1, trials - successes, CONFIDENCE)) if successes < trials else 1.0
+    return low, high
 
 
 def bootstrap_interval(values: Sequence[float], seed: int) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from risk_sac.config import FamilyName, MethodName
+from risk_sac.config import FamilyName, RunMethod
 from risk_sac.metrics import (
     METRICS,
     RATIOS,
@@ -30,7 +30,7 @@ class Cell:
     """What a method achieved in a family and phase, over all its finished runs."""
 
     family: FamilyName
-    method: MethodName
+    method: RunMethod
     phase: Phase
     seeds: tuple[int, ...]
     """Of the runs that are counted."""

@@ -39,6 +39,8 @@ class Comparison:
     cells: tuple[Cell, ...]  # by family, phase and method
     tests: tuple[PairedTest, ...]
     overviews: Mapping[FamilyName, Overview]  # of the failures of all methods that repeat; families with runs alone
+    drawn: tuple[FinishedRun, ...]  # of the i.i.d. phase; in no cell, no test and no overview
+    undrawn: tuple[MissingRun, ...]  # of the i.i.d. phase too
     headline: tuple[PairedTest, ...]  # what a user pays for, by family; declared before any run, so corrected by itself
 
     @property
@@ -91,7 +93,7 @@ def compare(
 
     Args:
         spec: the campaign.
-        runs: finished runs, in any order; those of other specs are left out.
+        runs: finished runs, in any order, those of the i.i.d. phase among them; those of other specs are left out.
         command: what a reader types to get the same.
         spec_file: where `risk-sac run --spec` finds the campaign.
         spec_command: what a reader types to have that file; empty where it lies there already.
@@ -99,13 +101,14 @@ def compare(
     """
     methods = _reference_first(spec.methods)
     found = {run.spec.digest: run for run in runs}
-    wanted = sorted(spec.runs(), key=lambda run: (spec.families.index(run.family), methods.index(run.method), run.seed))
+
+    def missing(wanted: Sequence[RunSpec]) -> tuple[MissingRun, ...]:
+        lacking = (run for run in wanted if run.digest not in found)
+        return tuple(MissingRun(spec=run, reason=(reasons or {}).get(run.digest, "not finished")) for run in lacking)
+
+    searches = spec.searches()
+    wanted = sorted(searches, key=lambda run: (spec.families.index(run.family), methods.index(run.method), run.seed))
     kept = tuple(found[run.digest] for run in wanted if run.digest in found)
-    missing = tuple(
-        MissingRun(spec=run, reason=(reasons or {}).get(run.digest, "not finished"))
-        for run in wanted
-        if run.digest not in found
-    )
     families = dict.fromkeys(run.spec.family for run in kept)
     return Comparison(
         spec=spec,
@@ -114,10 +117,12 @@ def compare(
         spec_command=spec_command,
         methods=methods,
         runs=kept,
-        missing=missing,
+        missing=missing(wanted),
         cells=tuple(_cells(kept)),
         tests=tuple(_tests(spec, methods, kept)),
         overviews={family: overview(_failures(family, kept)) for family in families},
+        drawn=tuple(found[run.digest] for run in spec.drawn() if run.digest in found),
+        undrawn=missing(spec.drawn()),
         headline=tuple(_headline(spec, methods, kept)),
     )
 

@@ -100,7 +100,7 @@ def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
             cell.method,
             *map(str, (cell.episodes, cell.raw_collisions, cell.failures)),
             *map(str, (cell.distinct_failures, cell.distinct_preventable)),
-            _verified(comparison.of_cell(family, cell.method), phase),
+            verified(comparison.of_cell(family, cell.method), phase),
             DASH if cell.unresponsive_share is None else percent(cell.unresponsive_share),
         ]
         for cell in comparison.group(family, phase)
@@ -108,7 +108,7 @@ def _funnel(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     return f"### The funnel: {family}, {phase}\n\n" + table(columns, rows)
 
 
-def _verified(runs: Sequence[FinishedRun], phase: Phase) -> str:
+def verified(runs: Sequence[FinishedRun], phase: Phase) -> str:
     """How many of the distinct failures that were replayed were the same each time."""
     if not all(run.verified for run in runs):
         return DASH

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from pydantic import ValidationError
 
-from risk_sac.config import FamilyName, MethodName, RunSpec
+from risk_sac.config import FamilyName, RunMethod, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, read_studies
 from risk_sac.metrics import MetricsAccumulator, Tally, results_digest
@@ -42,7 +42,7 @@ class FinishedRun:
     studies: Mapping[int, Studied] = field(default_factory=dict)  # of its failures, by index of the episode
 
     @property
-    def cell(self) -> tuple[FamilyName, MethodName]:
+    def cell(self) -> tuple[FamilyName, RunMethod]:
         """Where it belongs in the table."""
         return self.spec.family, self.spec.method
 

@@ -54,7 +54,7 @@ class Results:
     spec: RunSpec
     spec_digest: str
     finished: bool
-    metrics: RunMetrics | None = None  # of the search; None before its first episode
+    metrics: RunMetrics | None = None  # of the search or the i.i.d. phase; None before its first episode
     evaluation: RunMetrics | None = None  # of the frozen policy
     digest: str | None = None  # of all records; None while the run goes on
     versions: Mapping[str, str] | None = None

@@ -3,6 +3,7 @@
 from risk_sac.scene_optimizer.archive import ArchiveOptimizer
 from risk_sac.scene_optimizer.base import NOBODY, Encounter, SceneOptimizer, State
 from risk_sac.scene_optimizer.bayesian import BotorchOptimizer
+from risk_sac.scene_optimizer.iid import IidSampler
 from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
 from risk_sac.scene_optimizer.sobol import SobolOptimizer
 
@@ -11,6 +12,7 @@ __all__ = [
     "ArchiveOptimizer",
     "BotorchOptimizer",
     "Encounter",
+    "IidSampler",
     "RunningMaximum",
     "SceneOptimizer",
     "SobolOptimizer",

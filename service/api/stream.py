@@ -13,7 +13,7 @@ from async_lru import alru_cache
 from sse_starlette import ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.records import Outcome
+from risk_sac.records import RECORDED, Outcome
 from service.errors import NotFoundError, StorageError
 from service.schemas.changes import StateChange
 from service.store.reading import Store
@@ -117,7 +117,8 @@ def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None
 
 def _event(campaign_id: str, event: StoredEpisode | StoredChange) -> bytes:
     if isinstance(event, StoredEpisode):
-        name = "failure" if event.record.outcome is Outcome.FAILURE else "episode"
+        found = event.record.outcome is Outcome.FAILURE and event.record.phase != RECORDED["iid"]
+        name = "failure" if found else "episode"
         data = episode_body(event).model_dump_json()
     else:
         name, data = "state", StateChange.model_validate(event).model_dump_json()

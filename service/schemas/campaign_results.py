@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from risk_sac.config import FamilyName, MethodName
+from risk_sac.config import FamilyName, MethodName, RunMethod
 from service.schemas.base import Body, Real
 from service.schemas.campaigns import Metrics
 from service.store.states import State
@@ -13,12 +13,12 @@ class RunResult(Body):
 
     id: str
     family: FamilyName
-    method: MethodName
+    method: RunMethod
     seed: int
     state: State
     reason: str | None
     metrics: Metrics | None
-    """Of the search; null before the first episode."""
+    """Of the search, or of the i.i.d. phase that the run is; null before the first episode."""
     evaluation: Metrics | None
     """Of the frozen policy; null until, or unless, the budget has evaluation episodes."""
     spec_digest: str

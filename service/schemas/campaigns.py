@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from risk_sac.config import CampaignSpec, FamilyName, MethodName
+from risk_sac.config import CampaignSpec, FamilyName, RunMethod
 from risk_sac.records import RunMetrics
 from service.schemas.base import Body, Real, Shown
 from service.store.states import State
@@ -13,11 +13,11 @@ class Metrics(RunMetrics, Shown):
 
 
 class Run(Body):
-    """One (family, method, seed) of a campaign."""
+    """One (family, method, seed) of a campaign, or of its i.i.d. phase, whose methods begin with `iid-`."""
 
     id: str
     family: FamilyName
-    method: MethodName
+    method: RunMethod
     seed: int
     state: State
     reason: str | None
@@ -39,9 +39,10 @@ class Run(Body):
 
 
 class Progress(Body):
-    """How far a campaign is."""
+    """How far a campaign is, and what its searches have found."""
 
     episodes_done: int
+    """Of the i.i.d. phase too, if there is one; what follows the totals is of the searches alone."""
     episodes_total: int
     failures: int
     """Valid collisions."""

@@ -22,6 +22,8 @@ class Judged:
     grade: Grade | None = None
     broke: str | None = None
     signature: str | None = None
+    iid: bool = True
+    """Whether those of an i.i.d. phase are asked for, too."""
 
     def conditions(self) -> Iterator[ColumnElement[bool]]:
         """As the database takes them."""
@@ -31,6 +33,8 @@ class Judged:
             yield EpisodeRow.broke.contains(f",{self.broke},", autoescape=True)
         if self.signature is not None:
             yield EpisodeRow.signature == self.signature
+        if not self.iid:
+            yield EpisodeRow.phase != RECORDED["iid"]
 
 
 def find_campaign(session: Session, campaign_id: str, project: str | None = None) -> CampaignRow:

@@ -168,12 +168,12 @@ class Store:
             return episode_page(session, query, outcomes, limit, after or 0)
 
     def plain_episodes(self, number: int, outcomes: Collection[Outcome] = ()) -> Iterator[PlainEpisode]:
-        """All episodes of the campaign with this number in order of arrival; no outcomes means all.
+        """What searches did in the campaign with this number, in order of arrival; no outcomes means all episodes.
 
         Raises:
           StorageError: one of them is damaged.
         """
-        conditions = [EpisodeRow.campaign_number == number]
+        conditions = [EpisodeRow.campaign_number == number, *Judged(iid=False).conditions()]
         if outcomes:
             conditions.append(EpisodeRow.outcome.in_(outcomes))
         names = [field.name for field in fields(PlainEpisode)]

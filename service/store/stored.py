@@ -8,7 +8,7 @@ from typing import Any, Generic, Self, TypeVar
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import from_json
 
-from risk_sac.config import CampaignSpec, FamilyName, RunSpec
+from risk_sac.config import IID_METHODS, CampaignSpec, FamilyName, RunSpec
 from risk_sac.metrics import Funnel
 from risk_sac.records import EpisodeRecord, Outcome, RunMetrics
 from risk_sac.run_folder.verified import Repetition
@@ -62,6 +62,11 @@ class StoredRun:
         return cls(**_columns(cls, row) | read)
 
     @property
+    def iid(self) -> bool:
+        """Whether it belongs to an i.i.d. phase: what it counts is never added to what searches found."""
+        return self.method in IID_METHODS
+
+    @property
     def verified(self) -> int:
         """Distinct failures that repeat."""
         return sum(repetition.verified for repetition in self.repetitions.values())
@@ -104,7 +109,12 @@ class StoredCampaign:
     @property
     def methods(self) -> list[str]:
         """Of its runs, as they were posted."""
-        return list(dict.fromkeys(run.method for run in self.runs))
+        return list(dict.fromkeys(run.method for run in self.searches))
+
+    @property
+    def searches(self) -> tuple[StoredRun, ...]:
+        """Its runs without those of the i.i.d. phase."""
+        return tuple(run for run in self.runs if not run.iid)
 
     @property
     def ego(self) -> dict[str, Any]:
@@ -129,7 +139,9 @@ class StoredCampaign:
     def run_spec(self, run: StoredRun) -> RunSpec:
         """What a worker needs to know to execute one of the runs."""
         alone = {"families": (run.family,), "methods": (run.method,), "seeds": (run.seed,)}
-        (spec,) = self.spec.model_copy(update=alone).runs()
+        if run.iid:
+            return next(spec for spec in self.spec.drawn() if spec.id == run.id)
+        (spec,) = self.spec.model_copy(update=alone).searches()
         return spec
 
     def paused(self, reason: str) -> "StoredCampaign":

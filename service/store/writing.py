@@ -103,10 +103,10 @@ class Ledger:
                     count(run, Outcome(row.outcome), -1)
                 fill(row, event)
                 count(run, event.record.outcome, +1)
-                if event.record.searching:
-                    run.metrics = to_text(event.metrics)
-                else:
+                if event.record.evaluating:
                     run.evaluation = to_text(event.metrics)
+                else:
+                    run.metrics = to_text(event.metrics)
                 changed.add(number)
             for number in changed:
                 run = runs[number]

@@ -22,18 +22,18 @@ Counts = NDArray[np.int64]
 
 
 def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: int) -> Curves:
-    """The curves of all runs.
+    """The curves of all searches.
 
     Args:
       campaign: whose runs they are.
       episodes: all of the campaign, those of a run in their order.
       points: of each curve, at most.
     """
-    searches = {run.number: _Search() for run in campaign.runs}
+    searches = {run.number: _Search() for run in campaign.searches}
     for each in episodes:
         if each.phase == SEARCH:
             searches[each.run_number].add(each.outcome, from_json(each.record))
-    return Curves(runs=[_curves(run, searches[run.number], points) for run in campaign.runs])
+    return Curves(runs=[_curves(run, searches[run.number], points) for run in campaign.searches])
 
 
 @dataclass(slots=True)

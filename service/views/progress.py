@@ -10,7 +10,8 @@ from service.store.states import State
 from service.store.stored import StoredCampaign, StoredRun
 from service.store.tables import TALLIED
 
-SUMMED = ("episodes_total", "rejected", *TALLIED)
+OF_ALL = ("episodes_total", "episodes_done")
+OF_SEARCHES = ("rejected", *(name for name in TALLIED if name not in OF_ALL))
 AVERAGED = ("window_ecr", "window_pcr", "dual_variable", "temperature")
 LOOKS = 20  # that somebody who follows a campaign takes from now to its end
 SOONEST_S, LATEST_S = 1, 30
@@ -24,8 +25,10 @@ def progress(campaign: StoredCampaign, workers: int) -> Progress:
       campaign: the campaign.
       workers: runs the server executes at once.
     """
-    runs, present = campaign.runs, _present(campaign.runs)
-    sums = {name: sum(getattr(run, name) for run in runs) for name in SUMMED}
+    runs, searches = campaign.runs, campaign.searches
+    present = _present(searches)
+    sums = {name: sum(getattr(run, name) for run in runs) for name in OF_ALL}
+    sums |= {name: sum(getattr(run, name) for run in searches) for name in OF_SEARCHES}
     means = {name: _mean([getattr(metrics, name) for metrics in present]) for name in AVERAGED}
     eta = 0.0 if campaign.state.final else eta_s(runs, workers)
     return Progress.model_validate(sums | means | {"eta_s": eta})

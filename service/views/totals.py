@@ -29,7 +29,7 @@ def results(campaign: StoredCampaign) -> Results:
         state=campaign.state,
         complete=campaign.state.final,
         runs=[RunResult.model_validate(run) for run in campaign.runs],
-        totals=totals(campaign.runs),
+        totals=totals(campaign.searches),
     )
 
 

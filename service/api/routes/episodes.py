@@ -53,7 +53,9 @@ def list_failures(
     service: Service,
     caller: CurrentCaller,
     tier: Tier = "valid",
-    run: Annotated[str | None, Query(description="Only failures of this run.")] = None,
+    run: Annotated[
+        str | None, Query(description="Only failures of this run. Without it, none of an i.i.d. phase.")
+    ] = None,
     grade: Annotated[Grade | None, Query(description="Only failures of this grade; `careful`: preventable.")] = None,
     broke: Annotated[
         str | None, Query(max_length=40, pattern="^[a-z_]+$", description="Only those whose striker broke this.")
@@ -71,7 +73,7 @@ def list_failures(
         after=service.cursors.decode(cursor, campaign_id, caller.sees),
         run_id=run,
         outcomes=TIERS[tier],
-        judged=Judged(grade=grade, broke=broke, signature=signature),
+        judged=Judged(grade=grade, broke=broke, signature=signature, iid=run is not None),
         project=caller.sees,
     )
     return _episode_page(page, service.cursors.encode(page.last, campaign_id, caller.sees))

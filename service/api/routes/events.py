@@ -40,8 +40,8 @@ EVENT = {
 }
 EVENTS: Responses = {
     200: {
-        "description": "`episode`, or `failure` for a valid one: an Episode, with the funnel of its run so far."
-        " `state`: a StateChange. The end of a run"
+        "description": "`episode`, or `failure` for a valid one of a search: an Episode, with the funnel of its run so"
+        " far. `state`: a StateChange. The end of a run"
         " or of the campaign comes after all its episodes, and the stream ends with that of the campaign.",
         "content": {"text/event-stream": {"schema": EVENT, "example": EXAMPLE}},
     },

@@ -1,0 +1,66 @@
+"""`risk-sac report`: what runs found, how often it happens, and where nobody looked, as one file."""
+
+import argparse
+import shlex
+from pathlib import Path
+
+from risk_sac.cli.console import OK, Commands, console
+from risk_sac.cli.regress import read_baseline
+from risk_sac.errors import ConfigError
+from risk_sac.report.evidence import Evidence, Origin, gathered, html, markdown, report, show_command
+from risk_sac.report.evidence.folders import Found, read_folders
+from risk_sac.run_folder.durable import replace_file
+
+FORMATS = (".html", ".md", ".json")
+
+
+def add_report(commands: Commands) -> None:
+    """Adds the command."""
+    parser = commands.add_parser("report", help="one file on what runs found, with bounds, coverage and limits")
+    parser.set_defaults(command=_report)
+    parser.add_argument(
+        "runs", type=Path, nargs="+", metavar="RUNS", help="folder of `risk-sac evaluate`, or folders of runs"
+    )
+    parser.add_argument(
+        "--regression",
+        type=Path,
+        metavar="FILE.json",
+        help="failures against another ego, by `risk-sac regress --out`",
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="report.html, report.md, or its data as report.json"
+    )
+
+
+def _report(options: argparse.Namespace) -> int:
+    if options.out.suffix not in FORMATS:
+        raise ConfigError(f"got {options.out.name!r}; wanted a name that ends in {', '.join(FORMATS)}", field="--out")
+    regression = read_baseline(options.regression, "--regression") if options.regression else None
+    found = read_folders(options.runs)
+    evidence = gathered(found.comparison)
+    origin = Origin(
+        report=options.typed,
+        data=shlex.join(["risk-sac", "report", *map(str, options.runs), "--out", "report.json"]),
+        show=lambda run, failure: show_command(found.folders[run.spec.digest], failure),
+        regress=_regress(found),
+        folders=found.folders,
+        regression=regression,
+    )
+    content = _content(options.out.suffix, found, evidence, origin)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(options.out, content.encode())
+    console.print(f"Report: {options.out}", soft_wrap=True)
+    return OK
+
+
+def _content(suffix: str, found: Found, evidence: Evidence, origin: Origin) -> str:
+    if suffix == ".json":
+        return evidence.model_dump_json(indent=2) + "\n"
+    document = report(found.comparison, evidence, origin)
+    return html(document) if suffix == ".html" else markdown(document)
+
+
+def _regress(found: Found) -> str:
+    """What to type to play the failures of all searches that have finished."""
+    runs = [str(found.folders[run.spec.digest]) for run in found.comparison.runs]
+    return shlex.join(["risk-sac", "regress", "--failures", *runs, "--ego", "EGO", "--out", "cases.json"])

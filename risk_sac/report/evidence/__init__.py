@@ -1,0 +1,14 @@
+"""Evidence with its limits: how often an ego fails where nobody searched, where nobody looked, and a report of it.
+
+evidence = gathered(comparison)                      # bounds and coverage, as data
+document = report(comparison, evidence, origin)
+html(document); markdown(document)
+"""
+
+from risk_sac.report.evidence.gathered import Evidence, gathered
+from risk_sac.report.evidence.html import POLICY, html
+from risk_sac.report.evidence.origin import Origin, show_command
+from risk_sac.report.evidence.plain import markdown
+from risk_sac.report.evidence.report import report
+
+__all__ = ["POLICY", "Evidence", "Origin", "gathered", "html", "markdown", "report", "show_command"]

@@ -1,0 +1,91 @@
+"""The runs of one campaign, found in folders."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from risk_sac.config import IID_METHODS, CampaignSpec, Iid, RunSpec
+from risk_sac.config.spec_file import read_campaign
+from risk_sac.errors import ConfigError
+from risk_sac.report.comparison import Comparison, compare
+from risk_sac.report.runs import FinishedRun, read_run
+from risk_sac.run_folder.results import RESULTS, read_results
+
+SPEC, RUNS = "spec.yaml", "runs"
+SHARED = ("ego", "odd", "requirements", "learner")
+AGAIN = "risk-sac evaluate --spec spec.yaml --out campaign"  # with the spec that the report ends with
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Found:
+    """What lies in some folders."""
+
+    comparison: Comparison
+    folders: Mapping[str, Path]  # by digest of the run's spec
+
+
+def read_folders(paths: Sequence[Path]) -> Found:
+    """Reads runs, and says why those are missing that are not finished, not there, or damaged.
+
+    Args:
+      paths: one folder of `risk-sac evaluate`, or folders of runs that share all but family, method, seed and budget.
+
+    Raises:
+      ConfigError: there is no run, or they are of different campaigns.
+    """
+    whole = paths[0] if len(paths) == 1 and (paths[0] / SPEC).is_file() else None
+    spec = read_campaign(whole / SPEC, {}, {}) if whole else None
+    places = sorted(path for path in (whole / RUNS).glob("*/") if (path / RESULTS).exists()) if whole else list(paths)
+    if not places:
+        raise ConfigError(f"there is no run in {paths[0]}", field="RUNS")
+    runs: list[FinishedRun] = []
+    folders: dict[str, Path] = {}
+    reasons: dict[str, str] = {}
+    known: list[RunSpec] = []
+    for place in places:
+        try:
+            known.append(read_results(place).spec)
+        except ConfigError:
+            if whole is None:
+                raise
+            continue  # which of them it was, nobody can tell; it is missing
+        digest = known[-1].digest
+        folders[digest] = place
+        try:
+            runs.append(read_run(place))
+        except (ConfigError, OSError) as error:
+            reasons[digest] = str(error)
+    if not known:
+        raise ConfigError(f"no run in {paths[0]} can be read", field="RUNS")
+    comparison = compare(spec or _campaign(known), runs, AGAIN, reasons=reasons)
+    return Found(comparison=comparison, folders=folders)
+
+
+def _campaign(runs: Sequence[RunSpec]) -> CampaignSpec:
+    """The campaign that runs with these specs may be of."""
+    searches, drawn = [run for run in runs if not run.iid], [run for run in runs if run.iid]
+    if not searches:
+        raise ConfigError("there are only runs of an i.i.d. phase; wanted one of a search, too", field="RUNS")
+    for alike, names in ((runs, SHARED), (searches, ("budget",)), (drawn, ("budget", "seed"))):
+        for name in names:
+            other = next((run for run in alike if getattr(run, name) != getattr(alike[0], name)), None)
+            if other is not None:
+                raise ConfigError(
+                    f"{alike[0].id} and {other.id} differ in their {name}; wanted runs of one campaign", field="RUNS"
+                )
+    first = searches[0]
+    return CampaignSpec(
+        families=_each(run.family for run in runs),
+        methods=_each(run.method for run in searches if run.method not in IID_METHODS),
+        seeds=tuple(sorted({run.seed for run in searches})),
+        budget=first.budget,
+        iid=Iid(episodes=drawn[0].budget.episodes, seed=drawn[0].seed) if drawn else None,
+        **{name: getattr(first, name) for name in SHARED},
+    )
+
+
+def _each(names: Iterable[T]) -> tuple[T, ...]:
+    return tuple(dict.fromkeys(names))

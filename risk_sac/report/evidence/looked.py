@@ -1,0 +1,174 @@
+"""Sections of a report on the ODD: what it is, how often the ego fails in it, and where nobody looked."""
+
+from collections.abc import Iterator, Mapping
+
+from risk_sac.config import IID_METHODS, FamilyName
+from risk_sac.report.comparison import Comparison
+from risk_sac.report.evidence.bounds import Bound, Drawn
+from risk_sac.report.evidence.coverage import BINS, PAIR_BINS, Coverage, ParameterCoverage
+from risk_sac.report.evidence.document import Block, Commands, Items, Paragraph, Section, Table
+from risk_sac.report.evidence.gathered import Evidence, FamilyCoverage
+from risk_sac.report.evidence.origin import again
+from risk_sac.report.evidence.words import odd_in_words
+from risk_sac.report.page import DASH
+from risk_sac.scenario.families import FAMILIES
+
+MOST_PAIRS, MOST_CELLS = 12, 8  # that are named; all are in the data
+TRAFFIC: Mapping[str, str] = {"iid-undisturbed": "undisturbed", "iid-random": "random adversaries"}
+NO_IID = (
+    "The campaign had no i.i.d. phase, so nothing can be said of how often the ego fails: a search chooses scenes to "
+    "make it fail. A campaign ends with one where its spec has, or its command line:"
+)
+
+
+def odd(comparison: Comparison) -> Section:
+    """The ODD of each family, in words."""
+    families = comparison.spec.families
+    told = [dict(odd_in_words(FAMILIES[family], comparison.spec.odd)) for family in families]
+    rows = [[words, *(each[words] for each in told)] for words in told[0]]
+    blocks: list[Block] = [
+        Items([f"{family}: {FAMILIES[family].summary}" for family in families]),
+        Table("ODD", ["of the ODD", *families], rows, left=1 + len(families)),
+    ]
+    return Section("odd", "Operational design domain", blocks)
+
+
+def bounds(comparison: Comparison, evidence: Evidence) -> Section:
+    """How often the ego fails where nobody has searched."""
+    title = "How often it fails where nobody searched"
+    if comparison.spec.iid is None:
+        return Section("bounds", title, [Paragraph(NO_IID), Commands(["iid: {episodes: 300}", "--iid 300"])])
+    blocks: list[Block] = [
+        Paragraph(
+            "These scenes were drawn from the ODD independently of each other and of any search, uniformly between the "
+            "bounds of each scene parameter, with a seed of their own. Bounds are Clopper and Pearson's, exact and "
+            "one-sided: the rate is at most the upper one with 95 % confidence, and at least the lower one with 95 %, "
+            "each row by itself. They hold for such scenes, in this simulator, with this traffic: no road has them in "
+            "these shares."
+        ),
+        Items([f"{words}: {IID_METHODS[name].summary}" for name, words in TRAFFIC.items() if name in IID_METHODS]),
+    ]
+    if evidence.bounds:
+        columns = ["family", "traffic", "what", "of played", "at most", "at least", "scenes", "refused"]
+        rows = [row for each in evidence.bounds for row in _rows(each)]
+        blocks.append(Table("bounds", columns, rows, left=3))
+    if crashed := sum(each.crashed for each in evidence.bounds):
+        blocks.append(Paragraph(f"In {crashed} scenes the simulator died. Upper bounds count them as failures."))
+    if comparison.undrawn:
+        lacking = [f"{run.spec.id}: {run.reason}" for run in comparison.undrawn]
+        blocks += [Paragraph("Missing, and so without bounds:"), Items(lacking)]
+    if comparison.drawn:
+        first = comparison.drawn[0]
+        blocks += [Paragraph("One of these runs again, to the digit:"), Commands([again(comparison, first)])]
+    return Section("bounds", title, blocks)
+
+
+def _rows(each: Drawn) -> Iterator[list[str]]:
+    told: Mapping[str, Bound] = {
+        "contacts": each.contacts,
+        "valid failures": each.failures,
+        "preventable failures": each.preventable,
+    }
+    for what, bound in told.items():
+        yield [
+            each.family,
+            TRAFFIC[each.method],
+            what,
+            f"{bound.count} of {each.played}",
+            percent(bound.high),
+            percent(bound.low),
+            str(each.scenes),
+            str(each.refused),
+        ]
+
+
+def percent(rate: float) -> str:
+    """With two decimals, for rates are small."""
+    return f"{100 * rate:.2f} %"
+
+
+def coverage(evidence: Evidence) -> Section:
+    """Which part of the ODD was looked at, and what never was."""
+    text = (
+        f"The range of each scene parameter within the ODD is parted into {BINS} bins of equal width, and that of each "
+        f"pair into {PAIR_BINS} × {PAIR_BINS} cells. A bin says how many episodes began in it, and of how many the end "
+        "was a valid failure; a scene that was refused is none. What unfolds after the beginning is in the taxonomy."
+    )
+    parts = [_of_family(family, found) for family, found in evidence.coverage.items()]
+    return Section("coverage", "Coverage", [Paragraph(text)], parts)
+
+
+def _of_family(family: FamilyName, found: FamilyCoverage) -> Section:
+    searched = found.search
+    blocks: list[Block] = [
+        *_parameters(searched, "search"),
+        *(_parameters(found.iid, "i.i.d. phase") if found.iid else []),
+        Paragraph("Never sampled, by the search or the i.i.d. phase:"),
+        Items(list(_never(found)) or ["Every bin of every parameter, and every cell of every pair, has an episode."]),
+        *_taxonomy(searched),
+    ]
+    return Section(f"coverage-{family}", family, blocks)
+
+
+def _parameters(coverage: Coverage, who: str) -> Iterator[Block]:
+    numbers = [each for each in coverage.parameters if not each.categorical]
+    sorts = [each for each in coverage.parameters if each.categorical]
+    yield Paragraph(f"By the {who}: {coverage.episodes} episodes, as failed / played in each tenth of the range.")
+    heads = ["parameter", "from", "to", *(str(number + 1) for number in range(BINS))]
+    rows = [
+        [_named(each), f"{each.low:.4g}", f"{each.high:.4g}", *_counts(each), *[DASH] * (BINS - len(each.bins))]
+        for each in numbers
+    ]
+    yield Table(f"bins, {who}", heads, rows)
+    if sorts:
+        kinds = [[each.name, bin_.name, f"{bin_.failed} / {bin_.played}"] for each in sorts for bin_ in each.bins]
+        yield Table(f"categories, {who}", ["parameter", "category", "failed / played"], kinds, left=2)
+    failed = sum(each.failed for each in coverage.pairs)
+    played = sum(each.played for each in coverage.pairs)
+    cells = sum(each.cells for each in coverage.pairs)
+    yield Paragraph(
+        f"Pairs of parameters: {len(coverage.pairs)} with {cells:,} cells, of which {played:,} have an episode and "
+        f"{failed:,} a valid failure."
+    )
+
+
+def _named(each: ParameterCoverage) -> str:
+    return each.name if each.unit == "1" else f"{each.name} ({each.unit})"
+
+
+def _counts(each: ParameterCoverage) -> list[str]:
+    return [f"{bin_.failed} / {bin_.played}" for bin_ in each.bins]
+
+
+def _never(found: FamilyCoverage) -> Iterator[str]:
+    """What neither has looked at, in words."""
+    both = [each for each in (found.search, found.iid) if each is not None]
+    for several in zip(*(each.parameters for each in both), strict=True):
+        bins = [name for name in several[0].never if all(name in each.never for each in several)]
+        if bins:
+            yield f"{_named(several[0])}: {', '.join(bins)}"
+    lacking = []
+    for pairs in zip(*(each.pairs for each in both), strict=True):
+        cells = [cell for cell in pairs[0].never if all(cell in each.never for each in pairs)]
+        if cells:
+            lacking.append((pairs[0].parameters, cells))
+    lacking.sort(key=lambda each: -len(each[1]))
+    for (first, second), cells in lacking[:MOST_PAIRS]:
+        more = f", and {len(cells) - MOST_CELLS} more" if len(cells) > MOST_CELLS else ""
+        yield f"{first} with {second}: {', '.join(cells[:MOST_CELLS])}{more}"
+    if len(lacking) > MOST_PAIRS:
+        yield f"cells of {len(lacking) - MOST_PAIRS} more pairs"
+    if found.search.beyond:
+        yield f"what the ODD allows and no scene begins with: {', '.join(found.search.beyond)}"
+    yield f"no scene parameter varies {', '.join(found.search.fixed)}"
+
+
+def _taxonomy(coverage: Coverage) -> Iterator[Block]:
+    found = coverage.kinds
+    yield Paragraph(
+        f"Taxonomy of failures: {len(found.hit)} of {found.cells:,} cells hold a valid failure of the search. Most of "
+        "the others hold what no ego and no road allows."
+    )
+    if found.hit:
+        yield Table("taxonomy", ["cell", "failures"], [[name, str(count)] for name, count in found.hit.items()])
+    yield Paragraph(f"In no failure: {', '.join(found.never) or 'nothing; each value was met'}.")

@@ -1,0 +1,182 @@
+"""Sections of a report on what the search found."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+from risk_sac.config import FamilyName
+from risk_sac.failures.cases import Regression
+from risk_sac.failures.clusters import Cluster
+from risk_sac.records import EpisodeRecord, Grade
+from risk_sac.report.comparison import Comparison
+from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Paragraph, Picture, Section, Table
+from risk_sac.report.evidence.origin import Origin
+from risk_sac.report.evidence.pictures import draw
+from risk_sac.report.evidence.words import ego_in_words
+from risk_sac.report.markdown import verified
+from risk_sac.report.page import DASH
+from risk_sac.report.runs import FinishedRun
+
+MOST_CARDS = 12  # of a family
+GRADES = {
+    Grade.CAREFUL: "a careful driver would have prevented it",
+    Grade.IDEAL: "only full braking at once would have prevented it",
+    Grade.UNAVOIDABLE: "nobody would have prevented it",
+    None: "not judged",
+}
+FUNNEL = ["family", "method", "runs", "episodes", "refused", "contacts", "valid", "distinct", "preventable", "verified"]
+
+
+def budget(comparison: Comparison) -> Section:
+    """What was spent, and on what."""
+    spec, runs = comparison.spec, comparison.runs
+    allowed = [f"{spec.budget.episodes} search episodes"]
+    if spec.budget.evaluation_episodes:
+        allowed.append(f"{spec.budget.evaluation_episodes} episodes of the frozen policy")
+    if spec.budget.cpu_s is not None:
+        allowed.append(f"at most {spec.budget.cpu_s:g} s of processor time for the search")
+    every = len(runs) + len(comparison.missing)
+    rows = [
+        [family, method, str(len(of)), _sum(len(run.records) for run in of), f"{sum(run.cpu_s for run in of):,.0f}"]
+        for family in spec.families
+        for method in comparison.methods
+        if (of := comparison.of_cell(family, method))
+    ]
+    blocks: list[Block] = [
+        Paragraph(f"Each of {every} runs may spend {', and '.join(allowed)}. What was spent:"),
+        Table("what was spent", ["family", "method", "runs", "episodes", "CPU s"], rows, left=2),
+    ]
+    return Section("budget", "Budget", blocks)
+
+
+def funnel(comparison: Comparison) -> Section:
+    """From contacts to what is worth a person's time."""
+    rows = [
+        [
+            cell.family,
+            cell.method,
+            str(len(cell.seeds)),
+            *(f"{count:,}" for count in (cell.episodes, cell.rejected, cell.raw_collisions, cell.failures)),
+            *(f"{count:,}" for count in (cell.distinct_failures, cell.distinct_preventable)),
+            verified(comparison.of_cell(cell.family, cell.method), "search"),
+        ]
+        for cell in comparison.cells
+        if cell.phase == "search"
+    ]
+    blocks: list[Block] = [
+        Paragraph(
+            "Refused: the scene was infeasible, and nothing was played. Valid: no artefact of the simulator, and the "
+            "ego had a part in it. Distinct: resembles no earlier one of the same run. Preventable: the distinct ones "
+            "that a careful driver in the ego's place would have prevented. Verified: of the first failures of each "
+            "kind, those that were the same to the bit each time they were replayed; a dash where none was. The search "
+            "chose these scenes: no share of these numbers is a rate of crashes."
+        ),
+        Table("the funnel", FUNNEL, rows, left=2),
+    ]
+    return Section("funnel", "The funnel", blocks)
+
+
+def clusters(comparison: Comparison, origin: Origin) -> Section:
+    """Which failures there are, one of each as a picture."""
+    text = (
+        "Failures of one kind share who strikes, the type of conflict, from where, how the ego responds, whether it "
+        "saw the other, and the ground. Pictured is the one to look at first, from above, 3 s long: the ego is blue, "
+        "who strikes it orange, others grey."
+    )
+    parts = [_of_family(comparison, family, origin) for family in comparison.spec.families]
+    return Section("failures", "Which failures there are", [Paragraph(text)], parts)
+
+
+def _of_family(comparison: Comparison, family: FamilyName, origin: Origin) -> Section:
+    found = comparison.overviews.get(family)
+    if found is None or not found.clusters:
+        none = "No run of it has finished." if found is None else "None was found. That proves nothing: see the limits."
+        return Section(f"failures-{family}", family, [Paragraph(none)])
+    shown = found.clusters[:MOST_CARDS]
+    episodes = {
+        record.id_in(run.spec.id): (run, record)
+        for run in comparison.runs
+        if run.spec.family == family
+        for record in run.records
+        if record.collision is not None
+    }
+    rest = len(found.clusters) - len(shown)
+    said = f"{len(found.clusters)} kinds by all methods together" + (
+        f"; the {rest} with the fewest preventable failures are left out here." if rest else "."
+    )
+    cards = [_card(each, *episodes[each.representative], origin) for each in shown]
+    return Section(f"failures-{family}", family, [Paragraph(said), Cards(cards)])
+
+
+def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Origin) -> Card:
+    drawing = draw(run, origin.folders.get(run.spec.digest), record.index)
+    alt = f"The contact from above: {cluster.name}"
+    return Card(
+        title=cluster.name,
+        lines=[
+            f"{cluster.failures} {'failure' if cluster.failures == 1 else 'failures'}, {cluster.distinct} distinct, {cluster.preventable} preventable",
+            f"grade: {GRADES[cluster.grade]}",
+            *_told(run, record),
+        ],
+        command=origin.show(run, cluster.representative),
+        picture=Picture(alt, "image/svg+xml", drawing.svg) if drawing.svg else None,
+        missing=drawing.missing,
+    )
+
+
+def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
+    """Of the pictured failure."""
+    hit = record.collision
+    assert hit is not None  # that is what makes it one
+    yield f"pictured: {record.id_in(run.spec.id)}"
+    conflict_s = hit.judgement.conflict_s if hit.judgement else hit.time_s
+    yield (
+        f"touches {hit.other_id} at {hit.ego_speed_mps:.1f} m/s, {hit.time_s - conflict_s:.1f} s after the conflict "
+        f"began; it was in view for {hit.visible_for_s:.1f} s"
+    )
+    repeated = run.verified.episodes.get(record.index) if run.verified else None
+    if repeated is not None:
+        yield f"replayed {repeated.times} times, {repeated.same} times the same to the bit"
+    study = run.studies.get(record.index)
+    if study is not None and study.core is not None:
+        yield f"core: {study.core.sentence}"
+    if study is not None and study.region is not None:
+        shares = ", ".join(f"{share.what} {share.failed} of {share.played}" for share in study.region.shares)
+        yield f"neighbours that fail too: {shares}"
+
+
+def regression(origin: Origin) -> Section:
+    """What became of the failures with another ego."""
+    found = origin.regression
+    if found is None:
+        none = Paragraph("No other ego was played against these failures. To do so, and to be told here:")
+        return Section("regression", "Regression", [none, Commands([origin.regress])])
+    counts = Counter(case.verdict.replace("_", " ") for case in found.cases)
+    said = ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items())) or "no failure"
+    known = sum(case.known for case in found.cases)
+    text = (
+        f"The failures against another ego: {ego_in_words(found.ego)}. Of {len(found.cases)}: {said}; "
+        f"{known} known from a baseline. {'All are fixed or known.' if found.passed else 'Not all are fixed or known.'}"
+    )
+    columns = ["failure", "kind", "grade", "verdict", "what happens now"]
+    return Section(
+        "regression",
+        "Regression",
+        [Paragraph(text), Table("regression", columns, _cases(found), left=5), Commands([origin.regress])],
+    )
+
+
+def _cases(found: Regression) -> list[list[str]]:
+    return [
+        [
+            case.id,
+            case.name,
+            case.grade or DASH,
+            case.verdict.replace("_", " ") + (", known" if case.known else ""),
+            case.reason,
+        ]
+        for case in found.cases
+    ]
+
+
+def _sum(values: Iterator[int]) -> str:
+    return f"{sum(values):,}"

@@ -1,0 +1,69 @@
+"""An ego and an ODD in words."""
+
+import math
+from collections.abc import Iterator, Mapping
+
+from risk_sac.config import EgoConfig, Interval, Odd
+from risk_sac.scenario.family import Family
+from risk_sac.scenario.odd import field, intersect
+
+PROFILES = {
+    "default": "SUMO's driver with a delay and a line of sight",
+    "perfect": "SUMO's driver, who reacts at once and sees everything",
+    "careful": "the default with the careful driver's braking on top",
+}
+# Field of the ODD → what it is called, and its unit.
+FIELDS: Mapping[str, tuple[str, str]] = {
+    "scenery.lanes": ("lanes of the ego's road, per direction", ""),
+    "scenery.speed_limit_mps": ("posted limit", "m/s"),
+    "scenery.signal_types": ("traffic signals", ""),
+    "scenery.crossing_types": ("pedestrian crossings", ""),
+    "environment.friction": ("friction between tyre and road", ""),
+    "environment.visibility_m": ("visibility (its low end bounds the ego's sensor)", "m"),
+    "dynamic.actor_kinds": ("who is there beside the ego", ""),
+    "dynamic.ego_speed_mps": ("the ego's speed at the start", "m/s"),
+    "dynamic.vehicle_speed_mps": ("speed of other vehicles", "m/s"),
+    "dynamic.vehicle_accel_mps2": ("acceleration of other vehicles", "m/s²"),
+    "dynamic.vehicle_lateral_speed_mps": ("speed of other vehicles across their lane, to either side", "m/s"),
+    "dynamic.vehicle_lateral_accel_mps2": ("acceleration of other vehicles across their lane, to either side", "m/s²"),
+    "dynamic.pedestrian_speed_mps": ("speed of pedestrians", "m/s"),
+    "dynamic.pedestrian_accel_mps2": ("acceleration of pedestrians", "m/s²"),
+}
+
+
+def ego_in_words(ego: EgoConfig) -> str:
+    """Who drives, how fast it reacts, and what it sees."""
+    parts = [
+        f"profile {ego.profile} ({PROFILES[ego.profile]})",
+        f"car-following model {ego.car_following}",
+        f"decides every {ego.reaction_time_s:g} s",
+    ]
+    sensor = ego.sensor
+    if sensor is None:
+        return ", ".join([*parts, "sees everything"])
+    degrees = math.degrees(sensor.field_of_view_rad)
+    parts.append(f"sees {sensor.range_m:g} m far over {degrees:.0f}°")
+    parts.append("not through vehicles" if sensor.occlusion else "through vehicles too")
+    return ", ".join([*parts, f"reckons for {sensor.memory_s:g} s with whom it has lost from sight"])
+
+
+def odd_in_words(family: Family, odd: Odd) -> Iterator[tuple[str, str]]:
+    """The fields of the ODD that a family and a campaign allow together, and what each allows.
+
+    A field that has been added since has no words yet, and stands under its own name.
+    """
+    whole = intersect(family.odd, odd)
+    for branch in type(whole).model_fields:
+        for name in type(getattr(whole, branch)).model_fields:
+            path = f"{branch}.{name}"
+            words, unit = FIELDS.get(path, (path, ""))
+            yield words, _allowed(field(whole, path), unit)
+
+
+def _allowed(value: object, unit: str) -> str:
+    if isinstance(value, Interval):
+        text = f"{value.low:g}" if value.low == value.high else f"{value.low:g} to {value.high:g}"
+        return f"{text} {unit}".strip()
+    if isinstance(value, tuple):
+        return ", ".join(str(each).replace("_", " ") for each in value)
+    return "anything" if value is None else str(value)
