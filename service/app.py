@@ -24,6 +24,7 @@ from service.api.routes import (
     docs,
     episodes,
     events,
+    evidence,
     logs,
     networks,
     operations,
@@ -80,7 +81,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
         docs_url=None,  # the routes have pages that need no network
         redoc_url=None,
     )
-    shown = (episodes, logs, pictures, sketches, events, reports)
+    shown = (episodes, logs, pictures, sketches, events, reports, evidence)
     for routes in (campaigns, *shown, regressions, networks, catalogue, operations, docs):
         app.include_router(routes.router)
     app.router.routes += page.routes()

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunSpec
+from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunMethod, RunSpec
 from risk_sac.failures.clusters import Overview, overview
 from risk_sac.failures.studied import Studied
 from risk_sac.records import RECORDED, EpisodeRecord, Phase
@@ -67,7 +67,7 @@ class Comparison:
             if record.index in run.studies
         }
 
-    def of_cell(self, family: FamilyName, method: MethodName) -> tuple[FinishedRun, ...]:
+    def of_cell(self, family: FamilyName, method: RunMethod) -> tuple[FinishedRun, ...]:
         """The runs of a method in a family."""
         return tuple(run for run in self.runs if run.cell == (family, method))
 

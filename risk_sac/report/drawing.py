@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from risk_sac.canvas import canvas, picture
-from risk_sac.config import METHODS, MethodName
+from risk_sac.config import METHODS, RunMethod
 from risk_sac.metrics import RESAMPLING_SEED
 from risk_sac.report.comparison import REFERENCE, Comparison
 from risk_sac.report.figures import Bars, Curves, Format, Times, curve_values
@@ -49,7 +49,7 @@ _OWN = {
 }
 
 
-def _looks() -> dict[MethodName, Look]:
+def _looks() -> dict[RunMethod, Look]:
     """By the table of methods, so that a method looks the same whichever others are compared."""
     others = [method for method in METHODS if method not in _OWN]
     drawn = {

@@ -110,7 +110,7 @@ class Regressions:
           QuotaError: too many wait.
           StorageError: it cannot be written down.
         """
-        runs = tuple(run.id for run in campaign.runs if run.state is State.SUCCEEDED)
+        runs = tuple(run.id for run in campaign.searches if run.state is State.SUCCEEDED)
         if not campaign.state.final or not runs:
             message = (
                 f"campaign {campaign.id} is {campaign.state}; wanted one that has ended, with a run that succeeded"

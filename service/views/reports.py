@@ -2,6 +2,8 @@
 
 import hashlib
 import threading
+from collections.abc import Mapping
+from pathlib import Path
 
 from risk_sac import __version__
 from risk_sac.errors import ConfigError
@@ -19,11 +21,15 @@ class CampaignReport:
 
     Attributes:
       comparison: what it says; its commands are the caller's to fill in.
+      folders: of the runs, by the digest of their specs.
       lasting: whether the same edition would say it again: not if a finished run's folder could not be read.
     """
 
-    def __init__(self, campaign: StoredCampaign, comparison: Comparison, *, lasting: bool) -> None:
+    def __init__(
+        self, campaign: StoredCampaign, comparison: Comparison, folders: Mapping[str, Path], *, lasting: bool
+    ) -> None:
         self.comparison = comparison
+        self.folders = folders
         self.lasting = lasting
         self._campaign_id = campaign.id
         self._lock = threading.Lock()
@@ -93,7 +99,8 @@ class Reports:
                 reasons[run.spec_digest] = f"it succeeded, but its results are lost: {error}"
                 lasting = False
         comparison = compare(campaign.spec, found, command="", reasons=reasons)
-        return CampaignReport(campaign, comparison, lasting=lasting)
+        folders = {run.spec_digest: self._settings.run_folder(campaign.id, run.id) for run in campaign.runs}
+        return CampaignReport(campaign, comparison, folders, lasting=lasting)
 
 
 def _missing(run: StoredRun) -> str:

@@ -7,7 +7,8 @@ from risk_sac.report.evidence.document import Banner, Block, Cards, Commands, Do
 from risk_sac.report.evidence.html import shown
 from risk_sac.report.page import table
 
-_MARKS = re.compile(r"([\\`*\[\]<>])|(?<!\w)_|_(?!\w)")  # an underscore within a word is none
+_MARKS = re.compile(r"[\\`*\[\]]|(?<!\w)_|_(?!\w)")  # an underscore within a word is none
+_TAGS = {ord("&"): "&amp;", ord("<"): "&lt;", ord(">"): "&gt;"}
 
 
 def markdown(document: Document) -> str:
@@ -59,6 +60,6 @@ def _code(*lines: str) -> Iterator[str]:
 
 
 def _text(text: str) -> str:
-    """On one line, and nothing in it is a mark; an ampersand would begin a character of HTML."""
-    plain = " ".join(shown(text).split()).replace("&", "&amp;")
+    """On one line, and nothing in it is a mark or HTML."""
+    plain = " ".join(shown(text).split()).translate(_TAGS)
     return _MARKS.sub(lambda mark: f"\\{mark[0]}", plain)

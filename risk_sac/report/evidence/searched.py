@@ -28,13 +28,12 @@ FUNNEL = ["family", "method", "runs", "episodes", "refused", "contacts", "valid"
 
 def budget(comparison: Comparison) -> Section:
     """What was spent, and on what."""
-    spec, runs = comparison.spec, comparison.runs
+    spec = comparison.spec
     allowed = [f"{spec.budget.episodes} search episodes"]
     if spec.budget.evaluation_episodes:
         allowed.append(f"{spec.budget.evaluation_episodes} episodes of the frozen policy")
     if spec.budget.cpu_s is not None:
         allowed.append(f"at most {spec.budget.cpu_s:g} s of processor time for the search")
-    every = len(runs) + len(comparison.missing)
     rows = [
         [family, method, str(len(of)), _sum(len(run.records) for run in of), f"{sum(run.cpu_s for run in of):,.0f}"]
         for family in spec.families
@@ -42,7 +41,7 @@ def budget(comparison: Comparison) -> Section:
         if (of := comparison.of_cell(family, method))
     ]
     blocks: list[Block] = [
-        Paragraph(f"Each of {every} runs may spend {', and '.join(allowed)}. What was spent:"),
+        Paragraph(f"Each run may spend {', and '.join(allowed)}. What was spent:"),
         Table("what was spent", ["family", "method", "runs", "episodes", "CPU s"], rows, left=2),
     ]
     return Section("budget", "Budget", blocks)
@@ -100,8 +99,8 @@ def _of_family(comparison: Comparison, family: FamilyName, origin: Origin) -> Se
         if record.collision is not None
     }
     rest = len(found.clusters) - len(shown)
-    said = f"{len(found.clusters)} kinds by all methods together" + (
-        f"; the {rest} with the fewest preventable failures are left out here." if rest else "."
+    said = f"{_counted(len(found.clusters), 'kind')} by all methods together." + (
+        f" {_counted(rest, 'more kind')}, with the fewest preventable failures, left out here." if rest else ""
     )
     cards = [_card(each, *episodes[each.representative], origin) for each in shown]
     return Section(f"failures-{family}", family, [Paragraph(said), Cards(cards)])
@@ -113,7 +112,7 @@ def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Ori
     return Card(
         title=cluster.name,
         lines=[
-            f"{cluster.failures} {'failure' if cluster.failures == 1 else 'failures'}, {cluster.distinct} distinct, {cluster.preventable} preventable",
+            f"{_counted(cluster.failures, 'failure')}, {cluster.distinct} distinct, {cluster.preventable} preventable",
             f"grade: {GRADES[cluster.grade]}",
             *_told(run, record),
         ],
@@ -180,3 +179,7 @@ def _cases(found: Regression) -> list[list[str]]:
 
 def _sum(values: Iterator[int]) -> str:
     return f"{sum(values):,}"
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

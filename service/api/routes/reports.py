@@ -83,7 +83,7 @@ def get_table(
     """The methods compared over seeds by the runs that have finished, with the others named; empty before the first."""
     campaign = service.store.campaign(campaign_id, caller.sees)
     name = format_ or _accepted(request, TABLES)
-    command, spec_command = _commands(request, campaign_id)
+    command, spec_command = commands(request, campaign_id)
 
     def table(report: CampaignReport) -> str:
         return TABLES[name](replace(report.comparison, command=command, spec_command=spec_command))
@@ -174,7 +174,7 @@ def _files(campaign_id: str, name: str) -> list[FigureFile]:
     return [FigureFile(format=each, media_type=IMAGE_TYPES[each], href=f"{path}.{each}") for each in FORMATS]
 
 
-def _commands(request: Request, campaign_id: str) -> tuple[str, str]:
+def commands(request: Request, campaign_id: str) -> tuple[str, str]:
     """What to type to queue the campaign again, and to have it as a file for the command line."""
     campaigns = f"{request.base_url}v1/campaigns"
     spec, post, as_yaml = map(

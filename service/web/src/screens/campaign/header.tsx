@@ -1,7 +1,7 @@
 /** What a campaign is, how far it is, and what can be done with it. */
 
 import { useState } from "preact/hooks";
-import { download, send } from "../../api/client";
+import { absolute, download, hasKey, send } from "../../api/client";
 import { ended } from "../../api/ended";
 import type { Body } from "../../api/types";
 import { address, go } from "../../router";
@@ -74,6 +74,13 @@ function Actions({ campaign, again }: { campaign: Campaign; again: () => void })
     setRefused("");
     download(`${path}/spec?format=${format}`, `${campaign.id}.${format}`).catch((error: Error) => setRefused(error.message));
   };
+  const report = `${path}/report?format=html`;
+  const keyed = (event: Event) => {
+    if (!hasKey()) return; // a link cannot carry the key, a call can
+    event.preventDefault();
+    setRefused("");
+    download(report, `${campaign.id}.html`).catch((error: Error) => setRefused(error.message));
+  };
   return (
     <div class="actions">
       <a class="button primary" href={address(["campaigns", campaign.id, "failures"])}>
@@ -81,6 +88,9 @@ function Actions({ campaign, again }: { campaign: Campaign; again: () => void })
       </a>
       <a class="button" href={address(["campaigns", campaign.id, "compare"])}>
         Compare methods
+      </a>
+      <a class="button" href={absolute(report)} target="_blank" rel="noopener" onClick={keyed}>
+        Report
       </a>
       <a class="button" href={address(["new"], { from: campaign.id })}>
         Clone

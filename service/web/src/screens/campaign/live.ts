@@ -118,7 +118,7 @@ class Watch {
   private async snapshot(campaign: Campaign): Promise<void> {
     const { runs } = await this.get<Body<"Curves">>(`/curves?points=${POINTS}`);
     const known = new Map(runs.map((curve) => [curve.run_id, curve]));
-    this.curves = new LiveCurves(campaign.runs.map((run) => known.get(run.id) ?? begun(run)));
+    this.curves = new LiveCurves(campaign.runs.filter(searches).map((run) => known.get(run.id) ?? begun(run)));
     this.curves.apply(this.waiting);
     this.waiting = [];
     this.draw();
@@ -155,8 +155,15 @@ class Watch {
   }
 }
 
+type Search = Body<"Run"> & Pick<Curve, "method">;
+
+/** Whether a run searches; those of an i.i.d. phase do not, and have no curves. */
+function searches(run: Body<"Run">): run is Search {
+  return !run.method.startsWith("iid-");
+}
+
 /** The curve of a run without an episode. */
-function begun({ id, family, method, seed, state }: Body<"Run">): Curve {
+function begun({ id, family, method, seed, state }: Search): Curve {
   const columns = { episodes: [], window_ecr: [], window_pcr: [], distinct: [], distinct_preventable: [], dual_variable: [], mean_cost: [] };
   return { run_id: id, family, method, seed, state, ...columns };
 }
