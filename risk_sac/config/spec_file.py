@@ -92,7 +92,7 @@ def _only_run(data: dict[str, Any], picked: Mapping[str, Any]) -> RunSpec:
         runs = list(_validate(CampaignSpec, data | {CAMPAIGN_ONLY[k]: [v] for k, v in picked.items()}).searches())
     if len(runs) != 1:
         raise ConfigError(
-            f"the campaign has {len(runs)} such runs; wanted one: pick it with --family, --method and --seed",
+            f"the campaign has {len(runs) or 'no such'} runs; wanted one: pick it with --family, --method and --seed",
             field="spec",
         )
     return runs[0]

@@ -109,7 +109,7 @@ def find_triage(session: Session, episode: EpisodeRow) -> TriageRow | None:
 def split_failure_id(failure_id: str) -> tuple[str, str, int]:
     """Run, phase and index; an id of another shape yields a run that cannot exist."""
     for phase in RECORDED.values():
-        run_id, _, index = failure_id.partition(f"-{phase}-")
+        run_id, _, index = failure_id.rpartition(f"-{phase}-")  # the last: an i.i.d. run's own id has it too
         if "\0" not in run_id and index.isascii() and index.isdigit() and len(index) < 10:
             return run_id, phase, int(index)
     return "", "", -1

@@ -13,6 +13,8 @@ import pytest
 from risk_sac.config import (
     AgentConfig,
     Budget,
+    CampaignSpec,
+    Iid,
     LearnerConfig,
     ReplayConfig,
     RunSpec,
@@ -137,6 +139,21 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("stopped")
     run(folder, limit=4)
     return folder
+
+
+def test_a_resumed_i_i_d_phase_draws_on_and_no_search_meets_its_scenes(tmp_path: Path) -> None:
+    drawn = CampaignSpec(families=("mixed",), iid=Iid(episodes=4), learner=LEARNER).drawn()[1]
+    whole, first, rest, searched = Listener(), Listener(2), Listener(), Listener()
+    expected = train(drawn, tmp_path / "whole", whole)
+    train(drawn, tmp_path / "parts", first)
+    resumed = train(drawn, tmp_path / "parts", rest)
+    assert [record.phase for record in whole.records] == ["iid"] * 4
+    assert records_to_json(rest.records) == records_to_json(whole.records)
+    assert resumed.digest == expected.digest
+    train(spec(method="random"), tmp_path / "searched", searched)  # of the same seed
+    assert not {record.seed for record in searched.records} & {record.seed for record in whole.records}
+    scenes = [record.scene["friction"] for record in (*searched.records, *whole.records)]
+    assert len(set(scenes)) == len(scenes)
 
 
 def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path: Path) -> None:

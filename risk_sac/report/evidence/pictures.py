@@ -35,7 +35,7 @@ def draw(run: FinishedRun, folder: Path | None, index: int) -> Drawing:
         return Drawing(None, "the folder of its run is not there")
     record = next(each for each in run.records if each.index == index)
     try:
-        with np.load(folder / FAILURES / series_name(index), allow_pickle=False) as archive:
+        with (folder / FAILURES / series_name(index)).open("rb") as file, np.load(file, allow_pickle=False) as archive:
             series = {name: archive[name] for name in archive.files}
         recording = Recording(Contact.of(run.spec.id, record), series)
         return Drawing(thumbnail(recording, roads_of(run.spec.family, record.scene)).encode())

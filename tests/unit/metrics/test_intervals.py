@@ -2,11 +2,12 @@ import math
 
 import numpy as np
 import pytest
+import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.errors import NotFinite
-from risk_sac.metrics import bootstrap_interval, wilson_interval
+from risk_sac.metrics import bootstrap_interval, clopper_pearson, wilson_interval
 
 
 @pytest.mark.parametrize(
@@ -48,3 +49,24 @@ def test_bootstrap_refuses_nothing_and_nan():
         bootstrap_interval([], 0)
     with pytest.raises(NotFinite, match="nan"):
         bootstrap_interval([0.1, math.nan], 0)
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "low", "high"),
+    # 1 - 0.05^(1/300) and its mirror; Clopper and Pearson's own bounds for 3 of 20; no trial tells nothing.
+    [(0, 300, 0.0, 0.00993608), (300, 300, 0.99006392, 1.0), (3, 20, 0.04217, 0.34366), (0, 0, 0.0, 1.0)],
+)
+def test_clopper_pearson_literals(successes, trials, low, high):
+    assert clopper_pearson(successes, trials) == pytest.approx((low, high), abs=5e-6)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.integers(0, 10**4), st.integers(1, 10**4))
+def test_at_its_bounds_a_rate_gives_what_was_seen_in_one_case_of_twenty(successes, trials):
+    successes = min(successes, trials)
+    low, high = clopper_pearson(successes, trials)
+    assert 0 <= low <= successes / trials <= high <= 1
+    if successes < trials:
+        assert scipy.stats.binom.cdf(successes, trials, high) == pytest.approx(0.05, abs=1e-6)
+    if successes:
+        assert scipy.stats.binom.sf(successes - 1, trials, low) == pytest.approx(0.05, abs=1e-6)

@@ -3,8 +3,12 @@ import pytest
 from risk_sac.config import CampaignSpec
 from risk_sac.records import Outcome
 from service.errors import ConflictError, NotFoundError, StorageError, TransitionError
+from service.store.finding import Judged
 from service.store.states import State, TriageState
 from service.store.stored import StoredEpisode
+from service.views.curves import curves
+from service.views.progress import progress
+from service.views.totals import results
 from service.workers.messages import Finished
 from tests.begun import start
 
@@ -111,6 +115,35 @@ def test_failures_that_did_not_repeat_are_refused_with_the_end_of_their_run(stor
         (Outcome.FAILURE, ""),
         (Outcome.DEGENERATE, "repeats"),
     ]
+
+
+def test_what_an_i_i_d_phase_counts_is_added_to_nothing_that_searches_found(store, ledger, episode, metrics):
+    spec = CampaignSpec(families=("low",), methods=("random",), budget={"episodes": 3}, iid={"episodes": 3})
+    campaign = ledger.create(spec)
+    assert [campaign.run_spec(run) for run in campaign.runs] == list(spec.runs())
+    for phase in ("train", "iid", "iid"):
+        number = start(store, ledger)
+        outcomes = (Outcome.SAFE, Outcome.FAILURE, Outcome.REJECTED)
+        ledger.add_episodes([(number, episode(index, outcome, phase)) for index, outcome in enumerate(outcomes)])
+        end = {"metrics": metrics, "evaluation": None, "digest": phase, "versions": {}, "wall_s": 1.0}
+        ledger.end_run(number, State.SUCCEEDED, result=Finished(finished=True, **end))
+    found = store.campaign(campaign.id)
+    assert found.state is State.SUCCEEDED
+    assert found.methods == ["random"]
+    assert [run.failures for run in found.runs] == [1, 1, 1]  # each by itself
+    counted = progress(found, 1)
+    assert (counted.episodes_done, counted.episodes_total) == (9, 9)
+    assert (counted.failures, counted.raw_collisions, counted.rejected) == (1, 1, 1)
+    assert [(total.method, total.runs) for total in results(found).totals] == [("random", 1)]
+
+    def ids(**asked):
+        return [each.id for each in store.episodes(found.id, limit=9, outcomes=(Outcome.FAILURE,), **asked).items]
+
+    assert ids(judged=Judged(iid=False)) == ["low-random-0-train-1"]
+    assert ids(run_id="low-iid-random-0", judged=Judged()) == ["low-iid-random-0-iid-1"]
+    assert store.failure(found.id, "low-iid-random-0-iid-1").record.phase == "iid"
+    assert {each.phase for each in store.plain_episodes(found.number)} == {"train"}
+    assert [curve.run_id for curve in curves(found, store.plain_episodes(found.number), 9).runs] == ["low-random-0"]
 
 
 def test_one_failed_run_fails_the_campaign_once_the_others_have_ended(store, ledger):

@@ -1,0 +1,61 @@
+"""The i.i.d. phase of a campaign: an option that changes nothing where it is not asked for."""
+
+import pytest
+from pydantic import ValidationError
+
+from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.config.spec_file import campaign_yaml, read_spec
+from risk_sac.errors import ConfigError
+
+ENDS = {"families": ["low", "dense"], "methods": ["random", "archive"], "seeds": [0, 7], "iid": {"seed": 7}}
+
+
+def test_a_campaign_without_one_is_what_it_was_before_there_were_any():
+    spec = CampaignSpec(families=("low",))
+    assert spec.digest == "d9173f0325290b7958f2539c98d58f592329bd3af26fbfecc425513d67f2019d"
+    assert spec.runs()[0].digest == "a4422e995c53117395e00dfa88828b256b9e2507d31cab9c7eb36f5744ebd9f4"
+    assert "iid" not in spec.model_dump()
+    assert spec.drawn() == ()
+
+
+def test_its_runs_come_last_one_for_each_family_and_kind_of_traffic():
+    spec = CampaignSpec.model_validate(ENDS)
+    ids = [run.id for run in spec.runs()]
+    assert len(spec.searches()) == 8
+    assert ids[8:] == ["low-iid-undisturbed-7", "low-iid-random-7", "dense-iid-undisturbed-7", "dense-iid-random-7"]
+    assert len(set(ids)) == len(ids)
+    assert {run.budget.total_episodes for run in spec.drawn()} == {300}
+    assert CampaignSpec.model_validate_json(spec.model_dump_json()) == spec
+
+
+def test_no_generator_of_it_is_seeded_as_one_of_a_search_or_of_another_of_its_runs():
+    spec = CampaignSpec.model_validate(ENDS)
+    streams = [run.stream for run in spec.drawn()]
+    assert len(set(streams)) == 4
+    assert min(streams) > 2**31 - 1  # the largest seed that can be posted
+    assert all(run.stream == run.seed for run in spec.searches())
+
+
+def test_nobody_posts_its_runs_as_methods_nor_more_episodes_than_a_campaign_may_have():
+    with pytest.raises(ValidationError, match="iid-random"):
+        CampaignSpec.model_validate({"families": ["low"], "methods": ["iid-random"]})
+    with pytest.raises(ValidationError, match="episodes"):
+        CampaignSpec.model_validate({"families": ["low"], "iid": {"episodes": 0}})
+    full = {"families": ["low"], "seeds": list(range(20)), "budget": {"episodes": 100_000}}
+    assert CampaignSpec.model_validate(full)
+    with pytest.raises(ValidationError, match=r"and 600 of the i\.i\.d\. phase; wanted at most 2000000"):
+        CampaignSpec.model_validate(full | {"iid": {}})
+
+
+def test_a_command_line_picks_one_of_its_runs_from_a_campaigns_file(tmp_path):
+    spec = CampaignSpec.model_validate(ENDS)
+    file = tmp_path / "spec.yaml"
+    file.write_text(campaign_yaml(spec))
+    picked = {"family": "dense", "method": "iid-random", "seed": 7}
+    assert read_spec(file, picked) == spec.drawn()[3]
+    assert read_spec(file, picked | {"method": "archive"}) == spec.searches()[7]
+    with pytest.raises(ConfigError, match="has no such runs"):
+        read_spec(file, picked | {"seed": 8})
+    assert read_spec(None, {"family": "low", "method": "iid-random", "episodes": 3}) == RunSpec.model_validate(
+        {"family": "low", "method": "iid-random", "seed": 0, "budget": {"episodes": 3}}
+    )

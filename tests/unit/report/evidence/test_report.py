@@ -1,0 +1,177 @@
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+
+from risk_sac import cli
+from risk_sac.config import CampaignSpec, EgoConfig, Iid
+from risk_sac.errors import ConfigError
+from risk_sac.failures.cases import Case, Regression, Verdict
+from risk_sac.records import Grade
+from risk_sac.report import compare
+from risk_sac.report.evidence import Origin, gathered, html, markdown, report
+from risk_sac.report.evidence.folders import read_folders
+from risk_sac.scenario.families import FAMILIES
+
+HOSTILE = (
+    '<script>alert(1)</script><img src=x onerror=y> "q" `tick` [link](javascript:a) |cell| \u202egnp.exe \x07 &amp;'
+)
+BANNER = "Search results are no crash rate"
+
+
+def origin(**more):
+    return Origin(
+        report="risk-sac report runs --out report.html",
+        data="risk-sac report runs --out report.json",
+        show=lambda run, failure: f"risk-sac show {run.spec.id} {failure}",
+        regress="risk-sac regress --failures runs --ego EGO",
+        **more,
+    )
+
+
+def both(comparison, **more):
+    document = report(comparison, gathered(comparison), origin(**more))
+    return html(document), markdown(document)
+
+
+def drawn(finished, run, letters):
+    made = finished(run, letters)
+    scene = {parameter.name: parameter.high for parameter in FAMILIES[run.family].space.parameters}
+    fresh = {"phase": "iid", "scene": scene}
+    return replace(made, records=tuple(record.model_copy(update=fresh) for record in made.records))
+
+
+@pytest.fixture
+def told(spec, runs, finished):
+    """A campaign that ended with an i.i.d. phase."""
+    ends = spec.model_copy(update={"iid": Iid(episodes=8)})
+    fresh = [drawn(finished, run, letters) for run, letters in zip(ends.drawn(), ("........", "r..f...d"), strict=True)]
+    return compare(ends, [*runs, *fresh], "risk-sac evaluate --iid 8")
+
+
+class Tags(HTMLParser):
+    """Which elements a page has, with their attributes, and its text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.found, self.text = [], ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        self.found.append((tag, dict(attributes)))
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_it_says_what_was_found_how_often_and_where_nobody_looked(told):
+    page, text = both(told)
+    for each in (Tags(page).text, text):
+        assert BANNER in each
+        for title in ("Operational design domain", "Budget", "The funnel", "Coverage", "Limits", "Each number again"):
+            assert title in each
+        assert "1 of 7" in each  # valid failures of the scenes with random adversaries that were played
+        assert "0 of 8" in each
+        assert "31.23 %" in each  # 1 - 0.05^(1/8)
+        assert "Never sampled" in each
+        assert "risk-sac evaluate --iid 8" in each
+        assert told.runs[0].digest in each
+
+
+def test_an_i_i_d_phase_is_in_no_other_number(told, spec, runs):
+    without = compare(spec, runs, "")
+    assert told.cells == without.cells
+    assert told.overviews == without.overviews
+    assert told.tests == without.tests
+    evidence = gathered(told)
+    assert evidence.coverage["low"].search == gathered(without).coverage["low"].search
+    assert evidence.coverage["low"].iid.episodes == 15
+    assert gathered(without).bounds == ()
+
+
+def test_without_an_i_i_d_phase_it_says_that_nothing_is_known_and_how_to_know(spec, runs):
+    for text in both(compare(spec, runs, "")):
+        assert "had no i.i.d. phase, so nothing can be said of how often the ego fails" in text
+        assert "--iid 300" in text
+        assert "at most" not in text
+
+
+def test_runs_that_are_missing_are_named_with_the_reason(told, spec):
+    some = compare(told.spec, [*told.runs[1:], told.drawn[0]], "", reasons={told.runs[0].spec.digest: "its disk died"})
+    page, text = both(some)
+    for each in (Tags(page).text, text):
+        assert "5 of 6 searches; 1 of 2 of the i.i.d. phase" in each
+        assert "its disk died" in each
+        assert "low-iid-random-0: not finished" in each
+    nothing = compare(told.spec, [], "")
+    for each in both(nothing):
+        assert "0 of 6 searches" in each
+        assert "No run of it has finished." in each
+
+
+def test_what_users_write_is_shown_and_is_no_markup(told):
+    spec = CampaignSpec.model_validate(told.spec.model_dump() | {"label": HOSTILE})
+    case = Case(id="x", digest="d", name=HOSTILE, grade=Grade.CAREFUL, verdict=Verdict.FIXED, reason=HOSTILE)
+    regression = Regression(ego=EgoConfig(), cases=(case,))
+    reasons = {run.digest: HOSTILE for run in spec.runs()}
+    page, text = both(compare(spec, [], HOSTILE, reasons=reasons), regression=regression)
+    tags = Tags(page)
+    names = {tag for tag, _ in tags.found}
+    assert not names & {"script", "img", "iframe", "object", "link", "form"}
+    assert not any(name.startswith("on") for _, attributes in tags.found for name in attributes)
+    assert tags.text.count("<script>alert(1)</script>") >= 8
+    prose = re.sub(r"(?ms)^(`{3,})$.*?^\1$", "", text)  # without the commands
+    assert "<script" not in prose
+    assert "[link](" not in prose.replace("\\[link\\](", "")
+    assert len([line for line in prose.splitlines() if line.startswith("| low ") and "\\|cell\\|" in line]) == 6
+    for each in (page, text):
+        assert "\u202e" not in each
+        assert "\x07" not in each
+    assert text.count("\n# ") == 0  # but for the title in the first line, nothing made itself one
+
+
+def test_the_page_needs_nothing_else_and_two_make_the_same(told):
+    page, text = both(told)
+    assert (page, text) == both(told)
+    tags = Tags(page).found
+    policy = next(attributes["content"] for tag, attributes in tags if attributes.get("http-equiv"))
+    assert policy.startswith("default-src 'none'")
+    assert all(attributes["href"].startswith("#") for tag, attributes in tags if tag == "a")
+    ids = [attributes["id"] for _, attributes in tags if "id" in attributes]
+    assert len(set(ids)) == len(ids)
+    assert {attributes["href"][1:] for tag, attributes in tags if tag == "a"} <= set(ids)
+    assert "src=" not in page  # the failures' series were never written
+
+
+def test_a_picture_that_cannot_be_had_is_said_to_be_missing(told, tmp_path):
+    for text in both(told, folders={run.spec.digest: tmp_path for run in told.runs})[:1]:
+        assert "No picture: its time series is gone." in text
+    series = tmp_path / "failures" / "000000.npz"
+    series.parent.mkdir()
+    series.write_bytes(b"PK\x03\x04 damaged")
+    assert "is damaged" in both(told, folders={run.spec.digest: tmp_path for run in told.runs})[0]
+    assert "the folder of its run is not there" in both(told)[0]
+
+
+def test_a_regression_is_told_with_what_a_baseline_knows(told):
+    told_of = {"digest": "d", "name": "cut-in", "grade": None, "reason": "as told"}
+    cases = [
+        Case(id=f"low-x-{verdict}", verdict=verdict, known=known, **told_of)
+        for verdict, known in ((Verdict.FIXED, False), (Verdict.STILL_FAILING, True))
+    ]
+    page, text = both(told, regression=Regression(ego=EgoConfig(profile="careful"), cases=tuple(cases)))
+    for each in (page, text):
+        assert "1 fixed, 1 still failing; 1 known from a baseline. All are fixed or known." in each
+        assert "still failing, known" in each
+
+
+def test_folders_without_runs_and_runs_of_different_campaigns_are_refused(tmp_path, capsys):
+    out = tmp_path / "out" / "report.html"
+    assert cli.main(["report", str(tmp_path), "--out", str(out)]) == 2
+    assert "RESULTS: there is no" in capsys.readouterr().err
+    assert cli.main(["report", str(tmp_path), "--out", str(out.with_suffix(".pdf"))]) == 2
+    assert "wanted a name that ends in .html, .md, .json" in capsys.readouterr().err
+    assert not out.parent.exists()
+    with pytest.raises(ConfigError, match="there is no"):
+        read_folders([tmp_path / "nowhere"])
