@@ -10,6 +10,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures import studied
 from risk_sac.report import Comparison, FinishedRun, compare, figure_bytes, figure_names, read_run
 from risk_sac.report.figures import Format
+from risk_sac.scenario.families import family_named
 from service.errors import NotFoundError
 from service.settings import ServiceSettings
 from service.store.states import State
@@ -94,6 +95,7 @@ class Reports:
                 reasons[run.spec_digest] = _missing(run)
                 continue
             try:
+                family_named(run.family)  # whose place on a map may be gone
                 found.append(read_run(self._settings.run_folder(campaign.id, run.id)))
             except (ConfigError, OSError) as error:
                 reasons[run.spec_digest] = f"it succeeded, but its results are lost: {error}"

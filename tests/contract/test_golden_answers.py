@@ -88,6 +88,7 @@ ASKED = {
     "table_csv": ("GET", f"{ENDED}/table?format=csv"),
     "table_live": ("GET", f"{LIVE}/table"),
     "clusters": ("GET", f"{ENDED}/clusters"),
+    "report": ("GET", f"{ENDED}/report"),
     "figures": ("GET", f"{ENDED}/figures"),
     "figure_unknown": ("GET", f"{ENDED}/figures/pie.png"),
     "spec": ("GET", f"{ENDED}/spec"),

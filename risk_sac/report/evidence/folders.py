@@ -11,6 +11,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.report.comparison import Comparison, compare
 from risk_sac.report.runs import FinishedRun, read_run
 from risk_sac.run_folder.results import RESULTS, read_results
+from risk_sac.scenario.families import family_named
 
 SPEC, RUNS = "spec.yaml", "runs"
 SHARED = ("ego", "odd", "requirements", "learner")
@@ -55,6 +56,7 @@ def read_folders(paths: Sequence[Path]) -> Found:
         digest = known[-1].digest
         folders[digest] = place
         try:
+            family_named(known[-1].family)  # whose place on a map may be gone
             runs.append(read_run(place))
         except (ConfigError, OSError) as error:
             reasons[digest] = str(error)

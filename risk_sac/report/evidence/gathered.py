@@ -8,7 +8,7 @@ from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.bounds import Drawn, drawn
 from risk_sac.report.evidence.coverage import Coverage, coverage
 from risk_sac.report.runs import FinishedRun
-from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.families import family_named
 
 
 class FamilyCoverage(Record):
@@ -44,8 +44,8 @@ def gathered(comparison: Comparison) -> Evidence:
         fresh = _records(comparison.drawn, family)
         if searched or fresh:
             found[family] = FamilyCoverage(
-                search=coverage(FAMILIES[family], spec.odd, searched),
-                iid=coverage(FAMILIES[family], spec.odd, fresh) if fresh else None,
+                search=coverage(family_named(family), spec.odd, searched),
+                iid=coverage(family_named(family), spec.odd, fresh) if fresh else None,
             )
     return Evidence(
         complete=not comparison.missing and not comparison.undrawn,

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from risk_sac.config import IID_METHODS, FamilyName
+from risk_sac.errors import ConfigError
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.bounds import Bound, Drawn
 from risk_sac.report.evidence.coverage import BINS, PAIR_BINS, Coverage, ParameterCoverage
@@ -11,7 +12,8 @@ from risk_sac.report.evidence.gathered import Evidence, FamilyCoverage
 from risk_sac.report.evidence.origin import again
 from risk_sac.report.evidence.words import odd_in_words
 from risk_sac.report.page import DASH
-from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.families import family_named
+from risk_sac.scenario.family import Family
 
 MOST_PAIRS, MOST_CELLS = 12, 8  # that are named; all are in the data
 TRAFFIC: Mapping[str, str] = {"iid-undisturbed": "undisturbed", "iid-random": "random adversaries"}
@@ -23,12 +25,18 @@ NO_IID = (
 
 def odd(comparison: Comparison) -> Section:
     """The ODD of each family, in words."""
-    families = comparison.spec.families
-    told = [dict(odd_in_words(FAMILIES[family], comparison.spec.odd)) for family in families]
-    rows = [[words, *(each[words] for each in told)] for words in told[0]]
+    there: dict[FamilyName, Family] = {}
+    lost = []
+    for name in comparison.spec.families:
+        try:
+            there[name] = family_named(name)
+        except ConfigError as error:
+            lost.append(f"{name}: {error}")
+    told = [dict(odd_in_words(family, comparison.spec.odd)) for family in there.values()]
+    rows = [[words, *(each[words] for each in told)] for words in told[0]] if told else []
     blocks: list[Block] = [
-        Items([f"{family}: {FAMILIES[family].summary}" for family in families]),
-        Table("ODD", ["of the ODD", *families], rows, left=1 + len(families)),
+        Items([*(f"{name}: {family.summary}" for name, family in there.items()), *lost]),
+        Table("ODD", ["of the ODD", *there], rows, left=1 + len(there)),
     ]
     return Section("odd", "Operational design domain", blocks)
 

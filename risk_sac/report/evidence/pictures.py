@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from risk_sac.errors import RiskSacError
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.roads import roads_of
 from risk_sac.failures.thumbnail import thumbnail
@@ -39,6 +40,8 @@ def draw(run: FinishedRun, folder: Path | None, index: int) -> Drawing:
             series = {name: archive[name] for name in archive.files}
         recording = Recording(Contact.of(run.spec.id, record), series)
         return Drawing(thumbnail(recording, roads_of(run.spec.family, record.scene)).encode())
+    except RiskSacError as error:  # of a place on a map
+        return Drawing(None, str(error))
     except FileNotFoundError as error:
         lost = "its time series" if str(error.filename or "").endswith(".npz") else "the road net"
         return Drawing(None, f"{lost} is gone")

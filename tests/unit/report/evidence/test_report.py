@@ -175,3 +175,11 @@ def test_folders_without_runs_and_runs_of_different_campaigns_are_refused(tmp_pa
     assert not out.parent.exists()
     with pytest.raises(ConfigError, match="there is no"):
         read_folders([tmp_path / "nowhere"])
+
+
+def test_a_family_whose_place_on_a_map_is_gone_is_named_and_the_others_are_told(spec, monkeypatch, tmp_path):
+    monkeypatch.setenv("RISK_SAC_PLACES", str(tmp_path))
+    gone = CampaignSpec.model_validate(spec.model_dump() | {"families": ("low", "junction_0123456789ab")})
+    for text in both(compare(gone, [], "")):
+        assert "junction_0123456789ab: there is no" in text
+        assert "posted limit" in text
