@@ -1,5 +1,6 @@
 """The FastAPI application."""
 
+import os
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, closing, contextmanager
 
@@ -10,6 +11,7 @@ from prometheus_client import Histogram
 from risk_sac import __version__
 from risk_sac.execution.executor import Executor
 from risk_sac.execution.executors import executor_named
+from risk_sac.scenario.library import VARIABLE
 from service.api.answer_cache import AnswerCache
 from service.api.answers.pages import Cursors
 from service.api.answers.problems import add_problem_handlers
@@ -42,6 +44,7 @@ from service.keys.exposure import check_exposure
 from service.keys.file import KeyFile
 from service.keys.made import KeysMade
 from service.networks.shelf import Shelf
+from service.networks.surveys import Surveys
 from service.runs.manager import Manager
 from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
@@ -113,6 +116,8 @@ def opened(
         held(store.engine),
         made.kept(store.engine, KeyFile(settings.keys_file)),
     ):
+        # Whoever plays or draws an episode, here or in a process started from here, looks for its place in our library.
+        os.environ[VARIABLE] = str(settings.places_dir.absolute())
         manager = Manager(settings, store, executor)
         manager.start()
         gate, studies = Regressions(settings), Studies(settings)
@@ -133,6 +138,7 @@ def _context(
     studies: Studies,
     latencies: Histogram,
 ) -> Context:
+    shelf = Shelf(settings.networks_dir)
     return Context(
         settings,
         store,
@@ -141,7 +147,8 @@ def _context(
         pictures_of_contacts(settings),
         studies,
         gate,
-        Shelf(settings.networks_dir),
+        shelf,
+        Surveys(shelf, settings.places_dir),
         Streams(store),
         Cursors(cursor_secret(store.engine)),
         registry(latencies, store, manager),

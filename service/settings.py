@@ -107,6 +107,11 @@ class ServiceSettings(BaseSettings):
         return self.data_dir / "keys.json"
 
     @property
+    def places_dir(self) -> Path:
+        """Places of networks that campaigns have been run at."""
+        return self.data_dir / "places"
+
+    @property
     def networks_dir(self) -> Path:
         """Uploaded road networks."""
         return self.data_dir / "networks"

@@ -9,6 +9,7 @@ from prometheus_client import CollectorRegistry
 from service.api.answers.pages import Cursors
 from service.api.stream import Streams
 from service.networks.shelf import Shelf
+from service.networks.surveys import Surveys
 from service.runs.manager import Manager
 from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
@@ -31,6 +32,7 @@ class Context:
     studies: Studies
     regressions: Regressions
     networks: Shelf
+    surveys: Surveys
     streams: Streams
     cursors: Cursors
     metrics: CollectorRegistry

@@ -6,9 +6,9 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
-from risk_sac.config import CampaignSpec
 from service.api.guards.description import describe_guards
 from service.api.posted import input_schemas
+from service.api.posted_campaign import campaign_schemas
 from service.schemas.changes import StateChange
 from service.schemas.regressions import PostedRegression
 from service.schemas.triage import PostedTriage
@@ -29,7 +29,8 @@ def openapi(app: FastAPI) -> dict[str, Any]:
 
 def _document(app: FastAPI) -> dict[str, Any]:
     document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
-    for posted in (CampaignSpec, PostedRegression, PostedTriage):
+    document["components"]["schemas"] |= campaign_schemas()
+    for posted in (PostedRegression, PostedTriage):
         document["components"]["schemas"] |= input_schemas(posted)
     document["components"]["schemas"] |= _event_schemas()
     for operations in document["paths"].values():

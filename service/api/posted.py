@@ -27,7 +27,11 @@ async def read_posted(request: Request, model: type[Model]) -> Model:
       ProblemError, RequestValidationError: it is no JSON, or something in it is wrong.
     """
     media_type(request, ["application/json"])
-    content = await request.body()
+    return read_content(await request.body(), model)
+
+
+def read_content(content: bytes, model: type[Model]) -> Model:
+    """The content of a body; raises what `read_posted` does."""
     try:
         posted = model.model_validate_json(content, strict=True)
     except ValidationError as error:
@@ -36,8 +40,17 @@ async def read_posted(request: Request, model: type[Model]) -> Model:
             raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail) from error
         found = [item | {"loc": ("body", *item["loc"])} for item in error.errors()]
         raise RequestValidationError(found, body=model) from error  # the model: it knows which fields there are
-    json.loads(content, object_pairs_hook=_without_repeats)
+    refuse_repeats(content)
     return posted
+
+
+def refuse_repeats(content: bytes) -> None:
+    """Refuses JSON that has a field twice in one object.
+
+    Raises:
+      ProblemError: naming it.
+    """
+    json.loads(content, object_pairs_hook=_without_repeats)
 
 
 def documented(model: type[BaseModel]) -> dict[str, Any]:

@@ -15,10 +15,13 @@ MAX_LANES = 64  # of one edge
 MAX_COORDINATE = 1e7  # m; the Earth's circumference is 4e7
 MAX_NUMBER = 1e9  # of anything else
 
-CPU_S = 8
-WALL_S = 8
+CPU_S = 20  # a town of 1,000 junctions takes 2 to 3
+WALL_S = 20
 MEMORY_BYTES = 2 << 30  # of address space; Python with an idle libsumo takes 0.9 GiB
 LOG_BYTES = 64 << 10  # what the simulator may write to its log, and to any other file
 OPEN_FILES = 64
+SURVEY_S = 60  # that a search for places may take, in wall-clock and in processor time
+SURVEY_MEMORY_BYTES = 3 << 30
+MAX_PLACES = 100  # of a campaign
 STEPS, STEP_S = 3, 0.1  # that the simulator runs
 MAX_VEHICLES = 1000  # that it inserts meanwhile

@@ -6,6 +6,8 @@ No models of pydantic: to import that would take the checker more time and memor
 from dataclasses import dataclass
 from enum import StrEnum
 
+PLACES, PICTURE = "places.json", "places.png"  # what a search for places leaves beside the net
+
 
 class Kind(StrEnum):
     """What a document is, told by its root element."""

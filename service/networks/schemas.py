@@ -4,6 +4,7 @@ from datetime import datetime
 
 from pydantic import BaseModel, ConfigDict
 
+from risk_sac.scenario.maps.found import Pattern
 from service.networks.report import NetworkFile
 from service.schemas.base import Body
 
@@ -46,6 +47,35 @@ class NetworkPage(Body):
     items: list[Network]
     next: str | None
     """Pass as `cursor` to continue; null at the end."""
+
+
+class Spot(Body):
+    """Somewhere on a network, m in its own coordinates."""
+
+    pattern: Pattern
+    place: str
+    """The edge on which it is, or that leads to it; how a campaign names it."""
+    x_m: float
+    y_m: float
+
+
+class FoundPlace(Spot):
+    """Where a pattern fits."""
+
+    summary: str
+
+
+class Elsewhere(Spot):
+    """Where a pattern does not fit."""
+
+    why: str
+
+
+class Places(Body):
+    """Where the patterns fit on a network; in the order of the net."""
+
+    items: list[FoundPlace]
+    elsewhere: list[Elsewhere]
 
 
 class Record(BaseModel):

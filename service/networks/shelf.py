@@ -161,6 +161,11 @@ class Shelf:
         with _refusals("a network cannot be read"):
             return _read(path)
 
+    def folder(self, network_id: str, project: str | None) -> Path:
+        """Where the files of a network are; raises what `get` does."""
+        self.get(network_id, project)
+        return self._path(network_id, project)
+
     def delete(self, network_id: str, project: str | None) -> None:
         """Remove a network; at once for those who look, then from the disk.
 

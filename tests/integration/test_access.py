@@ -80,6 +80,8 @@ ROUTES = {
     ("GET", "/v1/networks"): ("read", 200),
     ("POST", "/v1/networks"): ("run", 422),  # what is uploaded is no network
     ("GET", NETWORK): ("read", 200),
+    ("GET", f"{NETWORK}/places"): ("read", 200),
+    ("GET", f"{NETWORK}/places.png"): ("read", 200),
     ("DELETE", NETWORK): ("run", 204),
 }
 every_route = pytest.mark.parametrize(("method", "path"), ROUTES, ids=lambda part: part.strip("/"))

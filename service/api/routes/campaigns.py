@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Request, Response
 
 from risk_sac import __version__, problem
-from risk_sac.config import CampaignSpec, FamilyName, MethodName
+from risk_sac.config import FamilyName, MethodName
 from service.api.access import Caller, CurrentCaller
 from service.api.answer_cache import keep
 from service.api.answers.pages import Cursor, Limit
@@ -26,8 +26,7 @@ from service.api.answers.responses import (
 )
 from service.api.answers.tiers import TIERS, Tier
 from service.api.context import Context, Service
-from service.api.posted import documented
-from service.api.posted_campaign import PostedCampaign
+from service.api.posted_campaign import PostedCampaign, documented_campaign
 from service.schemas.base import Body
 from service.schemas.campaign_results import Results
 from service.schemas.campaigns import Campaign, CampaignPage
@@ -59,7 +58,7 @@ Points = Annotated[int, Query(ge=1, le=1000, description="Of each curve, at most
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
 
 
-@router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=documented(CampaignSpec))
+@router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=documented_campaign())
 def post_campaign(
     spec: PostedCampaign, service: Service, caller: CurrentCaller, idempotency_key: IdempotencyKey = None
 ) -> Response:
@@ -68,7 +67,7 @@ def post_campaign(
     return _accepted(campaign, service)
 
 
-@router.post("/check", status_code=204, responses=MALFORMED | NOT_JSON, openapi_extra=documented(CampaignSpec))
+@router.post("/check", status_code=204, responses=MALFORMED | NOT_JSON, openapi_extra=documented_campaign())
 def check_campaign(spec: PostedCampaign) -> Response:
     """Say what is wrong with a campaign, as posting it would; nothing is kept, and no quota counts it."""
     problem.check_campaign(spec)

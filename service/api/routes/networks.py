@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from service.api.access import CurrentCaller
+from service.api.answers.busy import busy
 from service.api.answers.pages import Cursor, Limit
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, header, problem
@@ -16,7 +17,7 @@ from service.api.media_types import media_type
 from service.networks.errors import BusyError, UploadError
 from service.networks.limits import MAX_EDGES, MAX_EXPANDED_BYTES, MAX_FILES, WALL_S
 from service.networks.packaging import MEDIA_TYPES, Packaging
-from service.networks.schemas import Network, NetworkPage
+from service.networks.schemas import Network, NetworkPage, Places
 from service.schemas.problems import Reason
 
 LISTED = "networks"
@@ -29,6 +30,11 @@ REFUSALS: Responses = (
     | problem(422, "The upload is refused, and `detail` says why; or a query parameter is wrong")
     | problem(503, "The disk refuses; or there are too many uploads at once, and Retry-After says when to come again")
 )
+FINDING: Responses = problem(422, "Nothing can be found on the network, and `detail` says why") | problem(
+    503, "The disk refuses; or there are too many searches at once, and Retry-After says when to come again"
+)
+FINDING[503]["headers"] = {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)}
+DRAWN: Responses = {200: {"content": {"image/png": {}}}}
 REFUSALS[503]["headers"] = {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)}
 DESCRIPTION = f"""Check a SUMO road network and keep it. Campaigns cannot run on it yet: families bring their own roads.
 
@@ -70,8 +76,7 @@ async def post_network(
     except UploadError as error:
         raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.UPLOAD_REFUSED, str(error)) from error
     except BusyError as error:
-        headers = {"Retry-After": str(error.retry_after_s)}
-        raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.UPLOADS_BUSY, str(error), headers=headers) from error
+        raise busy(error) from error
     except TimeoutError as error:
         detail = f"the body took longer than {RECEIVE_S} s; wanted it faster"
         raise ProblemError(HTTPStatus.REQUEST_TIMEOUT, Reason.UPLOAD_TOO_SLOW, detail) from error
@@ -90,6 +95,24 @@ def list_networks(service: Service, caller: CurrentCaller, limit: Limit = 50, cu
 def get_network(network_id: str, service: Service, caller: CurrentCaller) -> Network:
     """What a network has, and which files it is kept as."""
     return service.networks.get(network_id, caller.sees)
+
+
+@router.get("/{network_id}/places", responses=UNKNOWN | FINDING)
+def get_places(network_id: str, service: Service, caller: CurrentCaller) -> Places:
+    """Where the patterns fit on a network, and why elsewhere they do not; looked for when first asked for."""
+    try:
+        return service.surveys.places(network_id, caller.sees)
+    except BusyError as error:
+        raise busy(error) from error
+
+
+@router.get("/{network_id}/places.png", response_class=Response, responses=UNKNOWN | FINDING | DRAWN)
+def get_places_picture(network_id: str, service: Service, caller: CurrentCaller) -> Response:
+    """The network from above with its places."""
+    try:
+        return Response(service.surveys.picture(network_id, caller.sees), media_type="image/png")
+    except BusyError as error:
+        raise busy(error) from error
 
 
 @router.delete("/{network_id}", status_code=204, responses=UNKNOWN)

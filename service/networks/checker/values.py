@@ -112,7 +112,7 @@ EMISSION = _matching(
     "a class of HBEFA, or another one that needs no file", r"(?!PHEM)[A-Za-z]\w{0,40}(?:/[\w-]{1,60})?"
 )
 PROJECTION = _matching(
-    "! or - or a PROJ string without files", rf"[!.-]|(?: ?\+(?:{_PROJECTION_KEYS})(?:=[\w.,+-]{{1,60}})?)+ ?"
+    "! or - or a PROJ string without files", rf"[!.-]|(?: {{0,3}}\+(?:{_PROJECTION_KEYS})(?:=[\w.,+-]{{1,60}})?)+ ?"
 )
 PARAMETER_KEY = _matching("a short name that is no file's", r"(?!(?i:.*(?:file|output)))[A-Za-z][\w.:-]{0,99}")
 LINK_LETTER = _matching("one of SUMO's letters", "[A-Za-z=-]")

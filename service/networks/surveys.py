@@ -1,0 +1,117 @@
+"""The places of networks: searched once, in a process of its own, and kept beside the network."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from risk_sac.errors import ConfigError
+from risk_sac.scenario.library import VARIABLE
+from service.errors import StorageError
+from service.networks.errors import BusyError
+from service.networks.limits import SURVEY_S
+from service.networks.report import PICTURE, PLACES
+from service.networks.schemas import Places
+from service.networks.shelf import Shelf
+
+SURVEYOR = (sys.executable, "-I", "-m", "service.networks.surveyor")
+AT_ONCE = 2
+RETRY_AFTER_S = 5
+_GRACE_S = 2.0
+_ENDS = (signal.SIGALRM, signal.SIGXCPU, signal.SIGKILL)
+
+
+class Surveys:
+    """Finds places on the networks of a shelf; used by many threads."""
+
+    def __init__(self, shelf: Shelf, library: Path) -> None:
+        """Starts nothing.
+
+        Args:
+          shelf: of networks.
+          library: the folder of places that campaigns are run at.
+        """
+        self._shelf = shelf
+        self._library = library
+        self._room = threading.BoundedSemaphore(AT_ONCE)
+
+    def places(self, network_id: str, project: str | None) -> Places:
+        """Where the patterns fit on a network, and why elsewhere they do not.
+
+        Raises:
+          NotFoundError: there is no such network.
+          ConfigError: nothing can be found on it; the message says why.
+          BusyError: too many searches are at work.
+          StorageError: the disk refuses.
+        """
+        return Places.model_validate_json((self._searched(network_id, project) / PLACES).read_bytes())
+
+    def picture(self, network_id: str, project: str | None) -> bytes:
+        """The network from above with its places, PNG; raises what `places` does."""
+        return (self._searched(network_id, project) / PICTURE).read_bytes()
+
+    def keep(self, network_id: str, project: str | None, pattern: str, place: str | None) -> list[str]:
+        """Names of the families that a place is, or all places of a pattern are; they can be run from now on.
+
+        Raises:
+          ConfigError: the pattern does not fit there; and what `places` raises.
+        """
+        folder = self._shelf.folder(network_id, project)
+        families: list[str] = self._run(folder, ["keep", pattern, *([] if place is None else [place])])["families"]
+        return families
+
+    def _searched(self, network_id: str, project: str | None) -> Path:
+        folder = self._shelf.folder(network_id, project)
+        if not (folder / PLACES).exists():
+            self._run(folder, ["survey"])
+        return folder
+
+    def _run(self, folder: Path, arguments: Sequence[str]) -> dict[str, Any]:
+        environment = {"PATH": os.environ.get("PATH", os.defpath), VARIABLE: str(self._library.absolute())}
+        environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLCONFIGDIR": str(self._library)}
+        with self._turn():
+            try:
+                self._library.mkdir(parents=True, exist_ok=True)
+                done = subprocess.run(
+                    [*SURVEYOR, *arguments],
+                    cwd=folder,
+                    env=environment,
+                    stdin=subprocess.DEVNULL,
+                    capture_output=True,
+                    timeout=SURVEY_S + _GRACE_S,
+                    check=False,
+                )
+            except OSError as error:
+                raise StorageError(f"places cannot be looked for ({error.strerror})") from error
+            except subprocess.TimeoutExpired:
+                raise _too_slow() from None
+        if -done.returncode in _ENDS:
+            raise _too_slow()
+        try:
+            report: dict[str, Any] = json.loads(done.stdout.decode().splitlines()[-1])
+        except (ValueError, IndexError) as error:
+            said = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
+            raise StorageError(f"places cannot be looked for (status {done.returncode}: {said})") from error
+        if "refused" in report:
+            raise ConfigError(report["refused"], field=report.get("field", "network"))
+        return report
+
+    @contextmanager
+    def _turn(self) -> Iterator[None]:
+        if not self._room.acquire(blocking=False):
+            again = f"wanted fewer: try again in {RETRY_AFTER_S} s"
+            raise BusyError(f"{AT_ONCE} searches for places are at work; {again}", RETRY_AFTER_S)
+        try:
+            yield
+        finally:
+            self._room.release()
+
+
+def _too_slow() -> ConfigError:
+    return ConfigError(f"looking for places takes more than {SURVEY_S} s; wanted a smaller network", field="network")
