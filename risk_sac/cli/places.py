@@ -14,9 +14,11 @@ from rich.table import Table
 from risk_sac.cli.console import OK, Commands, console
 from risk_sac.cli.on_map import MAP_HELP
 from risk_sac.cli.text import counted
+from risk_sac.cli.try_places import try_places
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, survey
 from risk_sac.scenario.maps.found import Fit, Misfit, Survey
+from risk_sac.scenario.maps.keep import Map
 from risk_sac.scenario.maps.net import read_net
 
 SHOWN = 20
@@ -31,6 +33,9 @@ def add_places(commands: Commands) -> None:
     places.add_argument("--why", action="store_true", help="say where they do not fit, and why")
     places.add_argument("--all", action="store_true", help=f"list all (default: {SHOWN} of each pattern)")
     places.add_argument("--json", action="store_true", help="one document, with everything")
+    places.add_argument("--try", dest="tries", type=int, metavar="N", help="play at N random places of each pattern")
+    places.add_argument("--episodes", type=int, default=20, metavar="N", help="of each place (default: %(default)s)")
+    places.add_argument("--seed", type=int, default=0, metavar="N", help="of what is tried (default: %(default)s)")
     places.add_argument("--out", type=Path, metavar="FILE.png", help="draw the map with its places")
 
 
@@ -44,6 +49,8 @@ def _places(options: argparse.Namespace) -> int:
             from risk_sac.failures.map_picture import map_png  # here, because loading matplotlib takes a second
 
             options.out.write_bytes(map_png(converted.file, found))
+        if options.tries is not None:
+            return try_places(Map(converted.file), found, options)
     if options.json:
         sys.stdout.write(json.dumps(_document(found, converted.warnings)) + "\n")
         return OK

@@ -1,0 +1,170 @@
+"""Whether the places that were found on a map can be played at: a random sample of them is.
+
+At each place the same scenes are played with nobody attacking and with random actions, and a pedestrian steps into the
+ego's way from the left and from the right.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from risk_sac.agents.random import RandomAgent
+from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.env import RiskSacEnv
+from risk_sac.errors import InfeasibleScene, SimulationError
+from risk_sac.geometry import relative_view
+from risk_sac.problem import Problem
+from risk_sac.scenario.families import family_named
+from risk_sac.scenario.family import Family
+from risk_sac.scenario.layout import Layout, PedestrianStart
+from risk_sac.scenario.maps.found import Fit
+from risk_sac.sim.commands import Walker
+from risk_sac.sim.paths import STATION
+from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.types import STEP_S, Role, Signal
+
+LEFT, RIGHT = 1, -1
+ASIDE_M, PACE_MPS = 6.0, 1.4  # where the pedestrian comes from, and how fast
+AHEAD_S = 6.0  # of driving to where it crosses
+MET_STEPS = 120
+STANDING_MPS = 0.5
+OFFSETS = 41  # of a cycle that are looked at
+ALIKE_M = 0.5  # by which the least distances from the left and from the right may differ
+
+
+@dataclass(slots=True)
+class Tried:
+    """What came of the episodes at one place."""
+
+    fit: Fit
+    family: str
+    played: int = 0
+    rejected: Counter[str] = field(default_factory=Counter)  # by the rule of C_hard that refused the scene
+    invalid: list[str] = field(default_factory=list)  # why episodes failed
+    touched_by_nobody: int = 0  # contacts with nobody attacking
+    touched: int = 0  # contacts with random actions
+    sides: tuple[float, float] = (math.nan, math.nan)  # least distance of a pedestrian from the left and the right
+
+    @property
+    def runs(self) -> bool:
+        """Whether no episode was invalid, and some were played."""
+        return not self.invalid and self.played > 0
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the ego let pedestrians from both sides pass alike."""
+        left, right = self.sides
+        return min(left, right) > 0.0 and abs(left - right) <= ALIKE_M
+
+
+def sample(fits: Sequence[Fit], count: int, seed: int) -> list[Fit]:
+    """So many places of each pattern, or all if there are fewer."""
+    draw = np.random.default_rng(seed)
+    chosen: list[Fit] = []
+    for pattern in dict.fromkeys(fit.spot.pattern for fit in fits):
+        own = [fit for fit in fits if fit.spot.pattern == pattern]
+        chosen += [own[i] for i in sorted(draw.permutation(len(own))[:count])]
+    return chosen
+
+
+def try_out(fit: Fit, family: str, episodes: int, seed: int) -> Tried:
+    """Plays at one place.
+
+    Args:
+      fit: the place.
+      family: its name in the library.
+      episodes: scenes, each with nobody attacking and with random actions.
+      seed: of scenes, actions and SUMO.
+    """
+    tried = Tried(fit, family)
+    problem = Problem.from_spec(RunSpec(family=family, method="random", seed=0))
+    for controlled in (False, True):
+        with closing(RiskSacEnv(problem, RunSpec.model_fields["learner"].default.reward, controlled=controlled)) as env:
+            for index in range(episodes):
+                _episode(env, tried, np.random.default_rng((seed, index)), controlled=controlled)
+    with closing(SumoSimulation(EgoConfig())) as sim:
+        tried.sides = (meet(sim, family, LEFT), meet(sim, family, RIGHT))
+    return tried
+
+
+def _episode(env: RiskSacEnv, tried: Tried, draw: np.random.Generator, *, controlled: bool) -> None:
+    scene = env.problem.space.from_unit(draw.random(env.problem.space.dimension))
+    simulator_seed, action_seed = (int(value) for value in draw.integers(2**31 - 1, size=2))
+    agent = RandomAgent(env.action_size, action_seed)
+    try:
+        observation, _ = env.reset(seed=simulator_seed, options={"scene": scene})
+        ended = False
+        while not ended:
+            observation, _, touched, truncated, _ = env.step(agent.act(observation))
+            ended = touched or truncated
+    except InfeasibleScene as infeasible:
+        tried.rejected[infeasible.reason] += 1
+        return
+    except SimulationError as error:
+        tried.invalid.append(str(error))
+        return
+    tried.played += 1
+    if controlled:
+        tried.touched += touched
+    else:
+        tried.touched_by_nobody += touched
+
+
+def meet(sim: SumoSimulation, family: str, side: int) -> float:
+    """Least distance of an ego, alone on the road, to a pedestrian that would meet it; 0 if it touches it.
+
+    Args:
+      sim: plays it.
+      family: of the place; the ego starts as in the middle of its scenes.
+      side: LEFT or RIGHT, from where the pedestrian comes.
+    """
+    found = family_named(family)
+    middle = found.layout(found.space.from_unit(np.full(found.space.dimension, 0.5)).values)
+    alone = _at_green(sim, replace(middle, vehicles=(), pedestrians=()), _cycle_s(found))
+    sim.reset(alone, 1)
+    speed = max(alone.ego.speed_mps, 1.0)
+    ahead_m = AHEAD_S * speed + ASIDE_M
+    path, station_m, _ = sim.along(alone.ego.id)
+    i = min(int(np.searchsorted(path.points[STATION], station_m + ahead_m)), path.points.shape[1] - 1) - 1
+    x, y, start_m, heading = path.points[:4, i]
+    along_m, cos, sin = station_m + ahead_m - start_m, math.cos(heading), math.sin(heading)
+    there = x + along_m * cos, y + along_m * sin
+    x, y = there[0] - side * ASIDE_M * sin, there[1] + side * ASIDE_M * cos
+    towards = heading - side * math.pi / 2
+    start = PedestrianStart(id="walker", role=Role.ADVERSARY, x_m=x, y_m=y, heading_rad=towards, speed_mps=0.0)
+    sim.reset(replace(alone, pedestrians=(start,)), 1)
+    least_m, walks = math.inf, False
+    frame = sim.step()
+    for _ in range(MET_STEPS):
+        left_m = math.hypot(there[0] - float(frame.x_m[0]), there[1] - float(frame.y_m[0]))
+        walks = walks or left_m <= frame.ego_speed_mps * ASIDE_M / PACE_MPS
+        pace = PACE_MPS if walks else 0.0
+        x, y = x + pace * STEP_S * math.cos(towards), y + pace * STEP_S * math.sin(towards)
+        sim.apply({}, {"walker": Walker(x, y, towards, pace)})
+        frame = sim.step()
+        view = relative_view(frame)
+        if frame.ego_speed_mps >= STANDING_MPS:  # who stands is walked into, whatever it does
+            least_m = min(least_m, 0.0 if view.overlap[0] else float(view.gap[0]))
+    return least_m
+
+
+def _cycle_s(family: Family) -> float:
+    return next((p.high for p in family.space.parameters if p.name == "signal_offset_s"), 0.0)
+
+
+def _at_green(sim: SumoSimulation, layout: Layout, cycle_s: float) -> Layout:
+    """The same at the beginning of the ego's green; unchanged where its signal is never seen to become green."""
+    if layout.signal is None:
+        return layout
+    before = Signal.GREEN
+    for offset_s in np.linspace(0.0, cycle_s, OFFSETS):
+        turned = replace(layout, signal_offset_s=float(offset_s))
+        now = sim.reset(turned, 1).signal
+        if now is Signal.GREEN and before is not Signal.GREEN:
+            return turned
+        before = now
+    return layout
