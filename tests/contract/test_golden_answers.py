@@ -36,6 +36,8 @@ ASKED = {
     "methods": ("GET", "/v1/methods"),
     "networks": ("GET", "/v1/networks"),
     "network_unknown": ("GET", "/v1/networks/n0"),
+    "places_unknown": ("GET", "/v1/networks/n0/places"),
+    "places_picture_unknown": ("GET", "/v1/networks/n0/places.png"),
     "campaigns": ("GET", "/v1/campaigns"),
     "campaigns_first_page": ("GET", "/v1/campaigns?limit=2"),
     "campaigns_filtered": ("GET", "/v1/campaigns?state=failed&family=low&method=random&label=ended"),
