@@ -36,7 +36,7 @@ FINDING: Responses = problem(422, "Nothing can be found on the network, and `det
 FINDING[503]["headers"] = {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)}
 DRAWN: Responses = {200: {"content": {"image/png": {}}}}
 REFUSALS[503]["headers"] = {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)}
-DESCRIPTION = f"""Check a SUMO road network and keep it. Campaigns cannot run on it yet: families bring their own roads.
+DESCRIPTION = f"""Check a SUMO road network and keep it. Its `places` are where campaigns can be run on it.
 
 The body is a net (`.net.xml`), the same as gzip, or a zip archive of one net and up to {MAX_FILES - 1} route and \
 additional files; what a file is, its root element says. UTF-8, at most {MAX_EXPANDED_BYTES >> 20} MiB once unpacked \
