@@ -124,7 +124,7 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
         if terminated or truncated or actor.hopeless:  # Alg. 1, l. 17-19
             break
     collision = info.get("collision")
-    encounter = Encounter(collision=collision, nearest_m=env.trace.nearest_m(run.problem.family.adversaries))
+    encounter = Encounter(collision=collision, encounters_s=env.trace.encounters_s(run.problem.family.adversaries))
     objective = run.searchers.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
     script = tuple(genes.tolist()) or None
     return _record(run, seed, scene.values, tally, objective=objective, script=script, collision=collision)

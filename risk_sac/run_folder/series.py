@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from risk_sac.errors import DamagedError
 from risk_sac.records import SeriesFile
 from risk_sac.risk.measures import Measures
-from risk_sac.risk.publish import AHEAD, GAP, SEEN, Assessment
+from risk_sac.risk.publish import AHEAD, ENCOUNTER, SEEN, Assessment
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.types import Bools, Floats, Frame
 from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
@@ -62,17 +62,17 @@ class Trace:
         """Smallest soft-min robustness since the release."""
         return min(m.soft_min for m in self.since_release)
 
-    def nearest_m(self, actors: Collection[str]) -> dict[str, float]:
-        """How near each of some actors came to the ego, m, while it was ahead and in sight and the ego on the move."""
-        nearest: dict[str, float] = {}
+    def encounters_s(self, actors: Collection[str]) -> dict[str, float]:
+        """The smallest time to encounter of each of some actors, s, while ahead and in sight, the ego on the move."""
+        least: dict[str, float] = {}
         for frame, measures in zip(self.frames[self.released :], self.since_release, strict=True):
             if frame.ego_speed_mps < ON_THE_MOVE_MPS:
                 continue
-            ahead_m, gap_m, seen = (measures.assessment.others[row].tolist() for row in (AHEAD, GAP, SEEN))
-            for name, ahead, gap, visible in zip(frame.ids[1:], ahead_m, gap_m, seen, strict=True):
+            ahead_m, encounter_s, seen = (measures.assessment.others[row].tolist() for row in (AHEAD, ENCOUNTER, SEEN))
+            for name, ahead, after_s, visible in zip(frame.ids[1:], ahead_m, encounter_s, seen, strict=True):
                 if ahead > 0.0 and visible and name in actors:
-                    nearest[name] = min(gap, nearest.get(name, math.inf))
-        return nearest
+                    least[name] = min(after_s, least.get(name, math.inf))
+        return least
 
     def append(self, frame: Frame, measures: Measures, action: NDArray[np.float32] | None) -> None:
         """Records a frame and the action that led to it, None up to the release."""

@@ -50,7 +50,7 @@ class ArchiveOptimizer:
         parent, self._parent = self._parent, None
         if mean_return is None:
             return None
-        self._elites.add_misses(point, encounter.nearest_m)
+        self._elites.add_misses(point, encounter.encounters_s)
         if encounter.collision is not None and encounter.collision.valid:
             self._elites.add_failure(point, encounter.collision, parent)
         self._maximum = update_running_maximum(self._maximum, mean_return, self._config.running_maximum_rate)

@@ -20,8 +20,9 @@ class Encounter:
     """Whom the ego met in an episode."""
 
     collision: Collision | None = None
-    nearest_m: Mapping[str, float] = field(default_factory=dict)
-    """Adversary → how near it came while it was ahead and in sight, the ego on the move; who never was is left out."""
+    encounters_s: Mapping[str, float] = field(default_factory=dict)
+    """Adversary → its smallest time to encounter while ahead and in sight, the ego on the move; who never was is left
+    out."""
 
 
 NOBODY = Encounter()

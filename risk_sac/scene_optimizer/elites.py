@@ -31,7 +31,7 @@ class Elite:
     worth: float
     striker: str
     kind: str  # elites of one kind share their chances
-    gap_m: float = 0.0  # that a near miss left
+    missed_s: float = 0.0  # of a near miss: its smallest time to encounter
     drawn: int = 0
     credit: float = 0.0  # for what was new among its children
 
@@ -79,13 +79,16 @@ class Elites:
         if known is None or known.worth < worth:
             self._failures[niche] = Elite(point=point, worth=worth, striker=collision.other_id, kind=kind)
 
-    def add_misses(self, point: Floats, nearest_m: Mapping[str, float]) -> None:
-        """Takes up how near each adversary came to the ego, where none was nearer."""
-        for name, gap_m in nearest_m.items():
+    def add_misses(self, point: Floats, encounters_s: Mapping[str, float]) -> None:
+        """Takes up how nearly each adversary struck the ego, where none did so more nearly.
+
+        Choice: by the time to encounter, and not by the gap, which is small whenever somebody passes by.
+        """
+        for name, missed_s in encounters_s.items():
             known = self._misses.get(name)
-            if known is None or gap_m <= known.gap_m:
+            if known is None or missed_s <= known.missed_s:
                 self._misses[name] = Elite(
-                    point=point, worth=NEAR_MISS_WORTH, striker=name, kind=f"near miss of {name}", gap_m=gap_m
+                    point=point, worth=NEAR_MISS_WORTH, striker=name, kind=f"near miss of {name}", missed_s=missed_s
                 )
 
     def state(self) -> dict[str, Any]:

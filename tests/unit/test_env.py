@@ -19,8 +19,10 @@ from shapely.affinity import rotate, translate
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.errors import InfeasibleScene, SceneError
+from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
 from risk_sac.records import Collision
+from risk_sac.risk.encounter import time_to_encounter
 from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.types import Frame, Kind, Scene
@@ -446,7 +448,7 @@ def test_a_closed_environment_can_start_again(low: RiskSacEnv) -> None:
     assert same(episode(low, 3), expected)
 
 
-def test_the_nearest_miss_is_the_least_distance_while_ahead_and_in_sight_and_the_ego_on_the_move(
+def test_the_nearest_miss_is_the_least_time_to_encounter_while_ahead_and_in_sight_and_the_ego_on_the_move(
     low: RiskSacEnv,
 ) -> None:
     frames = counted = 0
@@ -459,7 +461,12 @@ def test_the_nearest_miss_is_the_least_distance_while_ahead_and_in_sight_and_the
             seen, moves = series["visible"][released:, i] == 1, series["speed_mps"][released:, 0] >= 1.0
             counts = ahead & seen & moves
             frames, counted = frames + len(counts), counted + counts.sum()
-            if counts.any():
-                least[name] = series["distance_m"][released:, i][counts].min()
-        assert low.trace.nearest_m(series["ids"]) == least
+            times_s = [
+                time_to_encounter(relative_view(frame), frame.kind[1:] == Kind.PEDESTRIAN)[frame.ids.index(name) - 1]
+                for frame, count in zip(low.trace.frames[released:], counts, strict=True)
+                if count
+            ]
+            if times_s:
+                least[name] = min(times_s)
+        assert low.trace.encounters_s(series["ids"]) == least
     assert 0.1 < counted / frames < 0.9
