@@ -1,0 +1,132 @@
+"""A campaign that ends with an i.i.d. phase, and its report: real server, real workers, and the command line."""
+
+import json
+import resource
+import signal
+
+import pytest
+
+from risk_sac import cli
+from risk_sac.report.evidence import Evidence
+from risk_sac.run_folder.results import read_results
+
+LABEL = "night <script>alert(1)</script>"
+SPEC = {
+    "label": LABEL,
+    "methods": ["archive"],
+    "seeds": [601],
+    "budget": {"episodes": 40},
+    "iid": {"episodes": 5, "seed": 3},
+}
+RUNS = ["low-archive-601", "low-iid-undisturbed-3", "low-iid-random-3"]
+
+
+@pytest.fixture(scope="module")
+def service(serve_shared):
+    return serve_shared("service.worker", grace_s=30)
+
+
+@pytest.fixture(scope="module")
+def campaign(service):
+    ended = service.wait(service.post(**SPEC))
+    assert ended["state"] == "succeeded", ended["reason"]
+    return ended
+
+
+@pytest.fixture
+def folders(service, campaign):
+    return [str(service.data_dir / "campaigns" / campaign["id"] / run) for run in RUNS]
+
+
+def test_its_runs_end_the_campaign_and_are_in_no_count_of_the_search(service, campaign, folders):
+    assert [run["id"] for run in campaign["runs"]] == RUNS
+    assert campaign["methods"] == ["archive"]
+    assert campaign["progress"]["episodes_done"] == 50
+    search = read_results(service.data_dir / "campaigns" / campaign["id"] / RUNS[0]).metrics
+    assert campaign["progress"]["raw_collisions"] == search.raw_collisions > 0
+    (total,) = service.get(campaign["id"], "/results")["totals"]
+    assert (total["method"], total["episodes"]) == ("archive", 40)
+    found = service.get(campaign["id"], "/failures", tier="raw", limit=500)["items"]
+    assert {each["run_id"] for each in found} == {RUNS[0]}
+    assert service.get(campaign["id"], "/clusters")["complete"]
+    drawn = service.get(campaign["id"], "/episodes", run=RUNS[2])["items"]
+    assert [(each["phase"], each["index"]) for each in drawn] == [("iid", index) for index in range(5)]
+
+
+def test_the_report_has_bounds_of_the_i_i_d_phase_alone(service, campaign):
+    told = service.get(campaign["id"], "/report")
+    evidence = Evidence.model_validate(told)
+    assert evidence.complete
+    assert [(each.method, each.played + each.refused) for each in evidence.bounds] == [
+        ("iid-undisturbed", 5),
+        ("iid-random", 5),
+    ]
+    assert evidence.coverage["low"].search.episodes + campaign["progress"]["rejected"] == 40
+    first = evidence.bounds[0].failures
+    assert (first.count, first.low) == (0, 0.0)
+    assert first.high == pytest.approx(1 - 0.05 ** (1 / evidence.bounds[0].played))
+
+
+def test_the_page_may_run_and_load_nothing_and_a_client_that_has_it_is_told_so(service, campaign):
+    path = f"/v1/campaigns/{campaign['id']}/report"
+    page = service.client.get(path, headers={"accept": "text/html,application/xhtml+xml,*/*;q=0.8"})
+    assert page.headers["content-type"] == "text/html; charset=utf-8"
+    assert page.headers["content-security-policy"].startswith("default-src 'none'; img-src data:;")
+    assert "Search results are no crash rate" in page.text
+    assert "<script" not in page.text
+    assert "&lt;script&gt;" in page.text
+    assert "data:image/svg+xml;base64," in page.text
+    assert f"/v1/campaigns/{campaign['id']}/spec" in page.text
+    assert str(service.data_dir) not in page.text
+    unchanged = service.client.get(path, params={"format": "html"}, headers={"if-none-match": page.headers["etag"]})
+    assert unchanged.status_code == 304
+    text = service.client.get(path, params={"format": "md"})
+    assert text.text.startswith("# Failures of an ego: night &lt;script&gt;")
+    assert text.headers["etag"] != page.headers["etag"]
+    assert service.client.get(path, params={"format": "pdf"}).status_code == 422
+    assert service.client.get(path, headers={"accept": "image/png"}).status_code == 406
+
+
+def test_a_regression_of_the_campaign_is_told_in_it_and_no_other(service, campaign):
+    path = f"/v1/campaigns/{campaign['id']}/report"
+    for unknown in ("x", f"{campaign['id']}-{'0' * 16}", f"c0123-{'0' * 16}"):
+        assert service.client.get(path, params={"regression": unknown}).status_code == 404
+    posted = {"campaign_id": campaign["id"], "ego": {"profile": "perfect"}}
+    regression = service.client.post("/v1/regressions", json=posted).json()
+    where = f"/v1/regressions/{regression['id']}"
+    service.wait_until(lambda: service.client.get(where).json()["state"] == "succeeded")
+    told = service.client.get(path, params={"regression": regression["id"], "format": "md"}).text
+    assert "profile perfect" in told
+    for case in service.client.get(where).json()["cases"]:
+        assert f"| {case['id']} |" in told
+
+
+def test_the_command_line_says_the_same_of_the_same_folders(service, campaign, folders, tmp_path, capsys):
+    out = tmp_path / "new" / "report"
+    for suffix in (".json", ".html", ".md"):
+        assert cli.main(["report", *folders, "--out", str(out.with_suffix(suffix))]) == 0
+    told = json.loads(out.with_suffix(".json").read_text())
+    assert Evidence.model_validate(told) == Evidence.model_validate(service.get(campaign["id"], "/report"))
+    page = out.with_suffix(".html").read_text()
+    assert "data:image/svg+xml;base64," in page
+    assert f"risk-sac show {folders[0]} " in page
+    assert page.count("<h2 ") == out.with_suffix(".md").read_text().count("\n## ")
+    assert cli.main(["report", folders[1], "--out", str(out.with_suffix(".md"))]) == 2
+    assert "only runs of an i.i.d. phase" in capsys.readouterr().err
+
+
+def test_a_full_disk_leaves_the_report_that_was_there_and_nothing_half_written(folders, tmp_path, capsys):
+    out = tmp_path / "report.html"
+    out.write_text("the one before")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+        status = cli.main(["report", *folders, "--out", str(out)])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+    assert status == 1
+    assert "File too large" in capsys.readouterr().err
+    assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
+    assert out.read_text() == "the one before"
