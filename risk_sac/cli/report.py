@@ -3,15 +3,19 @@
 import argparse
 import shlex
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 from risk_sac.cli.console import OK, Commands, console
 from risk_sac.cli.regress import read_baseline
 from risk_sac.errors import ConfigError
-from risk_sac.report.evidence import Evidence, Origin, gathered, html, markdown, report, show_command
-from risk_sac.report.evidence.folders import Found, read_folders
 from risk_sac.run_folder.durable import replace_file
 
-FORMATS = (".html", ".md", ".json")
+if TYPE_CHECKING:
+    from risk_sac.report.evidence import Evidence, Origin
+    from risk_sac.report.evidence.folders import Found
+
+Format = Literal["html", "md", "json"]
+FORMATS: dict[str, Format] = {".html": "html", ".md": "md", ".json": "json"}
 
 
 def add_report(commands: Commands) -> None:
@@ -33,8 +37,10 @@ def add_report(commands: Commands) -> None:
 
 
 def _report(options: argparse.Namespace) -> int:
-    if options.out.suffix not in FORMATS:
-        raise ConfigError(f"got {options.out.name!r}; wanted a name that ends in {', '.join(FORMATS)}", field="--out")
+    from risk_sac.report.evidence import Origin, gathered, show_command  # here, because loading numpy takes a while
+    from risk_sac.report.evidence.folders import read_folders
+
+    format_ = format_of(options.out)
     regression = read_baseline(options.regression, "--regression") if options.regression else None
     found = read_folders(options.runs)
     evidence = gathered(found.comparison)
@@ -46,21 +52,34 @@ def _report(options: argparse.Namespace) -> int:
         folders=found.folders,
         regression=regression,
     )
-    content = _content(options.out.suffix, found, evidence, origin)
+    content = _content(format_, found, evidence, origin)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     replace_file(options.out, content.encode())
     console.print(f"Report: {options.out}", soft_wrap=True)
     return OK
 
 
-def _content(suffix: str, found: Found, evidence: Evidence, origin: Origin) -> str:
-    if suffix == ".json":
+def format_of(file: Path) -> Format:
+    """What a report is written as, by the name of its file.
+
+    Raises:
+      ConfigError: by none of the names there are.
+    """
+    if file.suffix not in FORMATS:
+        raise ConfigError(f"got {file.name!r}; wanted a name that ends in {', '.join(FORMATS)}", field="--out")
+    return FORMATS[file.suffix]
+
+
+def _content(format_: Format, found: "Found", evidence: "Evidence", origin: "Origin") -> str:
+    from risk_sac.report.evidence import html, markdown, report
+
+    if format_ == "json":
         return evidence.model_dump_json(indent=2) + "\n"
     document = report(found.comparison, evidence, origin)
-    return html(document) if suffix == ".html" else markdown(document)
+    return html(document) if format_ == "html" else markdown(document)
 
 
-def _regress(found: Found) -> str:
+def _regress(found: "Found") -> str:
     """What to type to play the failures of all searches that have finished."""
     runs = [str(found.folders[run.spec.digest]) for run in found.comparison.runs]
     return shlex.join(["risk-sac", "regress", "--failures", *runs, "--ego", "EGO", "--out", "cases.json"])

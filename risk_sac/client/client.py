@@ -187,6 +187,20 @@ class Client:
         path, query = f"{_path(campaign_id)}/table", {"format": format_}
         return self._transport.ask("GET", path, patience_s=self._patience_s, query=query).text
 
+    def report(
+        self, campaign_id: str, format_: Literal["json", "md", "html"] = "md", regression_id: str | None = None
+    ) -> str:
+        """What was found, how often it happens where nobody searched, and where nobody looked.
+
+        Args:
+          campaign_id: of the campaign.
+          format_: a page, Markdown, or bounds and coverage alone as JSON.
+          regression_id: of a regression of the campaign, to be told of in it.
+        """
+        query = {"format": format_} | ({} if regression_id is None else {"regression": regression_id})
+        path = f"{_path(campaign_id)}/report"
+        return self._transport.ask("GET", path, patience_s=self._patience_s, query=query).text
+
     def cancel(self, campaign_id: str) -> Campaign:
         """Stops a campaign, which takes a while, and keeps what it found; changes nothing once it has ended."""
         path = f"{_path(campaign_id)}/cancel"

@@ -67,7 +67,7 @@ def test_the_report_has_bounds_of_the_i_i_d_phase_alone(service, campaign):
     assert first.high == pytest.approx(1 - 0.05 ** (1 / evidence.bounds[0].played))
 
 
-def test_the_page_may_run_and_load_nothing_and_a_client_that_has_it_is_told_so(service, campaign):
+def test_the_page_may_run_and_load_nothing_and_a_client_that_has_it_is_told_so(service, campaign, tmp_path):
     path = f"/v1/campaigns/{campaign['id']}/report"
     page = service.client.get(path, headers={"accept": "text/html,application/xhtml+xml,*/*;q=0.8"})
     assert page.headers["content-type"] == "text/html; charset=utf-8"
@@ -78,6 +78,11 @@ def test_the_page_may_run_and_load_nothing_and_a_client_that_has_it_is_told_so(s
     assert "data:image/svg+xml;base64," in page.text
     assert f"/v1/campaigns/{campaign['id']}/spec" in page.text
     assert str(service.data_dir) not in page.text
+    out = tmp_path / "report.html"
+    url = str(service.client.base_url)
+    assert cli.main(["campaigns", "report", campaign["id"], "--out", str(out), "--url", url]) == 0
+    assert out.read_text() == service.client.get(path, params={"format": "html"}).text
+    assert cli.main(["campaigns", "report", campaign["id"], "--out", str(tmp_path / "x.pdf"), "--url", url]) == 2
     unchanged = service.client.get(path, params={"format": "html"}, headers={"if-none-match": page.headers["etag"]})
     assert unchanged.status_code == 304
     text = service.client.get(path, params={"format": "md"})

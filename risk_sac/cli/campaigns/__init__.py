@@ -5,11 +5,21 @@ import argparse
 from risk_sac.cli.campaigns.failures import add_bundle_failure, add_list_failures, add_show_failure
 from risk_sac.cli.campaigns.manage import add_cancel, add_delete, add_list
 from risk_sac.cli.campaigns.regress import add_regress_campaign
+from risk_sac.cli.campaigns.report import add_report_campaign
 from risk_sac.cli.campaigns.submit import add_submit
 from risk_sac.cli.campaigns.watch import add_results, add_watch
 from risk_sac.cli.console import COULD_NOT_RUN, Commands
 
-COMMANDS = (add_submit, add_list, add_watch, add_results, add_regress_campaign, add_cancel, add_delete)
+COMMANDS = (
+    add_submit,
+    add_list,
+    add_watch,
+    add_results,
+    add_report_campaign,
+    add_regress_campaign,
+    add_cancel,
+    add_delete,
+)
 OF_FAILURES = (add_list_failures, add_show_failure, add_bundle_failure)
 EPILOG = """exit status:
   0    fine
