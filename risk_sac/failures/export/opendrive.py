@@ -7,28 +7,37 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.beside import BESIDE
 from risk_sac.failures.export.markup import document
+from risk_sac.failures.export.net import Net, boundaries
+from risk_sac.types import Floats
 
 WALL_S = 120.0  # a second suffices
 
 
-def opendrive(net: Path, name: str) -> bytes:
+def opendrive(file: Path, net: Net, name: str) -> bytes:
     """The roads of a net.
 
     Args:
-      net: file of SUMO's.
+      file: of SUMO's net.
+      net: what is in it.
       name: of the map.
 
     Raises:
       ConfigError: netconvert cannot tell this net in OpenDRIVE.
     """
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "roads.xodr"
-        _netconvert("--sumo-net-file", str(net), "--opendrive-output", str(file))
-        root = ET.parse(file).getroot()
+        made = Path(folder) / "roads.xodr"
+        _netconvert("--sumo-net-file", str(file), "--opendrive-output", str(made))
+        root = ET.parse(made).getroot()
+    for road in root.iter("road"):
+        lane = _turning(road, net)
+        if lane is not None:
+            _lay(road, *lane)
+        _measure(road)
     return document(_as_of_1_7(root, name))
 
 
@@ -50,9 +59,56 @@ def _as_of_1_7(root: ET.Element, name: str) -> ET.Element:
     header.append(ET.Comment(f" {BESIDE} has what is not in this file "))
     for thing in root.iter("object"):  # crossings: required since 1.7
         thing.attrib.setdefault("zOffset", "0")
-    for road in root.iter("road"):
-        _measure(road)
     return root
+
+
+def _turning(road: ET.Element, net: Net) -> tuple[Floats, float] | None:
+    """Middle and width of the leftmost lane of a road that bends inside a junction; it is called as SUMO's edge is."""
+    edge = road.get("name", "")
+    lanes = [lane for lane in net.lanes.values() if lane.edge == edge and lane.use == "inside"]
+    if not lanes or road.find("planView/geometry/paramPoly3") is None:
+        return None
+    lane = max(lanes, key=lambda each: each.index)
+    line, width_m = [lane.centre], lane.width_m
+    while (after := next((net.lanes[name] for name in lane.next if name in net.lanes), None)) and after.use == "inside":
+        line.append(after.centre[1:])  # SUMO divides a turn where vehicles wait within the junction
+        lane = after
+    return np.concatenate(line), width_m
+
+
+def _lay(road: ET.Element, middle: Floats, width_m: float) -> None:
+    """Lays a road's reference line along the left edge of a lane, as cubics through all of its points.
+
+    netconvert bends one cubic from end to end, up to 11 cm beside the lane that SUMO's vehicles drive on.
+    """
+    plan = road.find("planView")
+    assert plan is not None  # that of a road that bends
+    edge = boundaries(middle, width_m)[0]
+    edge[[0, -1]], ends = _ends(plan[0])  # where the roads before and after it end, and the way they do
+    station = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1))))
+    through = CubicSpline(station, edge, bc_type=((1, ends[0]), (1, ends[1])))
+    plan.clear()
+    for piece, length_m in enumerate(np.diff(station)):
+        cubic, square, slope, start = through.c[:, piece]
+        heading = np.arctan2(slope[1], slope[0])
+        into = np.array([(np.cos(heading), -np.sin(heading)), (np.sin(heading), np.cos(heading))])  # the piece's frame
+        place = {"s": "0", "x": repr(float(start[0])), "y": repr(float(start[1])), "hdg": repr(float(heading))}
+        geometry = ET.SubElement(plan, "geometry", place)
+        curve = {"pRange": "normalized", "aU": "0", "aV": "0"}
+        for name, power, slopes in (("b", 1, slope), ("c", 2, square), ("d", 3, cubic)):
+            u, v = slopes @ into * length_m**power
+            curve |= {f"{name}U": repr(float(u)), f"{name}V": repr(float(v))}
+        ET.SubElement(geometry, "paramPoly3", curve)
+
+
+def _ends(geometry: ET.Element) -> tuple[Floats, Floats]:
+    """Both ends of a normalised cubic, and its unit direction there, `2 x 2` each."""
+    heading = float(geometry.get("hdg", "0"))
+    outward = np.array([(np.cos(heading), np.sin(heading)), (-np.sin(heading), np.cos(heading))])
+    a, b, c, d = (np.array([float(geometry[0].get(f"{name}{axis}", "0")) for axis in "UV"]) for name in "abcd")
+    places = np.array([a, a + b + c + d]) @ outward + (float(geometry.get("x", "0")), float(geometry.get("y", "0")))
+    directions = np.array([b, b + 2.0 * c + 3.0 * d]) @ outward
+    return places, directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
 def _measure(road: ET.Element) -> None:

@@ -38,7 +38,7 @@ LAST_S = 20.0  # that a free ego may take
 
 def files(failure: Recorded) -> Files:
     """Two scenarios, the roads, and what neither can say."""
-    roads = opendrive(failure.net_file, failure.name)
+    roads = opendrive(failure.net_file, failure.net, failure.name)
     return {
         FREE: _scenario(failure, roads, free=True),
         AS_RECORDED: _scenario(failure, roads, free=False),
