@@ -13,6 +13,9 @@ from pathlib import Path
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.failures.bundle import Bundle, bundle_bytes, make_bundle
+from risk_sac.failures.export.formats import FORMATS, of_failure
+from risk_sac.failures.export.recorded import Recorded
+from risk_sac.failures.export.written import packed
 from risk_sac.failures.minimise import minimise
 from risk_sac.failures.play import repeated
 from risk_sac.failures.question import REFUSED, Question
@@ -26,7 +29,7 @@ from risk_sac.run_folder.series import read_series
 
 
 def answer(question: Question) -> bytes:
-    """A bundle or a core as files, a region as JSON, a twin with its time series.
+    """A bundle, a core or an export as files, a region as JSON, a twin with its time series.
 
     Raises:
       RiskSacError: the failure does not repeat, or cannot be played.
@@ -37,6 +40,9 @@ def answer(question: Question) -> bytes:
     bundle = _bundle(question)
     if question.subject == "region":
         return region(bundle).model_dump_json().encode()
+    if question.subject == "export":
+        assert question.format is not None  # since it asks for an export
+        return packed(FORMATS[question.format], of_failure(question.format, Recorded.of(bundle)))
     return bundle_bytes(minimise(bundle) if question.subject == "core" else bundle)
 
 
@@ -48,8 +54,8 @@ def _bundle(question: Question) -> Bundle:
 
 
 def _policy(question: Question) -> FrozenPolicy | None:
-    """Of the run that the failure is of; a region has no use for it."""
-    if question.subject == "region":
+    """Of the run that the failure is of; regions and exports have no use for it."""
+    if question.subject in ("region", "export"):
         return None
     from risk_sac.failures.collect import policy_of  # here, because it loads torch, which takes seconds
 

@@ -1,6 +1,9 @@
 """What can be posted."""
 
+from typing import Literal
+
 from risk_sac.config import FamilyName, Method, MethodName, Odd, Requirement
+from risk_sac.failures.export.formats import FormatName
 from service.schemas.base import Body
 
 
@@ -42,6 +45,27 @@ class Signal(Body):
     low: float
     high: float
     meaning: str
+
+
+class ExportFormat(Body):
+    """A format of other tools."""
+
+    name: FormatName
+    title: str
+    what: str
+    of: Literal["failure", "episodes"]
+    """What it holds: one failure, or all episodes of runs."""
+    suffix: str
+    """Of what is downloaded."""
+    media_type: str
+    missing: list[str]
+    """Packages that are not installed here, without which it cannot be made."""
+
+
+class ExportFormats(Body):
+    """All of them."""
+
+    items: list[ExportFormat]
 
 
 class Families(Body):

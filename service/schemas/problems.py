@@ -26,6 +26,7 @@ class Reason(StrEnum):
     PICTURES_BUSY = "pictures_busy"
     SERIES_LOST = "series_lost"
     NOT_PLAYABLE = "not_playable"
+    NOT_INSTALLED = "not_installed"
     TOO_MANY_NETWORKS = "too_many_networks"
     UNSUPPORTED_MEDIA_TYPE = "unsupported_media_type"
     INVALID_FIELD = "invalid_field"

@@ -11,6 +11,7 @@ from typing import IO
 
 from risk_sac.config import EgoConfig
 from risk_sac.execution.postmortem import without_folders
+from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
 from service.errors import OutdatedError, ServiceError, StorageError
 from service.settings import ServiceSettings
@@ -36,6 +37,8 @@ class Study:
     subject: Subject
     twin: Twin | None = None
     """Of a twin, which."""
+    format: FormatName | None = None
+    """Of an export, which."""
 
 
 class Studies(Products[Study]):
@@ -64,6 +67,7 @@ class Studies(Products[Study]):
             spec=spec,
             episode=contact.episode.record,
             series=path,
+            format=study.format,
             twin=None if study.twin in (None, IDLE) else EgoConfig.model_validate({"profile": study.twin}),
         )
         with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as log:

@@ -46,6 +46,7 @@ ROUTES = {
     ("GET", "/metrics"): ("admin", 200),
     ("GET", "/v1/families"): ("read", 200),
     ("GET", "/v1/methods"): ("read", 200),
+    ("GET", "/v1/formats"): ("read", 200),
     ("GET", "/v1/campaigns"): ("read", 200),
     ("POST", "/v1/campaigns"): ("run", 202),
     ("POST", CHECK): ("run", 204),
@@ -60,6 +61,7 @@ ROUTES = {
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/picture.png"): ("read", 404),  # no time series was recorded
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/bundle.npz"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/core.npz"): ("read", 404),
+    ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/export"): ("read", 422),  # without a format
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/region"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}.png"): ("read", 404),
     ("GET", f"{CAMPAIGN}/failures/{{failure_id}}/twins/{{twin}}"): ("read", 404),

@@ -264,6 +264,12 @@ def test_picture_and_data_can_be_taken_along(failure: dict[str, Any], page_at: C
         page.get_by_role("button", name="Data (JSON)").click()
     assert json.loads(taken.value.path().read_text())["id"] == failure["id"]
     expect(page.get_by_role("region", name="Play it again, anywhere")).to_contain_text("risk-sac replay")
+    page.get_by_label("For other tools").select_option("GIF")
+    with page.expect_download() as taken:
+        page.get_by_role("button", name="Download").click()
+    assert taken.value.suggested_filename == f"{failure['id']}.gif"
+    with Image.open(taken.value.path()) as animation:
+        assert animation.n_frames > 10
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -29,6 +29,7 @@ from commonroad.scenario.traffic_light import (
     TrafficLightState,
 )
 from commonroad.scenario.trajectory import Trajectory
+from lxml.etree import SerialisationError
 
 from risk_sac.failures.export.beside import BESIDE, beside
 from risk_sac.failures.export.formats import Files
@@ -73,7 +74,11 @@ STATES = {
 
 
 def files(failure: Recorded) -> Files:
-    """Two scenarios, and what neither can say."""
+    """Two scenarios, and what neither can say.
+
+    Raises:
+      OSError: the folder for temporary files refuses them.
+    """
     return {
         FREE: _scenario(failure, failure.others),
         AS_RECORDED: _scenario(failure, failure.actors),
@@ -100,9 +105,15 @@ def _scenario(failure: Recorded, driven: tuple[Actor, ...]) -> bytes:
     )
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "scenario.xml"
-        writer.write_to_file(str(file), OverwriteExistingFile.ALWAYS)
+        try:
+            writer.write_to_file(str(file), OverwriteExistingFile.ALWAYS)
+        except SerialisationError as error:  # as lxml calls a disk that refuses
+            raise OSError(f"{folder} cannot be written: {error}") from error
         root = ET.parse(file).getroot()
     root.set("date", MADE)
+    tags = root.find("scenarioTags")
+    assert tags is not None  # they are given above
+    tags[:] = sorted(tags, key=lambda tag: tag.tag)  # they come from a set, in any order
     return document(root)
 
 

@@ -134,8 +134,9 @@ def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
     """
     format_ = FORMATS[name]
     if format_.of != of:
-        what = "a single failure" if of == "failure" else "all episodes of runs"
-        raise ConfigError(f"{name} cannot hold {what}; {', '.join(names(of))} can", field="format")
+        lacks = "no single failure" if of == "failure" else "no episodes of runs"
+        wanted = ", ".join(names(of))
+        raise ConfigError(f"got {name.value!r}, which holds {lacks}; wanted one of: {wanted}", field="format")
     if format_.missing:
         told = ", ".join(format_.missing)
         message = f"{name} needs {told}, which is not installed: pip install 'risk-sac[{EXTRA}]' brings it"

@@ -5,10 +5,20 @@ from dataclasses import asdict
 from fastapi import APIRouter
 
 from risk_sac.config import METHODS, EgoConfig
+from risk_sac.failures.export.formats import FORMATS
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import requirements_from_odd, widest
-from service.schemas.catalogue import Families, Family, Methods, NamedMethod, SceneParameter, Signal
+from service.schemas.catalogue import (
+    ExportFormat,
+    ExportFormats,
+    Families,
+    Family,
+    Methods,
+    NamedMethod,
+    SceneParameter,
+    Signal,
+)
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 
@@ -31,6 +41,24 @@ def list_families() -> Families:
     ]
     signals = [Signal(name=name, **asdict(signal)) for name, signal in SIGNALS.items()]
     return Families(items=items, signals=signals)
+
+
+@router.get("/formats")
+def list_formats() -> ExportFormats:
+    """Formats that failures and episodes can be exported in."""
+    items = [
+        ExportFormat(
+            name=name,
+            title=row.title,
+            what=row.what,
+            of=row.of,
+            suffix=row.suffix,
+            media_type=row.media_type,
+            missing=list(row.missing),
+        )
+        for name, row in FORMATS.items()
+    ]
+    return ExportFormats(items=items)
 
 
 @router.get("/methods")

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Request, Response
 from starlette.concurrency import run_in_threadpool
 
+from risk_sac.failures.export.formats import EXTRA, FORMATS, FormatName, check_carries, names
 from risk_sac.failures.question import Twin
 from risk_sac.failures.surroundings import Region
 from service.api.access import CurrentCaller
@@ -41,6 +42,13 @@ def _made(media_type: str) -> Responses:
 
 PICTURE = _made(PNG)
 PLAYED = problem(409, "The collision does not repeat here, or cannot be played")
+_EXPORTED = {FORMATS[name].media_type: {} for name in names("failure")}
+EXPORT = (
+    _made(NPZ)
+    | PLAYED
+    | problem(501, "The service lacks a package that makes this format")
+    | {200: TAGGED[200] | {"content": _EXPORTED}}
+)
 BUNDLE, TWIN, TOLD = _made(NPZ) | PLAYED, _made(PNG) | PLAYED, _made(JSON) | PLAYED
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
@@ -71,6 +79,21 @@ async def get_bundle(contact: Asked, request: Request, service: Service) -> Resp
 async def get_core(contact: Asked, request: Request, service: Service) -> Response:
     """The same with all taken away that the failure does not need; takes up to 150 episodes, some 10 s."""
     return await _answer(contact, request, NPZ, lambda: service.studies.product(Study(contact, "core")))
+
+
+@router.get("/failures/{failure_id}/export", response_class=Response, responses=EXPORT)
+async def get_export(contact: Asked, format: FormatName, request: Request, service: Service) -> Response:
+    """One collision in a format of other tools, see `GET /v1/formats`; some are several files, and come as a zip."""
+    row = FORMATS[format]
+    if row.missing:
+        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: the extra {EXTRA!r} has it"
+        raise _problem(HTTPStatus.NOT_IMPLEMENTED, Reason.NOT_INSTALLED, lacks)
+    check_carries(format, "failure")
+    study = Study(contact, "export", format=format)
+    answer = await _answer(contact, request, row.media_type, lambda: service.studies.product(study))
+    name = f"{contact.episode.id}{f'-{format}' if row.media_type == NPZ else ''}{row.suffix}"
+    answer.headers["Content-Disposition"] = f'attachment; filename="{name}"'
+    return answer
 
 
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=TOLD)

@@ -3,6 +3,7 @@
 import type { RefObject } from "preact";
 import { useState } from "preact/hooks";
 import { absolute, download, hasKey, save } from "../../api/client";
+import { Exports } from "./exports";
 
 interface Props {
   campaign: string;
@@ -25,6 +26,7 @@ export function Take({ campaign, run, failure, path, stage }: Props) {
         <button onClick={attempt(() => download(path, `${failure}.json`))}>Data (JSON)</button>
         <button onClick={attempt(() => download(`${path}/bundle.npz`, `${failure}.npz`))}>Bundle (NPZ)</button>
       </div>
+      <Exports failure={failure} path={path} attempt={attempt} />
       {trouble && (
         <p role="alert" class="bad">
           {trouble}

@@ -1,0 +1,51 @@
+"""Parquet, read by pyarrow."""
+
+import json
+from pathlib import Path
+
+import pytest
+from pyarrow import compute, parquet
+
+from risk_sac.cli import main
+from risk_sac.failures.export.parquet import SPECS
+from risk_sac.run_folder.episode_json import records_from_lines
+from risk_sac.run_folder.results import EPISODES
+
+RUNS = {"low": "random", "mixed": "random"}
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    for family, method in RUNS.items():
+        command = ["run", "--family", family, "--method", method, "--episodes", "20", "--seed", "601"]
+        assert main([*command, "--out", str(folder / family)]) == 0
+    return folder
+
+
+def test_every_episode_of_every_run_is_a_row_with_its_fields(runs: Path, tmp_path: Path) -> None:
+    file = tmp_path / "episodes.parquet"
+    assert main(["export", str(runs), "--format", "parquet", "--out", str(file)]) == 0
+    table = parquet.read_table(file)
+    records = {family: records_from_lines((runs / family / EPISODES).read_bytes()) for family in RUNS}
+    assert table.num_rows == sum(map(len, records.values())) >= 40
+    for family, method in RUNS.items():
+        mine = table.filter(compute.equal(table["family"], family))
+        assert mine["method"].unique().to_pylist() == [method]
+        for row, record in zip(mine.to_pylist(), records[family], strict=True):
+            assert row["id"] == record.id_in(f"{family}-{method}-601")
+            assert (row["outcome"], row["steps"], row["seed"]) == (record.outcome, record.steps, record.seed)
+            assert dict(row["scene"]) == dict(record.scene)
+            assert row["min_ttc_s"] == record.min_ttc_s
+            assert (row["collision"] is None) == (record.collision is None)
+            if record.collision is not None:
+                assert dict(row["collision"]["verdicts"]) == dict(record.collision.verdicts)
+                assert row["collision"]["early_min_ttc_s"] == record.collision.min_ttc_s
+    specs = json.loads(table.schema.metadata[SPECS])
+    assert {spec["family"] for spec in specs.values()} == set(RUNS)
+
+
+def test_what_is_no_run_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(tmp_path), "--format", "parquet", "--out", str(tmp_path / "e.parquet")]) == 2
+    assert "holds no run" in capsys.readouterr().err
+    assert not (tmp_path / "e.parquet").exists()
