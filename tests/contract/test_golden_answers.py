@@ -71,6 +71,8 @@ ASKED = {
     "failure_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0"),
     "picture_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/picture.png"),
     "bundle_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/bundle.npz"),
+    "export_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/export?format=gif"),
+    "export_bad_field": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-1/export?format=parquet"),
     "core_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/core.npz"),
     "region_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/region"),
     "twin_unknown": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-0/twins/idle.png"),

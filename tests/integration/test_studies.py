@@ -8,6 +8,7 @@ from shapely import Point, Polygon, union_all
 from risk_sac import cli
 from risk_sac.client import Client, Refused
 from risk_sac.failures.bundle import read_bundle
+from risk_sac.failures.export.formats import FORMATS
 
 SPEC = {"families": ["low"], "methods": ["archive"], "seeds": [3], "budget": {"episodes": 16}}
 
@@ -42,6 +43,20 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
         with pytest.raises(Refused) as refused:
             client.picture(campaign_id, id_, "nobody")
         assert refused.value.status == 422
+
+    for name, row in FORMATS.items():
+        answer = service.client.get(f"/v1/campaigns/{campaign_id}/failures/{id_}/export", params={"format": name})
+        if row.of == "episodes":
+            assert answer.status_code == 422
+            continue
+        assert answer.headers["content-type"] == row.media_type, answer.text
+        assert answer.headers["content-disposition"].startswith(f'attachment; filename="{id_}')
+        if row.suffix == ".zip":
+            assert b"beside.json" in answer.content
+        else:
+            assert answer.content[:4] in (b"\x89MCA", b"GIF8")
+    listed = {row["name"]: row["missing"] for row in service.client.get("/v1/formats").json()["items"]}
+    assert listed == {name: [] for name in FORMATS}
 
     own = service.get(campaign_id, f"/failures/{id_}")
     surfaces = service.get(campaign_id, f"/failures/{id_}/roads")["surfaces"]
