@@ -8,6 +8,8 @@ MAX_NAME = 200  # characters of an id, or of a file's name
 
 MAX_DEPTH = 8  # of nested elements; SUMO's files reach 4
 MAX_ELEMENTS = 300_000  # of all documents together
+MAX_FOREIGN_ELEMENTS = 1_000_000  # of a map that is converted: of a town, most are houses
+MAX_FOREIGN_DEPTH = 20
 MAX_ATTRIBUTES = 100  # of one element
 MAX_VALUE = 100_000  # characters of one attribute: a shape of 4,000 points
 MAX_EDGES = 50_000  # those inside junctions included

@@ -10,7 +10,6 @@ import os
 import re
 import shutil
 import subprocess
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -20,7 +19,7 @@ from risk_sac.errors import MapError
 PRESENT = (1, 16)  # nets since then say all that is read
 HEAD_BYTES = 4096
 WALL_S = 120
-MOST_WARNINGS = 20
+MOST_REMARKS = 20
 _LONGEST = 300
 
 
@@ -70,23 +69,38 @@ def present_net(file: Path, folder: Path) -> Converted:
     if format_ is Format.NET and version >= PRESENT:
         return Converted(plain, ())
     out = folder / "converted.net.xml"
-    said = _run([netconvert(), *OPTIONS[format_], str(plain), "--output-file", str(out)], file.name)
-    warnings = [line[:_LONGEST] for line in re.findall(r"^Warning: (.*)$", said, re.MULTILINE)]
-    return Converted(out, tuple(warnings[:MOST_WARNINGS]))
+    said = _run(format_, plain, out, file.name)
+    return Converted(out, tuple(remarks(said, "Warning")))
 
 
-def netconvert() -> str:
-    """The program.
+def conversion(format_: Format, source: str, target: str) -> list[str]:
+    """Netconvert's arguments."""
+    return [*OPTIONS[format_], source, "--output-file", target]
+
+
+def remarks(said: str, severity: str) -> list[str]:
+    """Netconvert's messages of a severity, `Error` or `Warning`; the first ones, shortened."""
+    found = re.findall(rf"^{severity}: (.*)$", said, re.MULTILINE)
+    return ["".join(filter(str.isprintable, line))[:_LONGEST] for line in found[:MOST_REMARKS]]
+
+
+def netconvert() -> tuple[str, dict[str, str]]:
+    """The program, and the environment in which it finds its own files.
 
     Raises:
       MapError: it is not installed.
     """
-    found = shutil.which("netconvert")
-    if found is None and (package := importlib.util.find_spec("sumo")) and package.submodule_search_locations:
-        found = shutil.which("netconvert", path=str(Path(package.submodule_search_locations[0]) / "bin"))
-    if found is None:
-        raise MapError("this map has to be converted, and netconvert is not installed; pip install eclipse-sumo")
-    return found
+    package = importlib.util.find_spec("sumo")
+    for home in package.submodule_search_locations or () if package else ():
+        if program := shutil.which("netconvert", path=str(Path(home) / "bin")):
+            return program, _environment(home)
+    if program := shutil.which("netconvert"):
+        return program, _environment(os.environ.get("SUMO_HOME", "/usr/share/sumo"))
+    raise MapError("this map has to be converted, and netconvert is not installed; pip install eclipse-sumo")
+
+
+def _environment(home: str) -> dict[str, str]:
+    return {"PATH": os.defpath, "SUMO_HOME": home, "PROJ_LIB": f"{home}/data/proj", "PROJ_DATA": f"{home}/data/proj"}
 
 
 def _unpacked(file: Path, folder: Path) -> Path:
@@ -120,16 +134,16 @@ def _told(file: Path) -> tuple[Format, tuple[int, ...]]:
     return ROOTS[root[1]], (0,) if version is None else (int(version[1]), int(version[2]))
 
 
-def _run(command: Sequence[str], name: str) -> str:
+def _run(format_: Format, plain: Path, out: Path, name: str) -> str:
     """What netconvert says."""
-    folder = str(Path(command[0]).resolve().parents[1])  # where it finds its data of projections
-    environment = {"PATH": os.defpath, "SUMO_HOME": folder, "PROJ_LIB": f"{folder}/data/proj"}
+    program, environment = netconvert()
+    command = [program, *conversion(format_, str(plain), str(out))]
     try:
         done = subprocess.run(command, capture_output=True, timeout=WALL_S, env=environment, check=False)
     except subprocess.TimeoutExpired:
         raise MapError(f"converting {name} takes more than {WALL_S} s; wanted a smaller map") from None
     said = done.stderr.decode("utf-8", "replace")
     if done.returncode != 0:
-        errors = re.findall(r"^Error: (.*)$", said, re.MULTILINE)[:5]
-        raise MapError(f"netconvert cannot convert {name}: {'; '.join(errors)[:1000] or f'status {done.returncode}'}")
+        why = "; ".join(remarks(said, "Error")[:5]) or f"status {done.returncode}"
+        raise MapError(f"netconvert cannot convert {name}: {why}")
     return said

@@ -6,7 +6,7 @@ from risk_sac.scenario.car_following import LEAST_BEHIND_M
 from risk_sac.scenario.maps.around import signal_of
 from risk_sac.scenario.maps.found import NoFit, Spot
 from risk_sac.scenario.maps.net import Edge, Lane, Link, Net
-from risk_sac.scenario.maps.ways import DRIVEN_S, Way, track, way_on
+from risk_sac.scenario.maps.ways import DRIVEN_S, PIECES_M, Way, track, way_on
 from risk_sac.scenario.place import Stretch, Track
 
 SLOWEST_MPS, FASTEST_MPS = 5.0, 60.0
@@ -34,7 +34,7 @@ def place(net: Net, spot: Spot) -> Stretch:
     check_limit(edge.drivable[0])
     reference_m = round(edge.drivable[0].length_m / 2, 2)
     own, way = _lane_to_drive(net, edge, reference_m)
-    ego = track(net, way, reference_m)
+    ego = track(net, way, reference_m, PIECES_M)
     if ego.room_m < LEAST_BEHIND_M:
         raise NoFit(f"there are {ego.room_m:.0f} m behind the ego; wanted {LEAST_BEHIND_M:.0f} m")
     signals = [link.signal for link in _soon(way, own.length_m - reference_m)]
@@ -81,7 +81,7 @@ def _beside(net: Net, lane: Lane, reference_m: float) -> Track | None:
     way = way_on(net, lane, BESIDE_S + reference_m / lane.limit_mps)
     if not isinstance(way, Way):
         return None
-    found = track(net, way, reference_m)
+    found = track(net, way, reference_m, PIECES_M)
     return found if found.room_m >= LEAST_BEHIND_M else None
 
 

@@ -8,7 +8,7 @@ from risk_sac.scenario.place import Piece, Track
 DRIVEN_S = 17.0  # an episode and a bit: the ego may not come to the end of the map before it is over
 AFTER_S = 15.5  # the same behind a stop line: what is driven until the adversaries' release comes off
 BEFORE_M = 160.0  # of road before a reference that anybody could start on
-PIECES_M = 160.0  # beyond a reference
+PIECES_M = 160.0  # beyond a reference that somebody may start beyond
 TRIES = 300  # lanes that are looked at for a way on
 
 
@@ -83,13 +83,14 @@ def way_back(net: Net, last: Lane, metres: float) -> Way:
     return Way(tuple(lanes), tuple(links))
 
 
-def track(net: Net, on: Way, reference_m: float) -> Track:
+def track(net: Net, on: Way, reference_m: float, beyond_m: float = 0.0) -> Track:
     """The track of a way, with the lanes that lead to it.
 
     Args:
       net: where.
       on: its first lane has the reference.
       reference_m: from the beginning of that lane.
+      beyond_m: so far beyond the reference somebody may start.
     """
     back = way_back(net, on.lanes[0], BEFORE_M - reference_m)
     been = {lane.edge for lane in on.lanes}
@@ -103,7 +104,7 @@ def track(net: Net, on: Way, reference_m: float) -> Track:
     for i in range(own + 1, len(lanes)):
         reach_m[i] = reach_m[i - 1] - lanes[i - 1].length_m - links[i - 1].inside_m
     pieces = tuple(_piece(lane, reach) for lane, reach in zip(lanes, reach_m, strict=True))
-    most = max(i for i, piece in enumerate(pieces) if i <= own or piece.reach_m > -PIECES_M)
+    most = max(i for i, piece in enumerate(pieces) if i <= own or piece.reach_m > -beyond_m)
     return Track(pieces=pieces[: most + 1], onward=tuple(piece.edge for piece in pieces[most + 1 :]))
 
 

@@ -38,8 +38,10 @@ DRAWN: Responses = {200: {"content": {"image/png": {}}}}
 REFUSALS[503]["headers"] = {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)}
 DESCRIPTION = f"""Check a SUMO road network and keep it. Its `places` are where campaigns can be run on it.
 
-The body is a net (`.net.xml`), the same as gzip, or a zip archive of one net and up to {MAX_FILES - 1} route and \
-additional files; what a file is, its root element says. UTF-8, at most {MAX_EXPANDED_BYTES >> 20} MiB once unpacked \
+The body is a net (`.net.xml`), an OpenStreetMap extract or OpenDRIVE, the same as gzip, or a zip archive of one net \
+and up to {MAX_FILES - 1} route and additional files; what a file is, its root element says. A map that is no net is \
+converted by SUMO's netconvert, and `warnings` has what it remarks, and whether lanes for cars, signals or connections \
+are missing. UTF-8, at most {MAX_EXPANDED_BYTES >> 20} MiB once unpacked \
 and {MAX_EDGES} edges, those inside junctions included. What names a file, includes one or writes output is refused. \
 What was read is written anew and loaded by the simulator once, in a process that may take {WALL_S} s; only that is \
 kept, without comments, under names of the service's own."""

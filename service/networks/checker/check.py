@@ -14,6 +14,9 @@ from service.networks.errors import UploadError
 from service.networks.packaging import Packaging
 from service.networks.report import CheckReport, Kind, NetworkFile, Summary
 
+FOREIGN = ("osm", "OpenDRIVE")  # roots of maps that are converted
+MOST_WARNINGS = 20
+
 
 def check(upload: Path, packaging: Packaging) -> CheckReport:
     """Read the upload, write anew what it says, and let the simulator load that.
@@ -21,15 +24,31 @@ def check(upload: Path, packaging: Packaging) -> CheckReport:
     Raises:
       UploadError: it breaks a rule, or the simulator refuses it.
     """
-    files, summary = rewrite(documents(upload, packaging))
+    found, remarks = _converted(documents(upload, packaging))
+    files, summary, more = rewrite(found)
     bind_simulator()
     names = {kind: [file.name for file in files if file.kind is kind] for kind in Kind}
     warnings = simulator.load(names[Kind.NET][0], names[Kind.ADDITIONAL], names[Kind.ROUTES])
-    return CheckReport(summary=summary, files=tuple(files), warnings=tuple(warnings))
+    return CheckReport(summary=summary, files=tuple(files), warnings=(*more, *remarks, *warnings)[:MOST_WARNINGS])
 
 
-def rewrite(found: Sequence[bytes]) -> tuple[list[NetworkFile], Summary]:
-    """Write each document anew in the current folder, under a name of ours; the net is the first.
+def _converted(found: Sequence[bytes]) -> tuple[Sequence[bytes], list[str]]:
+    """The documents as nets: a map in another format, alone in its upload, is converted."""
+    with _naming(0, "unknown"):
+        root = root_of(found[0]) if found else ""
+    if root not in FOREIGN:
+        return found, []
+    if len(found) > 1:
+        raise UploadError(f"file 0 is <{root}> and there are {len(found)} files; wanted a map to convert alone")
+    from service.networks.checker.foreign import converted  # here, because most uploads are nets
+
+    with _naming(0, root):
+        net, remarks = converted(found[0], root)
+    return [net], remarks
+
+
+def rewrite(found: Sequence[bytes]) -> tuple[list[NetworkFile], Summary, list[str]]:
+    """Write each document anew in the current folder, under a name of ours; the net is the first. Its remarks are last.
 
     Raises:
       UploadError: a document breaks a rule; the message says which and where.
@@ -45,14 +64,16 @@ def rewrite(found: Sequence[bytes]) -> tuple[list[NetworkFile], Summary]:
     for number, (kind, data) in enumerate(zip(kinds, found, strict=True)):
         if number != first:
             files.append(_rewrite_one(number, kind, data, demand, sum(file.elements for file in files)))
-    return files, summary
+    return files, summary, net.remarks()
 
 
 def _kind(number: int, data: bytes) -> Kind:
     with _naming(number, "unknown"):
         root = root_of(data)
         if root not in list(Kind):
-            raise UploadError(f"its root is <{root[:80]}>; wanted <net>, <routes> or <additional>")
+            raise UploadError(
+                f"its root is <{root[:80]}>; wanted <net>, <routes> or <additional>; or <osm> or <OpenDRIVE>, alone"
+            )
         return Kind(root)
 
 

@@ -1,5 +1,6 @@
 """What a net says about its roads, and whether its parts refer to each other."""
 
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
 from service.networks.checker.document import Attributes
@@ -31,6 +32,7 @@ class Net:
         self._references: list[tuple[str, str, str]] = []  # what is named, how it is called, by whom
         self._connections: list[Attributes] = []
         self._length_m = 0.0
+        self._cars = False
         self._box = [float("inf"), float("inf"), float("-inf"), float("-inf")]
 
     def element(self, tag: str, attributes: Attributes, parent: str) -> None:
@@ -76,6 +78,20 @@ class Net:
             bounding_box=(self._box[0], self._box[1], self._box[2], self._box[3]),
         )
 
+    def remarks(self) -> list[str]:
+        """What whoever wants to drive here should know."""
+        found = []
+        driven = {name for name, edge in self.edges.items() if edge.function in _DRIVEN}
+        if not self._cars:
+            found.append("no edge has a lane for passenger cars: no pattern will fit")
+        if not any("tl" in connection for connection in self._connections):
+            found.append("there are no traffic lights")
+        if not self._connections and len(driven) > 1:
+            found.append("there are no connections: no lane leads on to another")
+        elif (largest := _largest_part(driven, self._connections)) < len(driven):
+            found.append(f"roads are disconnected: the largest part has {largest} of {len(driven)} edges")
+        return found
+
     def _edge(self, attributes: Attributes) -> None:
         name = attributes["id"]
         function = attributes.get("function", "normal")
@@ -107,6 +123,7 @@ class Net:
         if not edge.lanes and edge.function in _DRIVEN:
             self._length_m += float(attributes["length"])
         edge.lanes += 1
+        self._cars |= edge.function in _DRIVEN and _admits_cars(attributes)
         self.lanes.add(name)
         for x, y in shape:
             box = self._box
@@ -135,6 +152,32 @@ class Net:
 
     def _refer(self, what: str, names: str, where: str) -> None:
         self._references += [(what, name, where) for name in names.split()]
+
+
+def _admits_cars(lane: Attributes) -> bool:
+    if "allow" in lane:
+        return bool({"passenger", "all"} & set(lane["allow"].split()))
+    return not {"passenger", "all"} & set(lane.get("disallow", "").split())
+
+
+def _largest_part(edges: Set[str], connections: Sequence[Attributes]) -> int:
+    """Edges in the largest part whose edges are connected, whichever way."""
+    beside: dict[str, list[str]] = {name: [] for name in edges}
+    for connection in connections:
+        one, other = connection["from"], connection["to"]
+        if one in beside and other in beside:
+            beside[one].append(other)
+            beside[other].append(one)
+    largest, left = 0, set(edges)
+    while left:
+        part = [left.pop()]
+        for name in part:  # grows meanwhile
+            for other in beside[name]:
+                if other in left:
+                    left.remove(other)
+                    part.append(other)
+        largest = max(largest, len(part))
+    return largest
 
 
 class Demand:
