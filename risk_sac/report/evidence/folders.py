@@ -1,6 +1,7 @@
 """The runs of one campaign, found in folders."""
 
-from collections.abc import Iterable, Mapping, Sequence
+import contextlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -10,7 +11,7 @@ from risk_sac.config.spec_file import read_campaign
 from risk_sac.errors import ConfigError
 from risk_sac.report.comparison import Comparison, compare
 from risk_sac.report.runs import FinishedRun, read_run
-from risk_sac.run_folder.results import RESULTS, read_results
+from risk_sac.run_folder.results import read_results
 from risk_sac.scenario.families import family_named
 
 SPEC, RUNS = "spec.yaml", "runs"
@@ -38,32 +39,31 @@ def read_folders(paths: Sequence[Path]) -> Found:
       ConfigError: there is no run, or they are of different campaigns.
     """
     whole = paths[0] if len(paths) == 1 and (paths[0] / SPEC).is_file() else None
-    spec = read_campaign(whole / SPEC, {}, {}) if whole else None
-    places = sorted(path for path in (whole / RUNS).glob("*/") if (path / RESULTS).exists()) if whole else list(paths)
-    if not places:
+    if whole is None:
+        specs = {path: read_results(path).spec for path in paths}
+    else:  # which of its runs a damaged results.json was of, nobody can tell; it is missing
+        specs = dict(_readable(sorted((whole / RUNS).glob("*/"))))
+    if not specs:
         raise ConfigError(f"there is no run in {paths[0]}", field="RUNS")
     runs: list[FinishedRun] = []
-    folders: dict[str, Path] = {}
     reasons: dict[str, str] = {}
-    known: list[RunSpec] = []
-    for place in places:
+    for path, spec in specs.items():
         try:
-            known.append(read_results(place).spec)
-        except ConfigError:
-            if whole is None:
-                raise
-            continue  # which of them it was, nobody can tell; it is missing
-        digest = known[-1].digest
-        folders[digest] = place
-        try:
-            family_named(known[-1].family)  # whose place on a map may be gone
-            runs.append(read_run(place))
+            family_named(spec.family)  # whose place on a map may be gone
+            runs.append(read_run(path))
         except (ConfigError, OSError) as error:
-            reasons[digest] = str(error)
-    if not known:
-        raise ConfigError(f"no run in {paths[0]} can be read", field="RUNS")
-    comparison = compare(spec or _campaign(known), runs, AGAIN, reasons=reasons)
-    return Found(comparison=comparison, folders=folders)
+            reasons[spec.digest] = str(error)
+    campaign = read_campaign(whole / SPEC, {}, {}) if whole else _campaign(list(specs.values()))
+    return Found(
+        comparison=compare(campaign, runs, AGAIN, reasons=reasons),
+        folders={spec.digest: path for path, spec in specs.items()},
+    )
+
+
+def _readable(paths: Iterable[Path]) -> Iterator[tuple[Path, RunSpec]]:
+    for path in paths:
+        with contextlib.suppress(ConfigError):
+            yield path, read_results(path).spec
 
 
 def _campaign(runs: Sequence[RunSpec]) -> CampaignSpec:

@@ -5,13 +5,15 @@ from html.parser import HTMLParser
 import pytest
 
 from risk_sac import cli
-from risk_sac.config import CampaignSpec, EgoConfig, Iid
+from risk_sac.config import CampaignSpec, EgoConfig, Iid, RunSpec
+from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.records import Grade
 from risk_sac.report import compare
 from risk_sac.report.evidence import Origin, gathered, html, markdown, report
 from risk_sac.report.evidence.folders import read_folders
+from risk_sac.run_folder.results import Results, write_results
 from risk_sac.scenario.families import FAMILIES
 
 HOSTILE = (
@@ -175,6 +177,31 @@ def test_folders_without_runs_and_runs_of_different_campaigns_are_refused(tmp_pa
     assert not out.parent.exists()
     with pytest.raises(ConfigError, match="there is no"):
         read_folders([tmp_path / "nowhere"])
+    runs = [
+        RunSpec(family="low", method="random", seed=seed, ego=EgoConfig(reaction_time_s=0.1 + seed)) for seed in (0, 1)
+    ]
+    for run in runs:
+        (tmp_path / run.id).mkdir()
+        write_results(tmp_path / run.id, Results(spec=run, spec_digest=run.digest, finished=False))
+    with pytest.raises(ConfigError, match="low-random-0 and low-random-1 differ in their ego"):
+        read_folders([tmp_path / run.id for run in runs])
+
+
+def test_a_campaigns_folder_is_told_with_what_is_unfinished_or_damaged_in_it(tmp_path):
+    spec = CampaignSpec.model_validate({"families": ["low"], "methods": ["random"], "seeds": [0, 1], "iid": {}})
+    (tmp_path / "spec.yaml").write_text(campaign_yaml(spec))
+    for run in spec.runs()[:2]:
+        (tmp_path / "runs" / run.id).mkdir(parents=True)
+        write_results(tmp_path / "runs" / run.id, Results(spec=run, spec_digest=run.digest, finished=False))
+    damaged = tmp_path / "runs" / spec.runs()[1].id / "results.json"
+    damaged.write_bytes(damaged.read_bytes()[:-9])
+    found = read_folders([tmp_path]).comparison
+    assert [(run.spec.id, run.reason.partition(" in ")[0]) for run in found.missing] == [
+        ("low-random-0", "the run"),
+        ("low-random-1", "not finished"),
+    ]
+    assert "is not finished" in found.missing[0].reason
+    assert [run.spec.id for run in found.undrawn] == ["low-iid-undisturbed-0", "low-iid-random-0"]
 
 
 def test_a_family_whose_place_on_a_map_is_gone_is_named_and_the_others_are_told(spec, monkeypatch, tmp_path):
