@@ -16,11 +16,13 @@ EXECUTABLE = os.environ.get("RISK_SAC_CHROMIUM") or next(filter(None, map(shutil
 collect_ignore_glob = [] if EXECUTABLE else ["test_[!t]*.py", "test_t[!h]*.py"]
 
 if EXECUTABLE:
-    from playwright.sync_api import Browser, Page, sync_playwright
+    from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 WIDE = {"width": 1280, "height": 720}
 PHONE = {"width": 390, "height": 844}
 LONG_MS = 120_000  # what has not happened by then never will, however busy the machine
+if EXECUTABLE:
+    expect.set_options(timeout=LONG_MS)
 AXE = ROOT / "service" / "web" / "node_modules" / "axe-core" / "axe.min.js"
 CAMPAIGN = {
     "label": "night <b>7</b>",

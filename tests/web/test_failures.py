@@ -12,10 +12,9 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from tests.server import Service
-from tests.web.conftest import LONG_MS, PHONE
+from tests.web.conftest import PHONE
 
 HOSTILE = '"><img src=x onerror="window.hacked=1"></script><script>window.hacked=1</script>'
-expect.set_options(timeout=LONG_MS)
 
 
 @pytest.fixture
