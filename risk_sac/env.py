@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec, method_of
+from risk_sac.egos.pilot import EgoPilot
+from risk_sac.egos.registry import load
 from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.geometry import overlapping_pairs, relative_view
 from risk_sac.observation import Encoder
@@ -57,13 +59,18 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
           problem: what to falsify.
           reward: the terms of R_risk, and β of the soft minimum.
           controlled: False leaves the adversary vehicles to SUMO and lets pedestrians stand: a control.
+
+        Raises:
+          ConfigError: the problem's ego is not registered, in another version, or cannot be loaded.
         """
         self.problem = problem
         self._reward = reward
         self._controlled = controlled
         sensor, horizon_steps = problem.ego.sensor, problem.family.horizon_steps
         self._perception = Perception(sensor.memory_s if sensor else 0.0, sight(sensor, problem.visibility_m))
-        self._sim = SumoSimulation(problem.ego, self._perception)
+        ego = load(problem.ego)
+        self._pilot = None if ego is None else EgoPilot(ego)
+        self._sim = SumoSimulation(problem.ego, self._perception, self._pilot)
         self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, reward.softmin_sharpness)
         self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
         self.observation_size = self._encoder.size
@@ -103,6 +110,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
           InfeasibleScene: the given scene breaks a rule of C_hard.
           SceneError: it is no point of the problem's space.
           SimulationError: no feasible scene was found, or SUMO failed.
+          EgoFailed: the ego cannot drive.
         """
         super().reset(seed=seed)
         if options and "scene" in options:
@@ -123,6 +131,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         Returns:
           Observation, R_risk, whether the ego touched something, whether the horizon is reached, and
           `info` with `cost` (C_soft), `robustness` (soft minimum) and, at a contact, `collision`.
+
+        Raises:
+          SimulationError: SUMO failed.
+          EgoFailed: the ego cannot drive on; the episode is invalid.
         """
         if self._controlled:
             self._adversaries.command([min(max(share, -1.0), 1.0) for share in action.tolist()], self._sim)
@@ -166,8 +178,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return self._sim.signal_heads()
 
     def close(self) -> None:
-        """Ends the simulation."""
+        """Ends the simulation, and lets the ego go."""
         self._sim.close()
+        if self._pilot is not None:
+            self._pilot.close()
 
     def _start(self, scene: Scene) -> tuple[Observation, dict[str, Any]]:
         self._unit_scene = self.problem.space.to_unit(scene)
@@ -192,6 +206,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._released_s = self._frame.time_s
         self._adversaries = Adversaries(self.problem.family, limits, self._frame)
         self._check_feasible(scene)
+        self._sim.hand_over_ego()
         if self._controlled:
             self._sim.release()
         else:

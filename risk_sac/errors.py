@@ -8,6 +8,7 @@ RiskSacError
 ├── SceneError             a scene is not a point of its family's space
 │   └── InfeasibleScene    C_hard: the scene's first frame is physically impossible
 ├── SimulationError        libsumo refused a command or died
+├── EgoFailed              a registered ego missed its deadline, answered nonsense, crashed or left the road
 ├── CheckpointError        a checkpoint is missing or belongs to another run
 │   └── DamagedCheckpoint  its bytes are not those that were written
 ├── DamagedError           a file that carries its own checksum is not as it was written
@@ -60,6 +61,14 @@ class InfeasibleScene(SceneError):
 
 class SimulationError(RiskSacError):
     """libsumo refused a command, or the simulation ended unexpectedly."""
+
+
+class EgoFailed(RiskSacError):
+    """A registered ego cannot be driven on with; `reason` is the rule's name, such as "ego_deadline"."""
+
+    def __init__(self, message: str, *, reason: str) -> None:
+        super().__init__(message)
+        self.reason = reason
 
 
 class CheckpointError(RiskSacError):

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Odd, Requirement, RunSpec
 from risk_sac.config.demand import check_demand
 from risk_sac.config.methods import MethodName
+from risk_sac.egos.registry import pinned
 from risk_sac.errors import ConfigError, OddError
 from risk_sac.observation_layout import observation_size
 from risk_sac.risk.rss_parameters import RssParameters
@@ -42,8 +43,10 @@ class Problem:
         Raises:
           OddError: the ODD contradicts itself or leaves no scene.
           FormulaError: a user's requirement cannot be monitored online.
-          ConfigError: a user's requirement takes the name of a shipped one, or the run takes too much memory.
+          ConfigError: a user's requirement takes the name of a shipped one, the ego is not registered or in another
+            version, or the run takes too much memory.
         """
+        ego = pinned(spec.ego)
         family = family_named(spec.family)
         odd = intersect(family.odd, spec.odd)
         if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
@@ -52,7 +55,7 @@ class Problem:
                 f"which every scene of the {family.name!r} family has",
                 field="odd.dynamic.actor_kinds",
             )
-        shipped = requirements_from_odd(odd, spec.ego.reaction_time_s)
+        shipped = requirements_from_odd(odd, ego.response_s)
         check_requirements(spec.requirements, STEP_S, family.horizon_steps)
         taken = {requirement.name for requirement in shipped}
         for index, requirement in enumerate(spec.requirements):
@@ -66,7 +69,7 @@ class Problem:
             family=family,
             odd=odd,
             space=narrow(family.space, odd),
-            ego=spec.ego,
+            ego=ego,
             requirements=(*shipped, *spec.requirements),
             rss=_rss_parameters(odd),
         )
@@ -121,8 +124,12 @@ def _rss_parameters(odd: Odd) -> RssParameters:
     )
 
 
-def check_campaign(spec: CampaignSpec) -> None:
-    """Refuses a campaign that could not run; see `Problem.from_spec` and `check_installed` for the errors."""
+def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
+    """The campaign as it is to be kept, with the version of its ego.
+
+    Refuses one that could not run; see `Problem.from_spec` and `check_installed` for the errors.
+    """
+    spec = spec.model_copy(update={"ego": pinned(spec.ego)})
     for method in spec.methods:
         check_installed(method)
     alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()  # the i.i.d. phase's among them
@@ -131,6 +138,7 @@ def check_campaign(spec: CampaignSpec) -> None:
         problem = Problem.from_spec(first)
         for run in others:
             problem.check_demand(run)
+    return spec
 
 
 def check_installed(method: MethodName) -> None:

@@ -18,6 +18,7 @@ class Outcome(StrEnum):
     SAFE = "safe"  # the horizon passed without contact
     DEGENERATE = "degenerate"  # raw contact that a validity rule refused
     FAILURE = "failure"  # valid collision
+    INVALID = "invalid"  # the ego failed to drive; no rate counts it
 
 
 class ConflictType(StrEnum):
@@ -141,7 +142,8 @@ class Collision(Record):
     min_robustness: Least = _early("min_robustness")
     """Soft minimum of the requirements, until 1 s before the contact too."""
     simulator_agrees: bool | None
-    """Whether SUMO lists the collision within 0.3 s; null for pedestrians, whom it does not know."""
+    """Whether SUMO lists the collision within 0.3 s; null for pedestrians, whom it does not know, and for an ego that
+    it does not drive."""
     verdicts: Mapping[str, bool] = {}
     """Validity rule → passed."""
     judgement: Judgement | None = None
@@ -184,7 +186,8 @@ class EpisodeRecord(Record):
     scene: Mapping[str, Real]
     outcome: Outcome
     reason: str
-    """Rule that rejected the scene, sim_crash, or the validity rules that the contact failed; else empty."""
+    """Rule that rejected the scene, sim_crash, the validity rules that the contact failed, or how the ego failed:
+    ego_deadline, ego_malformed, ego_crash, ego_off_road; else empty."""
     steps: int
     risk_return: Real
     """Σ R_risk, of the risk reward alone."""
@@ -257,6 +260,8 @@ class RunMetrics(Record):
     """Episodes in which the ego touched something."""
     failures: int
     """Valid collisions."""
+    invalid: int = 0
+    """Episodes in which the ego failed to drive; the rates leave them out."""
     environment_steps: int
     ecr: Real
     """Effective collision rate: valid collisions / episodes."""

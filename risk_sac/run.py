@@ -11,9 +11,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from risk_sac.config import RunSpec, method_of
+from risk_sac.egos.guard import DEAD_AFTER
 from risk_sac.env import RiskSacEnv
+from risk_sac.errors import ConfigError
 from risk_sac.metrics import MetricsAccumulator, results_digest
-from risk_sac.records import EpisodeRecord, Phase, RunMetrics, SeriesFile
+from risk_sac.records import EpisodeRecord, Outcome, Phase, RunMetrics, SeriesFile
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import sha256
@@ -25,6 +27,7 @@ from risk_sac.searchers import Searchers
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
+MOST_REJECTED = 200  # newest records among which a dead ego's episodes are looked for
 PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
 
 
@@ -110,6 +113,23 @@ class RunState:
         self.searchers.add(record)
         self._episode_cpu_s.append(time.process_time() - self._cpu_began_s)
         return self._count(record)
+
+    def refuse_dead_ego(self) -> None:
+        """Ends a run whose ego has failed in each of the latest episodes that it was to drive.
+
+        Nothing is kept of these: the same run goes on from its latest checkpoint once the ego works again.
+
+        Raises:
+          ConfigError: saying how it failed last.
+        """
+        driven = [record for record in self.records[-MOST_REJECTED:] if record.outcome is not Outcome.REJECTED]
+        latest = driven[-DEAD_AFTER:]
+        if len(latest) == DEAD_AFTER and all(record.outcome is Outcome.INVALID for record in latest):
+            raise ConfigError(
+                f"the ego {self.spec.ego.driver!r} failed in {DEAD_AFTER} episodes in a row, the last time with "
+                f"{latest[-1].reason}; wanted one that drives",
+                field="ego.driver",
+            )
 
     def save(self) -> None:
         """Writes the checkpoint, if there is something new; only ever called between episodes."""

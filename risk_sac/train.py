@@ -4,6 +4,7 @@ Source: RISK-SAC, Algorithm 1; each line is tagged where it happens. Lines 1-2 a
 one level down, in `risk_sac.agents.learner`, because the reward is formed when a batch is sampled.
 """
 
+import logging
 import time
 from collections.abc import Mapping
 from contextlib import closing
@@ -16,13 +17,16 @@ import torch
 
 from risk_sac.agents.replay import Transition
 from risk_sac.config import RunSpec
-from risk_sac.errors import InfeasibleScene
+from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.records import RECORDED, Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run import RunState, RunSummary
 from risk_sac.run_folder.crashes import CrashGuard
 from risk_sac.scene_optimizer import Encounter
+from risk_sac.types import Floats
+
+logger = logging.getLogger(__name__)
 
 SIM_CRASH = "sim_crash"  # reason of a rejection
 
@@ -50,7 +54,7 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
       observer: told of each episode.
 
     Raises:
-      ConfigError: the spec poses no problem that can be run.
+      ConfigError: the spec poses no problem that can be run, or its ego failed in too many episodes in a row.
       CheckpointError: the checkpoint is of another run.
       OSError: the folder cannot be written.
     """
@@ -65,6 +69,7 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
                 record = episode(run, guard)  # Alg. 1, l. 3
                 metrics = run.add(record)
                 observer.episode(record, metrics, run.series.get(record.index))
+                run.refuse_dead_ego()
                 if len(run.records) % spec.learner.checkpoint_every == 0:
                     run.save()
             run.save()
@@ -74,7 +79,8 @@ def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
 def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
     """The next episode of Algorithm 1, lines 4 to 22; in the evaluation phase the policy is frozen.
 
-    An episode that crashes the simulator, as its guard knows, is treated like a rejected scene.
+    An episode that crashes the simulator, as its guard knows, is treated like a rejected scene. So is one in which the
+    ego failed, but it is no rejected one: it is invalid, and no rate counts it.
 
     Choice: scenes keep coming from the method's own sampler during evaluation, since it is the pair of
     sampler and policy that generates scenarios.
@@ -94,13 +100,18 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
     except InfeasibleScene as infeasible:
         run.searchers.tell(point, None)
         return _record(run, seed, scene.values, tally, rejected=infeasible.reason)
+    except EgoFailed as failed:
+        return _invalid(run, seed, scene.values, tally, point, failed)
     actor.begin(genes)
     own = actor is agent
     for step in range(run.problem.family.horizon_steps):  # Alg. 1, l. 6
         guard.step(step)
         action = actor.act(observation, explore=learning)  # Alg. 1, l. 7
         robustness = info["robustness"]
-        next_observation, risk_reward, terminated, truncated, info = env.step(action)  # Alg. 1, l. 8
+        try:
+            next_observation, risk_reward, terminated, truncated, info = env.step(action)  # Alg. 1, l. 8
+        except EgoFailed as failed:
+            return _invalid(run, seed, scene.values, tally, point, failed)
         parts = risk_reward, info["cost"], robustness, info["robustness"]
         tally.add(risk_reward, info["cost"], run.reward(*parts, float(terminated), agent.dual_variable))
         if learning:
@@ -147,6 +158,15 @@ class Tally:
         self.shaped_return += shaped
 
 
+def _invalid(
+    run: RunState, seed: int, scene: Mapping[str, float], tally: Tally, point: Floats, failed: EgoFailed
+) -> EpisodeRecord:
+    """An episode that the ego did not drive to its end; what it might have come to, nobody knows."""
+    logger.warning("episode %d is invalid: %s", len(run.records), failed)
+    run.searchers.tell(point, None)
+    return _record(run, seed, scene, tally, invalid=failed.reason)
+
+
 def _record(
     run: RunState,
     seed: int,
@@ -155,10 +175,11 @@ def _record(
     *,
     objective: float | None = None,
     rejected: str = "",
+    invalid: str = "",
     script: tuple[float, ...] | None = None,
     collision: Collision | None = None,
 ) -> EpisodeRecord:
-    outcome, reason = _outcome(rejected, collision)
+    outcome, reason = (Outcome.INVALID, invalid) if invalid else _outcome(rejected, collision)
     crashed = rejected == SIM_CRASH
     return EpisodeRecord(
         index=len(run.records),

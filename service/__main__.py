@@ -2,8 +2,10 @@
 
 import contextlib
 import gc
+import os
 import sys
 
+from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
 from service.api.guards.connections import Server
 from service.app import create_app
@@ -22,6 +24,9 @@ def main() -> None:
     try:
         settings = read_settings()
         set_up_logs(settings.log_format)
+        if settings.egos is not None:  # from a folder of secrets, it may be; workers read the environment
+            os.environ[registry.FILE] = str(settings.egos.absolute())
+        registry.cards()  # an operator who has registered nonsense hears of it now
         check_exposure(settings)
     except ConfigError as error:
         print(error, file=sys.stderr)  # noqa: T201 - before there is a log

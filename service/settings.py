@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, FilePath
 from pydantic_core import from_json
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
@@ -45,6 +45,9 @@ class ServiceSettings(BaseSettings):
     """TCP port to listen on."""
     log_format: Literal["text", "json"] = "text"
     """How the log is written; `json` has one object per line with campaign and run ids as fields."""
+
+    egos: FilePath | None = None
+    """TOML file that registers egos in processes of their own, see `risk_sac/egos/README.md`."""
 
     executor: ExecutorName = "local"
     """Where runs are executed; `local`: in processes of this machine."""

@@ -9,6 +9,7 @@ from risk_sac import __version__
 from risk_sac.cli.audit import add_audit
 from risk_sac.cli.campaigns import add_campaigns
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
+from risk_sac.cli.egos import add_egos
 from risk_sac.cli.evaluate import add_evaluate
 from risk_sac.cli.export import add_export
 from risk_sac.cli.keys import add_keys
@@ -28,6 +29,7 @@ COMMANDS = (
     add_places,
     add_evaluate,
     add_audit,
+    add_egos,
     add_show,
     add_verify,
     add_clusters,

@@ -51,8 +51,8 @@ def _evaluate(options: argparse.Namespace) -> int:
     with progress_bar() as bar:
         jobs = options.jobs if options.jobs is not None else os.cpu_count() or 1
         executor = os.environ.get("RISK_SAC_EXECUTOR", "local")
-        drawn = partial(_drawn, Board(bar))
-        evaluation = evaluate(spec, options.out, options.typed, jobs, drawn, executor, options.verify)
+        progress = partial(drawn, Board(bar))
+        evaluation = evaluate(spec, options.out, options.typed, jobs, progress, executor, options.verify)
     for job in evaluation.failed:
         complain(f"{job.name}: {job.reason}")
     comparison = evaluation.comparison
@@ -64,7 +64,8 @@ def _evaluate(options: argparse.Namespace) -> int:
     return FAILED if comparison.missing else OK
 
 
-def _drawn(board: Board, jobs: "Sequence[Job]") -> None:
+def drawn(board: Board, jobs: "Sequence[Job]") -> None:
+    """Draws how runs go."""
     done = {job.name: job.total if job.state == "finished" else job.done() for job in jobs}
     finished = sum(job.state == "finished" for job in jobs)
     failed = sum(job.state == "failed" for job in jobs)

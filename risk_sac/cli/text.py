@@ -7,7 +7,8 @@ from collections.abc import Iterable
 _UNPRINTABLE = re.compile("[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-EGO = "default, perfect, careful, or a YAML file with the fields of a campaign's ego"  # what names one
+# What names an ego.
+EGO = "default, perfect, careful, a registered ego, or a YAML file with the fields of a campaign's ego"
 
 
 def printable(text: str) -> str:

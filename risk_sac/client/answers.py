@@ -131,6 +131,7 @@ class Total(Record):
     method: str
     runs: int
     episodes: int
+    invalid: int = 0  # episodes in which the ego failed to drive; no rate counts them
     raw_collisions: int
     failures: int
     ecr: float | None  # mean over the runs

@@ -1,13 +1,18 @@
-"""The vehicle under test: which SUMO models drive it and what it can see."""
+"""The vehicle under test: who drives it and what it can see."""
 
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, StringConstraints, model_validator
 
 from risk_sac.config.base import Settings
 
 CarFollowing = Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"]
+EgoName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_-]{0,39}$")]
+
+
+def _left_out(value: object) -> bool:
+    return value is None
 
 
 class SensorConfig(Settings):
@@ -24,10 +29,12 @@ class SensorConfig(Settings):
 
 
 class EgoConfig(Settings):
-    """SUMO's default driver, with a driver's delay and a driver's view.
+    """SUMO's default driver, with a driver's delay and a driver's view; or a driver that the operator has registered.
 
     The profile `perfect` reacts within one simulation step and sees everything. The profile `careful` is the default
     with the careful driver's braking on top, by whom preventable failures are judged.
+
+    A registered driver takes SUMO's place from the adversaries' release on, and has the same view.
     """
 
     profile: Literal["default", "perfect", "careful"] = "default"
@@ -36,6 +43,19 @@ class EgoConfig(Settings):
     """Time between two decisions (SUMO's actionStepLength), s; a multiple of 0.1."""
     sensor: SensorConfig | None = SensorConfig()
     """None: the ego sees everything."""
+    # What is younger is left out of JSON where it is not set: specs from before keep their digests.
+    driver: Annotated[EgoName | None, Field(exclude_if=_left_out)] = None
+    """Name of a registered ego, as `GET /v1/egos` lists them; null: SUMO's models drive."""
+    version: Annotated[str | None, Field(exclude_if=_left_out, min_length=1, max_length=100)] = None
+    """Of the registered ego. It is filled in where a campaign is posted; a run refuses to go on with another one."""
+    response_time_s: Annotated[float | None, Field(exclude_if=_left_out, ge=0.0, le=5.0)] = None
+    """Time within which the ego responds, s, from which its time-to-collision requirement follows. By default what a
+    registered ego declares of itself, and `reaction_time_s` of SUMO's models."""
+
+    @property
+    def response_s(self) -> float:
+        """The response time that requirements go by."""
+        return self.reaction_time_s if self.response_time_s is None else self.response_time_s
 
     @model_validator(mode="before")
     @classmethod
@@ -53,5 +73,12 @@ class EgoConfig(Settings):
         if self.profile == "perfect" and (self.reaction_time_s > 0.1 or self.sensor is not None):
             raise ValueError(
                 "profile 'perfect' has no delay and no sensor; leave reaction_time_s and sensor out, or use 'default'"
+            )
+        if self.driver is None and self.version is not None:
+            raise ValueError("version is of a registered ego; name it with driver, or leave version out")
+        models = (self.profile, self.car_following, self.reaction_time_s)
+        if self.driver is not None and models != ("default", "Krauss", 0.5):
+            raise ValueError(
+                "profile, car_following and reaction_time_s are SUMO's drivers'; leave them out beside driver"
             )
         return self

@@ -1,6 +1,7 @@
 """Settings of runs and campaigns from YAML and command-line flags, checked as strictly as a REST body."""
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
@@ -12,6 +13,7 @@ from risk_sac.config import IID_METHODS, Budget, CampaignSpec, EgoConfig, RunSpe
 from risk_sac.errors import ConfigError
 
 T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)
+DRIVER = re.compile(r"[a-z][a-z0-9_-]{0,39}")
 CAMPAIGN_ONLY = {"family": "families", "method": "methods", "seed": "seeds"}  # a run's field -> a campaign's
 
 
@@ -49,13 +51,17 @@ def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping
 
 
 def read_ego(text: str) -> EgoConfig:
-    """The ego that a command line names: a profile, or a file with its fields.
+    """The ego that a command line names: a profile, a registered ego, or a file with its fields.
+
+    Whether an ego of this name is registered is found out later.
 
     Raises:
-      ConfigError: it is neither.
+      ConfigError: it is none of these.
     """
     if text in get_args(EgoConfig.model_fields["profile"].annotation):
         return _validate(EgoConfig, {"profile": text})
+    if DRIVER.fullmatch(text) and not Path(text).exists():
+        return _validate(EgoConfig, {"driver": text})
     return _validate(EgoConfig, _read_yaml(Path(text)))
 
 

@@ -19,7 +19,7 @@ from risk_sac.execution.executors import executor_named
 from risk_sac.execution.processes import Job, Progress, Queue, program
 from risk_sac.execution.stopping import STOPPING, stop_signal
 from risk_sac.failures.verify import verify
-from risk_sac.problem import check_campaign
+from risk_sac.problem import checked_campaign
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
 from risk_sac.run_folder.verified import TIMES
 
@@ -66,7 +66,7 @@ def evaluate(
         raise ConfigError(f"got {jobs}; wanted at least one process", field="jobs")
     if times < 0:
         raise ConfigError(f"got {times}; wanted 0 or more", field="verify")
-    check_campaign(spec)  # before the folder is claimed
+    spec = checked_campaign(spec)  # before the folder is claimed
     make_executor = executor_named(executor)
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
     with _claimed(spec, folder) as lock, stop_signal((*STOPPING, *hung_up)) as stopping:

@@ -24,7 +24,7 @@ def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
       CheckpointError: the folder's checkpoint is of another run.
       OSError: the folder cannot be written.
     """
-    Problem.from_spec(spec)  # before the folder is claimed
+    spec = spec.model_copy(update={"ego": Problem.from_spec(spec).ego})  # before the folder is claimed
     with stop_signal() as stopping, Recorder(spec, folder, Watcher(progress, stopping)) as recorder:
         return recorder.finish(train(spec, folder, recorder))
 

@@ -19,7 +19,13 @@ class Counts:
     distinct_preventable: int = 0
     artefacts: int = 0
     unresponsive: int = 0
+    invalid: int = 0
     environment_steps: int = 0
+
+    @property
+    def driven(self) -> int:
+        """Episodes that rates are taken over: all, but for those in which the ego failed to drive."""
+        return self.episodes - self.invalid
 
 
 COUNTS = tuple(each.name for each in fields(Counts))

@@ -18,13 +18,13 @@ PER_STEPS = 1000  # environment steps over which the rate of distinct failures i
 
 
 def effective_collision_rate(counts: Counts) -> float:
-    """ECR: valid collisions per episode, rejected scenes included; 0 without episodes. Source: Sec. IV."""
-    return _share(counts.failures, counts.episodes)
+    """ECR: valid collisions per episode, rejected scenes included, invalid ones not; 0 without. Source: Sec. IV."""
+    return _share(counts.failures, counts.driven)
 
 
 def preventable_collision_rate(counts: Counts) -> float:
-    """PCR: valid collisions of grade `careful` per episode, rejected scenes included; 0 without episodes."""
-    return _share(counts.preventable, counts.episodes)
+    """PCR: valid collisions of grade `careful` per episode, rejected scenes included, invalid ones not; 0 without."""
+    return _share(counts.preventable, counts.driven)
 
 
 def newest_effective_collision_rate(tally: Tally) -> float:
@@ -49,7 +49,7 @@ def efficiency_score(tally: Tally) -> float:
 
     Source: RISK-SAC, Sec. IV.
     """
-    return 1 - tally.steps_to_failure / (tally.episodes * tally.horizon_steps) if tally.episodes else 0.0
+    return 1 - tally.steps_to_failure / (tally.driven * tally.horizon_steps) if tally.driven else 0.0
 
 
 def cost_rate(tally: Tally) -> float:
@@ -103,11 +103,11 @@ def _share(count: int, of: int) -> float:
 
 
 def _all(counts: Counts) -> int:
-    return counts.episodes
+    return counts.driven
 
 
 def _newest(counts: Counts) -> int:
-    return min(WINDOW, counts.episodes)
+    return min(WINDOW, counts.driven)
 
 
 METRICS = (
@@ -209,26 +209,26 @@ RATIOS = (
         name="raw_rate",
         symbol="raw contacts",
         meaning="contacts of any kind / episodes",
-        formula=lambda counts: _share(counts.raw_collisions, counts.episodes),
+        formula=lambda counts: _share(counts.raw_collisions, counts.driven),
     ),
     Ratio(
         name="artefact_rate",
         symbol="artefact",
         meaning="episodes whose contact was refused by a rule that speaks of the simulator or the control "
         f"({', '.join(sorted(ARTEFACT_RULES))}) / episodes",
-        formula=lambda counts: _share(counts.artefacts, counts.episodes),
+        formula=lambda counts: _share(counts.artefacts, counts.driven),
     ),
     Ratio(
         name="degenerate_rate",
         symbol="degenerate",
         meaning="all refused contacts / episodes, artefacts among them",
-        formula=lambda counts: _share(counts.raw_collisions - counts.failures, counts.episodes),
+        formula=lambda counts: _share(counts.raw_collisions - counts.failures, counts.driven),
     ),
     Ratio(
         name="rejected_rate",
         symbol="rejected",
         meaning="infeasible scenes / episodes",
-        formula=lambda counts: _share(counts.rejected, counts.episodes),
+        formula=lambda counts: _share(counts.rejected, counts.driven),
     ),
     Ratio(
         name="unresponsive_share",

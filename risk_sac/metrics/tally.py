@@ -67,9 +67,12 @@ class Tally(Counts):
         self.raw_collisions += failed or record.outcome is Outcome.DEGENERATE
         self.artefacts += record.collision is not None and record.collision.artefact
         self.environment_steps += record.steps
+        self.cost += record.mean_cost * record.steps if record.steps else 0.0
+        if record.outcome is Outcome.INVALID:
+            self.invalid += 1
+            return
         # A rejected scene counts T although it took 0 steps; else a search would gain by proposing impossible scenes.
         self.steps_to_failure += record.steps if failed else self.horizon_steps
-        self.cost += record.mean_cost * record.steps if record.steps else 0.0
         self._newest.append((failed, preventable(record)))
         self.newest_episodes = len(self._newest)
         self.newest_failures, self.newest_preventable = map(sum, zip(*self._newest, strict=True))

@@ -49,6 +49,8 @@ class Cell:
     """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
     artefacts: int
     unresponsive: int
+    invalid: int
+    """Episodes in which the ego failed to drive; the rates leave them out."""
     environment_steps: int
     estimates: Mapping[MetricName, Estimate]
     """By the name of the metric."""

@@ -12,7 +12,7 @@ import numpy as np
 from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import METRICS, WINDOW, Metric, preventable
-from risk_sac.records import Outcome, Phase
+from risk_sac.records import EpisodeRecord, Outcome, Phase
 from risk_sac.report.budgets import cpu_s
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.runs import FinishedRun
@@ -52,19 +52,21 @@ class Curve:
 
 def window_ecr(run: FinishedRun) -> Floats:
     """ECR over the newest `WINDOW` episodes, after each episode; over all while there are fewer."""
-    return _window_rate([record.outcome is Outcome.FAILURE for record in run.phase("search")])
+    return _window_rate(run, lambda record: record.outcome is Outcome.FAILURE)
 
 
 def window_pcr(run: FinishedRun) -> Floats:
     """The same of PCR."""
-    return _window_rate([preventable(record) for record in run.phase("search")])
+    return _window_rate(run, preventable)
 
 
-def _window_rate(counted: Sequence[bool]) -> Floats:
-    total = np.concatenate(([0], np.cumsum(counted)))
-    after = np.arange(1, len(total))
+def _window_rate(run: FinishedRun, counted: Callable[[EpisodeRecord], bool]) -> Floats:
+    """After each episode, of the newest in which the ego drove; 0 before the first of them."""
+    driven = [record.outcome is not Outcome.INVALID for record in run.phase("search")]
+    happened = [counted(record) for record in run.phase("search") if record.outcome is not Outcome.INVALID]
+    total, after = np.concatenate(([0], np.cumsum(happened))), np.cumsum(driven)
     begin = np.maximum(0, after - WINDOW)
-    rates: Floats = (total[after] - total[begin]) / (after - begin)
+    rates: Floats = (total[after] - total[begin]) / np.maximum(after - begin, 1)
     return rates
 
 

@@ -131,14 +131,15 @@ def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
     return space.narrow(bounds)
 
 
-def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement, ...]:
+def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...]:
     """The STL requirements that an ego has to meet in this ODD, thresholds included.
 
     Choice: each scale is what undisturbed traffic leaves, so that its robustness is about 1 there and falls without
     a clip as danger grows; else the one with the smallest scale would be the soft minimum whatever happens.
 
-    - TTC: a second of margin after the ego's reaction, and never under MIN_TTC_S. It is asked of the time to encounter,
-      in which near misses count: the bare TTC is flat at its cap until a collision course begins, and then jumps.
+    - TTC: a second of margin after the ego's response time, and never under MIN_TTC_S. It is asked of the time to
+      encounter, in which near misses count: the bare TTC is flat at its cap until a collision course begins, and then
+      jumps.
     - RSS: the signal is scaled already, and is negative where the situation is dangerous.
     - Pedestrians: a minimum gap that grows with the ego's speed, unless the ego stands and lets them pass; a standing
       ego has the margin of a gap of STANDING_M, whoever walks past it.
@@ -151,14 +152,14 @@ def requirements_from_odd(odd: Odd, reaction_time_s: float) -> tuple[Requirement
 
     Args:
       odd: complete, as `intersect` returns it.
-      reaction_time_s: of the ego.
+      response_s: within which the ego responds.
 
     Returns:
       TTC, RSS and braking always; pedestrians and red light where the ODD has them.
 
     Source: Hayward 1972 for TTC; the scales are medians over episodes that nobody disturbs.
     """
-    ttc_s = max(MIN_TTC_S, reaction_time_s + 1.0)
+    ttc_s = max(MIN_TTC_S, response_s + 1.0)
     ttc_scale_s = max(UNDISTURBED_ENCOUNTER_S - ttc_s, 1.0)
     friction = odd.environment.friction
     grip_mps2 = EMERGENCY_BRAKING_MPS2 if friction is None else friction.low * GRAVITY_MPS2

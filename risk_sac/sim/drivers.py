@@ -29,9 +29,13 @@ class Drivers:
             for start in layout.vehicles
         }
         self._released: dict[str, Driver] = {}
-        self._ego = Driver(layout.ego.id, reaction_time_s, emergency)
+        self._ego: Driver | None = Driver(layout.ego.id, reaction_time_s, emergency)
         self._walkers = bool(layout.pedestrians)
         self._roads = roads
+
+    def release_ego(self) -> None:
+        """Lets the ego's driver go: somebody else drives it."""
+        self._ego = None
 
     def release(self, vehicle: str) -> None:
         """Lets a driver go, who from now on only intends."""
@@ -45,13 +49,8 @@ class Drivers:
           belief: what the ego makes of it.
           braking_mps2: how hard the ego is to brake at least.
         """
-        ego = self._ego
-        speed, accel = reading.speed_and_accel[0]
-        if ego.due:
-            ego.wanted_mps2 = self._decide(ego, 0, reading, belief.state, belief.known)
-        ego.tell(speed, accel)
-        if braking_mps2:
-            ego.brake(speed, accel, braking_mps2)
+        if self._ego is not None:
+            self._tell_ego(self._ego, reading, belief, braking_mps2)
         if not self._walkers:
             return
         for row, id_ in enumerate(reading.vehicles):
@@ -59,6 +58,14 @@ class Drivers:
             if driver is not None and (reading.near[row] or driver.telling):
                 driver.wanted_mps2 = self._decide(driver, row, reading, reading.frame.state, reading.walks)
                 driver.tell(*reading.speed_and_accel[row])
+
+    def _tell_ego(self, ego: Driver, reading: Reading, belief: Belief, braking_mps2: float) -> None:
+        speed, accel = reading.speed_and_accel[0]
+        if ego.due:
+            ego.wanted_mps2 = self._decide(ego, 0, reading, belief.state, belief.known)
+        ego.tell(speed, accel)
+        if braking_mps2:
+            ego.brake(speed, accel, braking_mps2)
 
     def intended_accel(self, reading: Reading) -> dict[str, float]:
         """What the drivers of the released vehicles would do if nobody commanded them, m/s².

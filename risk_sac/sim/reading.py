@@ -38,6 +38,7 @@ from risk_sac.types import (
 PEDESTRIAN_SIZE_M = 0.5
 SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
 CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
+EgoTold = tuple[float, float, float, float, float, float]  # as SUMO does: see `MovedEgo.told`
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
 
 
@@ -89,8 +90,13 @@ class Reader:
         self._vehicles = tuple(id_ for id_ in self._vehicles if id_ not in gone)
         self._describe()
 
-    def read(self, walkers: Mapping[str, Walker]) -> Reading:
-        """What there is now; SUMO knows nothing of the walkers, so they are told."""
+    def read(self, walkers: Mapping[str, Walker], ego: EgoTold | None = None) -> Reading:
+        """What there is now; SUMO knows nothing of the walkers, so they are told.
+
+        Args:
+          walkers: all pedestrians.
+          ego: what SUMO would tell of an ego that it does not drive.
+        """
         get_position, get_angle = libsumo.vehicle.getPosition, libsumo.vehicle.getAngle
         get_speed, get_lateral = libsumo.vehicle.getSpeed, libsumo.vehicle.getLateralSpeed
         get_accel = libsumo.vehicle.getAcceleration
@@ -98,9 +104,13 @@ class Reader:
         told: list[float] = []  # flat: numpy converts nested sequences at half the speed
         speed_and_accel, offsets = [], []
         for id_ in self._vehicles:
-            x, y = get_position(id_)
-            speed, accel, offset = get_speed(id_), get_accel(id_), get_offset(id_)
-            told += (x, y, get_angle(id_), speed, get_lateral(id_), accel, offset)
+            offset = get_offset(id_)
+            if ego is not None and not told:
+                x, y, angle, speed, lateral, accel = ego
+            else:
+                (x, y), angle = get_position(id_), get_angle(id_)
+                speed, lateral, accel = get_speed(id_), get_lateral(id_), get_accel(id_)
+            told += (x, y, angle, speed, lateral, accel, offset)
             speed_and_accel.append((speed, accel))
             offsets.append(offset)
         for w in walkers.values():

@@ -15,12 +15,14 @@ from importlib.resources import files
 import libsumo
 
 from risk_sac.config import EgoConfig
-from risk_sac.errors import SimulationError
+from risk_sac.errors import EgoFailed, SimulationError
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.drivers import Drivers
 from risk_sac.sim.ego import EVERYTHING, Belief, Perception, Senses
+from risk_sac.sim.lookout import project
 from risk_sac.sim.paths import Along
+from risk_sac.sim.pilot import MovedEgo, Pilot
 from risk_sac.sim.placing import hand_over, place
 from risk_sac.sim.reading import Reader, Reading
 from risk_sac.sim.roads import Roads, Room
@@ -28,6 +30,7 @@ from risk_sac.types import STEP_S, Floats, Frame, Role
 
 NETS = files("sumo_nets")
 LISTED_WITHIN_S = 0.3
+OFF_ROAD = "ego_off_road"
 OPTIONS = (
     f"--step-length {STEP_S} --lateral-resolution 0.8 --default.speeddev 0 --insertion-checks none "
     "--collision.action warn --collision.mingap-factor 0 --collision.check-junctions "
@@ -45,16 +48,19 @@ class SumoSimulation:
     _reading: Reading
     _belief: Belief
     _reflex_mps2: float
+    _moved: MovedEgo | None
 
-    def __init__(self, ego: EgoConfig, senses: Senses | None = None) -> None:
+    def __init__(self, ego: EgoConfig, senses: Senses | None = None, pilot: Pilot | None = None) -> None:
         """Starts nothing yet.
 
         Args:
           ego: SUMO's models that drive it.
           senses: what it perceives; everything if not given.
+          pilot: who drives it in their place once `hand_over_ego` was called.
         """
         self._ego = ego
         self._senses = senses or Perception(0.0, EVERYTHING)
+        self._pilot = pilot
         self._started = False
         self._walkers: dict[str, Walker] = {}
         self._roads = Roads()
@@ -87,6 +93,8 @@ class SumoSimulation:
         self._reader = Reader(layout, self._walkers)
         self._drivers = Drivers(layout, self._ego.reaction_time_s, self._roads)
         self._reflex_mps2 = 0.0
+        self._moved = None
+        self._seed = seed
         self._senses.reset()
         self._belief = self._look()
         self._hide()
@@ -98,6 +106,19 @@ class SumoSimulation:
             self._started = True
             return
         libsumo.load(options)
+
+    def hand_over_ego(self) -> None:
+        """Hands the ego to its pilot, if it has one.
+
+        Raises:
+          EgoFailed: the pilot cannot drive.
+        """
+        if self._pilot is None:
+            return
+        frame = self._reading.frame
+        motion = self._pilot.begin(self._layout, self._seed, frame)
+        self._drivers.release_ego()
+        self._moved = MovedEgo(self._layout.ego.id, motion, float(frame.length_m[0]))
 
     def release(self) -> None:
         """Hands the adversary vehicles over: from now on they wait for commands.
@@ -126,8 +147,11 @@ class SumoSimulation:
 
         Raises:
           SimulationError: libsumo failed, or the ego left the net.
+          EgoFailed: its pilot cannot drive on, or drove it off its road.
         """
         try:
+            if self._moved is not None:
+                self._drive(self._moved)
             self._drivers.tell(self._reading, self._belief, self._reflex_mps2)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
@@ -135,12 +159,29 @@ class SumoSimulation:
         if libsumo.simulation.getArrivedNumber():
             gone = set(libsumo.simulation.getArrivedIDList())
             if self._layout.ego.id in gone:
+                if self._moved is not None:
+                    raise EgoFailed("the ego reached the end of its route before the horizon", reason=OFF_ROAD)
                 raise SimulationError("the ego left the net before the horizon; lengthen its route")
             self._reader.forget(gone)
+        if self._moved is not None:
+            self._moved.settle()
+            self._belief = self._look()
+            return self._reading.frame
         before, self._belief = self._belief, self._look()
         if before.known.tobytes() != self._belief.known.tobytes():
             self._hide()
         return self._reading.frame
+
+    def _drive(self, ego: MovedEgo) -> None:
+        """Lets the pilot drive a step."""
+        assert self._pilot is not None
+        id_, frame, width_m = self._layout.ego.id, self._reading.frame, float(self._reading.frame.width_m[0])
+        along = self._roads.along(id_)
+        _, offset_m, _ = project(along.path.points, float(frame.x_m[0]), float(frame.y_m[0]))
+        room, _ = self._roads.place(id_, offset_m, width_m)
+        if min(room.left_m, room.right_m) < -width_m:
+            raise EgoFailed(f"the ego is {offset_m:.1f} m beside its lane, off its road", reason=OFF_ROAD)
+        ego.move(self._pilot.drive(frame, self._belief, along), along)
 
     def signal_heads(self) -> bytes:
         """The letters of all signals, one after the other."""
@@ -149,7 +190,7 @@ class SumoSimulation:
 
     def _look(self) -> Belief:
         """Reads what there is, and lets the ego perceive it."""
-        self._reading = self._reader.read(self._walkers)
+        self._reading = self._reader.read(self._walkers, None if self._moved is None else self._moved.told())
         return self._senses.look(self._reading.frame)
 
     def _hide(self) -> None:
@@ -193,12 +234,16 @@ class SumoSimulation:
             return None
         return self._roads.place(vehicle, self._reading.offset_m[row], float(self._reading.frame.width_m[row]))
 
-    def lists_collision(self, other: str) -> bool:
+    def lists_collision(self, other: str) -> bool | None:
         """Whether SUMO lists a collision of the ego with a vehicle, now or if it goes on for `LISTED_WITHIN_S`.
+
+        None of an ego that a pilot drives, whose place SUMO is told, and which goes by the oracle's own boxes.
 
         SUMO tests rectangles that lie along their lanes, so it is a little late or early where a body is turned. It
         ends the episode: the simulation is past the contact afterwards.
         """
+        if self._moved is not None:
+            return None
         pair = {self._layout.ego.id, other}
         for _ in range(round(LISTED_WITHIN_S / STEP_S)):
             if any({c.collider, c.victim} == pair for c in libsumo.simulation.getCollisions()):

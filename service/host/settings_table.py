@@ -10,7 +10,7 @@ from service.settings import ServiceSettings
 BEGIN = "<!-- settings: written by `make settings` -->"
 END = "<!-- /settings -->"
 BOUNDS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤"}
-TYPES = {"array": "JSON list", "path": "folder", "string": "text"}
+TYPES = {"array": "JSON list", "path": "folder", "file-path": "file", "string": "text"}
 
 
 def table() -> str:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.executor import Cause, Executor, Exited
-from risk_sac.problem import check_campaign
+from risk_sac.problem import checked_campaign
 from service.errors import ConflictError, OutdatedError, StorageError
 from service.runs.active import Active
 from service.runs.disposal import dispose, settle
@@ -101,7 +101,7 @@ class Manager:
           QuotaError: the project has used up its share.
           StorageError: it cannot be written down.
         """
-        check_campaign(spec)
+        spec = checked_campaign(spec)
         with self._lock:
             found = None if key is None else self._ledger.find(project, key, spec)
             if found is not None:

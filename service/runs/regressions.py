@@ -19,6 +19,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from risk_sac.config import EgoConfig
+from risk_sac.egos.registry import pinned
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.failures.bundle import code_digest
 from risk_sac.failures.cases import Case
@@ -106,10 +107,12 @@ class Regressions:
         """Queues a regression, unless there is the same already.
 
         Raises:
+          ConfigError: the ego is not registered, or in another version.
           ConflictError: the campaign has not ended, or none of its runs has succeeded.
           QuotaError: too many wait.
           StorageError: it cannot be written down.
         """
+        ego = pinned(ego)
         runs = tuple(run.id for run in campaign.searches if run.state is State.SUCCEEDED)
         if not campaign.state.final or not runs:
             message = (

@@ -43,6 +43,8 @@ class Total(Body):
     runs: int
     episodes: int
     rejected: int
+    invalid: int
+    """Episodes in which the ego failed to drive; the rates leave them out."""
     raw_collisions: int
     failures: int
     environment_steps: int

@@ -73,6 +73,8 @@ class Driver(Body):
 
     profile: str
     car_following: str
+    driver: str | None
+    """Name of a registered ego; null: SUMO's models drive, as `profile` and `car_following` say."""
 
 
 class CampaignSummary(Body):

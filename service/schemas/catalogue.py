@@ -81,6 +81,28 @@ class NamedMethod(Method):
     name: MethodName
 
 
+class Ego(Body):
+    """Who can drive the ego."""
+
+    name: str
+    """Of kind sumo: what `ego.profile` of a campaign takes; else what `ego.driver` does."""
+    kind: Literal["sumo", "python", "remote"]
+    """sumo: SUMO's models; python: in the worker's own process; remote: in a process of the operator's."""
+    version: str | None
+    """A campaign keeps it, and its runs go on with no other; null of SUMO's models, whose version is libsumo's."""
+    response_time_s: float
+    """Within which it responds to a danger, s; requirements follow from it."""
+    deadline_s: float | None
+    """For each of its answers, s; an episode in which it misses it is invalid."""
+    summary: str
+
+
+class Egos(Body):
+    """All egos; the operator registers them."""
+
+    items: list[Ego]
+
+
 class Methods(Body):
     """All search methods."""
 

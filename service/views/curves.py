@@ -40,7 +40,8 @@ def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: i
 class _Search:
     """What each episode of a run's search adds to its curves."""
 
-    failures: list[bool] = field(default_factory=list)
+    driven: list[int] = field(default_factory=list)  # so far: episodes in which the ego did not fail to drive
+    failures: list[bool] = field(default_factory=list)  # of these alone
     preventable: list[bool] = field(default_factory=list)
     distinct: list[bool] = field(default_factory=list)
     distinct_preventable: list[bool] = field(default_factory=list)
@@ -55,8 +56,10 @@ class _Search:
         collision = record["collision"]
         judged = collision.get("judgement") if failed else None
         preventable = judged is not None and judged["grade"] == Grade.CAREFUL
-        self.failures.append(failed)
-        self.preventable.append(preventable)
+        if outcome != Outcome.INVALID:
+            self.failures.append(failed)
+            self.preventable.append(preventable)
+        self.driven.append(len(self.failures))
         self.distinct.append(failed and self._kinds.add(collision))
         self.distinct_preventable.append(preventable and self._preventable_kinds.add(collision))
         self.steps.append(record["steps"])
@@ -65,12 +68,13 @@ class _Search:
 
 
 def _curves(run: StoredRun, search: _Search, points: int) -> RunCurves:
-    at = spread(len(search.failures), points)
+    at = spread(len(search.steps), points)
     steps, cost = (np.diff(_summed(each)[at], prepend=0.0) for each in (search.steps, search.cost))
     lines = {name: _summed(getattr(search, name))[at] for name in ("distinct", "preventable", "distinct_preventable")}
+    driven = np.array([0, *search.driven])[at]
     lines |= {
-        "window_ecr": _window(search.failures, at),
-        "window_pcr": _window(search.preventable, at),
+        "window_ecr": _window(search.failures, driven),
+        "window_pcr": _window(search.preventable, driven),
         "dual_variable": np.array([0.0, *search.dual_variable])[at],
         "mean_cost": np.divide(cost, steps, out=np.full(len(at), np.nan), where=steps > 0.0),
     }
@@ -94,5 +98,5 @@ def _summed(values: Sequence[float]) -> Floats:
 def _window(happened: Sequence[bool], at: Counts) -> Floats:
     """Share of the newest `WINDOW` episodes by then in which it happened."""
     sums, before = _summed(happened), np.maximum(at - WINDOW, 0)
-    shares: Floats = (sums[at] - sums[before]) / (at - before)
+    shares: Floats = (sums[at] - sums[before]) / np.maximum(at - before, 1)
     return shares

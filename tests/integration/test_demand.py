@@ -10,7 +10,7 @@ import pytest
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.config.demand import MOST_BYTES, demand_bytes
 from risk_sac.errors import ConfigError
-from risk_sac.problem import Problem, check_campaign
+from risk_sac.problem import Problem, checked_campaign
 
 OBSERVATION, ACTION, HORIZON = 300, 8, 200  # wide, so that few transitions fill much
 PROGRAM = f"""
@@ -91,9 +91,9 @@ def campaign(methods: list[str], **learner: object) -> CampaignSpec:
 def test_what_would_take_too_much_memory_is_refused_by_the_field_that_takes_most(field: str, learner: object) -> None:
     for methods in (["risk-sac"], ["random", "sac-lag"]):
         with pytest.raises(ConfigError, match="GiB of memory") as refusal:
-            check_campaign(campaign(methods, **learner))
+            checked_campaign(campaign(methods, **learner))
         assert refusal.value.field == field
-    check_campaign(campaign(["random"], **learner))  # which has no networks
+    checked_campaign(campaign(["random"], **learner))  # which has no networks
     with pytest.raises(ConfigError, match="GiB of memory"):
         Problem.from_spec(campaign(["ddpg"], **learner).runs()[0])
 

@@ -12,7 +12,7 @@ from risk_sac.config import (
     Scenery,
 )
 from risk_sac.errors import ConfigError, FormulaError, OddError
-from risk_sac.problem import Problem, check_campaign
+from risk_sac.problem import Problem, checked_campaign
 
 
 def problem(family: str = "mixed", **settings: object) -> Problem:
@@ -88,7 +88,7 @@ def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs() -> None:
         families=("low", "mixed"), requirements=(Requirement(name="soon", formula="eventually(ttc_s > 1)", scale=1),)
     )
     with pytest.raises(FormulaError) as refused:
-        check_campaign(spec)
+        checked_campaign(spec)
     assert refused.value.field == "requirements[0].formula"
     assert refused.value.position == 0
 
@@ -102,8 +102,8 @@ def test_rss_asks_the_same_of_any_ego_and_reckons_with_the_worst_friction() -> N
 
 def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     campaign = CampaignSpec(families=("low",), methods=("random", "sb3-sac"))
-    check_campaign(campaign)
+    checked_campaign(campaign)
     monkeypatch.setattr("risk_sac.problem.find_spec", lambda name: None)
     with pytest.raises(ConfigError, match=r"'sb3-sac' needs stable_baselines3; pip install") as refusal:
-        check_campaign(campaign)
+        checked_campaign(campaign)
     assert refusal.value.field == "methods"

@@ -103,7 +103,8 @@ def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
         if found is None:
             continue
         # A bootstrap over few seeds ends at the worst of them: at 0 where none has failed, however short they were.
-        upper = max(high or 0.0, wilson_interval(failures, total.episodes)[1])
+        driven = total.episodes - total.invalid
+        upper = max(high or 0.0, wilson_interval(failures, driven)[1])
         yield Comparison(
             name=name,
             bound=bound,
@@ -111,7 +112,7 @@ def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
             rate=found,
             upper=upper,
             failures=failures,
-            episodes=total.episodes,
+            episodes=driven,
         )
 
 

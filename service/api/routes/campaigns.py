@@ -70,7 +70,7 @@ def post_campaign(
 @router.post("/check", status_code=204, responses=MALFORMED | NOT_JSON, openapi_extra=documented_campaign())
 def check_campaign(spec: PostedCampaign) -> Response:
     """Say what is wrong with a campaign, as posting it would; nothing is kept, and no quota counts it."""
-    problem.check_campaign(spec)
+    problem.checked_campaign(spec)
     return Response(status_code=204)
 
 

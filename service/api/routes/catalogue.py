@@ -5,6 +5,7 @@ from dataclasses import asdict
 from fastapi import APIRouter
 
 from risk_sac.config import METHODS, EgoConfig
+<<<<<<< HEAD
 from risk_sac.failures.export.formats import FORMATS
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
@@ -19,7 +20,19 @@ from service.schemas.catalogue import (
     SceneParameter,
     Signal,
 )
+=======
+from risk_sac.egos.registry import cards
+from risk_sac.risk.signals import SIGNALS
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.odd import requirements_from_odd, widest
+from service.schemas.catalogue import Ego, Egos, Families, Family, Methods, NamedMethod, SceneParameter, Signal
+>>>>>>> f387696 (Egos that drive themselves: a seam, four shipped drivers, egos in other processes, and episodes that are invalid when one fails)
 
+PROFILES = {
+    "default": "SUMO's default driver, with a driver's delay and a driver's view.",
+    "perfect": "The same, that reacts within a step and sees everything.",
+    "careful": "The default, with the braking of UN R157's careful driver on top.",
+}
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 
 
@@ -35,7 +48,7 @@ def list_families() -> Families:
             adversaries=list(family.adversaries),
             odd=family.odd,
             odd_limits=widest(family.odd),
-            requirements=list(requirements_from_odd(family.odd, EgoConfig().reaction_time_s)),
+            requirements=list(requirements_from_odd(family.odd, EgoConfig().response_s)),
         )
         for family in FAMILIES.values()
     ]
@@ -43,6 +56,7 @@ def list_families() -> Families:
     return Families(items=items, signals=signals)
 
 
+<<<<<<< HEAD
 @router.get("/formats")
 def list_formats() -> ExportFormats:
     """Formats that failures and episodes can be exported in."""
@@ -59,6 +73,23 @@ def list_formats() -> ExportFormats:
         for name, row in FORMATS.items()
     ]
     return ExportFormats(items=items)
+=======
+@router.get("/egos")
+def list_egos() -> Egos:
+    """Who can drive: SUMO's models by profile, and the egos that the operator has registered."""
+    models = [
+        Ego(
+            name=name,
+            kind="sumo",
+            version=None,
+            response_time_s=EgoConfig.model_validate({"profile": name}).response_s,
+            deadline_s=None,
+            summary=summary,
+        )
+        for name, summary in PROFILES.items()
+    ]
+    return Egos(items=[*models, *map(Ego.model_validate, cards())])
+>>>>>>> f387696 (Egos that drive themselves: a seam, four shipped drivers, egos in other processes, and episodes that are invalid when one fails)
 
 
 @router.get("/methods")

@@ -38,7 +38,8 @@ def feed(records):
 def counted(records):
     """What `Tally` counts, at once and by the definitions."""
     hits = [record.collision for record in records if record.outcome is Outcome.FAILURE]
-    newest = records[-WINDOW:]
+    driven = [record for record in records if record.outcome is not Outcome.INVALID]
+    newest = driven[-WINDOW:]
     points = [outcome_features(hit) for hit in hits]
     return Tally(
         horizon_steps=HORIZON,
@@ -47,7 +48,8 @@ def counted(records):
         preventable=sum(hit.preventable for hit in hits),
         distinct_failures=len(distinct_failures(hits)),
         environment_steps=sum(record.steps for record in records),
-        steps_to_failure=sum(record.steps if record.outcome is Outcome.FAILURE else HORIZON for record in records),
+        steps_to_failure=sum(record.steps if record.outcome is Outcome.FAILURE else HORIZON for record in driven),
+        invalid=len(records) - len(driven),
         cost=math.fsum(record.mean_cost * record.steps for record in records if record.steps),
         distance=math.fsum(math.dist(one, other) for one, other in combinations(points, 2)),
         newest_episodes=len(newest),

@@ -1,0 +1,105 @@
+"""`risk-sac egos`: which there are, and how they compare under the same search."""
+
+import argparse
+import os
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, get_args
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
+from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, complain, console, progress_bar
+from risk_sac.cli.evaluate import drawn
+from risk_sac.config import EgoConfig
+from risk_sac.config.spec_file import read_campaign, read_ego
+from risk_sac.egos.registry import SHIPPED, cards
+from risk_sac.metrics import wilson_interval
+
+if TYPE_CHECKING:
+    from risk_sac.report import FinishedRun
+
+SEEDS = 2
+PROFILES: Sequence[str] = get_args(EgoConfig.model_fields["profile"].annotation)
+COLUMNS = (
+    *("family", "ego", "runs", "episodes", "invalid", "contacts"),
+    *("valid", "ECR (95 %)", "preventable", "PCR (95 %)"),
+)
+
+
+def add_egos(commands: Commands) -> None:
+    """Adds the commands."""
+    egos = commands.add_parser("egos", help="who can drive, and how they compare").add_subparsers(
+        required=True, metavar="COMMAND"
+    )
+    listed = egos.add_parser("list", help="SUMO's models, the shipped egos, and those the operator has registered")
+    listed.set_defaults(command=_list)
+    ladder = egos.add_parser(
+        "ladder", help="the same search on equal budgets against each ego; the same command again goes on with it"
+    )
+    ladder.set_defaults(command=_ladder)
+    names = ["default", *SHIPPED]
+    ladder.add_argument("--egos", nargs="+", default=names, metavar="EGO", help=f"(default: {' '.join(names)})")
+    add_campaign_flags(ladder, families="low", methods="archive", seeds=SEEDS)
+    ladder.add_argument("--jobs", type=int, metavar="N", help="runs at a time (default: one per core)")
+    ladder.add_argument("--out", type=Path, required=True, metavar="DIR", help="a folder for each ego, and ladder.md")
+
+
+def _list(options: argparse.Namespace) -> int:
+    table = Table("name", "kind", "version", "responds within", "summary", box=SIMPLE_HEAD)
+    for name in PROFILES:
+        response_s = EgoConfig.model_validate({"profile": name}).response_s
+        table.add_row(name, "sumo", "", f"{response_s:g} s", "SUMO's models, named by `profile`")
+    for card in cards():
+        table.add_row(card.name, card.kind, card.version, f"{card.response_time_s:g} s", card.summary)
+    console.print(table)
+    return OK
+
+
+def _ladder(options: argparse.Namespace) -> int:
+    defaults = {"families": ["low"], "methods": ["archive"], "seeds": list(range(SEEDS))}
+    spec = read_campaign(options.spec, campaign_flags(options, SEEDS), defaults)
+    egos = {name: read_ego(name) for name in options.egos}
+    from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
+
+    found: dict[str, Sequence[FinishedRun]] = {}
+    jobs, executor = options.jobs or os.cpu_count() or 1, os.environ.get("RISK_SAC_EXECUTOR", "local")
+    for name, ego in egos.items():
+        with progress_bar() as bar:
+            campaign, folder = spec.model_copy(update={"ego": ego}), options.out / name
+            evaluation = evaluate(campaign, folder, options.typed, jobs, partial(drawn, Board(bar)), executor, 0)
+        for job in evaluation.failed:
+            complain(f"{name}: {job.name}: {job.reason}")
+        if evaluation.stopped:
+            return INTERRUPTED
+        found[name] = evaluation.comparison.runs
+    rows = [row for family in spec.families for row in _rows(family, found)]
+    text = "".join(f"| {' | '.join(line)} |\n" for line in (COLUMNS, ["---"] * len(COLUMNS), *rows))
+    (options.out / "ladder.md").write_text(f"`{options.typed}`\n\n{text}", encoding="utf-8")
+    console.print(text, markup=False, soft_wrap=True)
+    return OK if all(found.values()) else FAILED
+
+
+def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[str]]:
+    """The egos of a family, the worst first; intervals are Wilson's of all episodes that an ego drove, together."""
+    rows: list[tuple[tuple[float, float], list[str]]] = []
+    for name, runs in found.items():
+        of_family = [run.metrics["search"] for run in runs if run.spec.family == family]
+        if not of_family:
+            continue
+        episodes, invalid, contacts, valid, preventable = (
+            sum(getattr(metrics, count) for metrics in of_family)
+            for count in ("episodes", "invalid", "raw_collisions", "failures", "preventable")
+        )
+        driven = episodes - invalid
+        counts = map(str, (len(of_family), episodes, invalid, contacts, valid))
+        rates = _rate(valid, driven), str(preventable), _rate(preventable, driven)
+        rows.append(((preventable / max(driven, 1), valid / max(driven, 1)), [family, name, *counts, *rates]))
+    return [row for _, row in sorted(rows, key=lambda each: each[0], reverse=True)]
+
+
+def _rate(count: int, driven: int) -> str:
+    low, high = wilson_interval(count, driven)
+    return f"{count / max(driven, 1):.3f} ({low:.3f} to {high:.3f})"

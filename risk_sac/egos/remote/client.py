@@ -1,0 +1,85 @@
+"""Our end of the protocol: an ego in another process, as one of ours."""
+
+import uuid
+
+import grpc
+
+from risk_sac.egos.guard import CRASH, DEADLINE, MALFORMED
+from risk_sac.egos.remote.messages import METHODS, SERVICE, command_of, observation, start_request
+from risk_sac.egos.remote.wire import Message, decode, encode
+from risk_sac.egos.seam import Command, Episode, Perceived
+from risk_sac.errors import EgoFailed
+from risk_sac.types import Floats
+
+VERSION = "ego_version"
+LONGEST = 1 << 20  # bytes of an answer
+OPTIONS = [("grpc.max_receive_message_length", LONGEST), ("grpc.enable_retries", 0)]
+
+
+class RemoteEgo:
+    """A session for each episode, over one connection that is made anew when it breaks."""
+
+    def __init__(self, address: str, version: str, deadline_s: float) -> None:
+        """Connects to nobody yet.
+
+        Args:
+          address: of its server.
+          version: which it has to say of itself.
+          deadline_s: for each answer.
+        """
+        self._address, self._version, self._deadline_s = address, version, deadline_s
+        self._channel = grpc.insecure_channel(address, options=OPTIONS)
+        self._call = {name: self._channel.unary_unary(f"/{SERVICE}/{name}") for name in METHODS}
+        self._session = ""
+        self._path: Floats | None = None
+
+    def reset(self, episode: Episode) -> None:
+        """Opens a session.
+
+        Raises:
+          EgoFailed: nobody answers in time, or an ego of another version.
+        """
+        self._end()
+        self._session, self._path = str(uuid.uuid4()), None
+        reply = self._ask("Start", start_request(episode, self._session))
+        if reply["version"] != self._version:
+            raise EgoFailed(
+                f"the ego at {self._address} is of version {reply['version']!r}; registered is {self._version!r}",
+                reason=VERSION,
+            )
+
+    def act(self, perceived: Perceived) -> Command:
+        """Tells what is perceived and returns what is commanded.
+
+        Raises:
+          EgoFailed: it does not answer in time, or with nothing.
+        """
+        message = observation(perceived, self._session, new_path=perceived.path is not self._path)
+        self._path = perceived.path
+        command = command_of(self._ask("Act", message))
+        if command is None:
+            raise EgoFailed("the ego answered neither a control nor a trajectory", reason=MALFORMED)
+        return command
+
+    def close(self) -> None:
+        """Ends the session and hangs up."""
+        self._end()
+        self._channel.close()
+
+    def _end(self) -> None:
+        if self._session:
+            session, self._session = self._session, ""
+            request = encode("CloseRequest", {"session": session})
+            self._call["Close"].future(request, timeout=self._deadline_s)  # nobody waits
+
+    def _ask(self, name: str, message: Message) -> Message:
+        request, reply = METHODS[name]
+        try:
+            return decode(reply, self._call[name](encode(request, message), timeout=self._deadline_s))
+        except ValueError as error:
+            raise EgoFailed(f"the ego at {self._address} answered {error}", reason=MALFORMED) from error
+        except grpc.RpcError as error:
+            code, details = error.code(), error.details()
+            late = code is grpc.StatusCode.DEADLINE_EXCEEDED
+            said = f"did not answer within {self._deadline_s:g} s" if late else f"failed: {code.name}: {details}"
+            raise EgoFailed(f"the ego at {self._address} {said}", reason=DEADLINE if late else CRASH) from error

@@ -1,0 +1,112 @@
+"""Rows of a perceived path, and a driver's way of staying on it."""
+
+import math
+
+import numpy as np
+
+from risk_sac.egos.seam import Perceived, Vehicle
+from risk_sac.jit import compiled
+from risk_sac.sim.lookout import project
+from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
+
+# Rows of a path, as in `risk_sac.sim.paths`.
+PATH_X, PATH_Y = 0, 1
+STATION = 2  # length of the line up to each point, m
+PATH_HEADING = 3  # of the segment that begins at the point, rad
+LIMIT = 4  # the fastest to take it, m/s; bends are slow
+
+LOOKAHEAD_S, LEAST_LOOKAHEAD_M = 0.6, 5.0
+BEND_M = 5.0
+ASIDE_M = 0.3  # beside the ego's body: who is in there is in its way
+
+
+@compiled
+def point_at(path: Floats, station_m: float) -> tuple[float, float]:
+    """Where a path is at a station; its ends go on straight."""
+    stations = path[STATION]
+    i = 0
+    while i < len(stations) - 2 and stations[i + 1] <= station_m:
+        i += 1
+    ahead_m, heading = station_m - stations[i], path[PATH_HEADING, i]
+    return path[PATH_X, i] + ahead_m * math.cos(heading), path[PATH_Y, i] + ahead_m * math.sin(heading)
+
+
+@compiled
+def steering_towards(
+    x_m: float, y_m: float, heading_rad: float, wheelbase_m: float, aim_x_m: float, aim_y_m: float
+) -> float:
+    """Steering of the arc that takes the rear axle to a point (pure pursuit), rad.
+
+    Source: Coulter 1992, "Implementation of the Pure Pursuit Path Tracking Algorithm".
+    """
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    dx, dy = aim_x_m - (x_m - wheelbase_m / 2 * cos), aim_y_m - (y_m - wheelbase_m / 2 * sin)
+    across, distance2 = dy * cos - dx * sin, dx * dx + dy * dy
+    return math.atan2(2.0 * wheelbase_m * across, max(distance2, 1e-6))
+
+
+def lane_keeping(perceived: Perceived, vehicle: Vehicle) -> float:
+    """Steering that brings the ego to the middle of its lane and along its path, rad."""
+    x_m, y_m, heading = (float(perceived.state[row, 0]) for row in (X, Y, HEADING))
+    lookahead_m = max(LOOKAHEAD_S * float(perceived.state[SPEED, 0]), LEAST_LOOKAHEAD_M)
+    aim = point_at(perceived.path, perceived.station_m - vehicle.length_m / 2 + lookahead_m)
+    return float(steering_towards(x_m, y_m, heading, vehicle.wheelbase_m, *aim))
+
+
+@compiled
+def bend(path: Floats, point: int) -> float:
+    """Curvature of the path around a point, over `BEND_M`, 1/m: corners of the drawn line are no bends."""
+    stations, headings, last = path[STATION], path[PATH_HEADING], path.shape[1] - 1
+    first = point
+    while first > 0 and stations[point] - stations[first] < BEND_M / 2:
+        first -= 1
+    turned = 0.0
+    for i in range(first + 1, last + 1):
+        if stations[i] - stations[point] > BEND_M / 2:
+            break
+        change = headings[i] - headings[i - 1]
+        turned += math.atan2(math.sin(change), math.cos(change))
+    return abs(turned) / BEND_M
+
+
+@compiled
+def cruise_speed(path: Floats, station_m: float, comfort_mps2: float, sideways_mps2: float) -> float:
+    """The fastest that limits and bends, here and ahead, allow, m/s.
+
+    Args:
+      path: rows x `p`.
+      station_m: of the front bumper.
+      comfort_mps2: braking for slower stretches ahead.
+      sideways_mps2: acceleration in a bend.
+    """
+    stations, limits = path[STATION], path[LIMIT]
+    fastest = math.inf
+    for i in range(len(stations)):
+        if i + 1 < len(stations) and stations[i + 1] <= station_m - BEND_M:  # the rear axle is behind
+            continue
+        ahead_m = max(stations[i] - station_m, 0.0)
+        here = min(limits[i], math.sqrt(sideways_mps2 / max(bend(path, i), 1e-6)))
+        fastest = min(fastest, math.sqrt(here * here + 2.0 * comfort_mps2 * ahead_m))
+    return fastest
+
+
+@compiled
+def leaders(path: Floats, station_m: float, offset_m: float, state: Floats, vehicle: Bools) -> Floats:
+    """The vehicles ahead that are in the ego's way along its path right now.
+
+    Returns:
+      `leaders x 3`: column, distance from the front bumper to the body, m, and speed along the path, m/s.
+    """
+    found, count = np.empty((len(vehicle), 3)), 0
+    for i in range(1, len(vehicle)):
+        station, across, way = project(path, state[X, i], state[Y, i])
+        cos, sin = abs(math.cos(state[HEADING, i] - way)), abs(math.sin(state[HEADING, i] - way))
+        half_length, half_width = state[LENGTH, i] / 2, state[WIDTH, i] / 2
+        reach = state[WIDTH, 0] / 2 + ASIDE_M + half_length * sin + half_width * cos
+        if not vehicle[i] or station < station_m or abs(across - offset_m) > reach:
+            continue
+        gap = max(station - half_length * cos - half_width * sin - station_m, 0.0)
+        along = state[VX, i] * math.cos(way) + state[VY, i] * math.sin(way)
+        found[count, 0], found[count, 1], found[count, 2] = i, gap, max(along, 0.0)
+        count += 1
+    return found[:count]

@@ -1,0 +1,98 @@
+"""The seam between us and an ego that drives itself: what it is told, and what it may answer.
+
+Who perceives what stays ours: an ego gets what the line-of-sight sensor and its memory have. How it moves is ours too:
+a bicycle with limits (`risk_sac.egos.bicycle`) does as much of a command as a car can.
+
+Everything is metric and mathematical: x east, y north, heading 0 = east, counter-clockwise, radians, and a position is
+the centre of a body.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.types import Floats, Signal
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Vehicle:
+    """The car that an ego drives, and its limits in this episode."""
+
+    length_m: float
+    width_m: float
+    wheelbase_m: float = 2.7  # the body's centre is in the middle between the axles
+    accel_mps2: float = 2.6  # the most it speeds up
+    brake_mps2: float = 9.0  # the hardest it brakes on this road
+    brake_jerk_mps3: float = 12.65  # at which a braking builds up
+    steering_rad: float = 0.55  # of the front wheels, to either side
+    steering_rate_rad_s: float = 0.6
+    grip_mps2: float = 9.81  # friction · g: what the tyres bear along and across together
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Episode:
+    """What an ego is told before it drives."""
+
+    seed: int  # of all chance in the ego: the same seed and the same perceived frames have to give the same commands
+    net: str  # the road network's file
+    route: tuple[str, ...]  # edges of the net
+    vehicle: Vehicle
+    step_s: float  # between two perceived frames
+
+
+class Perceived(NamedTuple):
+    """What an ego knows at one moment. Every array has `n` columns, of which the first is the ego itself.
+
+    Rows of `state` are those of `risk_sac.types`. Of others it has X, Y, HEADING, VX, VY, SPEED, LENGTH and WIDTH;
+    LATERAL, ACCEL and OFFSET, which no sensor tells, are NaN. Who is out of sight, but remembered, is where the ego
+    expects it.
+    """
+
+    time_s: float  # since the simulation began
+    ids: tuple[str, ...]  # as long as an actor is known, it keeps its id
+    kind: NDArray[np.int8]  # of `risk_sac.types.Kind`
+    state: Floats  # rows x n
+    path: Floats  # rows of `risk_sac.egos.road` x p: the middle of the lanes that its route goes on along
+    station_m: float  # of its front bumper on the path
+    offset_m: float  # of its middle from the path, positive to the left
+    signal: Signal  # ahead of it
+    stop_line_m: float  # from its front bumper to that signal's stop line; inf without one
+
+
+class Control(NamedTuple):
+    """A command: how hard to speed up, negative to brake, and where to turn the front wheels to."""
+
+    accel_mps2: float
+    steering_rad: float = 0.0  # positive to the left
+
+
+class Trajectory(NamedTuple):
+    """A command: where to be, and how fast, at times from now on; `k` of each, two or more, the times rising."""
+
+    time_s: Floats
+    x_m: Floats
+    y_m: Floats
+    speed_mps: Floats
+
+
+Command = Control | Trajectory
+
+
+class Ego(Protocol):
+    """Who drives, in lock-step: one command for each perceived frame, which holds for one step.
+
+    The class says three things of itself as plain literals, which are read without running it: `version`,
+    `response_time_s` (the time within which it responds to a danger, from which its requirements follow) and, if it is
+    not 1, `deadline_s` for each of its answers. The first line of its docstring is its summary.
+    """
+
+    def reset(self, episode: Episode) -> None:
+        """Begins an episode; it is about to drive."""
+
+    def act(self, perceived: Perceived) -> Command:
+        """What to do in the next step."""
+
+    def close(self) -> None:
+        """Lets go of what it holds; nothing comes afterwards."""

@@ -1,0 +1,140 @@
+"""`python -m risk_sac.egos.serve r157 --address 127.0.0.1:50051`: serve a Python ego to others.
+
+It is the reference of the other end, too: whoever writes an ego in another language does what is done here.
+"""
+
+import argparse
+import logging
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import grpc
+import numpy as np
+
+from risk_sac.egos.registry import make
+from risk_sac.egos.remote.messages import (
+    METHODS,
+    PROTOCOL,
+    SERVICE,
+    command_message,
+    episode_of,
+    path_of,
+    perceived_of,
+)
+from risk_sac.egos.remote.wire import Message, decode, encode
+from risk_sac.egos.seam import Ego, Episode, Vehicle
+from risk_sac.types import STEP_S, Floats, Kind, Signal
+
+logger = logging.getLogger(__name__)
+
+MOST_SESSIONS = 64  # a client that died closed nothing; the oldest goes
+
+
+@dataclass(slots=True)
+class Session:
+    """An episode at work."""
+
+    ego: Ego
+    path: Floats = field(default_factory=lambda: np.empty((0, 0)))
+
+
+class Sessions:
+    """The egos that drive at present, each in a session of its own."""
+
+    def __init__(self, make_ego: Callable[[], Ego], version: str) -> None:
+        """Serves nobody yet.
+
+        Args:
+          make_ego: a new ego for each session.
+          version: what it says of itself.
+        """
+        self._make, self._version = make_ego, version
+        self._sessions: dict[str, Session] = {}
+        self._lock = threading.Lock()
+
+    def start(self, request: Message, context: Any) -> Message:
+        """Begins an episode."""
+        if request["protocol"] != PROTOCOL:
+            context.abort(grpc.StatusCode.FAILED_PRECONDITION, f"protocol {request['protocol']}; wanted {PROTOCOL}")
+        session = Session(self._make())
+        session.ego.reset(episode_of(request))
+        with self._lock:
+            while len(self._sessions) >= MOST_SESSIONS:
+                self._sessions.pop(next(iter(self._sessions))).ego.close()
+            self._sessions[request["session"]] = session
+        return {"version": self._version}
+
+    def act(self, request: Message, context: Any) -> Message:
+        """One step."""
+        session = self._sessions.get(request["session"])
+        if session is None:
+            context.abort(grpc.StatusCode.NOT_FOUND, f"there is no session {request['session']!r}")
+        assert session is not None
+        if "path" in request:
+            session.path = path_of(request["path"])
+        return command_message(session.ego.act(perceived_of(request, session.path)))
+
+    def close(self, request: Message, context: Any) -> Message:
+        """An episode is over."""
+        with self._lock:
+            session = self._sessions.pop(request["session"], None)
+        if session is not None:
+            session.ego.close()
+        return {}
+
+
+def warm_up(ego: Ego) -> None:
+    """Lets an ego drive one step on a straight road, so that what it compiles or loads at first costs no deadline."""
+    ego.reset(Episode(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=STEP_S))
+    along, still = np.array([0.0, 50.0, 100.0]), np.zeros(3)
+    path = np.array([along, still, along, still, np.full(3, 13.9), np.cos(still), np.sin(still)])
+    actors = {"id": ["ego", "lead", "walker"], "kind": [Kind.VEHICLE, Kind.VEHICLE, Kind.PEDESTRIAN]}
+    states = {"x_m": [0.0, 30.0, 60.0], "y_m": [0.0, 0.0, 5.0], "heading_rad": still, "vx_mps": [10.0, 10.0, 0.0]}
+    sizes = {"vy_mps": still, "length_m": [4.6, 4.6, 0.5], "width_m": [1.85, 1.85, 0.5]}
+    own = {"time_s": 0.0, "speed_mps": 10.0, "accel_mps2": 0.0, "station_m": 2.3, "offset_m": 0.0}
+    seen = {"actors": actors | states | sizes, "signal": Signal.RED, "stop_line_m": 50.0, **own}
+    ego.act(perceived_of(seen, path))
+    ego.close()
+
+
+def serve(sessions: Sessions, address: str, threads: int = 4) -> tuple[grpc.Server, int]:
+    """A server at work, and its port.
+
+    Raises:
+      RuntimeError: the address cannot be listened on.
+    """
+    answers = {"Start": sessions.start, "Act": sessions.act, "Close": sessions.close}
+    handlers = {
+        name: grpc.unary_unary_rpc_method_handler(
+            answers[name],
+            request_deserializer=partial(decode, request),
+            response_serializer=partial(encode, reply),
+        )
+        for name, (request, reply) in METHODS.items()
+    }
+    server = grpc.server(ThreadPoolExecutor(threads))
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
+    port = server.add_insecure_port(address)
+    server.start()
+    return server, port
+
+
+def main() -> None:
+    """Serves until it is killed; prints the port and the version once it listens."""
+    parser = argparse.ArgumentParser(description="Serves a registered Python ego by the protocol of ego.proto.")
+    parser.add_argument("ego", help="its name")
+    parser.add_argument("--address", default="127.0.0.1:0", help="to listen on; port 0 is any (default: %(default)s)")
+    options = parser.parse_args()
+    make_ego, version = make(options.ego)
+    warm_up(make_ego())
+    server, port = serve(Sessions(make_ego, version), options.address)
+    print(f"{options.ego} {version} listens on port {port}", flush=True)  # noqa: T201 - for who started it
+    server.wait_for_termination()
+
+
+if __name__ == "__main__":
+    main()

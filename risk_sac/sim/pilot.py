@@ -1,0 +1,97 @@
+"""Who drives the ego in the place of SUMO's models, and how SUMO is told where it is.
+
+SUMO maps such an ego onto the lane that is nearest along its route, so that its drivers follow it and yield to it as to
+anybody. Its own models of the ego decide nothing any more. Where it is, and how fast, is ours.
+"""
+
+import math
+from typing import NamedTuple, Protocol
+
+import libsumo
+
+from risk_sac.scenario.layout import Layout
+from risk_sac.sim.ego import Belief
+from risk_sac.sim.lookout import project
+from risk_sac.sim.paths import Along
+from risk_sac.types import Frame
+
+KEEP_ROUTE = 1  # SUMO's word for the nearest place along the route
+NO_LANE_CHANGE = 0
+
+
+class Motion(NamedTuple):
+    """A car in motion; the position is its centre's."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    speed_mps: float  # never negative
+    accel_mps2: float = 0.0  # over the step before
+    steering_rad: float = 0.0  # of the front wheels, positive to the left
+    slip_rad: float = 0.0  # from the heading to where the centre moves
+
+
+class Pilot(Protocol):
+    """Drives the ego from the adversaries' release on."""
+
+    def begin(self, layout: Layout, seed: int, frame: Frame) -> Motion:
+        """Takes the ego over as it moves in the latest frame.
+
+        Raises:
+          EgoFailed: it cannot.
+        """
+
+    def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
+        """Its motion after the next step.
+
+        Args:
+          frame: all actors now.
+          belief: what the ego makes of it.
+          along: the ego on its path.
+
+        Raises:
+          EgoFailed: it does not know.
+        """
+
+
+class MovedEgo:
+    """The ego that a pilot drives, in SUMO.
+
+    Attributes:
+      motion: after its latest step.
+    """
+
+    def __init__(self, vehicle: str, motion: Motion, length_m: float) -> None:
+        """Takes it from SUMO's models.
+
+        Args:
+          vehicle: its id.
+          motion: now.
+          length_m: of its body.
+        """
+        self._vehicle, self.motion, self._half_m = vehicle, motion, length_m / 2
+        self._lane_heading_rad = motion.heading_rad
+        libsumo.vehicle.setLaneChangeMode(vehicle, NO_LANE_CHANGE)
+
+    def move(self, motion: Motion, along: Along) -> None:
+        """Has SUMO put it there in its next step.
+
+        Args:
+          motion: after the step.
+          along: the ego on its path before.
+        """
+        self.motion = motion
+        *_, self._lane_heading_rad = project(along.path.points, motion.x_m, motion.y_m)
+        x, y, angle, *_ = self.told()
+        libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, angle, KEEP_ROUTE)
+
+    def settle(self) -> None:
+        """After the step: SUMO derives a speed from the way along the lane, 0 where a lane begins. Followers see it."""
+        libsumo.vehicle.setPreviousSpeed(self._vehicle, self.motion.speed_mps)
+
+    def told(self) -> tuple[float, float, float, float, float, float]:
+        """What SUMO tells of others: front bumper, compass degrees, speed, lateral speed, acceleration."""
+        x, y, heading, speed, accel, _, slip = self.motion
+        lateral = speed * math.sin(heading + slip - self._lane_heading_rad)
+        front = x + self._half_m * math.cos(heading), y + self._half_m * math.sin(heading)
+        return (*front, 90.0 - math.degrees(heading), speed, lateral, accel)

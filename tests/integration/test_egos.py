@@ -1,0 +1,247 @@
+"""Egos that drive themselves, in real episodes: in our process, in another one, and when they fail."""
+
+import json
+import shutil
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.egos.registry import card_of, cards, pinned
+from risk_sac.env import RiskSacEnv
+from risk_sac.errors import CheckpointError, ConfigError, InfeasibleScene
+from risk_sac.execution.runs import run
+from risk_sac.records import EpisodeRecord, Outcome
+from risk_sac.run_folder.results import Results
+from risk_sac.types import Frame
+from tests.egos import running, served
+
+EXAMPLE = '''
+from risk_sac.egos import Control
+from risk_sac.egos.road import lane_keeping
+
+class Example:
+    """{summary}"""
+
+    version = "{version}"
+    response_time_s = 0.4
+
+    def reset(self, episode):
+        self.vehicle, self.steps = episode.vehicle, 0
+
+    def act(self, perceived):
+        self.steps += 1
+        {body}
+        return Control(0.0, lane_keeping(perceived, self.vehicle))
+
+    def close(self):
+        pass
+'''
+
+
+@pytest.fixture
+def install(tmp_path, monkeypatch):
+    """Installs a package with an ego, as an operator would: a distribution with an entry point."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+
+    def installed(body: str = "pass", version: str = "1", summary: str = "An example.") -> None:
+        sys.modules.pop("example_ego", None)
+        (tmp_path / "example_ego.py").write_text(EXAMPLE.format(body=body, version=version, summary=summary))
+        info = tmp_path / "example_ego-1.dist-info"
+        info.mkdir(exist_ok=True)
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: example-ego\nVersion: 1\n")
+        (info / "entry_points.txt").write_text("[risk_sac.egos]\nexample = example_ego:Example\n")
+
+    return installed
+
+
+def register(monkeypatch, folder: Path, **tables: str) -> None:
+    file = folder / "egos.toml"
+    file.write_text("".join(f"[{name}]\n{table}" for name, table in tables.items()))
+    monkeypatch.setenv("RISK_SAC_EGOS", str(file))
+
+
+def spec_of(driver: str, *, family: str = "low", episodes: int = 6, method: str = "random") -> RunSpec:
+    data = {"family": family, "method": method, "seed": 5, "budget": {"episodes": episodes}, "ego": {"driver": driver}}
+    return RunSpec.model_validate_json(json.dumps(data))
+
+
+def play(spec: RunSpec, folder: Path) -> tuple[Results, list[EpisodeRecord]]:
+    results = run(spec, folder, lambda done, metrics: None)
+    lines = (folder / "episodes.jsonl").read_bytes().splitlines()
+    return results, [EpisodeRecord.model_validate_json(line) for line in lines]
+
+
+def frames(family: str, driver: str | None, episode: int, *, controlled: bool = False) -> list[Frame]:
+    """Of an episode in which nobody attacks."""
+    spec = RunSpec(family=family, method="random", seed=0, ego=EgoConfig(driver=driver))
+    with closing(RiskSacEnv.of(spec)) as env:
+        env = RiskSacEnv(env.problem, spec.learner.reward, controlled=controlled)
+        scene = env.problem.space.from_unit(np.random.default_rng((3, episode)).random(env.problem.space.dimension))
+        env.reset(seed=episode, options={"scene": scene})
+        ended = False
+        while not ended:
+            *_, terminated, truncated, _ = env.step(np.zeros(env.action_size, dtype=np.float32))
+            ended = terminated or truncated
+        return env.trace.frames
+
+
+@pytest.mark.parametrize("family", ["low", "mixed", "dense"])
+@pytest.mark.parametrize("driver", ["r157", "rss", "idm-aeb"])
+def test_a_shipped_ego_touches_nobody_when_nobody_attacks(family, driver):
+    for episode in range(2):
+        try:
+            found = frames(family, driver, episode)
+        except InfeasibleScene:
+            continue
+        assert len(found) > 100  # to the horizon
+        moved_m = np.hypot(np.diff([f.x_m[0] for f in found]), np.diff([f.y_m[0] for f in found]))
+        assert moved_m.max() < 2.0  # and it jumps nowhere, junctions included
+
+
+def test_sumo_s_drivers_see_where_the_ego_is_and_how_fast():
+    """Followers keep their distance from an ego that SUMO does not drive, where lanes end and junctions begin too."""
+    import libsumo
+
+    spec = RunSpec(family="dense", method="random", seed=0, ego=EgoConfig(driver="idm-aeb"))
+    with closing(RiskSacEnv(RiskSacEnv.of(spec).problem, spec.learner.reward, controlled=False)) as env:
+        env.reset(seed=1)
+        lanes = set()
+        for _ in range(env.problem.family.horizon_steps):
+            env.step(np.zeros(env.action_size, dtype=np.float32))
+            frame = env.trace.frames[-1]
+            cos, sin = np.cos(frame.heading_rad[0]), np.sin(frame.heading_rad[0])
+            front = frame.x_m[0] + frame.length_m[0] / 2 * cos, frame.y_m[0] + frame.length_m[0] / 2 * sin
+            assert libsumo.vehicle.getPosition("ego") == pytest.approx(front, abs=1e-6)
+            assert libsumo.vehicle.getSpeed("ego") == pytest.approx(frame.speed_mps[0])
+            lanes.add(libsumo.vehicle.getLaneID("ego"))
+    assert any(lane.startswith(":") for lane in lanes) or len(lanes) == 1
+
+
+def test_the_broken_ego_is_caught(tmp_path):
+    """On the same scenes, under the same random attacks."""
+    failures = {}
+    for driver in ("broken", "rss"):
+        results, _ = play(spec_of(driver, episodes=12), tmp_path / driver)
+        failures[driver] = results.metrics.raw_collisions
+    assert failures["broken"] >= failures["rss"] + 3
+
+
+def test_an_ego_in_another_process_drives_as_in_ours(tmp_path, monkeypatch):
+    pytest.importorskip("grpc")
+    with served("idm-aeb", tmp_path, deadline_s=60) as table:
+        register(monkeypatch, tmp_path, far=table)
+        far, _ = play(spec_of("far", episodes=3, family="dense"), tmp_path / "far")
+    near, _ = play(spec_of("idm-aeb", episodes=3, family="dense"), tmp_path / "near")
+    assert far.metrics.environment_steps > 100
+    assert far.digest == near.digest
+
+
+def test_a_process_that_dies_fails_the_run_and_the_same_run_goes_on_when_it_is_back(tmp_path, monkeypatch):
+    pytest.importorskip("grpc")
+    with served("idm-aeb", tmp_path, deadline_s=60) as table:
+        register(monkeypatch, tmp_path, far=table)
+        version = pinned(EgoConfig(driver="far")).version
+    with pytest.raises(ConfigError, match="5 episodes in a row, the last time with ego_crash"):
+        play(spec_of("far"), tmp_path / "run")
+    with served("idm-aeb", tmp_path, deadline_s=60) as table:
+        register(monkeypatch, tmp_path, far=table)
+        assert pinned(EgoConfig(driver="far")).version == version
+        results, records = play(spec_of("far"), tmp_path / "run")
+    assert results.finished
+    assert all(record.outcome is not Outcome.INVALID for record in records)
+
+
+def test_a_process_of_another_version_drives_nothing(tmp_path, monkeypatch):
+    pytest.importorskip("grpc")
+    with served("idm-aeb", tmp_path, deadline_s=60) as table:
+        other = "".join(line if "version" not in line else 'version = "2"\n' for line in table.splitlines(True))
+        register(monkeypatch, tmp_path, far=other)
+        with pytest.raises(ConfigError, match="ego_version"):
+            play(spec_of("far"), tmp_path / "run")
+
+
+def test_invalid_episodes_are_counted_by_no_rate(install, tmp_path):
+    install("if self.steps == 30 and perceived.state[0, 0] % 2 < 1: raise ValueError('by me')")
+    results, records = play(spec_of("example", episodes=12), tmp_path)
+    metrics, invalid = results.metrics, [record for record in records if record.outcome is Outcome.INVALID]
+    assert 0 < metrics.invalid == len(invalid) < 12
+    assert {record.reason for record in invalid} == {"ego_crash"}
+    assert all(record.collision is None and record.steps == 29 for record in invalid)
+    assert metrics.ecr == metrics.failures / (12 - metrics.invalid)
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        ("raise ValueError('by me')", "ego_crash"),
+        ("return None", "ego_malformed"),
+        ("return Control(2.0, 0.5)", "ego_off_road"),
+    ],
+)
+def test_five_in_a_row_fail_the_run(install, tmp_path, body, reason):
+    install(body)
+    with pytest.raises(ConfigError, match=f"5 episodes in a row, the last time with {reason}"):
+        play(spec_of("example"), tmp_path)
+
+
+def test_a_run_refuses_another_version_of_its_ego(install, tmp_path):
+    install(version="1")
+    spec = spec_of("example", episodes=2)
+    spec = spec.model_copy(update={"ego": pinned(spec.ego)})
+    play(spec, tmp_path)
+    before = spec.digest
+    install(version="1", body="self.steps += 1")  # the same by name
+    with pytest.raises(ConfigError, match=r"ego\.version"):
+        play(spec, tmp_path)
+    unpinned = spec_of("example", episodes=2)
+    assert unpinned.model_copy(update={"ego": pinned(unpinned.ego)}).digest != before
+    with pytest.raises((ConfigError, CheckpointError)):
+        play(unpinned, tmp_path)
+
+
+def test_an_ego_s_card_is_read_without_running_it(install):
+    install(body="pass", summary="Runs nowhere.")
+    with (Path(sys.path[0]) / "example_ego.py").open("a") as source:
+        source.write("\nraise SystemExit('it ran')\n")
+    card = card_of("example")
+    assert (card.kind, card.response_time_s, card.summary) == ("python", 0.4, "Runs nowhere.")
+    assert card in cards()
+    assert pinned(EgoConfig(driver="example")).response_s == 0.4
+
+
+def test_a_request_names_only_what_is_registered(client):
+    body = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 1}, "ego": {"driver": "nobody-s"}}
+    refused = client.post("/v1/campaigns", json=body)
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["field"] == "ego.driver"
+    items = {item["name"]: item for item in client.get("/v1/egos").json()["items"] if item["kind"] != "sumo"}
+    assert {"r157", "rss", "idm-aeb", "broken"} <= items.keys()
+    assert not any("address" in item for item in items.values())
+
+
+def test_a_campaign_keeps_the_version_of_its_ego_and_runs_with_it(shared):
+    body = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 2}, "ego": {"driver": "idm-aeb"}}
+    posted = shared.client.post("/v1/campaigns", json=body).raise_for_status().json()
+    assert posted["spec"]["ego"]["version"] == card_of("idm-aeb").version
+    assert posted["ego"]["driver"] == "idm-aeb"
+    assert shared.wait(posted["id"])["state"] == "succeeded"
+
+
+@pytest.mark.skipif(
+    not all(map(shutil.which, ("make", "g++", "protoc", "grpc_cpp_plugin", "pkg-config"))), reason="needs C++ and gRPC"
+)
+@pytest.mark.torture
+def test_the_example_in_c_plus_plus_compiles_and_drives(tmp_path, monkeypatch):
+    pytest.importorskip("grpc")
+    folder = Path(__file__).parents[2] / "risk_sac/egos/remote/cpp"
+    subprocess.run(["make", f"OUT={tmp_path}"], cwd=folder, check=True)
+    with running([str(tmp_path / "ego")], tmp_path, deadline_s=60) as table:
+        register(monkeypatch, tmp_path, cpp=table)
+        results, records = play(spec_of("cpp", episodes=4), tmp_path / "run")
+    assert results.metrics.environment_steps > 200
+    assert all(record.outcome is not Outcome.INVALID for record in records)
