@@ -46,11 +46,8 @@ ROUTES = {
     ("GET", "/metrics"): ("admin", 200),
     ("GET", "/v1/families"): ("read", 200),
     ("GET", "/v1/methods"): ("read", 200),
-<<<<<<< HEAD
     ("GET", "/v1/formats"): ("read", 200),
-=======
     ("GET", "/v1/egos"): ("read", 200),
->>>>>>> f387696 (Egos that drive themselves: a seam, four shipped drivers, egos in other processes, and episodes that are invalid when one fails)
     ("GET", "/v1/campaigns"): ("read", 200),
     ("POST", "/v1/campaigns"): ("run", 202),
     ("POST", CHECK): ("run", 204),

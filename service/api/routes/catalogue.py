@@ -5,12 +5,14 @@ from dataclasses import asdict
 from fastapi import APIRouter
 
 from risk_sac.config import METHODS, EgoConfig
-<<<<<<< HEAD
+from risk_sac.egos.registry import cards
 from risk_sac.failures.export.formats import FORMATS
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import requirements_from_odd, widest
 from service.schemas.catalogue import (
+    Ego,
+    Egos,
     ExportFormat,
     ExportFormats,
     Families,
@@ -20,13 +22,6 @@ from service.schemas.catalogue import (
     SceneParameter,
     Signal,
 )
-=======
-from risk_sac.egos.registry import cards
-from risk_sac.risk.signals import SIGNALS
-from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.odd import requirements_from_odd, widest
-from service.schemas.catalogue import Ego, Egos, Families, Family, Methods, NamedMethod, SceneParameter, Signal
->>>>>>> f387696 (Egos that drive themselves: a seam, four shipped drivers, egos in other processes, and episodes that are invalid when one fails)
 
 PROFILES = {
     "default": "SUMO's default driver, with a driver's delay and a driver's view.",
@@ -56,7 +51,6 @@ def list_families() -> Families:
     return Families(items=items, signals=signals)
 
 
-<<<<<<< HEAD
 @router.get("/formats")
 def list_formats() -> ExportFormats:
     """Formats that failures and episodes can be exported in."""
@@ -73,7 +67,8 @@ def list_formats() -> ExportFormats:
         for name, row in FORMATS.items()
     ]
     return ExportFormats(items=items)
-=======
+
+
 @router.get("/egos")
 def list_egos() -> Egos:
     """Who can drive: SUMO's models by profile, and the egos that the operator has registered."""
@@ -89,7 +84,6 @@ def list_egos() -> Egos:
         for name, summary in PROFILES.items()
     ]
     return Egos(items=[*models, *map(Ego.model_validate, cards())])
->>>>>>> f387696 (Egos that drive themselves: a seam, four shipped drivers, egos in other processes, and episodes that are invalid when one fails)
 
 
 @router.get("/methods")
