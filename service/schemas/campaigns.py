@@ -73,7 +73,7 @@ class Driver(Body):
 
     profile: str
     car_following: str
-    driver: str | None
+    driver: str | None = None
     """Name of a registered ego; null: SUMO's models drive, as `profile` and `car_following` say."""
 
 

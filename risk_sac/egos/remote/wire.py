@@ -85,7 +85,7 @@ def decode(name: str, data: bytes) -> dict[str, Any]:
             field = fields.get(number)
             if field is not None:
                 message[field.name] = _value(field, wire, value, message.get(field.name))
-    except (IndexError, struct.error, TypeError, UnicodeDecodeError) as error:
+    except (AttributeError, IndexError, struct.error, TypeError, UnicodeDecodeError) as error:
         raise ValueError(f"{len(data)} bytes that are no {name}") from error
     return message
 
