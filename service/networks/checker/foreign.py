@@ -4,6 +4,7 @@ netconvert is started from here, so it is bound as this process is: in memory, i
 sees no document type, no included file and no option but ours, and what it makes is checked as any net.
 """
 
+import re
 import subprocess
 from pathlib import Path
 from xml.etree.ElementTree import ParseError
@@ -18,6 +19,7 @@ from service.networks.errors import UploadError
 from service.networks.limits import MAX_FOREIGN_DEPTH, MAX_FOREIGN_ELEMENTS, MAX_VALUE, WALL_S
 
 FORMATS = {"osm": Format.OSM, "OpenDRIVE": Format.OPENDRIVE}
+NOTES = re.compile(rb"<param [^>]*/>")  # where netconvert has something from; of a signal, the checker takes none
 MAP, CONVERTED = "map.xml", "converted.net.xml"
 # What netconvert does not need: other files, text, and projections that name files.
 LEFT_OUT = frozenset(("include", "userData", "dataQuality", "geoReference", "offset", "license"))
@@ -76,7 +78,7 @@ def converted(data: bytes, root: str) -> tuple[bytes, list[str]]:
     if done.returncode != 0:
         why = "; ".join(remarks(said, "Error")) or f"it ended with status {done.returncode}"
         raise UploadError(f"netconvert cannot convert the map: {why}")
-    net = Path(CONVERTED).read_bytes()
+    net = NOTES.sub(b"", Path(CONVERTED).read_bytes())
     for name in (MAP, CONVERTED):
         Path(name).unlink()
     return net, remarks(said, "Warning")
