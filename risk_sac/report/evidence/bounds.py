@@ -9,6 +9,7 @@ from risk_sac.records import RECORDED, EpisodeRecord, Outcome, Record
 from risk_sac.report.runs import FinishedRun
 
 CRASHED = "sim_crash"  # the reason of an episode that was left out because the simulator died in it
+NOT_PLAYED = (Outcome.REJECTED, Outcome.INVALID)
 
 
 class Bound(Record):
@@ -18,7 +19,7 @@ class Bound(Record):
     low: float
     """Clopper-Pearson, one-sided."""
     high: float
-    """Clopper-Pearson, one-sided; an episode in which the simulator crashed counts as one in which it happened."""
+    """Clopper-Pearson, one-sided; an episode without an end counts as one in which it happened."""
 
 
 class Drawn(Record):
@@ -31,8 +32,8 @@ class Drawn(Record):
     """That were drawn."""
     refused: int
     """By C_hard, before the first step: of these scenes nothing is said."""
-    crashed: int
-    """In which the simulator died."""
+    unended: int
+    """In which the simulator died, or the ego failed to drive: what would have happened, nobody knows."""
     played: int
     """All others."""
     contacts: Bound
@@ -53,27 +54,26 @@ def drawn(run: FinishedRun) -> Drawn:
     """
     if other := {record.phase for record in run.records} - {RECORDED["iid"]}:
         raise ConfigError(f"{run.spec.id} has episodes of the phase {min(other)!r}; wanted those of its own alone")
-    refused = [record for record in run.records if record.outcome is Outcome.REJECTED]
-    crashed = sum(record.reason == CRASHED for record in refused)
-    played = [record for record in run.records if record.outcome is not Outcome.REJECTED]
+    played = [record for record in run.records if record.outcome not in NOT_PLAYED]
+    unended = sum(record.outcome is Outcome.INVALID or record.reason == CRASHED for record in run.records)
     return Drawn.model_validate(
         {
             **{name: getattr(run.spec, name) for name in ("family", "method", "seed")},
             "scenes": len(run.records),
-            "refused": len(refused) - crashed,
-            "crashed": crashed,
+            "refused": len(run.records) - len(played) - unended,
+            "unended": unended,
             "played": len(played),
-            "contacts": _bound([record.collision is not None for record in played], crashed),
-            "failures": _bound([record.outcome is Outcome.FAILURE for record in played], crashed),
-            "preventable": _bound([_preventable(record) for record in played], crashed),
+            "contacts": _bound([record.collision is not None for record in played], unended),
+            "failures": _bound([record.outcome is Outcome.FAILURE for record in played], unended),
+            "preventable": _bound([_preventable(record) for record in played], unended),
         }
     )
 
 
-def _bound(happened: Sequence[bool], crashed: int) -> Bound:
-    count, trials = sum(happened), len(happened) + crashed
+def _bound(happened: Sequence[bool], unended: int) -> Bound:
+    count, trials = sum(happened), len(happened) + unended
     low, _ = clopper_pearson(count, trials)
-    _, high = clopper_pearson(count + crashed, trials)
+    _, high = clopper_pearson(count + unended, trials)
     return Bound(count=count, low=low, high=high)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from risk_sac.config import FamilyName, Interval, Odd
 from risk_sac.records import EpisodeRecord, Outcome, Record
 from risk_sac.report.evidence.bins import Axis, axis_of
+from risk_sac.report.evidence.bounds import NOT_PLAYED
 from risk_sac.report.evidence.taxonomy import Kinds, kinds
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.odd import TINY, field, intersect, narrow
@@ -28,7 +29,7 @@ class Bin(Record):
     failed: int
     """Valid failures."""
     refused: int
-    """Scenes that were not played."""
+    """Scenes that were not played, or not to the end."""
 
 
 class ParameterCoverage(Record):
@@ -91,7 +92,7 @@ def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Cove
     values = np.array([[record.scene[name] for name in space.names] for record in known], dtype=np.float64)
     counted = _Counted(
         columns=tuple(values.reshape(-1, space.dimension).T),
-        played=np.array([record.outcome is not Outcome.REJECTED for record in known], dtype=bool),
+        played=np.array([record.outcome not in NOT_PLAYED for record in known], dtype=bool),
         failed=np.array([record.outcome is Outcome.FAILURE for record in known], dtype=bool),
     )
     fine, coarse = (

@@ -60,8 +60,9 @@ def bounds(comparison: Comparison, evidence: Evidence) -> Section:
         columns = ["family", "traffic", "what", "of played", "at most", "at least", "scenes", "refused"]
         rows = [row for each in evidence.bounds for row in _rows(each)]
         blocks.append(Table("bounds", columns, rows, left=3))
-    if crashed := sum(each.crashed for each in evidence.bounds):
-        blocks.append(Paragraph(f"In {crashed} scenes the simulator died. Upper bounds count them as failures."))
+    if unended := sum(each.unended for each in evidence.bounds):
+        why = f"In {unended} scenes the simulator died, or the ego failed to drive"
+        blocks.append(Paragraph(f"{why}: upper bounds count them as failures."))
     if comparison.undrawn:
         lacking = [f"{run.spec.id}: {run.reason}" for run in comparison.undrawn]
         blocks += [Paragraph("Missing, and so without bounds:"), Items(lacking)]

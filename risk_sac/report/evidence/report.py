@@ -65,7 +65,10 @@ def _facts(comparison: Comparison) -> Iterator[tuple[str, str]]:
 
 
 def _versions(comparison: Comparison) -> str:
-    """An ego of SUMO's models is what these two packages are."""
+    """A registered ego's own; one of SUMO's models is what these two packages are."""
+    ego = comparison.spec.ego
+    if ego.driver is not None:
+        return ego.version or "not told"
     named = {name: comparison.versions.get(name) for name in ("libsumo", "risk-sac")}
     told = ", ".join(f"{name} {version}" for name, version in named.items() if version)
     return told or "unknown: no run has finished"
@@ -83,6 +86,8 @@ def _limits(comparison: Comparison) -> Section:
     items = list(LIMITS)
     if not all(run.verified for run in (*comparison.runs, *comparison.drawn)):
         items.append("Not all runs had their failures replayed: some may not repeat (risk-sac verify replays them).")
+    if invalid := sum(cell.invalid for cell in comparison.cells):
+        items.append(f"In {invalid} episodes of the search the ego failed to drive: they are in no rate.")
     blocks: list[Block] = [Items(items)]
     if comparison.missing:
         rows = [[run.spec.family, run.spec.method, str(run.spec.seed), run.reason] for run in comparison.missing]

@@ -33,18 +33,26 @@ FIELDS: Mapping[str, tuple[str, str]] = {
 
 def ego_in_words(ego: EgoConfig) -> str:
     """Who drives, how fast it reacts, and what it sees."""
+    if ego.driver is not None:
+        parts = [f"registered driver {ego.driver}", f"responds within {ego.response_s:g} s"]
+        return ", ".join([*parts, *_sight(ego)])
     parts = [
         f"profile {ego.profile} ({PROFILES[ego.profile]})",
         f"car-following model {ego.car_following}",
         f"decides every {ego.reaction_time_s:g} s",
     ]
-    sensor = ego.sensor
-    if sensor is None:
-        return ", ".join([*parts, "sees everything"])
-    degrees = math.degrees(sensor.field_of_view_rad)
-    parts.append(f"sees {sensor.range_m:g} m far over {degrees:.0f}°")
-    parts.append("not through vehicles" if sensor.occlusion else "through vehicles too")
-    return ", ".join([*parts, f"reckons for {sensor.memory_s:g} s with whom it has lost from sight"])
+    return ", ".join([*parts, *_sight(ego)])
+
+
+def _sight(ego: EgoConfig) -> Iterator[str]:
+    """What it sees."""
+    if ego.sensor is None:
+        yield "sees everything"
+        return
+    degrees = math.degrees(ego.sensor.field_of_view_rad)
+    yield f"sees {ego.sensor.range_m:g} m far over {degrees:.0f}°"
+    yield "not through vehicles" if ego.sensor.occlusion else "through vehicles too"
+    yield f"reckons for {ego.sensor.memory_s:g} s with whom it has lost from sight"
 
 
 def odd_in_words(family: Family, odd: Odd) -> Iterator[tuple[str, str]]:

@@ -29,16 +29,24 @@ def test_nothing_of_300_is_at_most_a_hundredth(finished):
 
 def test_contacts_valid_and_preventable_failures_are_of_the_scenes_that_were_played(finished):
     found = drawn(run_of(finished, "....rfFad."))
-    assert (found.scenes, found.refused, found.crashed, found.played) == (10, 1, 0, 9)
+    assert (found.scenes, found.refused, found.unended, found.played) == (10, 1, 0, 9)
     assert [each.count for each in (found.contacts, found.failures, found.preventable)] == [4, 2, 1]
     assert (found.failures.low, found.failures.high) == clopper_pearson(2, 9)
 
 
 def test_a_crash_of_the_simulator_may_have_been_a_failure_or_none(finished):
     found = drawn(run_of(finished, "...frr", crashed=1))
-    assert (found.refused, found.crashed, found.played, found.failures.count) == (1, 1, 4, 1)
+    assert (found.refused, found.unended, found.played, found.failures.count) == (1, 1, 4, 1)
     assert found.failures.low == clopper_pearson(1, 5)[0]
     assert found.failures.high == clopper_pearson(2, 5)[1]
+
+
+def test_an_ego_that_failed_to_drive_may_have_failed_or_not(finished):
+    run = run_of(finished, "...f.")
+    invalid = run.records[4].model_copy(update={"outcome": Outcome.INVALID, "reason": "ego_deadline"})
+    found = drawn(replace(run, records=(*run.records[:4], invalid)))
+    assert (found.refused, found.unended, found.played, found.failures.count) == (0, 1, 4, 1)
+    assert (found.failures.low, found.failures.high) == (clopper_pearson(1, 5)[0], clopper_pearson(2, 5)[1])
 
 
 def test_bounds_are_never_drawn_from_a_search(finished):
