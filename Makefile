@@ -20,7 +20,9 @@ $(STAMP): pyproject.toml constraints.txt
 	@python=$$($(FIND_PYTHON)); \
 	if [ -z "$$python" ]; then echo "make: found neither python3.11 nor python3.12; install one of them" >&2; exit 1; fi; \
 	test -x $(PYTHON) || "$$python" -m venv .venv
-	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,export]"
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,export,s3]"
+	@# By itself: commonroad-io insists on protobuf 3.20.2, where Ray says that it wants 3.20.3; it works with either.
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps "ray==2.60.*"
 	@echo "compiling, once: else it would be a part of the first searches' processor time"; set -e; \
 	folder=$$(mktemp -d); trap 'rm -r "$$folder"' EXIT; \
 	for run in "low --method archive --episodes 60" "mixed --method risk-sac --episodes 15"; do \
@@ -62,6 +64,8 @@ torture: $(STAMP) ## kill, fill, damage and fuzz the service in earnest, about t
 	$(PYTHON) -m pytest -m torture --timeout 7200 tests/acceptance tests/integration tests/unit
 	RISK_SAC_TORTURE=full RISK_SAC_SCHEMATHESIS_CASES=20000 $(PYTHON) -m pytest -m "not bench" --timeout 7200 \
 		tests/torture tests/contract/test_fuzzing.py
+	for times in "worker --times 30" "raylet --times 10" "head --times 5" "server --times 10"; do \
+		$(PYTHON) -m tests.torture.ray_numbers kills --of $$times || exit 1; done
 
 load: $(STAMP) ## poll and follow the service while it searches, and fill its database; half an hour on a quiet machine
 	$(PYTHON) -m tests.load.run

@@ -70,8 +70,10 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         to_thread.current_default_thread_limiter().total_tokens = READERS
-        chosen = executor or executor_named(settings.executor)(program(settings))
-        with opened(settings, chosen, latencies, made) as context:
+        with (
+            closing(executor or executor_named(settings.executor)(program(settings))) as chosen,
+            opened(settings, chosen, latencies, made) as context,
+        ):
             app.state.context = context
             yield
 

@@ -2,15 +2,17 @@
 
 import os
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FilePath
 from pydantic_core import from_json
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from risk_sac.execution.executors import ExecutorName
+from risk_sac.execution.ray.settings import RaySettings
 from risk_sac.run_folder.verified import TIMES
 
+MOST_WORKERS = 1024
 SECRETS = os.environ.get("RISK_SAC_SECRETS_DIR")
 
 
@@ -28,7 +30,11 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class ServiceSettings(BaseSettings):
+def _most_workers(given: dict[str, Any]) -> int:
+    return MOST_WORKERS if given.get("executor") == "ray" else _cores()
+
+
+class ServiceSettings(RaySettings, BaseSettings):
     """Where the server listens, what it may use, whom it lets in, and how patient it is."""
 
     model_config = SettingsConfigDict(
@@ -50,9 +56,10 @@ class ServiceSettings(BaseSettings):
     """TOML file that registers egos in processes of their own, see `risk_sac/egos/README.md`."""
 
     executor: ExecutorName = "local"
-    """Where runs are executed; `local`: in processes of this machine."""
-    max_workers: Annotated[int, Field(ge=1, le=1024)] = Field(default_factory=_cores)
-    """Runs executed at the same time, each in a process of its own; by default one per core."""
+    """Where runs are executed; `local`: in processes of this machine; `ray`: on a cluster."""
+    max_workers: Annotated[int, Field(ge=1, le=MOST_WORKERS)] = Field(default_factory=_most_workers)
+    """Runs executed at the same time, each in a process of its own; by default one per core, or as many as the cluster
+    has room for."""
     worker_module: str = "service.worker"
     """Module that executes one run, started as `python -m`."""
     worker_niceness: Annotated[int, Field(ge=0, le=19)] = 5

@@ -29,7 +29,18 @@ def add_evaluate(commands: Commands) -> None:
     evaluate.set_defaults(command=_evaluate)
     add_map_flags(evaluate, several=True)
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
-    evaluate.add_argument("--jobs", type=int, metavar="N", help="runs at a time (default: one per core)")
+    evaluate.add_argument(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help="runs at a time (default: one per core, or what a cluster has room for)",
+    )
+    evaluate.add_argument(
+        "--executor",
+        default=os.environ.get("RISK_SAC_EXECUTOR", "local"),
+        metavar="NAME",
+        help="where runs execute: `local` or, on a cluster, `ray` (default: RISK_SAC_EXECUTOR or local)",
+    )
     evaluate.add_argument(
         "--verify",
         type=int,
@@ -49,10 +60,10 @@ def _evaluate(options: argparse.Namespace) -> int:
     from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
 
     with progress_bar() as bar:
-        jobs = options.jobs if options.jobs is not None else os.cpu_count() or 1
-        executor = os.environ.get("RISK_SAC_EXECUTOR", "local")
+        fill = os.cpu_count() or 1 if options.executor == "local" else len(spec.runs())
+        jobs = options.jobs if options.jobs is not None else fill
         progress = partial(drawn, Board(bar))
-        evaluation = evaluate(spec, options.out, options.typed, jobs, progress, executor, options.verify)
+        evaluation = evaluate(spec, options.out, options.typed, jobs, progress, options.executor, options.verify)
     for job in evaluation.failed:
         complain(f"{job.name}: {job.reason}")
     comparison = evaluation.comparison

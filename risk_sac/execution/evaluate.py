@@ -6,9 +6,10 @@ DIR/table.{json,md,csv}, DIR/figures/    see `risk_sac.report`
 """
 
 import fcntl
+import os
 import signal
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -71,9 +72,11 @@ def evaluate(
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
     with _claimed(spec, folder) as lock, stop_signal((*STOPPING, *hung_up)) as stopping:
         queue = [Job(spec=run, folder=folder / RUNS / run.id) for run in spec.runs()]
-        Queue(queue, make_executor(program(folder / SPEC, lock)), progress).execute(jobs, stopping)
+        with closing(make_executor(program(folder / SPEC, lock))) as chosen:
+            Queue(queue, chosen, progress).execute(jobs, stopping)
         if times and not stopping():
-            verify([job.folder for job in queue if job.state == "finished"], times, jobs, stopping)
+            finished = [job.folder for job in queue if job.state == "finished"]
+            verify(finished, times, min(jobs, os.cpu_count() or 1), stopping)  # here, wherever they were executed
         comparison = _report(spec, folder, command, queue)
         return Evaluation(
             comparison=comparison,

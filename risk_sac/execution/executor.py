@@ -19,6 +19,7 @@ class Cause(StrEnum):
     KILLED = "killed"  # by somebody else: the kernel for want of memory, an operator
     STOPPED = "stopped"  # it gave no sign of life or finished nothing, and was killed for that
     CRASHED = "crashed"  # by itself, without a last word
+    LOST = "lost"  # with the whole cluster that it ran on, which says nothing about the run
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +54,38 @@ class Program(Generic[Word]):
     says nothing, and writes all that it prints to its log."""
     inherited: tuple[int, ...] = ()
     """Open files that a worker on this machine keeps open, as a lock is."""
+    inputs: tuple[Path, ...] = ()
+    """Text files that the arguments name; a worker on another machine is given copies."""
     lease_s: float = math.inf
     """It is killed once it neither says anything nor uses its processor for so long, s."""
     stall_s: float = math.inf
     """It is killed once it finishes no episode for so long, s."""
     linger_s: float = math.inf
     """It is killed once it is still there so long after its last word, s."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Node:
+    """A machine of the cluster."""
+
+    id: str  # Ray's; several nodes may share an address
+    address: str
+    alive: bool
+    slots: int  # runs that it has room for
+    runs: int = 0  # of this server's, at work on it
+    silent_s: float = 0.0  # since the last report of the one that was heard last; 0 without any
+
+
+@dataclass(frozen=True, slots=True)
+class Cluster:
+    """What the cluster looks like, told every few seconds."""
+
+    nodes: tuple[Node, ...] = ()
+
+    @property
+    def slots(self) -> int:
+        """Runs that it has room for."""
+        return sum(node.slots for node in self.nodes if node.alive)
 
 
 class Executor(Protocol[Word]):
@@ -90,3 +117,14 @@ class Executor(Protocol[Word]):
 
     def wake(self) -> None:
         """Let a waiting `events` return early."""
+
+    @property
+    def slots(self) -> float:
+        """How many attempts it has room for at present; infinite where whoever submits has to know."""
+
+    @property
+    def cluster(self) -> Cluster | None:
+        """The machines that it has, as they were a few seconds ago; None if there is but this one."""
+
+    def close(self) -> None:
+        """Lets go of what it holds, when nothing is at work any more."""

@@ -7,9 +7,17 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Executor, Program
 from risk_sac.execution.local import LocalExecutor
 
-ExecutorName = Literal["local"]
+ExecutorName = Literal["local", "ray"]
 MakeExecutor = Callable[[Program[Any]], Executor[Any]]
-EXECUTORS: Mapping[ExecutorName, MakeExecutor] = {"local": LocalExecutor}
+
+
+def _on_ray(program: Program[Any]) -> Executor[Any]:
+    from risk_sac.execution.ray.executor import RayExecutor  # here: who does not want it does not load it
+
+    return RayExecutor(program)
+
+
+EXECUTORS: Mapping[ExecutorName, MakeExecutor] = {"local": LocalExecutor, "ray": _on_ray}
 
 
 def executor_named(name: str) -> MakeExecutor:

@@ -57,6 +57,24 @@ class LocalExecutor(Generic[Word]):
         """See `Executor.wake`."""
         self._mailbox.wake()
 
+    @property
+    def slots(self) -> float:
+        """As many as there is patience for: whoever submits knows this machine."""
+        return math.inf
+
+    @property
+    def cluster(self) -> None:
+        """There is none."""
+
+    def close(self) -> None:
+        """Holds nothing."""
+
+    def pid(self, number: int) -> int | None:
+        """Of the process at work on a run, which leads a group of its own; None if there is none."""
+        with self._lock:
+            worker = self._workers.get(number)
+            return None if worker is None else worker.process.pid
+
     def cancel(self, number: int, grace_s: float) -> None:
         """SIGTERM now; SIGKILL once the grace time is over."""
         with self._lock:

@@ -10,7 +10,7 @@ from typing import Literal, Never
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import Executor, Exited, Program
+from risk_sac.execution.executor import Cause, Executor, Exited, Program
 from risk_sac.execution.postmortem import signal_name
 from risk_sac.run_folder.crashes import PATIENCE
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
@@ -32,6 +32,7 @@ class Job:
     folder: Path
     state: State = "waiting"
     attempts: int = 0
+    lost: int = 0  # of them, with the cluster that they ran on
     reason: str = "not started"  # why it is not finished
     _read: int = field(default=0, repr=False)  # bytes of its episodes counted so far
     _episodes: int = field(default=0, repr=False)
@@ -88,7 +89,7 @@ def program(spec_file: Path, lock: int) -> Program[Never]:
         picked = ["--family", spec.family, "--method", spec.method, "--seed", str(spec.seed)]
         return ["-m", "risk_sac", "run", "--spec", str(spec_file), *picked, "--out", str(folder)]
 
-    return Program(arguments=arguments, log=LOG, hear=None, inherited=(lock,))
+    return Program(arguments=arguments, log=LOG, hear=None, inherited=(lock,), inputs=(spec_file,))
 
 
 class Queue:
@@ -106,7 +107,7 @@ class Queue:
         told_to_stop = False
         try:
             while self._running or (waiting and not stopping()):
-                while waiting and len(self._running) < processes and not stopping():
+                while waiting and len(self._running) < min(processes, self._executor.slots) and not stopping():
                     self._begin(waiting.popleft())
                 if stopping() and not told_to_stop:
                     told_to_stop = True
@@ -149,9 +150,10 @@ class Queue:
             job = self._running.pop(number)
             if self._settled_after(job, exited):
                 continue
+            job.lost += exited.cause is Cause.LOST
             if stopping:
                 job.state, job.reason = "stopped", f"stopped after {job.done()} of {job.total} episodes"
-            elif exited.status == MISUSED or job.attempts == ATTEMPTS:
+            elif exited.status == MISUSED or job.attempts - job.lost == ATTEMPTS:
                 job.state, job.reason = "failed", _why(job, exited)
             else:
                 job.state = "waiting"

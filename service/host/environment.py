@@ -24,7 +24,9 @@ def read_settings() -> ServiceSettings:
     try:
         return ServiceSettings()
     except ValidationError as error:
-        raise ConfigError("\n".join(dict.fromkeys(map(_line, error.errors())))) from error
+        # A default that depends on other settings is not wrong because they are.
+        wrong = [each for each in error.errors() if each["type"] != "default_factory_not_called"]
+        raise ConfigError("\n".join(dict.fromkeys(map(_line, wrong)))) from error
     except OSError as error:
         raise ConfigError(f"secret {error.filename!r} cannot be read ({error.strerror})") from error
 

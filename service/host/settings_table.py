@@ -18,9 +18,14 @@ def table() -> str:
     prefix = ServiceSettings.model_config["env_prefix"]
     rows = [
         f"| `{prefix}{name.upper()}` | {takes(field)} | {_default(field)} | {' '.join(field['description'].split())} |"
-        for name, field in ServiceSettings.model_json_schema()["properties"].items()
+        for name, field in sorted(ServiceSettings.model_json_schema()["properties"].items(), key=_of_ray)
     ]
     return "\n".join(["| variable | takes | default | meaning |", "|---|---|---|---|", *rows])
+
+
+def _of_ray(setting: tuple[str, dict[str, Any]]) -> bool:
+    """They come last; all others stay in their order."""
+    return setting[0].startswith("ray_")
 
 
 def with_table(text: str) -> str:

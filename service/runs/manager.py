@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from risk_sac.config import CampaignSpec
-from risk_sac.execution.executor import Cause, Executor, Exited
+from risk_sac.execution.executor import Cause, Cluster, Executor, Exited
 from risk_sac.problem import checked_campaign
 from service.errors import ConflictError, OutdatedError, StorageError
 from service.runs.active import Active
@@ -62,6 +62,11 @@ class Manager:
     def storage_problem(self) -> str | None:
         """Why campaigns are paused, while they are."""
         return self._storage.reason
+
+    @property
+    def cluster(self) -> Cluster | None:
+        """The cluster that runs execute on; None where they execute on this machine."""
+        return self._executor.cluster
 
     def start(self) -> None:
         """Take up what an earlier server left, then work the queue.
@@ -248,7 +253,7 @@ class Manager:
         """A worker was lost: another one goes on from its checkpoint, unless that has failed too often."""
         number = active.run.number
         reason = exited.reason or "worker stopped before its run was done"
-        self._deaths[number] += 1
+        self._deaths[number] += exited.cause is not Cause.LOST  # which is nothing that the run has done
         self.restarts[exited.cause] += 1
         logger.warning("%s; attempt %d", reason, self._deaths[number], extra=active.ids)
         if self._deaths[number] < self._settings.attempts:
@@ -258,7 +263,7 @@ class Manager:
             self._ledger.end_run(number, State.FAILED, f"{reason}; {times}")
 
     def _launch_waiting(self) -> None:
-        while len(self._active) < self._settings.max_workers:
+        while len(self._active) < min(self._settings.max_workers, self._executor.slots):
             number = self._next()
             if number is None:
                 return

@@ -60,21 +60,22 @@ class Runs:
     """An executor at work: the program of a run is the code that was submitted for it."""
 
     def __init__(self, make: MakeExecutor, folder: Path, **patience: Any) -> None:
-        self._codes: dict[Path, str] = {}
+        self._codes: dict[str, str] = {}  # by the name of the run's folder
         self._folder = folder
         self._numbers: set[int] = set()
         program = Program(arguments=self._arguments, log="log", hear=hear, **{"linger_s": LONG_S} | patience)
         self.executor: Executor[str] = make(program)
 
     def _arguments(self, spec: RunSpec, folder: Path) -> list[str]:
-        return ["-c", WORKER + self._codes[folder], str(folder)]
+        # A worker elsewhere is given another folder to work in; here it meets the test in the run's own.
+        return ["-c", WORKER + self._codes[folder.name], str(self._folder / folder.name)]
 
     def folder(self, number: int, attempt: int = 1) -> Path:
         return self._folder / f"{number}-{attempt}"
 
     def submit(self, code: str, number: int = 1, attempt: int = 1) -> None:
         folder = self.folder(number, attempt)
-        self._codes[folder] = code
+        self._codes[folder.name] = code
         self.executor.submit(number, attempt, SPEC, folder)
         self._numbers.add(number)
 
@@ -111,6 +112,7 @@ class Runs:
         """Ends what is still there."""
         for number in self._numbers:
             self.executor.cancel(number, 0)
+        self.executor.close()
 
 
 def outcome(told: list[tuple[int, str | Exited]]) -> tuple[list[str], Cause]:

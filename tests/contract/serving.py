@@ -1,5 +1,6 @@
 """The real app on a real socket, with an executor that starts nothing."""
 
+import math
 import socket
 import threading
 import time
@@ -17,6 +18,8 @@ from service.workers.messages import Event
 
 class IdleExecutor:
     """Accepts runs and leaves them waiting until they are cancelled."""
+
+    slots, cluster = math.inf, None
 
     def __init__(self) -> None:
         self._cancelled: list[int] = []
@@ -37,6 +40,9 @@ class IdleExecutor:
 
     def wake(self) -> None:
         self._wake.set()
+
+    def close(self) -> None:
+        pass
 
 
 @contextmanager

@@ -1,8 +1,10 @@
 import re
 import shlex
 import subprocess
+import tomllib
 from pathlib import Path
 
+import jsonschema_rs
 import pytest
 import yaml
 from smoke_test import chroot_engine
@@ -16,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "service" / "README.md").read_text(encoding="utf-8")
 DOCKERFILE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
 COMPOSE = (ROOT / "docker" / "compose.yaml").read_text(encoding="utf-8")
+KUBERAY = (ROOT / "docker" / "kuberay.yaml").read_text(encoding="utf-8")
 # No setting of the service: a shell's own, which name the image, what is published and where secrets lie.
 OTHERS = {
     "RISK_SAC_SECRETS_DIR",
@@ -44,7 +47,7 @@ def test_table_of_settings_in_the_readme_is_what_the_settings_generate():
 def test_table_has_a_row_for_each_setting():
     rows = with_table(f"{BEGIN}{END}").splitlines()
     named = [row.split("`")[1] for row in rows if row.startswith("| `")]
-    assert named == [f"RISK_SAC_{name.upper()}" for name in ServiceSettings.model_fields]
+    assert sorted(named) == sorted(f"RISK_SAC_{name.upper()}" for name in ServiceSettings.model_fields)
 
 
 def test_text_without_the_marks_of_the_table_is_refused():
@@ -55,7 +58,7 @@ def test_text_without_the_marks_of_the_table_is_refused():
 def test_containers_set_no_variable_that_is_none():
     known = {f"RISK_SAC_{name.upper()}" for name in ServiceSettings.model_fields} | OTHERS
     workflow = (ROOT / "docker" / "workflow.yaml").read_text(encoding="utf-8")
-    assert set(re.findall(r"RISK_SAC_\w+", DOCKERFILE + COMPOSE + workflow)) <= known
+    assert set(re.findall(r"RISK_SAC_\w+", DOCKERFILE + COMPOSE + KUBERAY + workflow)) <= known
 
 
 def test_service_of_the_compose_file_gets_its_secrets_as_settings(compose):
@@ -109,3 +112,85 @@ def test_engine_without_an_engine_understands_each_command_of_the_workflow(workf
 def test_script_is_executable_bash(script):
     assert (ROOT / script).stat().st_mode & 0o111 or script == ".ci/run"
     subprocess.run(["bash", "-n", ROOT / script], check=True)
+
+
+# What `kubectl` would say of a RayCluster: the fields of ray.io/v1 that KubeRay 1.x requires, and those that are used.
+RAY_CLUSTER = {
+    "type": "object",
+    "required": ["apiVersion", "kind", "metadata", "spec"],
+    "properties": {
+        "apiVersion": {"const": "ray.io/v1"},
+        "kind": {"const": "RayCluster"},
+        "spec": {
+            "type": "object",
+            "required": ["headGroupSpec"],
+            "additionalProperties": False,
+            "properties": {
+                "rayVersion": {"type": "string"},
+                "enableInTreeAutoscaling": {"type": "boolean"},
+                "headGroupSpec": {
+                    "type": "object",
+                    "required": ["rayStartParams", "template"],
+                    "additionalProperties": False,
+                    "properties": {
+                        "serviceType": {"type": "string"},
+                        "rayStartParams": {"type": "object", "additionalProperties": {"type": "string"}},
+                        "template": {"$ref": "#/$defs/pod"},
+                    },
+                },
+                "workerGroupSpecs": {
+                    "type": "array",
+                    "items": {
+                        "type": "object",
+                        "required": ["groupName", "minReplicas", "maxReplicas", "rayStartParams", "template"],
+                        "additionalProperties": False,
+                        "properties": {
+                            "groupName": {"type": "string"},
+                            **{name: {"type": "integer"} for name in ("replicas", "minReplicas", "maxReplicas")},
+                            "rayStartParams": {"type": "object", "additionalProperties": {"type": "string"}},
+                            "template": {"$ref": "#/$defs/pod"},
+                        },
+                    },
+                },
+            },
+        },
+    },
+    "$defs": {
+        "pod": {
+            "type": "object",
+            "required": ["spec"],
+            "properties": {
+                "spec": {
+                    "type": "object",
+                    "required": ["containers"],
+                    "properties": {"containers": {"type": "array", "minItems": 1, "items": {"required": ["name"]}}},
+                }
+            },
+        }
+    },
+}
+
+
+def test_manifest_for_kuberay_has_the_fields_that_its_schema_wants():
+    documents = {each["kind"]: each for each in yaml.safe_load_all(KUBERAY)}
+    jsonschema_rs.validator_for(RAY_CLUSTER).validate(documents["RayCluster"])
+    spec = documents["RayCluster"]["spec"]
+    (extra,) = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["ray"]
+    assert extra == f"ray=={spec['rayVersion'].rpartition('.')[0]}.*"
+    pods = [spec["headGroupSpec"]["template"], *(group["template"] for group in spec["workerGroupSpecs"])]
+    pods.append(documents["Deployment"]["spec"]["template"])
+    for pod in pods:
+        (container,) = pod["spec"]["containers"]
+        environment = {each["name"]: each for each in container["env"]}
+        assert environment["RAY_AUTH_MODE"]["value"] == "token"
+        assert "secretKeyRef" in environment["RAY_AUTH_TOKEN"]["valueFrom"]
+
+
+def test_compose_has_a_cluster_of_a_head_and_two_workers_that_want_a_token(compose):
+    ray = {name: each for name, each in compose.items() if each.get("profiles") == ["ray"]}
+    assert set(ray) == {"service-ray", "ray-head", "ray-worker-1", "ray-worker-2"}
+    for each in ray.values():
+        assert each["environment"]["RAY_AUTH_MODE"] == "token"
+        assert each["environment"]["RAY_AUTH_TOKEN_PATH"] == "/run/secrets/ray_token"
+        assert "ray_token" in each["secrets"]
+    assert ray["service-ray"]["environment"]["RISK_SAC_EXECUTOR"] == "ray"

@@ -25,6 +25,11 @@ def test_the_server_process_loads_nothing_that_learns_compiles_or_simulates_and_
     assert not {"torch", "libsumo", "botorch", "gpytorch", "numba", "matplotlib", "service.worker"} & loaded
 
 
+def test_the_server_loads_nothing_of_a_cluster_that_it_does_not_use(loaded: set[str]) -> None:
+    assert "risk_sac.execution.local" in loaded
+    assert not {"ray", "fsspec", "risk_sac.execution.ray.executor", "risk_sac.execution.ray.bridge"} & loaded
+
+
 def test_the_server_reads_no_upload_itself(loaded: set[str]) -> None:
     assert "service.networks.sandbox" in loaded
     assert "defusedxml" not in loaded

@@ -64,7 +64,8 @@ class Room:
     def __init__(self, settings: ServiceSettings) -> None:
         self.head_s = settings.head_timeout_s
         # Of those that go, some still have their descriptor when the next ones are accepted.
-        others = OWN_FILES + WORKER_FILES * settings.max_workers + 4 * _accepted_at_once()
+        workers = settings.max_workers if settings.executor == "local" else 0
+        others = OWN_FILES + WORKER_FILES * workers + 4 * _accepted_at_once()
         possible = max(FEWEST, _descriptors() - others)
         self._most = min(possible, settings.max_connections or possible)
         self._open: set[Connection] = set()

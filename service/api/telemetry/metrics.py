@@ -5,13 +5,14 @@ What is stored is counted when it is asked for, so that it survives restarts and
 
 import threading
 from collections import Counter as Counts
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from prometheus_client import CollectorRegistry, Histogram, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.registry import Collector
 from pydantic_core import from_json
 
+from risk_sac.execution.executor import Cluster, Node
 from service.errors import StorageError
 from service.runs.manager import Manager
 from service.store.reading import Store
@@ -32,6 +33,12 @@ COUNTERS = {
         "The distinct ones of the preventable failures.",
     ),
 }
+NODE_GAUGES: tuple[tuple[str, str, Callable[[Node], float]], ...] = (
+    ("alive", "Whether the cluster counts the node as alive.", lambda node: node.alive),
+    ("slots", "Runs that the node has room for.", lambda node: node.slots),
+    ("runs", "Runs at work on the node.", lambda node: node.runs),
+    ("silent_seconds", "Since a run on the node was heard of, at least.", lambda node: node.silent_s),
+)
 RATES = {"ecr": "Valid failures", "pcr": "Preventable failures"}
 
 
@@ -65,6 +72,7 @@ class CampaignMetrics(Collector):
 
     def collect(self) -> Iterator[Metric]:
         """All families; without those of the database while it cannot be read."""
+        yield from _of_cluster(self._manager.cluster)
         refusal = self._manager.storage_problem
         restarts = CounterMetricFamily("risk_sac_worker_restarts", "Workers lost and replaced.", labels=["cause"])
         for cause, count in sorted(self._manager.restarts.items()):
@@ -94,6 +102,18 @@ class CampaignMetrics(Collector):
                 ):  # not before the first episode; the PCR not in what is older than judgements
                     gauge.add_metric([run.campaign_id, run.id, run.family, run.method], metrics[name])
             yield gauge
+
+
+def _of_cluster(cluster: Cluster | None) -> Iterator[Metric]:
+    """Each node of the cluster that runs execute on; nothing where they execute on this machine."""
+    if cluster is None:
+        return
+    yield GaugeMetricFamily("risk_sac_cluster_connected", "Whether there is a cluster.", value=int(bool(cluster.nodes)))
+    for name, meaning, of in NODE_GAUGES:
+        gauge = GaugeMetricFamily(f"risk_sac_node_{name}", meaning, labels=["node"])
+        for node in cluster.nodes:
+            gauge.add_metric([f"{node.address}/{node.id[:8]}"], of(node))
+        yield gauge
 
 
 class _Monotone:

@@ -1,3 +1,4 @@
+import math
 import queue
 import time
 
@@ -15,6 +16,8 @@ SPEC = CampaignSpec(families=("low",), methods=("random",))
 
 class Scripted:
     """An executor whose attempts do what the test says, one after the other."""
+
+    slots, cluster = math.inf, None
 
     def __init__(self, *attempts):
         self._attempts = list(attempts)
@@ -36,6 +39,9 @@ class Scripted:
         pass
 
     def wake(self):
+        pass
+
+    def close(self):
         pass
 
 
@@ -65,6 +71,14 @@ def test_a_lost_run_is_submitted_again_as_its_next_attempt(execute, metrics):
     assert (run.state, run.attempts) == ("succeeded", 3)
     assert executor.submitted == [(run.number, attempt) for attempt in (1, 2, 3)]
     assert manager.restarts == {Cause.KILLED: 2}
+
+
+def test_a_run_that_loses_its_cluster_again_and_again_has_not_failed(execute, metrics):
+    lost, done = Exited("the cluster was lost", Cause.LOST), Exited(None, Cause.ENDED, 0)
+    finished = Finished(finished=True, metrics=metrics, evaluation=None, digest="d", versions={}, wall_s=1.0)
+    run, _, manager = execute(*[[lost]] * 6, [finished, done])
+    assert (run.state, run.attempts) == ("succeeded", 7)
+    assert manager.restarts == {Cause.LOST: 6}
 
 
 def test_a_worker_that_stops_although_nobody_asked_was_told_to_by_somebody_else(execute, metrics):

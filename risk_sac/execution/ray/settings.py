@@ -1,0 +1,55 @@
+"""What the executor on Ray has to be told: RISK_SAC_RAY_* environment variables."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, ValidationError
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from risk_sac.errors import ConfigError
+
+
+class RaySettings(BaseSettings):
+    """Where the cluster is, what a run takes of it, and where its files go."""
+
+    model_config = SettingsConfigDict(
+        env_prefix="RISK_SAC_",
+        frozen=True,
+        use_attribute_docstrings=True,
+        secrets_dir=os.environ.get("RISK_SAC_SECRETS_DIR"),
+    )
+
+    ray_address: str = "auto"
+    """Address of the Ray cluster's head, `HOST:PORT`; `auto`: the cluster that this machine is a part of."""
+    ray_join: bool = False
+    """Whether this machine joins the cluster by itself, as a node that executes nothing; else it is one already."""
+    ray_cpus_per_run: Annotated[float, Field(gt=0, le=1024)] = 1.0
+    """Processors that a run takes of its node."""
+    ray_memory_bytes_per_run: Annotated[int, Field(ge=0)] = 1 << 30
+    """Memory that a run takes of its node, as Ray counts it, bytes; 0 leaves it uncounted."""
+    ray_storage: str | None = None
+    """URL under which nodes and server exchange checkpoints and series, as fsspec has it (`s3://bucket/folder`); by
+    default the run's own folder, which then has to be the same on all of them."""
+    ray_scratch_dir: Path = Path("/tmp/risk-sac")
+    """Folder of every node in which runs work."""
+    ray_lease_s: Annotated[float, Field(ge=1, le=600)] = 15.0
+    """A node of which nothing is heard for so long is lost, and its runs are resumed elsewhere, s."""
+
+
+def read_settings() -> RaySettings:
+    """The settings of this process.
+
+    Raises:
+      ConfigError: one is wrong; its field is the variable.
+    """
+    try:
+        return RaySettings()
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ConfigError(f"got {first['input']!r}; {first['msg']}", field=variable(str(first["loc"][0]))) from error
+
+
+def variable(name: str) -> str:
+    """The environment variable of a setting."""
+    return f"RISK_SAC_{name.upper()}"

@@ -1,0 +1,161 @@
+"""A Ray cluster of the tests' own: nodes that are processes of this machine, with a token, ended by their ids."""
+
+import contextlib
+import os
+import secrets
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+import psutil
+import pytest
+
+needs_ray = pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
+
+ROOT = Path(__file__).parents[1]
+STORE_BYTES = 80_000_000
+LONG_S = 300
+GONE_S = 30
+# Nothing that a test does not need: each process of Ray that is started in advance takes a second of a processor.
+FRUGAL = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_enable_metrics_collection": "false",
+    "RAY_prestart_worker_first_driver": "false",
+    "RAY_enable_worker_prestart": "false",
+}
+
+
+class Cluster:
+    """Nodes that share this machine; the first is the head.
+
+    Attributes:
+      environment: what those who use it need.
+      nodes: what was started for each node, by its number.
+    """
+
+    def __init__(self, folder: Path, cpus: int, **environment: str) -> None:
+        # Ray's sockets lie in there, whose paths must be short.
+        self.temp = Path(tempfile.mkdtemp(prefix="rs", dir="/tmp"))
+        self.port = free_port()
+        self.cpus = cpus
+        self.nodes: dict[int, psutil.Popen] = {}
+        self.scratch = folder / "scratch"
+        self._log = folder / "ray.log"
+        paths = [str(ROOT), str(ROOT / "tests" / "integration"), os.environ.get("PYTHONPATH", "")]
+        self.environment = {
+            "RISK_SAC_EXECUTOR": "ray",
+            "RISK_SAC_RAY_ADDRESS": f"127.0.0.1:{self.port}",
+            "RISK_SAC_RAY_SCRATCH_DIR": str(self.scratch),
+            "RISK_SAC_RAY_MEMORY_BYTES_PER_RUN": "0",
+            "RAY_AUTH_MODE": "token",
+            "RAY_AUTH_TOKEN": secrets.token_hex(16),
+            "PYTHONPATH": os.pathsep.join(paths),
+            "OMP_NUM_THREADS": "1",
+            **FRUGAL,
+            **environment,
+        }
+
+    def start(self, nodes: int) -> None:
+        """The head, and then the others."""
+        for number in range(nodes):
+            self.add(number)
+
+    def add(self, number: int, **environment: str) -> None:
+        """Starts a node; 0 is the head. `ray start --block` stays beside what it started."""
+        where = (
+            ["--head", f"--port={self.port}", "--include-dashboard=false", f"--temp-dir={self.temp}"]
+            if number == 0
+            else [f"--address=127.0.0.1:{self.port}"]
+        )
+        with self._log.open("ab") as log:
+            start = psutil.Popen(
+                [sys.executable, "-m", "ray.scripts.scripts", "start", *where, f"--num-cpus={self.cpus}",
+                 f"--object-store-memory={STORE_BYTES}", "--disable-usage-stats", "--block"],
+                env=os.environ | self.environment | environment,
+                stdout=log, stderr=log, stdin=subprocess.DEVNULL, start_new_session=True, cwd=ROOT,
+            )  # fmt: skip
+        self.nodes[number] = start
+        self._started(number)
+
+    def _started(self, number: int) -> None:
+        deadline = time.monotonic() + LONG_S
+        while not any("raylet" in name for name in self.names(number)):
+            assert self.nodes[number].is_running(), self._log.read_text()[-3000:]
+            assert time.monotonic() < deadline, self._log.read_text()[-3000:]
+            time.sleep(0.1)
+
+    def names(self, number: int) -> list[str]:
+        """Of a node's processes."""
+        return [name for _, name in self.processes(number)]
+
+    def processes(self, number: int) -> list[tuple[psutil.Process, str]]:
+        """Of a node, each with what it is called."""
+        found = []
+        for process in self.nodes[number].children(recursive=True):
+            with contextlib.suppress(psutil.Error):
+                command = process.cmdline()
+                found.append((process, Path(command[0]).name if command else process.name()))
+        return found
+
+    def kill(self, number: int, *names: str, number_of_signal: int = signal.SIGKILL) -> int:
+        """Signals a node's processes whose name begins so; how many."""
+        victims = [each for each, name in self.processes(number) if any(name.startswith(part) for part in names)]
+        for victim in victims:
+            with contextlib.suppress(psutil.Error):
+                victim.send_signal(number_of_signal)
+        return len(victims)
+
+    def end(self, number: int) -> None:
+        """Kills a node with all that belongs to it."""
+        start = self.nodes.pop(number)
+        family = [start, *start.children(recursive=True)] if start.is_running() else [start]
+        for each in family:
+            with contextlib.suppress(psutil.Error):
+                each.kill()
+        start.wait(GONE_S)
+        psutil.wait_procs(family, GONE_S)
+
+    def close(self) -> None:
+        for number in sorted(self.nodes, reverse=True):
+            self.end(number)
+        for process in self.left():
+            with contextlib.suppress(psutil.Error):
+                process.kill()
+        shutil.rmtree(self.temp, ignore_errors=True)
+
+    def left(self) -> list[psutil.Process]:
+        """Processes of this cluster, its runs and their caretakers among them, by what they were started with."""
+        mark, found = self.environment["RAY_AUTH_TOKEN"], []
+        for process in psutil.process_iter():
+            with contextlib.suppress(psutil.Error):
+                if process.pid != os.getpid() and process.environ().get("RAY_AUTH_TOKEN") == mark:
+                    found.append(process)
+        return found
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port: int = probe.getsockname()[1]
+        return port
+
+
+@contextlib.contextmanager
+def running(folder: Path, nodes: int = 1, cpus: int = 2, **environment: str) -> Iterator[Cluster]:
+    """A cluster, and the environment of those who use it as this process's own."""
+    cluster = Cluster(folder, cpus, **environment)
+    before = dict(os.environ)
+    try:
+        cluster.start(nodes)
+        os.environ.update(cluster.environment)
+        yield cluster
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
+        cluster.close()
