@@ -6,6 +6,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from risk_sac.egos import Control, Episode, Perceived
+from risk_sac.egos.road import lane_keeping
+
 
 @contextmanager
 def running(command: Sequence[str], folder: Path, **told: float) -> Iterator[str]:
@@ -30,3 +33,19 @@ def served(name: str, folder: Path, **told: float) -> Iterator[str]:
     command = [sys.executable, "-m", "risk_sac.egos.serve", name]
     with running(command, folder, **told) as table:
         yield table
+
+
+class LaneKeeper:
+    """Keeps its lane and its speed, and looks at nobody."""
+
+    version = "1"
+    response_time_s = 1.0
+
+    def reset(self, episode: Episode) -> None:
+        self._vehicle = episode.vehicle
+
+    def act(self, perceived: Perceived) -> Control:
+        return Control(0.0, lane_keeping(perceived, self._vehicle))
+
+    def close(self) -> None:
+        pass

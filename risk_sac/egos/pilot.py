@@ -1,20 +1,52 @@
 """An ego at the wheel: it is shown what it perceives, and its car does what it commands."""
 
+import math
+
 import numpy as np
+from numpy.typing import NDArray
 
 from risk_sac.egos.bicycle import advance
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.seam import Episode, Perceived, Trajectory, Vehicle
 from risk_sac.egos.tracking import track
+from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import Motion
-from risk_sac.types import ACCEL, LATERAL, OFFSET, SPEED, STEP_S, VX, VY, Frame
+from risk_sac.types import ACCEL, LATERAL, OFFSET, SPEED, STEP_S, VX, VY, Bools, Floats, Frame
 
 BRAKE_MPS2 = 9.0  # as SUMO's driver can, on dry asphalt
-UNTOLD = [LATERAL, ACCEL, OFFSET]
+
+
+class View:
+    """Makes of a frame what the ego is shown; one for each episode."""
+
+    def __init__(self) -> None:
+        self._of: tuple[tuple[str, ...], bytes] = ((), b"")
+        self._ids: tuple[str, ...] = ()
+        self._kind: NDArray[np.int8] = np.empty(0, dtype=np.int8)
+
+    def perceived(self, frame: Frame, belief: Belief, along: Along) -> Perceived:
+        """Those it knows of, as far as its sensor and its memory tell of them."""
+        known = belief.known
+        of = frame.ids, known.tobytes()
+        if of != self._of:  # seldom
+            self._of, self._kind = of, frame.kind[known]
+            self._ids = tuple(id_ for id_, is_known in zip(frame.ids, known.tolist(), strict=True) if is_known)
+        path, station_m, offset_m = along
+        return Perceived(
+            frame.time_s,
+            self._ids,
+            self._kind,
+            shown(belief.state, known),
+            path.points,
+            station_m,
+            offset_m,
+            frame.signal,
+            frame.stop_line_m,
+        )
 
 
 class EgoPilot:
@@ -22,6 +54,7 @@ class EgoPilot:
 
     _vehicle: Vehicle
     _motion: Motion
+    _view: View
 
     def __init__(self, ego: Guarded) -> None:
         self._ego = ego
@@ -34,7 +67,7 @@ class EgoPilot:
         x, y, heading, speed, accel = (
             float(row[0]) for row in (frame.x_m, frame.y_m, frame.heading_rad, frame.speed_mps, frame.accel_mps2)
         )
-        self._motion = Motion(x, y, heading, speed, accel)
+        self._motion, self._view = Motion(x, y, heading, speed, accel), View()
         self._ego.reset(
             Episode(seed=seed, net=layout.net, route=layout.ego.route, vehicle=self._vehicle, step_s=STEP_S)
         )
@@ -42,7 +75,7 @@ class EgoPilot:
 
     def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
         """See `risk_sac.sim.pilot.Pilot.drive`."""
-        command = self._ego.act(perceived(frame, belief, along))
+        command = self._ego.act(self._view.perceived(frame, belief, along))
         if isinstance(command, Trajectory):
             command = track(command, self._motion, self._vehicle)
         self._motion = advance(self._motion, command.accel_mps2, command.steering_rad, self._vehicle, STEP_S)
@@ -53,13 +86,18 @@ class EgoPilot:
         self._ego.close()
 
 
-def perceived(frame: Frame, belief: Belief, along: Along) -> Perceived:
-    """What the ego is shown: those it knows of, as far as its sensor and its memory tell of them."""
-    ids, kind, state, known = frame.ids, frame.kind, belief.state.copy(), belief.known
-    if not known.all():
-        ids = tuple(id_ for id_, is_known in zip(ids, known.tolist(), strict=True) if is_known)
-        kind, state = kind[known], np.compress(known, state, axis=1)
-    state[SPEED, 1:] = np.hypot(state[VX, 1:], state[VY, 1:])
-    state[UNTOLD, 1:] = np.nan
-    path, station_m, offset_m = along
-    return Perceived(frame.time_s, ids, kind, state, path.points, station_m, offset_m, frame.signal, frame.stop_line_m)
+@compiled
+def shown(state: Floats, known: Bools) -> Floats:
+    """The columns of those that are known; of the others' rows, those that a sensor tells."""
+    found = np.empty((state.shape[0], int(known.sum())))
+    column = 0
+    for i in range(state.shape[1]):
+        if not known[i]:
+            continue
+        for row in range(state.shape[0]):
+            found[row, column] = state[row, i]
+        if i > 0:
+            found[SPEED, column] = math.hypot(state[VX, i], state[VY, i])
+            found[LATERAL, column] = found[ACCEL, column] = found[OFFSET, column] = np.nan
+        column += 1
+    return found

@@ -59,6 +59,7 @@ class MovedEgo:
 
     Attributes:
       motion: after its latest step.
+      told: what SUMO tells of others: front bumper, compass degrees, speed, lateral speed, acceleration.
     """
 
     def __init__(self, vehicle: str, motion: Motion, length_m: float) -> None:
@@ -69,8 +70,8 @@ class MovedEgo:
           motion: now.
           length_m: of its body.
         """
-        self._vehicle, self.motion, self._half_m = vehicle, motion, length_m / 2
-        self._lane_heading_rad = motion.heading_rad
+        self._vehicle, self._half_m = vehicle, length_m / 2
+        self.motion, self.told = motion, self._told(motion, motion.heading_rad)
         libsumo.vehicle.setLaneChangeMode(vehicle, NO_LANE_CHANGE)
 
     def move(self, motion: Motion, along: Along) -> None:
@@ -80,18 +81,17 @@ class MovedEgo:
           motion: after the step.
           along: the ego on its path before.
         """
-        self.motion = motion
-        *_, self._lane_heading_rad = project(along.path.points, motion.x_m, motion.y_m)
-        x, y, angle, *_ = self.told()
+        *_, lane_heading_rad = project(along.path.points, motion.x_m, motion.y_m)
+        self.motion, self.told = motion, self._told(motion, lane_heading_rad)
+        x, y, angle, *_ = self.told
         libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, angle, KEEP_ROUTE)
 
     def settle(self) -> None:
         """After the step: SUMO derives a speed from the way along the lane, 0 where a lane begins. Followers see it."""
         libsumo.vehicle.setPreviousSpeed(self._vehicle, self.motion.speed_mps)
 
-    def told(self) -> tuple[float, float, float, float, float, float]:
-        """What SUMO tells of others: front bumper, compass degrees, speed, lateral speed, acceleration."""
-        x, y, heading, speed, accel, _, slip = self.motion
-        lateral = speed * math.sin(heading + slip - self._lane_heading_rad)
+    def _told(self, motion: Motion, lane_heading_rad: float) -> tuple[float, float, float, float, float, float]:
+        x, y, heading, speed, accel, _, slip = motion
+        lateral = speed * math.sin(heading + slip - lane_heading_rad)
         front = x + self._half_m * math.cos(heading), y + self._half_m * math.sin(heading)
         return (*front, 90.0 - math.degrees(heading), speed, lateral, accel)

@@ -31,6 +31,7 @@ from risk_sac.types import STEP_S, Floats, Frame, Role
 NETS = files("sumo_nets")
 LISTED_WITHIN_S = 0.3
 OFF_ROAD = "ego_off_road"
+BESIDE_M = 1.0  # from the middle of its lane; nobody who is nearer can be off the road
 OPTIONS = (
     f"--step-length {STEP_S} --lateral-resolution 0.8 --default.speeddev 0 --insertion-checks none "
     "--collision.action warn --collision.mingap-factor 0 --collision.check-junctions "
@@ -175,13 +176,18 @@ class SumoSimulation:
     def _drive(self, ego: MovedEgo) -> None:
         """Lets the pilot drive a step."""
         assert self._pilot is not None
-        id_, frame, width_m = self._layout.ego.id, self._reading.frame, float(self._reading.frame.width_m[0])
-        along = self._roads.along(id_)
+        frame, along = self._reading.frame, self._roads.along(self._layout.ego.id)
+        if abs(along.offset_m) > BESIDE_M:
+            self._refuse_off_road(frame, along)
+        ego.move(self._pilot.drive(frame, self._belief, along), along)
+
+    def _refuse_off_road(self, frame: Frame, along: Along) -> None:
+        """SUMO itself keeps who leaves the road at its edge."""
+        width_m = float(frame.width_m[0])
         _, offset_m, _ = project(along.path.points, float(frame.x_m[0]), float(frame.y_m[0]))
-        room, _ = self._roads.place(id_, offset_m, width_m)
+        room, _ = self._roads.place(self._layout.ego.id, offset_m, width_m)
         if min(room.left_m, room.right_m) < -width_m:
             raise EgoFailed(f"the ego is {offset_m:.1f} m beside its lane, off its road", reason=OFF_ROAD)
-        ego.move(self._pilot.drive(frame, self._belief, along), along)
 
     def signal_heads(self) -> bytes:
         """The letters of all signals, one after the other."""
@@ -190,7 +196,7 @@ class SumoSimulation:
 
     def _look(self) -> Belief:
         """Reads what there is, and lets the ego perceive it."""
-        self._reading = self._reader.read(self._walkers, None if self._moved is None else self._moved.told())
+        self._reading = self._reader.read(self._walkers, None if self._moved is None else self._moved.told)
         return self._senses.look(self._reading.frame)
 
     def _hide(self) -> None:
