@@ -34,6 +34,7 @@ ASKED = {
     "metrics": ("GET", "/metrics"),
     "families": ("GET", "/v1/families"),
     "methods": ("GET", "/v1/methods"),
+    "formats": ("GET", "/v1/formats"),
     "networks": ("GET", "/v1/networks"),
     "network_unknown": ("GET", "/v1/networks/n0"),
     "places_unknown": ("GET", "/v1/networks/n0/places"),
