@@ -12,6 +12,8 @@ CROSSINGS_M = 60.0  # so far from a place a crossing is told of
 WALKED_M = 40.0  # so far a pedestrian may get in an episode
 JUNCTIONS_M = 120.0
 KERB_M = 0.05  # of the crossing before its ends: whoever stands at the kerb is on the road's edge
+CLEAR_M = 1.45  # of the kerb from the middle of a way across the junction: half a car, and what it cuts corners by
+BACK_M, MOST_BACK_M = 0.25, 5.0
 LEGS = 3  # of a junction where ways can cross
 
 
@@ -42,15 +44,24 @@ def ground_around(net: Net, x_m: float, y_m: float, *, walked: bool) -> Ground:
     )
 
 
-def walk_over(crossing: Crossing, driven_rad: float) -> Walk:
-    """From the kerb on the right of who drives in a direction, over a crossing."""
+def walk_over(net: Net, crossing: Crossing, driven_rad: float) -> Walk:
+    """From the kerb on the right of who drives in a direction, over a crossing.
+
+    Where cars turn round the corner across the end of a crossing, the kerb is beyond them: who waits there is clear.
+    """
     right = (math.sin(driven_rad), -math.cos(driven_rad))
     (x0, y0), (x1, y1) = crossing.line[0], crossing.line[-1]
     line = crossing.line if (x0 - x1) * right[0] + (y0 - y1) * right[1] >= 0.0 else crossing.line[::-1]
     (x, y), (to_x, to_y) = line[0], line[1]
     length = math.hypot(to_x - x, to_y - y)
     along_x, along_y = (to_x - x) / length, (to_y - y) / length
-    return Walk(x_m=x + KERB_M * along_x, y_m=y + KERB_M * along_y, along_x=along_x, along_y=along_y)
+    x, y = x + KERB_M * along_x, y + KERB_M * along_y
+    lines = [lane.line for lane in net.inside.get(crossing.junction, ())]
+    for _ in range(round(MOST_BACK_M / BACK_M)):
+        if not any(_near(line, x, y, CLEAR_M) for line in lines):
+            break
+        x, y = x - BACK_M * along_x, y - BACK_M * along_y
+    return Walk(x_m=x, y_m=y, along_x=along_x, along_y=along_y)
 
 
 def signal_of(net: Net, ids: Iterable[str | None]) -> Signal | None:

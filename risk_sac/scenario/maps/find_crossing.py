@@ -54,7 +54,7 @@ def place(net: Net, spot: Spot) -> CrossingPlace:
                 ego=ego,
                 occluder=occluder,
                 oncoming=_oncoming(net, edge.id, crossing.edges),
-                walk=walk_over(crossing, ego_lane.way_out_rad),
+                walk=walk_over(net, crossing, ego_lane.way_out_rad),
             ),
         ),
     )

@@ -80,7 +80,7 @@ def place(net: Net, spot: Spot) -> JunctionPlace:
         ego=ego,
         others=tuple(legs.values()),
         streams=tuple(Stream(name=f"{name}_road", track=found) for name, found in streams if found is not None),
-        walk=None if crossing is None else walk_over(crossing, own.driven_rad),
+        walk=None if crossing is None else walk_over(net, crossing, own.driven_rad),
     )
 
 
