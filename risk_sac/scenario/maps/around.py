@@ -14,6 +14,7 @@ JUNCTIONS_M = 120.0
 KERB_M = 0.05  # of the crossing before its ends: whoever stands at the kerb is on the road's edge
 CLEAR_M = 1.45  # of the kerb from the middle of a way across the junction: half a car, and what it cuts corners by
 BACK_M, MOST_BACK_M = 0.25, 5.0
+BESIDE_M = 1.9  # from the crossing's axis, that a pedestrian may stand
 LEGS = 3  # of a junction where ways can cross
 
 
@@ -58,7 +59,8 @@ def walk_over(net: Net, crossing: Crossing, driven_rad: float) -> Walk:
     x, y = x + KERB_M * along_x, y + KERB_M * along_y
     lines = [lane.line for lane in net.inside.get(crossing.junction, ())]
     for _ in range(round(MOST_BACK_M / BACK_M)):
-        if not any(_near(line, x, y, CLEAR_M) for line in lines):
+        stood = [(x + off_m * along_y, y - off_m * along_x) for off_m in (-BESIDE_M, 0.0, BESIDE_M)]
+        if not any(_near(line, *point, CLEAR_M) for line in lines for point in stood):
             break
         x, y = x - BACK_M * along_x, y - BACK_M * along_y
     return Walk(x_m=x, y_m=y, along_x=along_x, along_y=along_y)

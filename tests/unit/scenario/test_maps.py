@@ -42,7 +42,8 @@ def test_the_finder_finds_the_place_of_the_junction_that_is_shipped() -> None:
     assert found.others == ours.others
     assert found.signal == ours.signal
     assert [stream.track for stream in found.streams] == [stream.track for stream in ours.streams]
-    assert (found.walk.x_m, found.walk.y_m) == pytest.approx((ours.walk.x_m, ours.walk.y_m))
+    # The finder leaves room for cars that turn round the corner.
+    assert (found.walk.x_m, found.walk.y_m) == pytest.approx((ours.walk.x_m, ours.walk.y_m), abs=1.0)
     assert (found.walk.along_x, found.walk.along_y) == pytest.approx((ours.walk.along_x, ours.walk.along_y))
     family, theirs = family_at("dense", found), FAMILIES["dense"]
     assert family.space == theirs.space
