@@ -27,6 +27,7 @@ from service.api.routes import (
     episodes,
     events,
     evidence,
+    exports,
     logs,
     networks,
     operations,
@@ -86,7 +87,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
         docs_url=None,  # the routes have pages that need no network
         redoc_url=None,
     )
-    shown = (episodes, logs, pictures, sketches, events, reports, evidence)
+    shown = (episodes, logs, pictures, exports, sketches, events, reports, evidence)
     for routes in (campaigns, *shown, regressions, networks, catalogue, operations, docs):
         app.include_router(routes.router)
     app.router.routes += page.routes()

@@ -169,6 +169,15 @@ def test_with_its_own_ego_every_failure_still_fails_and_a_baseline_accepts_that(
     assert regressed(tell, tmp_path, *again)[0] == 0
 
 
+def test_what_still_fails_is_exported_as_the_other_ego_has_it(failure: Path, tmp_path: Path, tell: Tell) -> None:
+    exports = tmp_path / "exports"
+    asked = ("--failures", failure, "--ego", "default", "--exports", exports, "--format", "gif")
+    assert regressed(tell, tmp_path, *asked) == (1, [Verdict.STILL_FAILING])
+    (bundle,), (gif,) = exports.rglob("*.npz"), exports.rglob("*.gif")
+    assert gif.read_bytes().startswith(b"GIF8")
+    assert tell("replay", bundle)[0] == 0
+
+
 def test_a_better_ego_fixes_more_than_a_worse_one(failures: Path, tmp_path: Path, tell: Tell) -> None:
     (tmp_path / "slow.yaml").write_text("reaction_time_s: 1.0\n")
     fixed = {}

@@ -88,6 +88,8 @@ ASKED = {
     "log_bad_field": ("GET", f"{ENDED}/runs/low-risk-sac-3/log?lines=1001"),
     "events": ("GET", f"{ENDED}/events"),
     "events_cancelled": ("GET", f"{CANCELLED}/events"),
+    "episodes_export_live": ("GET", f"{LIVE}/export?format=parquet"),
+    "episodes_export_bad_field": ("GET", f"{ENDED}/export?format=gif"),
     "table": ("GET", f"{ENDED}/table"),
     "table_markdown": ("GET", f"{ENDED}/table?format=md"),
     "table_csv": ("GET", f"{ENDED}/table?format=csv"),

@@ -74,6 +74,7 @@ ROUTES = {
     ("GET", f"{CAMPAIGN}/curves"): ("read", 200),
     ("GET", f"{CAMPAIGN}/clusters"): ("read", 200),
     ("GET", f"{CAMPAIGN}/report"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/export"): ("read", 422),  # without a format
     ("GET", f"{CAMPAIGN}/table"): ("read", 200),
     ("GET", f"{CAMPAIGN}/figures"): ("read", 200),
     ("GET", f"{CAMPAIGN}/figures/{{name}}.{{format}}"): ("read", 404),  # no run has finished

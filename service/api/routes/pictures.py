@@ -2,7 +2,7 @@
 
 from collections.abc import Awaitable, Callable
 from http import HTTPStatus
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Request, Response
 from starlette.concurrency import run_in_threadpool
@@ -42,13 +42,9 @@ def _made(media_type: str) -> Responses:
 
 PICTURE = _made(PNG)
 PLAYED = problem(409, "The collision does not repeat here, or cannot be played")
+LACKING = problem(501, "The service lacks a package that makes this format")
 _EXPORTED: dict[str, Any] = {FORMATS[name].media_type: {} for name in names("failure")}
-EXPORT = (
-    _made(NPZ)
-    | PLAYED
-    | problem(501, "The service lacks a package that makes this format")
-    | {200: TAGGED[200] | {"content": _EXPORTED}}
-)
+EXPORT = _made(NPZ) | PLAYED | LACKING | {200: TAGGED[200] | {"content": _EXPORTED}}
 BUNDLE, TWIN, TOLD = _made(NPZ) | PLAYED, _made(PNG) | PLAYED, _made(JSON) | PLAYED
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
@@ -85,15 +81,25 @@ async def get_core(contact: Asked, request: Request, service: Service) -> Respon
 async def get_export(contact: Asked, format: FormatName, request: Request, service: Service) -> Response:
     """One collision in a format of other tools, see `GET /v1/formats`; some are several files, and come as a zip."""
     row = FORMATS[format]
-    if row.of == "failure" and row.missing:
-        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: the extra {EXTRA!r} has it"
-        raise _problem(HTTPStatus.NOT_IMPLEMENTED, Reason.NOT_INSTALLED, lacks)
+    check_installed(format, "failure")
     check_carries(format, "failure")
     study = Study(contact, "export", format=format)
     answer = await _answer(contact, request, row.media_type, lambda: service.studies.product(study))
     name = f"{contact.episode.id}{f'-{format}' if row.media_type == NPZ else ''}{row.suffix}"
     answer.headers["Content-Disposition"] = f'attachment; filename="{name}"'
     return answer
+
+
+def check_installed(format: FormatName, of: Literal["failure", "episodes"]) -> None:
+    """Refuses a format whose packages the service lacks: that is no mistake of who asks.
+
+    Raises:
+      ProblemError: naming them, and the extra that has them.
+    """
+    row = FORMATS[format]
+    if row.of == of and row.missing:
+        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: the extra {EXTRA!r} has it"
+        raise _problem(HTTPStatus.NOT_IMPLEMENTED, Reason.NOT_INSTALLED, lacks)
 
 
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=TOLD)

@@ -70,16 +70,15 @@ function Actions({ campaign, again }: { campaign: Campaign; again: () => void })
   const [asking, setAsking] = useState<"cancel" | "delete">();
   const [refused, setRefused] = useState("");
   const path = `v1/campaigns/${encodeURIComponent(campaign.id)}`;
-  const save = (format: string) => {
+  const save = (from: string, suffix: string) => {
     setRefused("");
-    download(`${path}/spec?format=${format}`, `${campaign.id}.${format}`).catch((error: Error) => setRefused(error.message));
+    download(from, `${campaign.id}.${suffix}`).catch((error: Error) => setRefused(error.message));
   };
   const report = `${path}/report?format=html`;
   const keyed = (event: Event) => {
     if (!hasKey()) return; // a link cannot carry the key, a call can
     event.preventDefault();
-    setRefused("");
-    download(report, `${campaign.id}.html`).catch((error: Error) => setRefused(error.message));
+    save(report, "html");
   };
   return (
     <div class="actions">
@@ -96,9 +95,12 @@ function Actions({ campaign, again }: { campaign: Campaign; again: () => void })
         Clone
       </a>
       <span class="joined" role="group" aria-label="Download what was posted">
-        <button onClick={() => save("json")}>Spec JSON</button>
-        <button onClick={() => save("yaml")}>YAML</button>
+        <button onClick={() => save(`${path}/spec?format=json`, "json")}>Spec JSON</button>
+        <button onClick={() => save(`${path}/spec?format=yaml`, "yaml")}>YAML</button>
       </span>
+      <button title="All episodes so far, as a Parquet table" onClick={() => save(`${path}/export?format=parquet`, "parquet")}>
+        Episodes
+      </button>
       {ended(campaign) ? (
         <button class="danger" onClick={() => setAsking("delete")}>
           Delete
