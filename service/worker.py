@@ -118,7 +118,6 @@ def main() -> int:
     """Execute the run; returns the exit status."""
     folder, (niceness, memory_bytes, replays) = Path(sys.argv[1]), map(int, sys.argv[2:5])
     os.nice(niceness)
-    limit_memory(memory_bytes)
     reporter = Reporter(_take_stdout())
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     spec = RunSpec.model_validate_json(sys.stdin.buffer.readline())
@@ -133,7 +132,7 @@ def main() -> int:
 def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, replays: int) -> Finished | Failed:
     try:
         with take_over(folder):
-            return _execute(spec, folder, reporter, replays)
+            return _execute(spec, folder, reporter, memory_bytes, replays)
     except Exception as error:
         if out_of_memory(error):  # as it would be for the next worker
             logger.exception("the run needs more memory than there is")
@@ -147,15 +146,14 @@ def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, rep
         raise
 
 
-def _execute(spec: RunSpec, folder: Path, reporter: Reporter, replays: int) -> Finished:
-    import torch  # noqa: F401 - before libsumo: if memory ends while torch is loaded after it, the process crashes
-
+def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, replays: int) -> Finished:
     from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
     from risk_sac.failures.verify import verify
     from risk_sac.report.runs import read_run
     from risk_sac.run_folder.verified import Verified
     from risk_sac.train import train
 
+    limit_memory(memory_bytes)  # from here on: where it ends while libsumo is loaded, the process crashes
     with Recorder(spec, folder, reporter) as recorder:
         summary = train(spec, folder, recorder)
         recorder.finish(summary)

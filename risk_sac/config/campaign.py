@@ -7,7 +7,8 @@ import hashlib
 import re
 from typing import Annotated, Any, Self
 
-from pydantic import Field, StringConstraints, WithJsonSchema, model_validator
+from pydantic import AfterValidator, Field, StringConstraints, WithJsonSchema, model_validator
+from pydantic_core import PydanticCustomError
 
 from risk_sac.config.base import Settings
 from risk_sac.config.ego import EgoConfig
@@ -18,9 +19,18 @@ from risk_sac.config.odd import Odd
 SHIPPED = ("low", "mixed", "dense")
 PLACED = r"(car_following|crossing|junction)_[0-9a-f]{12}"
 FAMILY_NAME = re.compile(rf"^({'|'.join(SHIPPED)}|{PLACED})$")
+
+
+def _family_name(name: str) -> str:
+    if not FAMILY_NAME.fullmatch(name):  # as pydantic says it of literals, so that clients are told alike
+        expected = "'low', 'mixed' or 'dense', or the name of a place on a map"
+        raise PydanticCustomError("literal_error", "Input should be {expected}", {"expected": expected})
+    return name
+
+
 FamilyName = Annotated[
     str,
-    StringConstraints(pattern=FAMILY_NAME),
+    AfterValidator(_family_name),
     WithJsonSchema(
         {"anyOf": [{"type": "string", "enum": list(SHIPPED)}, {"type": "string", "pattern": f"^{PLACED}$"}]}
     ),

@@ -227,5 +227,5 @@ def test_an_executor_that_does_not_exist_is_one_line_and_leaves_no_folder(
 ) -> None:
     monkeypatch.setenv("RISK_SAC_EXECUTOR", "cloud")
     assert cli.main(["evaluate", *ONE, str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == "RISK_SAC_EXECUTOR: got 'cloud'; wanted one of local\n"
+    assert capsys.readouterr().err == "RISK_SAC_EXECUTOR: got 'cloud'; wanted one of local, ray\n"
     assert not (tmp_path / "out").exists()
