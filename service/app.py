@@ -55,6 +55,7 @@ from service.store.server import cursor_secret
 from service.views.pictures import pictures as pictures_of_contacts
 from service.views.reports import Reports
 from service.views.studies import Studies
+from service.views.tables import Tables
 from service.workers.messages import Event
 from service.workers.program import program
 
@@ -123,12 +124,13 @@ def opened(
         os.environ[VARIABLE] = str(settings.places_dir.absolute())
         manager = Manager(settings, store, executor)
         manager.start()
-        gate, studies = Regressions(settings), Studies(settings)
+        gate, studies, tables = Regressions(settings), Studies(settings), Tables(settings)
         try:
             gate.start()
-            yield _context(settings, store, manager, gate, studies, latencies)
+            yield _context(settings, store, manager, gate, studies, tables, latencies)
         finally:
             studies.stop()
+            tables.stop()
             gate.stop()
             manager.stop()
 
@@ -139,6 +141,7 @@ def _context(
     manager: Manager,
     gate: Regressions,
     studies: Studies,
+    tables: Tables,
     latencies: Histogram,
 ) -> Context:
     shelf = Shelf(settings.networks_dir)
@@ -149,6 +152,7 @@ def _context(
         Reports(settings),
         pictures_of_contacts(settings),
         studies,
+        tables,
         gate,
         shelf,
         Surveys(shelf, settings.places_dir),

@@ -23,7 +23,8 @@ FAMILY_NAME = re.compile(rf"^({'|'.join(SHIPPED)}|{PLACED})$")
 
 def _family_name(name: str) -> str:
     if not FAMILY_NAME.fullmatch(name):  # as pydantic says it of literals, so that clients are told alike
-        expected = "'low', 'mixed' or 'dense', or the name of a place on a map"
+        *others, last = map(repr, SHIPPED)
+        expected = f"{', '.join(others)} or {last}, or the name of a place on a map"
         raise PydanticCustomError("literal_error", "Input should be {expected}", {"expected": expected})
     return name
 

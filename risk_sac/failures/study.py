@@ -1,4 +1,4 @@
-"""`python -m risk_sac.failures.study NICENESS FILE`: what takes the simulator to say of a failure.
+"""`python -m risk_sac.failures.study FILE`: what takes the simulator to say of a failure.
 
 The question is a line of JSON on stdin, the answer is written into the file. For whoever must not load the simulator.
 The end of stdin means that nobody waits for the answer any more.
@@ -93,5 +93,4 @@ def _leave_with_asker() -> None:
 
 
 if __name__ == "__main__":
-    os.nice(int(sys.argv[1]))
-    sys.exit(_main(Path(sys.argv[2])))
+    sys.exit(_main(Path(sys.argv[1])))

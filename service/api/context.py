@@ -18,6 +18,7 @@ from service.views.pictures import Picture
 from service.views.products import Products
 from service.views.reports import Reports
 from service.views.studies import Studies
+from service.views.tables import Tables
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +31,7 @@ class Context:
     reports: Reports
     pictures: Products[Picture]
     studies: Studies
+    tables: Tables
     regressions: Regressions
     networks: Shelf
     surveys: Surveys

@@ -165,7 +165,8 @@ class Regressions:
             with log.open("wb") as errors:
                 command = [sys.executable, "-m", "risk_sac", *arguments]
                 with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors) as process:
-                    os.setpriority(os.PRIO_PROCESS, process.pid, self._settings.worker_niceness)
+                    ours = os.getpriority(os.PRIO_PROCESS, 0)
+                    os.setpriority(os.PRIO_PROCESS, process.pid, ours + self._settings.worker_niceness)
                     while process.poll() is None:
                         if self._stopping.wait(POLL_S):
                             process.terminate()

@@ -1,4 +1,4 @@
-"""What takes seconds to make of a failure: made when it is asked for, one at a time, the newest kept."""
+"""What takes seconds to make: made when it is asked for, one at a time, the newest kept."""
 
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
@@ -11,7 +11,7 @@ from service.errors import ServiceError
 
 AT_ONCE = 1  # of a kind
 MOST_WAITING = 16
-KEPT = 64  # each of some 150 kB
+KEPT = 64  # of pictures and bundles, each of some 150 kB
 
 
 class TooManyWaiting(ServiceError):
@@ -25,17 +25,18 @@ S = TypeVar("S", bound=Hashable)
 class Products(Generic[S]):
     """Makes products in threads of its own, so that they hold up nothing else that the service does."""
 
-    def __init__(self, make: Callable[[S], bytes], what: str) -> None:
+    def __init__(self, make: Callable[[S], bytes], what: str, kept: int = KEPT) -> None:
         """Makes nothing yet.
 
         Args:
           make: makes one; may take seconds.
           what: they are called, in the plural.
+          kept: how many of the newest.
         """
         self._make, self._what = make, what
         self._threads = anyio.CapacityLimiter(AT_ONCE)
         self._begun = 0  # that are being made, or wait
-        self._made = alru_cache(maxsize=KEPT)(self._queue)  # who asks for one that is being made waits for it
+        self._made = alru_cache(maxsize=kept)(self._queue)  # who asks for one that is being made waits for it
 
     async def product(self, subject: S) -> bytes:
         """The product of a subject, or whatever its making raises.

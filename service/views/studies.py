@@ -1,9 +1,7 @@
 """What takes the simulator to say of a failure: asked of a process of its own, see `risk_sac.failures.study`."""
 
-import contextlib
 import logging
 import subprocess
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +13,13 @@ from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
 from service.errors import OutdatedError, ServiceError, StorageError
 from service.settings import ServiceSettings
+from service.views.asides import WALL_S, Aside
 from service.views.bodies import series_file
 from service.views.pictures import ContactOfARun
 from service.views.products import Products
 from service.views.series import load_arrays
 
 logger = logging.getLogger(__name__)
-
-WALL_S = 300.0  # a minimisation takes ten on a machine with nothing else to do
 
 
 class CannotBePlayed(ServiceError):
@@ -46,13 +43,11 @@ class Studies(Products[Study]):
 
     def __init__(self, settings: ServiceSettings) -> None:
         super().__init__(self._answer, "failures")
-        self._settings = settings
-        self._process: subprocess.Popen[bytes] | None = None
+        self._settings, self._aside = settings, Aside(settings)
 
     def stop(self) -> None:
         """Ends what is being played: nobody waits for it any more."""
-        if (process := self._process) is not None:
-            process.kill()
+        self._aside.stop()
 
     def _answer(self, study: Study) -> bytes:
         contact = study.contact
@@ -87,19 +82,8 @@ class Studies(Products[Study]):
         return said
 
     def _ask(self, question: Question, file: Path, log: IO[bytes]) -> int:
-        """The exit status of a study. Its stdin stays open until then: it leaves with a server that is killed."""
-        niceness = str(self._settings.worker_niceness)
-        command = [sys.executable, "-m", "risk_sac.failures.study", niceness, str(file)]
-        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log) as process:
-            self._process = process
-            try:
-                assert process.stdin is not None
-                with contextlib.suppress(BrokenPipeError):  # its status says more
-                    process.stdin.write(question.model_dump_json().encode() + b"\n")
-                    process.stdin.flush()
-                return process.wait(WALL_S)
-            except subprocess.TimeoutExpired as error:
-                process.kill()
-                raise CannotBePlayed(f"it takes more than {WALL_S:g} s here") from error
-            finally:
-                self._process = None
+        told = question.model_dump_json().encode() + b"\n"
+        try:
+            return self._aside.run("risk_sac.failures.study", [str(file)], log, told)
+        except subprocess.TimeoutExpired as error:
+            raise CannotBePlayed(f"it takes more than {WALL_S:g} s here") from error

@@ -2,52 +2,63 @@
 
 import logging
 import subprocess
-import sys
 import tempfile
-import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from risk_sac.failures.export.formats import FormatName
+from risk_sac.run_folder.results import RESULTS
 from service.errors import StorageError
-from service.views.products import TooManyWaiting
+from service.settings import ServiceSettings
+from service.views.asides import Aside
+from service.views.products import Products
 
 logger = logging.getLogger(__name__)
 
-WALL_S = 300.0  # a hundred thousand episodes take one of ten
-_AT_WORK = threading.Lock()
+KEPT = 1  # of some megabytes; the newest, for those who ask for it at once
 
 
-def table_of(folders: Sequence[Path], name: FormatName) -> bytes:
-    """The episodes of runs, from their folders.
+@dataclass(frozen=True, slots=True)
+class Table:
+    """What is made: the episodes in folders of runs, as they are at a time."""
 
-    Raises:
-      TooManyWaiting: another table is being made.
-      StorageError: it cannot be made; the log has the reason.
-    """
-    if not _AT_WORK.acquire(blocking=False):
-        raise TooManyWaiting("another table of episodes is being made; wanted one at a time")
-    try:
-        with tempfile.TemporaryDirectory() as scratch:
-            file = Path(scratch) / name
-            command = [
-                sys.executable,
-                "-m",
-                "risk_sac",
-                "export",
-                *map(str, folders),
-                "--format",
-                name,
-                "--out",
-                str(file),
-            ]
-            subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=WALL_S, check=True)
-            return file.read_bytes()
-    except subprocess.SubprocessError as error:
-        told = error.stderr.decode(errors="replace")[-2000:] if isinstance(error, subprocess.CalledProcessError) else ""
-        logger.exception("a table of episodes was not made: %s", told)
-        raise StorageError("the table of episodes cannot be made; the log has the reason") from error
-    except OSError as error:
-        raise StorageError(f"the table of episodes cannot be made ({error.strerror})") from error
-    finally:
-        _AT_WORK.release()
+    folders: tuple[Path, ...]
+    written_ns: tuple[int, ...]
+    """When the results of each run were."""
+    format: FormatName
+
+    @classmethod
+    def of(cls, folders: Sequence[Path], format: FormatName) -> "Table":
+        """Of those that have results by now, which may be none."""
+        begun = tuple(folder for folder in folders if (folder / RESULTS).exists())
+        return cls(begun, tuple((folder / RESULTS).stat().st_mtime_ns for folder in begun), format)
+
+
+class Tables(Products[Table]):
+    """Makes them, one at a time; StorageError where one cannot be made, and the log has the reason."""
+
+    def __init__(self, settings: ServiceSettings) -> None:
+        super().__init__(self._written, "tables", KEPT)
+        self._aside = Aside(settings)
+
+    def stop(self) -> None:
+        """Ends the one that is being made."""
+        self._aside.stop()
+
+    def _written(self, table: Table) -> bytes:
+        with tempfile.TemporaryDirectory() as scratch, tempfile.TemporaryFile() as log:
+            file = Path(scratch) / table.format
+            arguments = ["export", *map(str, table.folders), "--format", table.format, "--out", str(file)]
+            try:
+                if (status := self._aside.run("risk_sac", arguments, log)) == 0:
+                    return file.read_bytes()
+                reason = f"status {status}"
+            except subprocess.TimeoutExpired as error:
+                reason = str(error)
+            except OSError as error:
+                raise StorageError(f"the table of episodes cannot be made ({error.strerror})") from error
+            log.seek(0)
+            tail = log.read()[-2000:].decode(errors="replace")
+            logger.error("a table of episodes was not made (%s): %s", reason, tail)
+        raise StorageError("the table of episodes cannot be made; the log has the reason")

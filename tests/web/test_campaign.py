@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
+from pyarrow import parquet
 
 from tests.server import Service, servers
 from tests.web.conftest import LONG_MS, PHONE
@@ -194,6 +195,13 @@ def test_what_was_posted_can_be_taken_away(
         page.get_by_role("button", name="Spec JSON").click()
     download.value.save_as(tmp_path / "spec.json")
     assert json.loads((tmp_path / "spec.json").read_text()) == service.get(campaign, "/spec")
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Episodes", exact=True).click()
+    download.value.save_as(tmp_path / "episodes.parquet")
+    assert (
+        parquet.read_metadata(tmp_path / "episodes.parquet").num_rows
+        == service.get(campaign)["progress"]["episodes_done"]
+    )
     expect(page.get_by_role("link", name="Clone")).to_have_attribute("href", f"#/new?from={campaign}")
     expect(page.get_by_role("link", name="Compare methods")).to_have_attribute(
         "href", f"#/campaigns/{campaign}/compare"

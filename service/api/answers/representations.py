@@ -28,6 +28,12 @@ def accepted(accept: str, offered: Sequence[str]) -> str:
     return best
 
 
+def accepted_format(request: Request, media_types: Mapping[str, str]) -> str:
+    """Which of the formats, each of a media type, the request likes best, see `accepted`."""
+    names = {media_type: name for name, media_type in media_types.items()}
+    return names[accepted(", ".join(request.headers.getlist("accept")), list(names))]
+
+
 def takes(accept_encoding: str, encoding: str) -> bool:
     """Whether an Accept-Encoding header names an encoding, and not to refuse it."""
     return dict(map(_range, accept_encoding.split(","))).get(encoding, 0.0) > 0.0

@@ -13,7 +13,7 @@ from risk_sac.failures.cases import Regression
 from risk_sac.report import FinishedRun
 from risk_sac.report.evidence import POLICY, Evidence, Origin, gathered, html, markdown, report
 from service.api.access import CurrentCaller
-from service.api.answers.representations import accepted, caching, entity_tag, has, not_modified
+from service.api.answers.representations import accepted_format, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
 from service.api.context import Context, Service
 from service.api.routes.reports import CACHED, UNCHANGED, commands
@@ -57,7 +57,7 @@ def get_report(
     Search results are no crash rate: bounds come from the i.i.d. phase alone, and there are none without one.
     """
     campaign = service.store.campaign(campaign_id, caller.sees)
-    name = format_ or _accepted(request)
+    name = format_ or accepted_format(request, MEDIA_TYPES)
     played = None if regression is None else _played(service, campaign, regression)
     tag = entity_tag(service.reports.edition(campaign), "report", name, *([played.id] if played else []))
     if has(request, tag):
@@ -67,11 +67,6 @@ def get_report(
     if name == "html":
         headers["Content-Security-Policy"] = f"{POLICY}; frame-ancestors 'none'"
     return Response(_content(request, campaign, made, name, played), headers=headers, media_type=MEDIA_TYPES[name])
-
-
-def _accepted(request: Request) -> str:
-    names = {media_type: name for name, media_type in MEDIA_TYPES.items()}
-    return names[accepted(", ".join(request.headers.getlist("accept")), list(names))]
 
 
 def _played(service: Context, campaign: StoredCampaign, regression_id: str) -> StoredRegression:

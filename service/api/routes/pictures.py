@@ -2,18 +2,19 @@
 
 from collections.abc import Awaitable, Callable
 from http import HTTPStatus
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.failures.export.formats import EXTRA, FORMATS, FormatName, check_carries, names
+from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names
 from risk_sac.failures.question import Twin
 from risk_sac.failures.surroundings import Region
 from service.api.access import CurrentCaller
+from service.api.answers.made import CROWDED, LACKING, check_installed, crowded
 from service.api.answers.problems import ProblemError
 from service.api.answers.representations import caching, entity_tag, has, not_modified
-from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, Responses, header, problem
+from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, Responses, problem
 from service.api.context import Context, Service
 from service.errors import StorageError
 from service.schemas.failures import TwinPlay
@@ -24,7 +25,6 @@ from service.views.studies import CannotBePlayed, Study
 from service.views.twins import twin_body
 
 PNG, JSON, NPZ = "image/png", "application/json", "application/zip"
-RETRY_AFTER_S = 2  # in which some of those who wait get theirs
 
 
 def _made(media_type: str) -> Responses:
@@ -32,17 +32,12 @@ def _made(media_type: str) -> Responses:
     return TAGGED | {
         200: TAGGED[200] | {"content": {media_type: {}}},
         **problem(404, "Nothing has this id, or its time series is lost"),
-        503: STORAGE[503]
-        | {
-            "description": "The database cannot be read, or too many wait for theirs",
-            "headers": {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)},
-        },
+        **CROWDED,
     }
 
 
 PICTURE = _made(PNG)
 PLAYED = problem(409, "The collision does not repeat here, or cannot be played")
-LACKING = problem(501, "The service lacks a package that makes this format")
 _EXPORTED: dict[str, Any] = {FORMATS[name].media_type: {} for name in names("failure")}
 EXPORT = _made(NPZ) | PLAYED | LACKING | {200: TAGGED[200] | {"content": _EXPORTED}}
 BUNDLE, TWIN, TOLD = _made(NPZ) | PLAYED, _made(PNG) | PLAYED, _made(JSON) | PLAYED
@@ -90,18 +85,6 @@ async def get_export(contact: Asked, format: FormatName, request: Request, servi
     return answer
 
 
-def check_installed(format: FormatName, of: Literal["failure", "episodes"]) -> None:
-    """Refuses a format whose packages the service lacks: that is no mistake of who asks.
-
-    Raises:
-      ProblemError: naming them, and the extra that has them.
-    """
-    row = FORMATS[format]
-    if row.of == of and row.missing:
-        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: the extra {EXTRA!r} has it"
-        raise _problem(HTTPStatus.NOT_IMPLEMENTED, Reason.NOT_INSTALLED, lacks)
-
-
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=TOLD)
 async def get_region(contact: Asked, request: Request, service: Service) -> Response:
     """How many of its neighbours fail as it does: nearby scenes, other traffic, other actions; takes 170 episodes."""
@@ -145,14 +128,9 @@ async def _answer(
     try:
         content = await make()
     except StorageError as error:
-        raise _problem(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, f"{id_!r} cannot be shown: {error}") from error
+        raise ProblemError(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, f"{id_!r} cannot be shown: {error}") from error
     except CannotBePlayed as error:
-        raise _problem(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, f"{id_!r}: {error}") from error
+        raise ProblemError(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, f"{id_!r}: {error}") from error
     except TooManyWaiting as error:
-        wait = {"Retry-After": str(RETRY_AFTER_S)}
-        raise _problem(HTTPStatus.SERVICE_UNAVAILABLE, Reason.PICTURES_BUSY, str(error), headers=wait) from error
+        raise crowded(error) from error
     return Response(content, headers=caching(tag), media_type=media_type)
-
-
-def _problem(status: HTTPStatus, reason: Reason, detail: str, **more: Any) -> ProblemError:
-    return ProblemError(status, reason, detail, **more)

@@ -4,7 +4,7 @@ Sync routes, so that statistics and drawing take place in FastAPI's thread pool.
 """
 
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
@@ -15,7 +15,7 @@ from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.report import Comparison, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS, Format
 from service.api.access import CurrentCaller
-from service.api.answers.representations import accepted, caching, entity_tag, has, not_modified
+from service.api.answers.representations import accepted_format, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses
 from service.api.context import Context, Service
 from service.schemas.reports import Clusters, Figure, FigureFile, Figures, Table
@@ -82,7 +82,7 @@ def get_table(
 ) -> Response:
     """The methods compared over seeds by the runs that have finished, with the others named; empty before the first."""
     campaign = service.store.campaign(campaign_id, caller.sees)
-    name = format_ or _accepted(request, TABLES)
+    name = format_ or accepted_format(request, _types(TABLES))
     command, spec_command = commands(request, campaign_id)
 
     def table(report: CampaignReport) -> str:
@@ -143,7 +143,7 @@ def get_spec(
 ) -> Response:
     """The campaign alone: JSON to post again, or YAML for `risk-sac run --spec` and `risk-sac evaluate --spec`."""
     spec = service.store.campaign(campaign_id, caller.sees).spec
-    name = format_ or _accepted(request, SPECS)
+    name = format_ or accepted_format(request, _types(SPECS))
     return Response(SPECS[name](spec), headers={"Vary": "Accept"}, media_type=MEDIA_TYPES[name])
 
 
@@ -164,9 +164,8 @@ def _shown(
     return Response(show(report), headers=caching(tag if report.lasting else None, vary), media_type=media_type)
 
 
-def _accepted(request: Request, formats: dict[str, Any]) -> str:
-    names = {MEDIA_TYPES[name]: name for name in formats}
-    return names[accepted(", ".join(request.headers.getlist("accept")), list(names))]
+def _types(formats: Iterable[str]) -> dict[str, str]:
+    return {name: MEDIA_TYPES[name] for name in formats}
 
 
 def _files(campaign_id: str, name: str) -> list[FigureFile]:
