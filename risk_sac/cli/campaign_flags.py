@@ -4,7 +4,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from risk_sac.cli.text import EGO
 from risk_sac.config import METHODS
+from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
 
 
@@ -33,6 +35,20 @@ def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, method
     )
     parser.add_argument("--iid-seed", type=int, metavar="S", help="of those scenes (default: 0)")
     parser.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags go first")
+
+
+def add_ego_flag(parser: argparse.ArgumentParser) -> None:
+    """Adds the flag that says who drives; a ladder has egos of its own."""
+    parser.add_argument("--ego", metavar="EGO", help=f"who drives: {EGO} (default: default)")
+
+
+def ego_flag(options: argparse.Namespace) -> dict[str, Any]:
+    """The field of a run or a campaign; None where the flag was not given.
+
+    Raises:
+      ConfigError: it names no ego.
+    """
+    return {"ego": None if options.ego is None else read_ego(options.ego).model_dump(mode="json")}
 
 
 def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:

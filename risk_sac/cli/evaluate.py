@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
+from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, campaign_flags, ego_flag
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, complain, console, progress_bar
 from risk_sac.cli.on_map import add_map_flags, families_on_map
 from risk_sac.cli.text import counted
@@ -29,6 +29,7 @@ def add_evaluate(commands: Commands) -> None:
     evaluate.set_defaults(command=_evaluate)
     add_map_flags(evaluate, several=True)
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
+    add_ego_flag(evaluate)
     evaluate.add_argument(
         "--jobs",
         type=int,
@@ -56,7 +57,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     defaults = {"families": SHIPPED, "methods": methods, "seeds": range(SEEDS)}
     defaults = {name: list(values) for name, values in defaults.items()}
     options.families = families_on_map(options) or options.families
-    spec = read_campaign(options.spec, campaign_flags(options, SEEDS), defaults)
+    spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | ego_flag(options), defaults)
     from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
 
     with progress_bar() as bar:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rich.table import Table
 
+from risk_sac.cli.campaign_flags import add_ego_flag, ego_flag
 from risk_sac.cli.console import INTERRUPTED, OK, Commands, console, or_dash, progress_bar
 from risk_sac.cli.on_map import add_map_flags, families_on_map
 from risk_sac.cli.text import counted
@@ -21,6 +22,7 @@ def add_run(commands: Commands) -> None:
     run.set_defaults(command=_run)
     run.add_argument("--family", metavar="low|mixed|dense", help="scenario family")
     add_map_flags(run, several=False)
+    add_ego_flag(run)
     run.add_argument("--method", metavar="NAME", help=f"one of {', '.join(METHODS)} (default: risk-sac)")
     run.add_argument("--episodes", type=int, metavar="N", help="search episodes (default: 300)")
     run.add_argument("--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)")
@@ -37,7 +39,7 @@ def _run(options: argparse.Namespace) -> int:
     families = families_on_map(options)
     if families:
         options.family = families[0]
-    spec = read_spec(options.spec, {name: getattr(options, name) for name in names})
+    spec = read_spec(options.spec, {name: getattr(options, name) for name in names} | ego_flag(options))
     from risk_sac.execution.runs import run  # here, because loading torch takes seconds
 
     total = spec.budget.total_episodes

@@ -6,9 +6,12 @@ the run.
 
 import math
 import time
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
+from risk_sac.egos import alarm
 from risk_sac.egos.seam import Command, Control, Ego, Episode, Perceived, Trajectory
 from risk_sac.errors import EgoFailed
 
@@ -16,31 +19,32 @@ DEADLINE, MALFORMED, CRASH = "ego_deadline", "ego_malformed", "ego_crash"
 DEAD_AFTER = 5
 MOST_POINTS = 1000
 
+Told, Answer = TypeVar("Told"), TypeVar("Answer")
+
 
 class Guarded:
     """An ego whose every answer is checked."""
 
-    def __init__(self, ego: Ego, deadline_s: float) -> None:
+    def __init__(self, ego: Ego, deadline_s: float, *, interrupted: bool = False) -> None:
         """Wraps it.
 
         Args:
           ego: who drives.
-          deadline_s: for each answer, of real time. An ego in our own process is asked to the end and then refused.
+          deadline_s: for each answer, of real time.
+          interrupted: whether it is interrupted then, as far as `risk_sac.egos.alarm` can; else it keeps its deadline
+            itself, or is asked to the end and then refused.
         """
-        self._ego, self._deadline_s = ego, deadline_s
+        self._ego, self._deadline_s, self._interrupted = ego, deadline_s, interrupted
+        self._alarmed = False
 
     def reset(self, episode: Episode) -> None:
         """Begins an episode.
 
         Raises:
-          EgoFailed: it crashed.
+          EgoFailed: it crashed, or took too long.
         """
-        try:
-            self._ego.reset(episode)
-        except EgoFailed:
-            raise
-        except Exception as error:
-            raise _crashed(error) from error
+        self._alarmed = self._interrupted and alarm.ready()
+        self._asked(self._ego.reset, episode)
 
     def act(self, perceived: Perceived) -> Command:
         """Its command, which is sound.
@@ -49,12 +53,7 @@ class Guarded:
           EgoFailed: it crashed, took too long, or answered nonsense.
         """
         began = time.monotonic()
-        try:
-            command = self._ego.act(perceived)
-        except EgoFailed:
-            raise
-        except Exception as error:
-            raise _crashed(error) from error
+        command = self._asked(self._ego.act, perceived)
         took_s = time.monotonic() - began
         if took_s > self._deadline_s:
             raise EgoFailed(f"the ego took {took_s:.2f} s; wanted at most {self._deadline_s:g} s", reason=DEADLINE)
@@ -66,6 +65,25 @@ class Guarded:
     def close(self) -> None:
         """Lets go of what it holds."""
         self._ego.close()
+
+    def _asked(self, question: Callable[[Told], Answer], told: Told) -> Answer:
+        try:
+            return self._in_time(question, told) if self._alarmed else question(told)
+        except EgoFailed:
+            raise
+        except alarm.Overdue as overdue:
+            alarm.off()  # it may have rung while it was put off
+            said = f"the ego did not answer within {self._deadline_s:g} s"
+            raise EgoFailed(said, reason=DEADLINE) from overdue
+        except Exception as error:
+            raise _crashed(error) from error
+
+    def _in_time(self, question: Callable[[Told], Answer], told: Told) -> Answer:
+        alarm.on(self._deadline_s)
+        try:
+            return question(told)
+        finally:
+            alarm.off()
 
 
 def complaint(command: object) -> str:

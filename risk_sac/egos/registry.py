@@ -104,12 +104,12 @@ def load(ego: EgoConfig) -> Guarded | None:
     if isinstance(card, RemoteCard):
         from risk_sac.egos.remote.client import RemoteEgo  # here, because not everybody has grpc
 
-        return Guarded(RemoteEgo(card.address, card.version, card.deadline_s), card.deadline_s)
-    return Guarded(make(card.name)[0](), card.deadline_s)
+        return Guarded(RemoteEgo(card.name, card.address, card.version, card.deadline_s), card.deadline_s)
+    return Guarded(make(card.name)[0](), card.deadline_s, interrupted=True)
 
 
-def make(name: str) -> tuple[Callable[[], Ego], str]:
-    """What makes a registered Python ego, and its version.
+def make(name: str) -> tuple[Callable[[], Ego], EgoCard]:
+    """What makes a registered Python ego, and its card.
 
     Raises:
       ConfigError: there is none of this name, or it cannot be loaded.
@@ -117,12 +117,32 @@ def make(name: str) -> tuple[Callable[[], Ego], str]:
     card, points = card_of(name), _points()
     if name not in points:
         raise ConfigError(f"the ego {name!r} is no Python ego, but {card.kind}", field="ego.driver")
+    return _loaded(points[name]), card
+
+
+def make_unregistered(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
+    """What makes an ego that no entry point names, and its card.
+
+    Args:
+      source: `module:Class`.
+      name: that it is to have.
+
+    Raises:
+      ConfigError: there is no such class, it does not declare what it has to, or it cannot be loaded.
+    """
+    point = EntryPoint(name=name, value=source, group=GROUP)
+    return _loaded(point), python_card(point)
+
+
+def _loaded(point: EntryPoint) -> Callable[[], Ego]:
     try:
-        return points[name].load(), card.version
+        made: Callable[[], Ego] = point.load()
     except Exception as error:
         raise ConfigError(
-            f"the registered ego {name!r} cannot be loaded: {type(error).__name__}: {error}", field="ego.driver"
+            f"the ego {point.name!r} ({point.value}) cannot be loaded: {type(error).__name__}: {error}",
+            field="ego.driver",
         ) from error
+    return made
 
 
 def _points() -> Mapping[str, EntryPoint]:

@@ -1,9 +1,10 @@
-"""`python -m risk_sac.egos.serve r157 --address 127.0.0.1:50051`: serve a Python ego to others.
+"""`python -m risk_sac.egos.serve my_egos:Follower --address 127.0.0.1:50051`: serve a Python ego to others.
 
 It is the reference of the other end, too: whoever writes an ego in another language does what is done here.
 """
 
 import argparse
+import json
 import logging
 import threading
 from collections.abc import Callable
@@ -15,7 +16,8 @@ from typing import Any
 import grpc
 import numpy as np
 
-from risk_sac.egos.registry import make
+from risk_sac.egos.cards import EgoCard
+from risk_sac.egos.registry import make, make_unregistered
 from risk_sac.egos.remote.messages import (
     METHODS,
     PROTOCOL,
@@ -27,6 +29,7 @@ from risk_sac.egos.remote.messages import (
 )
 from risk_sac.egos.remote.wire import Message, decode, encode
 from risk_sac.egos.seam import Ego, Episode, Vehicle
+from risk_sac.errors import ConfigError
 from risk_sac.types import STEP_S, Floats, Kind, Signal
 
 logger = logging.getLogger(__name__)
@@ -116,23 +119,40 @@ def serve(sessions: Sessions, address: str, threads: int = 4) -> tuple[grpc.Serv
         )
         for name, (request, reply) in METHODS.items()
     }
-    server = grpc.server(ThreadPoolExecutor(threads))
+    # Without the option a second server would share the port, and every other session.
+    server = grpc.server(ThreadPoolExecutor(threads), options=[("grpc.so_reuseport", 0)])
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
     port = server.add_insecure_port(address)
     server.start()
     return server, port
 
 
+def table(name: str, address: str, card: EgoCard) -> str:
+    """What registers an ego that is served, for the file of RISK_SAC_EGOS."""
+    told = {"address": address, "version": card.version, "response_time_s": card.response_time_s}
+    return "\n".join([f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in told.items())])
+
+
 def main() -> None:
-    """Serves until it is killed; prints the port and the version once it listens."""
-    parser = argparse.ArgumentParser(description="Serves a registered Python ego by the protocol of ego.proto.")
-    parser.add_argument("ego", help="its name")
+    """Serves until it is killed; prints the port and the version, or what registers it, once it listens."""
+    parser = argparse.ArgumentParser(description="Serves a Python ego by the protocol of ego.proto.")
+    parser.add_argument("ego", help="name of a registered one, or module:Class")
     parser.add_argument("--address", default="127.0.0.1:0", help="to listen on; port 0 is any (default: %(default)s)")
+    lines = "print the lines with which an operator registers it by this name, for the file of RISK_SAC_EGOS"
+    parser.add_argument("--register", metavar="NAME", help=lines)
     options = parser.parse_args()
-    make_ego, version = make(options.ego)
-    warm_up(make_ego())
-    server, port = serve(Sessions(make_ego, version), options.address)
-    print(f"{options.ego} {version} listens on port {port}", flush=True)  # noqa: T201 - for who started it
+    named = ":" not in options.ego
+    try:
+        make_ego, card = make(options.ego) if named else make_unregistered(options.ego, options.register or "ego")
+        warm_up(make_ego())
+        server, port = serve(Sessions(make_ego, card.version), options.address)
+    except (ConfigError, RuntimeError) as error:
+        parser.error(str(error))
+    said = f"{options.ego} {card.version} listens on port {port}"
+    if options.register is not None:
+        address, any_port = options.address, ":0"
+        said = table(options.register, address.removesuffix(any_port) + f":{port}" * address.endswith(any_port), card)
+    print(said, flush=True)  # noqa: T201 - for who started it
     server.wait_for_termination()
 
 

@@ -10,7 +10,7 @@ import json
 import multiprocessing
 import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 
@@ -42,21 +42,38 @@ def _same(folder: Path, results: Results, env: RiskSacEnv) -> list[int]:
     return same
 
 
-def _tell(runs: Mapping[Path, tuple[Results, RiskSacEnv]]) -> None:
+Prepared = Mapping[Path, tuple[Results, RiskSacEnv]]
+
+
+def _prepared(folders: Sequence[Path]) -> Prepared:
+    """The runs that can be played here; of each other one a line says why not, such as that its ego is not there."""
+    found = {}
+    for folder in folders:
+        results = read_results(folder)
+        try:
+            found[folder] = results, RiskSacEnv.of(results.spec)
+        except RiskSacError as error:
+            _say(folder, error=f"{type(error).__name__}: {error}")
+    return found
+
+
+def _say(folder: Path, **told: object) -> None:
+    print(json.dumps({"folder": str(folder)} | told), flush=True)  # noqa: T201 - to whoever started it
+
+
+def _tell(runs: Prepared) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     for folder, (results, env) in runs.items():
         try:
             with closing(env):
-                line = {"folder": str(folder), "same": _same(folder, results, env)}
+                _say(folder, same=_same(folder, results, env))
         except (RiskSacError, OSError, KeyError) as error:  # a key: of a series from before there was a release
-            line = {"folder": str(folder), "error": f"{type(error).__name__}: {error}"}
-        print(json.dumps(line), flush=True)  # noqa: T201 - to whoever started it
+            _say(folder, error=f"{type(error).__name__}: {error}")
 
 
 def _main(times: int, jobs: int, folders: list[Path]) -> int:
     """The greatest exit status of the processes."""
-    found = {folder: read_results(folder) for folder in folders}
-    runs = {folder: (results, RiskSacEnv.of(results.spec)) for folder, results in found.items()}
+    runs = _prepared(folders)
     soft_min(np.zeros(1), 1.0)  # the first call of any compiled function loads what all of them need
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # and daemons end with their parent's exit
     fork, statuses = multiprocessing.get_context("fork"), [0]

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import ConfigError, InfeasibleScene, SimulationError
+from risk_sac.errors import ConfigError, EgoFailed, InfeasibleScene, SimulationError
 from risk_sac.failures.bundle import Bundle, check_world
 from risk_sac.failures.trajectory import actions_of
 from risk_sac.records import Collision
 from risk_sac.scenario.space import SceneSpace
+from risk_sac.sim.sumo import OFF_ROAD
 from risk_sac.types import STEP_S, Floats, Scene
 
 TAIL_S = 3.0  # that is played on without any action: what is done less, or elsewhere, takes longer to end in a contact
@@ -72,7 +73,11 @@ class Stage:
         return Scene(self.space.family, dict(zip(self.space.names, variant.scene.tolist(), strict=True)))
 
     def play(self, variant: Variant) -> Collision | None:
-        """The contact that a variant ends in; None without one, or if its scene is infeasible."""
+        """The contact that a variant ends in; None without one, or if its scene is infeasible.
+
+        Raises:
+          EgoFailed: the ego is dead, which says nothing of the variant.
+        """
         self.played += 1
         try:
             self.env.reset(seed=variant.seed, options={"scene": self.scene(variant)})
@@ -83,6 +88,9 @@ class Stage:
                     return collision
         except (InfeasibleScene, SimulationError):
             pass
+        except EgoFailed as failed:
+            if failed.reason != OFF_ROAD:
+                raise
         return None
 
     def fails(self, variant: Variant) -> bool:

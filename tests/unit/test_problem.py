@@ -19,6 +19,11 @@ def problem(family: str = "mixed", **settings: object) -> Problem:
     return Problem.from_spec(RunSpec(family=family, method="risk-sac", seed=0, **settings))
 
 
+def wanted_ttc_s(posed: Problem) -> float:
+    (safe,) = (each for each in posed.requirements if each.name == "safe_ttc")
+    return float(safe.formula.rpartition(" ")[2])
+
+
 def bounds(posed: Problem, name: str) -> tuple[float, float]:
     [parameter] = [p for p in posed.space.parameters if p.name == name]
     return parameter.low, parameter.high
@@ -93,8 +98,21 @@ def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs() -> None:
     assert refused.value.position == 0
 
 
-def test_rss_asks_the_same_of_any_ego_and_reckons_with_the_worst_friction() -> None:
-    assert {problem(ego=EgoConfig(reaction_time_s=t)).rss.response_s for t in (0.1, 0.5, 1.0)} == {0.5}
+def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_it_says_it_is() -> None:
+    """RSS decides which scenes are refused: by an ego's own time a slow one would be offered the milder ones."""
+    egos = [EgoConfig(reaction_time_s=t) for t in (0.1, 0.5, 1.0)]
+    egos += [EgoConfig(driver=name) for name in ("rss", "idm-aeb", "broken", "r157")]
+    egos += [EgoConfig(driver="rss", response_time_s=t) for t in (0.0, 5.0)]
+    posed = sorted((problem(ego=ego) for ego in egos), key=lambda posed: posed.ego.response_s)
+    assert {each.rss for each in posed} == {problem().rss}
+    assert problem().rss.response_s == 0.5
+    wanted_s = [wanted_ttc_s(each) for each in posed]
+    assert wanted_s == sorted(wanted_s)
+    assert wanted_s[0] == wanted_ttc_s(problem()) == 1.5  # who says that it is quick gains nothing by it
+    assert wanted_s[-1] == 6.0
+
+
+def test_rss_reckons_with_the_worst_friction() -> None:
     assert problem(
         odd=Odd(environment=Environment(friction=Interval(low=0.6, high=1)))
     ).rss.brake_min_mps2 == pytest.approx(0.6 * 9.81)

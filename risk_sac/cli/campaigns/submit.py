@@ -2,7 +2,7 @@
 
 import argparse
 
-from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
+from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, campaign_flags, ego_flag
 from risk_sac.cli.campaigns.output import line, print_answer
 from risk_sac.cli.campaigns.watch import add_watch_flags, prepare, watch
 from risk_sac.cli.console import OK, Commands, notes
@@ -18,6 +18,7 @@ def add_submit(campaigns: Commands) -> None:
     parser = campaigns.add_parser("submit", help="queue a campaign")
     parser.set_defaults(command=_submit)
     add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
+    add_ego_flag(parser)
     parser.add_argument("--label", metavar="TEXT", help="to find it by")
     parser.add_argument(
         "--idempotency-key", metavar="KEY", help="the same key gives the same campaign, however often it is submitted"
@@ -31,7 +32,8 @@ def _submit(options: argparse.Namespace) -> int:
         if getattr(options, name) is not None and not options.watch:
             raise ConfigError("got it without --watch; wanted both", field=f"--{name.replace('_', '-')}")
     prepare(options)
-    spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | {"label": options.label}, {})
+    flags = campaign_flags(options, SEEDS) | ego_flag(options) | {"label": options.label}
+    spec = read_campaign(options.spec, flags, {})
     with Client.from_environment(options.url) as client:
         campaign = client.submit(spec, options.idempotency_key)
         if options.watch:

@@ -1,6 +1,8 @@
 """Our end of the protocol: an ego in another process, as one of ours."""
 
 import uuid
+from collections.abc import Mapping
+from typing import Any
 
 import grpc
 
@@ -19,17 +21,18 @@ OPTIONS = [("grpc.max_receive_message_length", LONGEST), ("grpc.enable_retries",
 class RemoteEgo:
     """A session for each episode, over one connection that is made anew when it breaks."""
 
-    def __init__(self, address: str, version: str, deadline_s: float) -> None:
-        """Connects to nobody yet.
+    def __init__(self, name: str, address: str, version: str, deadline_s: float) -> None:
+        """Connects to nobody yet: replays fork after this, and a connection does not survive that.
 
         Args:
+          name: by which it is registered. What goes wrong is told with it, and never with the address.
           address: of its server.
           version: which it has to say of itself.
           deadline_s: for each answer.
         """
-        self._address, self._version, self._deadline_s = address, version, deadline_s
-        self._channel = grpc.insecure_channel(address, options=OPTIONS)
-        self._call = {name: self._channel.unary_unary(f"/{SERVICE}/{name}") for name in METHODS}
+        self._name, self._address, self._version, self._deadline_s = name, address, version, deadline_s
+        self._channel: Any = None
+        self._call: Mapping[str, Any] = {}
         self._session = ""
         self._path: Floats | None = None
 
@@ -39,12 +42,15 @@ class RemoteEgo:
         Raises:
           EgoFailed: nobody answers in time, or an ego of another version.
         """
+        if self._channel is None:
+            self._channel = grpc.insecure_channel(self._address, options=OPTIONS)
+            self._call = {name: self._channel.unary_unary(f"/{SERVICE}/{name}") for name in METHODS}
         self._end()
         self._session, self._path = str(uuid.uuid4()), None
         reply = self._ask("Start", start_request(episode, self._session))
         if reply["version"] != self._version:
             raise EgoFailed(
-                f"the ego at {self._address} is of version {reply['version']!r}; registered is {self._version!r}",
+                f"the ego {self._name!r} is of version {reply['version']!r}; registered is {self._version!r}",
                 reason=VERSION,
             )
 
@@ -64,7 +70,9 @@ class RemoteEgo:
     def close(self) -> None:
         """Ends the session and hangs up."""
         self._end()
-        self._channel.close()
+        if self._channel is not None:
+            self._channel.close()
+            self._channel = None
 
     def _end(self) -> None:
         if self._session:
@@ -77,9 +85,13 @@ class RemoteEgo:
         try:
             return decode(reply, self._call[name](encode(request, message), timeout=self._deadline_s))
         except ValueError as error:
-            raise EgoFailed(f"the ego at {self._address} answered {error}", reason=MALFORMED) from error
+            raise EgoFailed(f"the ego {self._name!r} answered {error}", reason=MALFORMED) from error
         except grpc.RpcError as error:
-            code, details = error.code(), error.details()
+            code = error.code()
             late = code is grpc.StatusCode.DEADLINE_EXCEEDED
-            said = f"did not answer within {self._deadline_s:g} s" if late else f"failed: {code.name}: {details}"
-            raise EgoFailed(f"the ego at {self._address} {said}", reason=DEADLINE if late else CRASH) from error
+            said = f"failed: {code.name}: {error.details()}"
+            if late:
+                said = f"did not answer within {self._deadline_s:g} s"
+            elif code is grpc.StatusCode.UNAVAILABLE:  # whose details name the address
+                said = "is not there: nobody answers at the address that it is registered with"
+            raise EgoFailed(f"the ego {self._name!r} {said}", reason=DEADLINE if late else CRASH) from error
