@@ -1,4 +1,4 @@
-"""Messages of `ego.proto` as bytes, in protocol buffers' wire format; the schema is read from that file.
+"""Messages of a `.proto` of this folder as bytes, in protocol buffers' wire format; the schema is read from that file.
 
 Choice: no protobuf package. Other packages pin versions of it (commonroad-io one that is pure Python, with which a step
 takes half a millisecond more), and all that is needed of it is what follows. Rows of numbers are numpy's.
@@ -30,8 +30,13 @@ class Field(NamedTuple):
     repeated: bool
 
 
-def _schema(proto: str) -> dict[str, tuple[Field, ...]]:
-    """The messages of a file in which each field has a line of its own."""
+Schema = Mapping[str, tuple[Field, ...]]
+"""Message -> its fields."""
+
+
+def read_schema(file: str) -> Schema:
+    """The messages of a file of this folder, in which each field has a line of its own."""
+    proto = (files(__package__) / file).read_text(encoding="utf-8")
     found: dict[str, list[Field]] = {}
     fields: list[Field] = []
     for line in proto.splitlines():
@@ -42,18 +47,19 @@ def _schema(proto: str) -> dict[str, tuple[Field, ...]]:
     return {name: tuple(fields) for name, fields in found.items()}
 
 
-SCHEMA = _schema((files(__package__) / "ego.proto").read_text(encoding="utf-8"))
+SCHEMA = read_schema("ego.proto")
 
 
-def encode(name: str, message: Message) -> bytes:
+def encode(name: str, message: Message, schema: Schema = SCHEMA) -> bytes:
     """A message as bytes.
 
     Args:
       name: of its type.
       message: all of its fields; those that are None or left out are not told.
+      schema: that has the type.
     """
     parts = []
-    for field in SCHEMA[name]:
+    for field in schema[name]:
         value = message.get(field.name)
         if value is None:
             continue
@@ -63,8 +69,10 @@ def encode(name: str, message: Message) -> bytes:
             parts.append(_varint(field.number << 3 | FIXED64) + struct.pack("<d", value))
         elif field.type == "string":
             parts += [_told(field, each.encode()) for each in (value if field.repeated else (value,))]
-        elif field.type in SCHEMA:
-            parts.append(_told(field, encode(field.type, value)))
+        elif field.type in schema:
+            parts += [
+                _told(field, encode(field.type, each, schema)) for each in (value if field.repeated else (value,))
+            ]
         elif field.repeated:
             parts.append(_told(field, b"".join(map(_varint, value))))
         else:
@@ -72,19 +80,19 @@ def encode(name: str, message: Message) -> bytes:
     return b"".join(parts)
 
 
-def decode(name: str, data: bytes) -> dict[str, Any]:
+def decode(name: str, data: bytes, schema: Schema = SCHEMA) -> dict[str, Any]:
     """A message from bytes; fields of a later version are passed over.
 
     Raises:
       ValueError: these bytes are none of such a message's.
     """
-    fields = {field.number: field for field in SCHEMA[name]}
-    message = {field.name: _nothing(field) for field in SCHEMA[name] if field.type not in SCHEMA}
+    fields = {field.number: field for field in schema[name]}
+    message = {field.name: _nothing(field) for field in schema[name] if field.repeated or field.type not in schema}
     try:
         for number, wire, value in _parts(data):
             field = fields.get(number)
             if field is not None:
-                message[field.name] = _value(field, wire, value, message.get(field.name))
+                message[field.name] = _value(field, wire, value, message.get(field.name), schema)
     except (AttributeError, IndexError, struct.error, TypeError, UnicodeDecodeError) as error:
         raise ValueError(f"{len(data)} bytes that are no {name}") from error
     return message
@@ -118,15 +126,16 @@ def _parts(data: bytes) -> Iterator[tuple[int, int, Any]]:
         yield number, wire, value
 
 
-def _value(field: Field, wire: int, value: Any, before: Any) -> Any:
+def _value(field: Field, wire: int, value: Any, before: Any, schema: Schema) -> Any:
     """What a part says of its field."""
     if field.type == "double":
         numbers = np.frombuffer(value, dtype="<f8").tolist()
         return [*before, *numbers] if field.repeated else numbers[0]
     if field.type == "string":
         return [*before, value.decode()] if field.repeated else value.decode()
-    if field.type in SCHEMA:
-        return decode(field.type, value)
+    if field.type in schema:
+        found = decode(field.type, value, schema)
+        return [*before, found] if field.repeated else found
     if not field.repeated:
         return value + 0
     return [*before, value] if wire == VARINT else [*before, *_varints(value)]

@@ -1,0 +1,147 @@
+"""An ego that speaks ASAM OSI: literals by the `osi3` of osi-python 3.8.0, and an episode."""
+
+import math
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.egos.registry import SHIPPED
+from risk_sac.egos.remote.osi import SCHEMA, OsiEgo, ground_truth, trajectory_of
+from risk_sac.egos.remote.wire import decode, encode
+from risk_sac.egos.seam import Perceived
+from risk_sac.env import RiskSacEnv
+from risk_sac.types import HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Kind, Signal, X, Y
+
+AHEAD_S, STEP_S = 2.0, 0.5
+
+# Written by osi3.
+GROUND_TRUTH = (
+    "0a060803100818001208080110808c8d9e021a0208012a80010a02080112740a1b09000000000000124011000000000000fc3f19"
+    "000000000000f83f121b09000000000000244011000000000000004019000000000000e83f1a1b09000000000000000011000000"
+    "000000000019000000000000d03f221b0900000000000020401100000000000000401900000000000000001802320208042a8001"
+    "0a02080212740a1b090000000000002440110000000000000440190000000000000840121b090000000000004440110000000000"
+    "00044019000000000000f83f1a1b090000000000000000110000000000000000190000000000000000221b090000000000001840"
+    "1100000000000000001900000000000000001802320208072a7c0a02080312740a1b09000000000000e03f11000000000000e03f"
+    "19000000000000fc3f121b090000000000004e4011000000000000184019000000000000ec3f1a1b090000000000000000110000"
+    "00000000000019000000000000f8bf221b09000000000000000011000000000000f0bf19000000000000000018033a2d0a060880"
+    "80808010121d121b0900000000008051401100000000000000001900000000000000001a04080218038a0182010a060881808080"
+    "1012260a1b09000000000000000011000000000000000019000000000000000011000000000000000012260a1b09000000000000"
+    "494011000000000000000019000000000000000011000000000000494012260a1b09000000000000594011000000000000000019"
+    "00000000000000001100000000000059401800"
+)
+REQUEST = (
+    "0a02080318012a9b010a320a08080110808c8d9e02121b0900000000000021401100000000000000401900000000000000001a09"
+    "1900000000000000000a310a0708021080c2d72f121b0900000000000029401100000000000000401900000000000000001a0919"
+    "00000000000000000a320a08080210808c8d9e02121b0900000000008030401100000000000000401900000000000000001a0919"
+    "0000000000000000"
+)
+STATE = (
+    "1800223d0a08080210808c8d9e0212120900000000000032401100000000000000401a0919182d4454fb21f93f22120900000000"
+    "00000840110000000000001040"
+)
+
+
+def perceived() -> Perceived:
+    state = np.full((WIDTH + 1, 3), np.nan)
+    state[[X, Y, HEADING, VX, VY, SPEED, LENGTH, WIDTH]] = [
+        [10.0, 40.0, 60.0],
+        [2.0, 2.5, 6.0],
+        [0.25, 0.0, -1.5],
+        [8.0, 6.0, 0.0],
+        [2.0, 0.0, -1.0],
+        [8.25, 6.0, 1.0],
+        [4.5, 10.0, 0.5],
+        [1.75, 2.5, 0.5],
+    ]
+    x, zero = np.array([0.0, 50.0, 100.0]), np.zeros(3)
+    return Perceived(
+        time_s=1.6,
+        ids=("ego", "truck", "walker"),
+        kind=np.array([Kind.VEHICLE, Kind.VEHICLE, Kind.PEDESTRIAN], dtype=np.int8),
+        state=state,
+        path=np.array([x, zero, x, zero, zero + 14.0, zero + 1.0, zero]),
+        station_m=12.25,
+        offset_m=2.0,
+        signal=Signal.RED,
+        stop_line_m=57.75,
+    )
+
+
+def test_what_is_told_is_an_osi_ground_truth() -> None:
+    """The literal is what `osi3.GroundTruth.FromString` read, `SerializeToString` wrote again, byte for byte."""
+    assert ground_truth(perceived(), {}).hex() == GROUND_TRUTH
+
+
+def test_actors_keep_their_numbers() -> None:
+    numbers: dict[str, int] = {}
+    ground_truth(perceived(), numbers)
+    later = perceived()._replace(ids=("ego", "walker", "new"))
+    told = decode("GroundTruth", ground_truth(later, numbers), SCHEMA)
+    assert [each["id"]["value"] for each in told["moving_object"]] == [1, 3, 4]
+    assert told["host_vehicle_id"]["value"] == 1
+
+
+def test_an_osi_motion_request_is_a_trajectory_of_the_middle_of_the_body() -> None:
+    found = trajectory_of(bytes.fromhex(REQUEST), perceived(), 1.5)
+    np.testing.assert_allclose(found.time_s, [0.0, 0.5, 1.0])
+    np.testing.assert_allclose(found.x_m, [10.0, 14.0, 18.0])
+    np.testing.assert_allclose(found.y_m, [2.0, 2.0, 2.0])
+    np.testing.assert_allclose(found.speed_mps, [8.0, 8.0, 8.0])
+
+
+def test_a_desired_state_is_where_to_be_then() -> None:
+    found = trajectory_of(bytes.fromhex(STATE), perceived(), 1.5)
+    np.testing.assert_allclose(found.time_s, [0.0, 1.0])
+    np.testing.assert_allclose(found.x_m, [10.0, 18.0])
+    np.testing.assert_allclose(found.y_m, [2.0, 3.5])
+    np.testing.assert_allclose(found.speed_mps, [8.25, 5.0])
+
+
+@pytest.mark.parametrize("nothing", [b"", bytes.fromhex("0a00"), bytes.fromhex("1801")])
+def test_what_is_no_motion_request_is_refused(nothing: bytes) -> None:
+    with pytest.raises(ValueError, match="motion request"):
+        trajectory_of(nothing, perceived(), 1.5)
+
+
+class ByOsi(OsiEgo):
+    """Drives along its reference line at 8 m/s, told and telling in OSI alone."""
+
+    version = "1"
+    response_time_s = 1.0
+
+    def drive(self, told: bytes) -> bytes:
+        truth = decode("GroundTruth", told, SCHEMA)
+        now_s = truth["timestamp"]["seconds"] + truth["timestamp"]["nanos"] / 1e9
+        (own,) = (each for each in truth["moving_object"] if each["id"] == truth["host_vehicle_id"])
+        position = own["base"]["position"]
+        line = [
+            (at["world_position"]["x"], at["world_position"]["y"]) for at in truth["reference_line"][0]["poly_line"]
+        ]
+        x, y = np.array(line).T
+        along = np.insert(np.cumsum(np.hypot(np.diff(x), np.diff(y))), 0, 0.0)
+        stations = np.arange(0.0, along[-1], 0.1)
+        xs, ys = np.interp(stations, along, x), np.interp(stations, along, y)
+        here = stations[np.argmin(np.hypot(xs - position["x"], ys - position["y"]))]
+        points = []
+        for k in range(1, round(AHEAD_S / STEP_S) + 1):
+            at = here + 8.0 * STEP_S * k - 1.35 + np.array((0.0, 0.1))  # of the rear axle
+            (x0, x1), (y0, y1) = np.interp(at, along, x), np.interp(at, along, y)
+            seconds, nanos = divmod(round((now_s + k * STEP_S) * 1e9), 10**9)
+            pose = {"position": {"x": x0, "y": y0}, "orientation": {"yaw": math.atan2(y1 - y0, x1 - x0)}}
+            points.append(pose | {"timestamp": {"seconds": seconds, "nanos": nanos}})
+        request = {"motion_request_type": 1, "desired_trajectory": {"trajectory_point": points}}
+        return encode("MotionRequest", request, SCHEMA)
+
+
+def test_it_drives_an_episode(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(SHIPPED, "by-osi", "tests.unit.egos.test_osi:ByOsi")
+    spec = RunSpec(family="low", method="random", seed=0, ego=EgoConfig(driver="by-osi"))
+    with closing(RiskSacEnv(RiskSacEnv.of(spec).problem, spec.learner.reward, controlled=False)) as env:
+        env.reset(seed=2)
+        for _ in range(60):
+            env.step(np.zeros(env.action_size, dtype=np.float32))
+        frames = env.trace.frames
+    assert frames[-1].speed_mps[0] == pytest.approx(8.0, abs=0.3)
+    assert abs(frames[-1].state[OFFSET, 0]) < 0.3
