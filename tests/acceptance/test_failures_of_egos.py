@@ -52,7 +52,7 @@ def far(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Found, str]]
     """And what registers the ego, whose process lives on for a test."""
     pytest.importorskip("grpc")
     folder = tmp_path_factory.mktemp("far")
-    with pytest.MonkeyPatch.context() as patch, served("broken", folder, deadline_s=60) as table:
+    with pytest.MonkeyPatch.context() as patch, served("broken", folder, deadline_s=60, response_time_s=1.0) as table:
         register(patch, folder, table)
         yield found(folder, "far"), table
 
