@@ -129,7 +129,12 @@ def serve(sessions: Sessions, address: str, threads: int = 4) -> tuple[grpc.Serv
 
 def table(name: str, address: str, card: EgoCard) -> str:
     """What registers an ego that is served, for the file of RISK_SAC_EGOS."""
-    told = {"address": address, "version": card.version, "response_time_s": card.response_time_s}
+    told = {
+        "address": address,
+        "version": card.version,
+        "summary": card.summary,
+        "response_time_s": card.response_time_s,
+    }
     return "\n".join([f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in told.items())])
 
 
