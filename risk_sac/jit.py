@@ -21,6 +21,7 @@ COMPILED = (  # where compiled functions are, and the constants that are compile
     "observation_layout.py",
     "types.py",
     "agents/sum_tree.py",
+    "egos/bicycle.py",
     "egos/pilot.py",
     "egos/road.py",
     "risk/*.py",

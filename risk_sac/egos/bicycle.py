@@ -6,6 +6,7 @@ Source: Kong et al. 2015, "Kinematic and dynamic vehicle models for autonomous d
 import math
 
 from risk_sac.egos.seam import Vehicle
+from risk_sac.jit import compiled
 from risk_sac.sim.pilot import Motion
 
 
@@ -22,36 +23,54 @@ def advance(motion: Motion, accel_mps2: float, steering_rad: float, vehicle: Veh
       vehicle: with the limits.
       step_s: length of the step.
     """
-    v, speed = vehicle, motion.speed_mps
-    turn = v.steering_rate_rad_s * step_s
-    steering = min(max(steering_rad, motion.steering_rad - turn), motion.steering_rad + turn)
-    largest = min(v.steering_rad, math.atan(v.wheelbase_m * v.grip_mps2 / max(speed * speed, 1e-3)))
+    v, (x_m, y_m, heading_rad, speed_mps, before_mps2, steered_rad, _) = vehicle, motion
+    limits = (v.wheelbase_m, v.accel_mps2, v.brake_mps2, v.brake_jerk_mps3, v.steering_rad, v.steering_rate_rad_s)
+    now = x_m, y_m, heading_rad, speed_mps, before_mps2, steered_rad
+    return Motion(*_advanced(*now, float(accel_mps2), float(steering_rad), *limits, v.grip_mps2, step_s))
+
+
+@compiled
+def _advanced(
+    x_m: float,
+    y_m: float,
+    heading_rad: float,
+    speed: float,
+    before_mps2: float,
+    steered_rad: float,
+    wanted_mps2: float,
+    wanted_rad: float,
+    wheelbase_m: float,
+    most_accel_mps2: float,
+    most_brake_mps2: float,
+    brake_jerk_mps3: float,
+    most_steering_rad: float,
+    steering_rate_rad_s: float,
+    grip_mps2: float,
+    step_s: float,
+) -> tuple[float, float, float, float, float, float, float]:
+    """The fields of the next motion."""
+    turn = steering_rate_rad_s * step_s
+    steering = min(max(wanted_rad, steered_rad - turn), steered_rad + turn)
+    largest = min(most_steering_rad, math.atan(wheelbase_m * grip_mps2 / max(speed * speed, 1e-3)))
     steering = min(max(steering, -largest), largest)
     slip = math.atan(math.tan(steering) / 2.0)  # the centre is halfway between the axles
-    curvature = 2.0 * math.sin(slip) / v.wheelbase_m
-    left_mps2 = math.sqrt(max(v.grip_mps2**2 - (speed * speed * curvature) ** 2, 0.0))
-    accel = max(accel_mps2, min(motion.accel_mps2, 0.0) - v.brake_jerk_mps3 * step_s)
-    accel = min(max(accel, -min(v.brake_mps2, left_mps2)), min(v.accel_mps2, left_mps2))
+    curvature = 2.0 * math.sin(slip) / wheelbase_m
+    left_mps2 = math.sqrt(max(grip_mps2**2 - (speed * speed * curvature) ** 2, 0.0))
+    accel = max(wanted_mps2, min(before_mps2, 0.0) - brake_jerk_mps3 * step_s)
+    accel = min(max(accel, -min(most_brake_mps2, left_mps2)), min(most_accel_mps2, left_mps2))
     faster = max(speed + accel * step_s, 0.0)
-    way_m = (speed + faster) / 2.0 * step_s if faster > 0.0 else _stopping_way(speed, accel)
+    way_m = (speed + faster) / 2.0 * step_s
+    if faster == 0.0:  # to a standstill within the step
+        way_m = speed * speed / (-2.0 * accel) if accel < 0.0 else 0.0
     turned = curvature * way_m
-    chord_m = way_m * _sinc(turned / 2.0)
-    direction = motion.heading_rad + slip + turned / 2.0
-    return Motion(
-        motion.x_m + chord_m * math.cos(direction),
-        motion.y_m + chord_m * math.sin(direction),
-        motion.heading_rad + turned,
+    chord_m = way_m * (math.sin(turned / 2.0) / (turned / 2.0) if abs(turned / 2.0) > 1e-9 else 1.0)
+    direction = heading_rad + slip + turned / 2.0
+    return (
+        x_m + chord_m * math.cos(direction),
+        y_m + chord_m * math.sin(direction),
+        heading_rad + turned,
         faster,
         (faster - speed) / step_s,
         steering,
         slip,
     )
-
-
-def _stopping_way(speed_mps: float, accel_mps2: float) -> float:
-    """To a standstill within the step."""
-    return speed_mps * speed_mps / (-2.0 * accel_mps2) if accel_mps2 < 0.0 else 0.0
-
-
-def _sinc(angle: float) -> float:
-    return math.sin(angle) / angle if abs(angle) > 1e-9 else 1.0

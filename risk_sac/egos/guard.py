@@ -19,7 +19,8 @@ DEADLINE, MALFORMED, CRASH = "ego_deadline", "ego_malformed", "ego_crash"
 DEAD_AFTER = 5
 MOST_POINTS = 1000
 
-Told, Answer = TypeVar("Told"), TypeVar("Answer")
+Told = TypeVar("Told")
+Answer = TypeVar("Answer")
 
 
 class Guarded:

@@ -47,10 +47,15 @@ def steering_towards(
 
 def lane_keeping(perceived: Perceived, vehicle: Vehicle) -> float:
     """Steering that brings the ego to the middle of its lane and along its path, rad."""
-    x_m, y_m, heading = (float(perceived.state[row, 0]) for row in (X, Y, HEADING))
-    lookahead_m = max(LOOKAHEAD_S * float(perceived.state[SPEED, 0]), LEAST_LOOKAHEAD_M)
-    aim = point_at(perceived.path, perceived.station_m - vehicle.length_m / 2 + lookahead_m)
-    return float(steering_towards(x_m, y_m, heading, vehicle.wheelbase_m, *aim))
+    p = perceived
+    return _lane_keeping(p.path, p.station_m - vehicle.length_m / 2, p.state, vehicle.wheelbase_m)
+
+
+@compiled
+def _lane_keeping(path: Floats, middle_m: float, state: Floats, wheelbase_m: float) -> float:
+    lookahead_m = max(LOOKAHEAD_S * state[SPEED, 0], LEAST_LOOKAHEAD_M)
+    aim_x_m, aim_y_m = point_at(path, middle_m + lookahead_m)
+    return steering_towards(state[X, 0], state[Y, 0], state[HEADING, 0], wheelbase_m, aim_x_m, aim_y_m)
 
 
 @compiled

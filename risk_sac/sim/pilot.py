@@ -9,11 +9,13 @@ from typing import NamedTuple, Protocol
 
 import libsumo
 
+from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.lookout import project
 from risk_sac.sim.paths import Along
-from risk_sac.types import Frame
+from risk_sac.sim.reading import EgoTold
+from risk_sac.types import Floats, Frame
 
 KEEP_ROUTE = 1  # SUMO's word for the nearest place along the route
 NO_LANE_CHANGE = 0
@@ -62,16 +64,17 @@ class MovedEgo:
       told: what SUMO tells of others: front bumper, compass degrees, speed, lateral speed, acceleration.
     """
 
-    def __init__(self, vehicle: str, motion: Motion, length_m: float) -> None:
+    def __init__(self, vehicle: str, motion: Motion, length_m: float, points: Floats) -> None:
         """Takes it from SUMO's models.
 
         Args:
           vehicle: its id.
           motion: now.
           length_m: of its body.
+          points: of its path.
         """
         self._vehicle, self._half_m = vehicle, length_m / 2
-        self.motion, self.told = motion, self._told(motion, motion.heading_rad)
+        self.motion, self.told = motion, self._told(motion, points)
         libsumo.vehicle.setLaneChangeMode(vehicle, NO_LANE_CHANGE)
 
     def move(self, motion: Motion, along: Along) -> None:
@@ -81,8 +84,7 @@ class MovedEgo:
           motion: after the step.
           along: the ego on its path before.
         """
-        *_, lane_heading_rad = project(along.path.points, motion.x_m, motion.y_m)
-        self.motion, self.told = motion, self._told(motion, lane_heading_rad)
+        self.motion, self.told = motion, self._told(motion, along.path.points)
         x, y, angle, *_ = self.told
         libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, angle, KEEP_ROUTE)
 
@@ -90,8 +92,17 @@ class MovedEgo:
         """After the step: SUMO derives a speed from the way along the lane, 0 where a lane begins. Followers see it."""
         libsumo.vehicle.setPreviousSpeed(self._vehicle, self.motion.speed_mps)
 
-    def _told(self, motion: Motion, lane_heading_rad: float) -> tuple[float, float, float, float, float, float]:
+    def _told(self, motion: Motion, points: Floats) -> EgoTold:
         x, y, heading, speed, accel, _, slip = motion
-        lateral = speed * math.sin(heading + slip - lane_heading_rad)
-        front = x + self._half_m * math.cos(heading), y + self._half_m * math.sin(heading)
-        return (*front, 90.0 - math.degrees(heading), speed, lateral, accel)
+        return _told(points, x, y, heading, speed, accel, slip, self._half_m)
+
+
+@compiled
+def _told(
+    points: Floats, x: float, y: float, heading: float, speed: float, accel: float, slip: float, half_m: float
+) -> EgoTold:
+    """What SUMO would tell of a motion on a path."""
+    _, _, lane_heading = project(points, x, y)
+    lateral = speed * math.sin(heading + slip - lane_heading)
+    front_x, front_y = x + half_m * math.cos(heading), y + half_m * math.sin(heading)
+    return front_x, front_y, 90.0 - math.degrees(heading), speed, lateral, accel

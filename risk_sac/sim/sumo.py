@@ -119,7 +119,8 @@ class SumoSimulation:
         frame = self._reading.frame
         motion = self._pilot.begin(self._layout, self._seed, frame)
         self._drivers.release_ego()
-        self._moved = MovedEgo(self._layout.ego.id, motion, float(frame.length_m[0]))
+        points = self._roads.along(self._layout.ego.id).path.points
+        self._moved = MovedEgo(self._layout.ego.id, motion, float(frame.length_m[0]), points)
 
     def release(self) -> None:
         """Hands the adversary vehicles over: from now on they wait for commands.
