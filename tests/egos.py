@@ -5,9 +5,11 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import ClassVar
 
 from risk_sac.egos import Control, Episode, Perceived
 from risk_sac.egos.road import lane_keeping
+from risk_sac.types import SPEED
 
 
 @contextmanager
@@ -35,17 +37,22 @@ def served(name: str, folder: Path, **told: float) -> Iterator[str]:
         yield table
 
 
-class LaneKeeper:
-    """Keeps its lane and its speed, and looks at nobody."""
+class Shadow:
+    """Keeps its lane, at the speeds that another driver drove at; it looks at nobody and hardly thinks."""
 
     version = "1"
     response_time_s = 1.0
 
+    speeds_mps: ClassVar[Sequence[float]] = ()  # after each step
+
     def reset(self, episode: Episode) -> None:
-        self._vehicle = episode.vehicle
+        self._vehicle, self._step_s = episode.vehicle, episode.step_s
+        self._next = iter(self.speeds_mps)
 
     def act(self, perceived: Perceived) -> Control:
-        return Control(0.0, lane_keeping(perceived, self._vehicle))
+        speed = float(perceived.state[SPEED, 0])
+        accel = (next(self._next, speed) - speed) / self._step_s
+        return Control(accel, lane_keeping(perceived, self._vehicle))
 
     def close(self) -> None:
         pass
