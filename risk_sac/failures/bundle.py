@@ -1,7 +1,8 @@
 """A failure in one file that stands alone: what is needed to play it again anywhere, and to see what it was.
 
-The file is an .npz: the arrays of the episode's series, the letters of all signal heads, and `manifest`, a JSON text.
-Nothing in it is executed, and its reader believes nothing that it says of itself.
+The file is an .npz: the arrays of the episode's series, the letters of all signal heads, and `manifest`, a JSON text;
+of a failure on somebody's map also the place, with the piece of net around it. Nothing in it is executed, and its
+reader believes nothing that it says of itself.
 """
 
 import hashlib
@@ -19,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from risk_sac.config import RunSpec
+from risk_sac.config import SHIPPED, RunSpec
 from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.failures.carried import carried, unpack
 from risk_sac.failures.core import Core
 from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
 from risk_sac.frozen_policy import FrozenPolicy
@@ -41,8 +43,8 @@ MANIFEST, HEADS, LAYER = "manifest", "signal_heads", "policy_layer_"  # the laye
 class Manifest(Record):
     """What a bundle says of its failure."""
 
-    format: Literal[1, 2] = 1  # another one with whatever an older reader would misread
-    """2 of those that hold a policy."""
+    format: Literal[1, 2, 3] = 1  # another one with whatever an older reader would misread
+    """2 of those that hold a policy, 3 of those that hold a place."""
     id: str
     """The episode's, as the run that found it names it."""
     spec: RunSpec
@@ -81,7 +83,7 @@ def make_bundle(
     if policy is not None and sum(layer.nbytes for layer in policy.layers) > MOST_POLICY_BYTES:
         policy = None
     manifest = Manifest(
-        format=1 if policy is None else 2,
+        format=3 if spec.family not in SHIPPED else 1 if policy is None else 2,
         id=episode.id_in(spec.id),
         spec=spec,
         episode=episode,
@@ -131,9 +133,14 @@ def _portable(name: str, spec: RunSpec) -> str:
 
 
 def bundle_bytes(bundle: Bundle) -> bytes:
-    """The content of its file."""
+    """The content of its file.
+
+    Raises:
+      ConfigError: its place is gone.
+    """
     content = io.BytesIO()
     arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
+    arrays |= carried(bundle.manifest.spec.family)
     if bundle.policy is not None:
         arrays |= {f"{LAYER}{place}": layer for place, layer in enumerate(bundle.policy.layers)}
     np.savez_compressed(content, allow_pickle=False, **arrays)
@@ -166,7 +173,7 @@ def read_bundle(file: Path) -> Bundle:
 
     Raises:
       ConfigError: it is no bundle, one of another version, damaged, too large, or holds no episode that can be played.
-      OSError: it cannot be read.
+      OSError: it cannot be read, or the place that it carries cannot be kept.
     """
     content = _read(file)
     try:
@@ -182,6 +189,10 @@ def read_bundle(file: Path) -> Bundle:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise _refused(file, f"has a manifest of another version, or none: {where}: {first['msg']}") from error
+    try:
+        unpack(manifest.spec.family, arrays)
+    except ValueError as error:
+        raise _refused(file, f"is no bundle that can be played: {error}") from error
     if trajectory_digest(arrays) != manifest.digest:
         raise _refused(file, "is damaged: its arrays do not have the digest in its manifest")
     try:

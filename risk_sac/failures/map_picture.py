@@ -1,5 +1,6 @@
 """A map from above, with the places that were found on it."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -9,11 +10,12 @@ from matplotlib.figure import Figure
 
 from risk_sac.canvas import canvas, picture
 from risk_sac.failures.from_above import SURFACE_COLOURS
-from risk_sac.failures.roads import read_surfaces
+from risk_sac.failures.roads import Surface, read_surfaces
 from risk_sac.scenario.maps.found import Survey
 
 MARKS = {"car_following": ("o", "tab:blue"), "crossing": ("s", "tab:orange"), "junction": ("^", "tab:green")}
-SIZE_IN, DPI = (9.0, 8.0), 130
+WIDTH_IN, DPI = 9.0, 130
+HEIGHT_IN = (4.5, 12.0)  # the least and the most; in between it goes by the map's
 NAMED = 60  # so many names can be told apart
 
 
@@ -24,9 +26,9 @@ def map_png(net: Path, found: Survey) -> bytes:
 
 
 def _figure(net: Path, found: Survey) -> Figure:
-    figure = canvas(SIZE_IN)
-    axis = figure.subplots()
     surfaces = read_surfaces(net)
+    figure = canvas((WIDTH_IN, _height_in(surfaces)))
+    axis = figure.subplots()
     for use, colour in SURFACE_COLOURS.items():
         outlines = [surface.outline for surface in surfaces if surface.use == use]
         axis.add_collection(PolyCollection(outlines, facecolors=colour, edgecolors="0.6", linewidths=0.2))
@@ -45,6 +47,12 @@ def _figure(net: Path, found: Survey) -> Figure:
     axis.set(xlabel="x, m", ylabel="y, m")
     axis.legend(loc="best", fontsize=7)
     return figure
+
+
+def _height_in(surfaces: Sequence[Surface]) -> float:
+    points = np.concatenate([surface.outline for surface in surfaces])
+    wide_m, high_m = np.maximum(np.ptp(points, axis=0), 1.0)
+    return float(np.clip(WIDTH_IN * high_m / wide_m, *HEIGHT_IN))
 
 
 def _names(found: Survey) -> list[tuple[float, float, str]]:

@@ -1,5 +1,9 @@
 """A hidden pedestrian at a crossing, and a vehicle that stands between who walks and who drives.
 
+The vehicle waits before the crossing on a lane to the ego's right, and the pedestrian comes from there. Where the ego's
+road has no such lane, it is one that came the other way and is just beyond the crossing, as the end of a queue is, and
+the pedestrian comes from the left.
+
 Source: RISK-SAC, Sec. IV-A.2.
 """
 
@@ -28,6 +32,7 @@ NEAREST_M, FARTHEST_M = 25.0, 90.0  # the ego from the crossing
 FOLLOWING_M = 25.0  # from the ego's front to its follower's
 BODY_M = 8.0
 OCCLUDER_MPS = 12.0
+OCCLUDER_M = 25.0  # the farthest from the crossing
 ONCOMING, ONCOMING_MPS = 4, 10.0
 ONCOMING_M, SPACING_M = 60.0, 30.0  # the first of them from the crossing, and the others from one another
 
@@ -43,7 +48,14 @@ def family(name: str, place: CrossingPlace) -> Family:
         return Layout(
             ego=vehicle(EGO, Role.EGO, site.ego, ego_m, ego_mps),
             vehicles=(
-                vehicle("occluder", Role.ADVERSARY, site.occluder, occluder_m, occluder_mps, body=truck),
+                vehicle(
+                    "occluder",
+                    Role.ADVERSARY,
+                    site.occluder,
+                    -occluder_m - BODY_M if site.beyond else occluder_m,
+                    occluder_mps,
+                    body=truck,
+                ),
                 vehicle("follower", Role.BACKGROUND, site.ego, ego_m + FOLLOWING_M, ego_mps),
                 *_oncoming(site),
             ),
@@ -77,6 +89,18 @@ def room_wanted_m(limit_mps: float) -> float:
     return NEAREST_M + FOLLOWING_M + BODY_M + LEAD_IN_S * top_speed(limit_mps)
 
 
+def room_beyond_m() -> float:
+    """Before a crossing on the track of who comes the other way, at the least."""
+    return LEAD_IN_S * OCCLUDER_MPS + BODY_M
+
+
+def _farthest_m(site: Site, lead_m: float) -> float:
+    if site.beyond:
+        last = site.occluder.pieces[-1]
+        return at_most(OCCLUDER_M, last.length_m - last.reach_m - BODY_M)
+    return at_most(OCCLUDER_M, site.occluder.room_m - BODY_M - lead_m)
+
+
 def _oncoming(site: Site) -> list[VehicleStart]:
     found = []
     for i in range(ONCOMING if site.oncoming else 0):
@@ -95,12 +119,14 @@ def _parameters(place: CrossingPlace) -> tuple[Parameter, ...]:
         kinds.append(Parameter("crossing", "1", 0, 1, "zebra below 0.5, signalised from 0.5", odd, kinds_of))
     lead_m = LEAD_IN_S * top_speed(limit)
     ego_m = at_most(FARTHEST_M, min(site.ego.room_m for site in place.sites) - FOLLOWING_M - BODY_M - lead_m)
-    occluder_m = at_most(25, min(site.occluder.room_m for site in place.sites) - BODY_M - lead_m)
+    occluder_m = min(_farthest_m(site, lead_m) for site in place.sites)
+    beyond = any(site.beyond for site in place.sites)
+    whence = "crossing's far edge to the occluder's rear" if beyond else "occluder's front to the crossing's near edge"
     return (
         *kinds,
         initial_speed("ego_speed_mps", 6, limit, "initial speed of the ego"),
         Parameter("ego_distance_m", "m", NEAREST_M, ego_m, "ego's front to the crossing's near edge"),
-        Parameter("occluder_distance_m", "m", 0.5, occluder_m, "occluder's front to the crossing's near edge"),
+        Parameter("occluder_distance_m", "m", 0.5, occluder_m, whence),
         initial_speed("occluder_speed_mps", 0, min(OCCLUDER_MPS, limit), "initial speed of the occluder"),
         *walking("pedestrian along the road from the crossing's axis"),
         *offset_of(place.signal),

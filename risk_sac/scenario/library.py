@@ -8,6 +8,8 @@ import hashlib
 import os
 import shutil
 import tempfile
+import time
+from collections.abc import Collection
 from pathlib import Path
 
 from risk_sac.config import FAMILY_NAME
@@ -17,6 +19,7 @@ from risk_sac.scenario.place import PLACES, Place
 VARIABLE = "RISK_SAC_PLACES"
 NET, PLACE = "net.xml", "place.json"
 DIGITS = 12
+_NEW, _GONE = ".new-", ".gone-"
 
 
 def library() -> Path:
@@ -43,24 +46,38 @@ def keep(place: Place, net: bytes) -> str:
     """
     text = place.model_copy(update={"net": NET}).model_dump_json().encode()
     name = f"{place.pattern}_{_digest(text, net)}"
-    folder = library() / name
-    if not folder.is_dir():
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        new = Path(tempfile.mkdtemp(prefix=".new-", dir=folder.parent))
-        new.chmod(0o755)
-        (new / NET).write_bytes(net)
-        (new / PLACE).write_bytes(text)
-        try:
-            new.rename(folder)
-        except OSError:  # somebody else was quicker
-            shutil.rmtree(new)
-            if not folder.is_dir():
-                raise
+    put(name, text, net)
     return name
 
 
-def kept(name: str) -> Place:
-    """A place of the library.
+def put(name: str, text: bytes, net: bytes) -> None:
+    """Puts what `files_of` has told of a place into the library, unless it is there.
+
+    Raises:
+      ConfigError: it is not what its name says.
+      OSError: the folder cannot be written.
+    """
+    if not name.endswith(f"_{_digest(text, net)}"):
+        raise ConfigError(f"the place {name!r} is not what its name says", field="family")
+    folder = library() / name
+    if folder.is_dir():
+        os.utime(folder)  # it is wanted again: see `prune`
+        return
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    new = Path(tempfile.mkdtemp(prefix=_NEW, dir=folder.parent))
+    new.chmod(0o755)
+    (new / NET).write_bytes(net)
+    (new / PLACE).write_bytes(text)
+    try:
+        new.rename(folder)
+    except OSError:  # somebody else was quicker
+        shutil.rmtree(new)
+        if not folder.is_dir():
+            raise
+
+
+def files_of(name: str) -> tuple[bytes, bytes]:
+    """A place of the library and the piece of net around it, as they are kept.
 
     Raises:
       ConfigError: it keeps none of this name, or what it keeps is not what was put there.
@@ -75,7 +92,35 @@ def kept(name: str) -> Place:
         raise ConfigError(f"there is no place {name!r}; {wanted}", field="family") from None
     if not name.endswith(f"_{_digest(text, net)}"):
         raise ConfigError(f"the place {name!r} in {library()} is damaged; find it on its map anew", field="family")
-    return PLACES.validate_json(text).model_copy(update={"net": str((folder / NET).absolute())})
+    return text, net
+
+
+def kept(name: str) -> Place:
+    """A place of the library; raises what `files_of` does."""
+    text, _ = files_of(name)
+    return PLACES.validate_json(text).model_copy(update={"net": str((library() / name / NET).absolute())})
+
+
+def prune(folder: Path, named: Collection[str], unused_s: float) -> list[str]:
+    """Removes the places that nobody names; returns their names.
+
+    Args:
+      folder: the library; never that of a person, whose run folders nobody knows.
+      named: families that stay.
+      unused_s: how long ago a place must have been put there last, so that whoever is about to name it can.
+
+    Raises:
+      OSError: the folder cannot be written.
+    """
+    removed = []
+    for path in sorted(folder.glob("*")):
+        ours = FAMILY_NAME.fullmatch(path.name) is not None and path.name not in named
+        if (ours or path.name.startswith(_NEW)) and path.stat().st_mtime < time.time() - unused_s:
+            path.rename(path.with_name(f"{_GONE}{path.name}"))  # nobody may find half of it
+            removed += [path.name] if ours else []
+    for path in folder.glob(f"{_GONE}*"):
+        shutil.rmtree(path)
+    return removed
 
 
 def _digest(text: bytes, net: bytes) -> str:

@@ -102,6 +102,8 @@ class Site(Settings):
     ego: Track
     occluder: Track
     """Beside the ego's lane, on the side from which the pedestrian comes."""
+    beyond: bool = False
+    """Whether the occluder comes the other way and is beyond the crossing: its reference is the crossing's far edge."""
     oncoming: tuple[Track, ...] = ()
     walk: Walk
 

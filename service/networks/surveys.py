@@ -23,6 +23,8 @@ from service.networks.shelf import Shelf
 SURVEYOR = (sys.executable, "-I", "-m", "service.networks.surveyor")
 AT_ONCE = 2
 RETRY_AFTER_S = 5
+MOST_ASKING = 16  # of those threads that answer everybody
+MOST_KEPT = 200  # answers that are remembered; what a network is never changes
 _GRACE_S = 2.0
 _ENDS = (signal.SIGALRM, signal.SIGXCPU, signal.SIGKILL)
 
@@ -40,6 +42,10 @@ class Surveys:
         self._shelf = shelf
         self._library = library
         self._room = threading.BoundedSemaphore(AT_ONCE)
+        self._asking = threading.BoundedSemaphore(MOST_ASKING)
+        self._counting = threading.Lock()
+        self._locks: dict[tuple[str | None, ...], threading.Lock] = {}
+        self._kept: dict[tuple[str, str, str | None], list[str]] = {}  # a form asks after each key that is pressed
 
     def places(self, network_id: str, project: str | None) -> Places:
         """Where the patterns fit on a network, and why elsewhere they do not.
@@ -63,13 +69,32 @@ class Surveys:
           ConfigError: the pattern does not fit there; and what `places` raises.
         """
         folder = self._shelf.folder(network_id, project)
-        families: list[str] = self._run(folder, ["keep", pattern, *([] if place is None else [place])])["families"]
-        return families
+        asked = network_id, pattern, place
+        with self._alone(asked):
+            families = self._kept.get(asked)
+            if families is None or not self._still_there(families):
+                families = self._run(folder, ["keep", pattern, *([] if place is None else [place])])["families"]
+                if len(self._kept) >= MOST_KEPT:
+                    self._kept.clear()
+                self._kept[asked] = families
+            return list(families)
+
+    def _still_there(self, families: Sequence[str]) -> bool:
+        """Whether the library has them; it will go on doing so for a while, since they are wanted."""
+        try:
+            for name in families:
+                os.utime(self._library / name)
+        except FileNotFoundError:
+            return False
+        except OSError as error:
+            raise StorageError(f"the library of places cannot be written ({error.strerror})") from error
+        return True
 
     def _searched(self, network_id: str, project: str | None) -> Path:
         folder = self._shelf.folder(network_id, project)
-        if not (folder / PLACES).exists():
-            self._run(folder, ["survey"])
+        with self._alone((network_id,)):
+            if not (folder / PLACES).exists():
+                self._run(folder, ["survey"])
         return folder
 
     def _run(self, folder: Path, arguments: Sequence[str]) -> dict[str, Any]:
@@ -101,6 +126,21 @@ class Surveys:
         if "refused" in report:
             raise ConfigError(report["refused"], field=report.get("field", "network"))
         return report
+
+    @contextmanager
+    def _alone(self, asked: tuple[str | None, ...]) -> Iterator[None]:
+        """Lets one of those who ask the same search, and the others wait for what it finds."""
+        with self._counting:
+            if len(self._locks) >= MOST_KEPT:
+                self._locks.clear()  # who holds one of them goes on; at worst the same is searched twice
+            lock = self._locks.setdefault(asked, threading.Lock())
+        if not self._asking.acquire(blocking=False):
+            raise BusyError(f"{MOST_ASKING} ask for places; try again in {RETRY_AFTER_S} s", RETRY_AFTER_S)
+        try:
+            with lock:
+                yield
+        finally:
+            self._asking.release()
 
     @contextmanager
     def _turn(self) -> Iterator[None]:

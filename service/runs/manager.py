@@ -15,6 +15,7 @@ from service.runs.disposal import dispose, settle
 from service.runs.quota import check_quota, exhausted
 from service.runs.retention import Retention
 from service.runs.storage_pause import StoragePause, refused
+from service.runs.unused_places import UnusedPlaces
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.states import State, TriageState
@@ -51,6 +52,7 @@ class Manager:
         self._stopping = False
         self._storage = StoragePause(store, self._ledger, settings.data_dir)
         self._retention = Retention(settings, store)
+        self._unused_places = UnusedPlaces(settings.places_dir, store)
         self._thread = threading.Thread(target=self._work, name="manager", daemon=True)
 
     @property
@@ -191,6 +193,7 @@ class Manager:
         try:
             self._launch_waiting()
             self._retention.retire(self._dispose)
+            self._unused_places.remove()
         except StorageError as error:
             self._pause(str(error))
 

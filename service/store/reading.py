@@ -245,6 +245,11 @@ class Store:
         with self._reading() as session:
             return list(session.scalars(query.order_by(CampaignRow.number).limit(limit)))
 
+    def families(self) -> set[str]:
+        """All that any campaign names."""
+        with self._reading() as session:
+            return set(session.scalars(select(RunRow.family).distinct()))
+
     def exists(self, campaign_id: str) -> bool:
         """Whether there is a campaign with this id."""
         with self._reading() as session:

@@ -1,7 +1,8 @@
 """Cuts the piece of a net around a place out of it, so that an episode does not load a town.
 
 Every junction that somebody may come to stays as it is, with all its roads, ways and signals; where the piece ends,
-junctions become dead ends. Nothing is computed anew, so who yields to whom is what it was.
+junctions become dead ends. Nothing is computed anew, so who yields to whom is what it was. Signals keep to their
+programme, also those that would count vehicles: an episode sets where in its cycle a signal is.
 """
 
 import math
@@ -65,21 +66,22 @@ def _written(root: ET.Element, edges: Set[str], touched: Set[str], whole: Set[st
     links = [link for link in root.iter("connection") if at(link.attrib["from"]) in whole]
     lights = {link.get("tl") for link in links}
     out = ET.Element(root.tag, root.attrib)
-    out.extend([child for child in root if child.tag in ("location", "type")])
+    out.extend([_alone(child) for child in root if child.tag in ("location", "type")])
     for edge in root.iter("edge"):
         id_ = edge.attrib["id"]
         if _inside_of(id_) in whole if id_.startswith(":") else id_ in edges:
-            out.append(_bare(edge))
+            out.append(_with(edge, "lane"))
     # Of several programmes with one name, SUMO runs the last.
-    out.extend({light.attrib["id"]: light for light in root.iter("tlLogic") if light.get("id") in lights}.values())
+    programmes = {light.attrib["id"]: light for light in root.iter("tlLogic") if light.get("id") in lights}
+    out.extend(map(_fixed, programmes.values()))
     for junction in root.iter("junction"):
         id_ = junction.attrib["id"]
         if (_inside_of(_inside_of(id_), "") if id_.startswith(":") else id_) in whole:
-            out.append(junction)
+            out.append(_with(junction, "request"))
         elif id_ in touched:
             out.append(_dead_end(junction, edges))
-    out.extend(links)
-    out.extend(r for r in root.iter("roundabout") if set(r.get("edges", "").split()) <= edges)
+    out.extend(map(_alone, links))
+    out.extend(_alone(r) for r in root.iter("roundabout") if set(r.get("edges", "").split()) <= edges)
     return ET.tostring(out, encoding="unicode").encode()
 
 
@@ -88,13 +90,22 @@ def _inside_of(id_: str, colon: str = ":") -> str:
     return id_.removeprefix(colon).rpartition("_")[0]
 
 
-def _bare(edge: ET.Element) -> ET.Element:
-    """An edge whose lanes say nothing of the lanes of others, which may be cut off."""
-    if edge.find("lane/*") is None:
-        return edge
-    bare = ET.Element(edge.tag, edge.attrib)
-    bare.extend(ET.Element(lane.tag, lane.attrib) for lane in edge.iter("lane"))
-    return bare
+def _alone(element: ET.Element) -> ET.Element:
+    """Without what it has inside: parameters of other tools, and of lanes the lanes of others, which may be cut off."""
+    return ET.Element(element.tag, element.attrib)
+
+
+def _with(element: ET.Element, inside: str) -> ET.Element:
+    """With the elements of one kind that it has inside, and those alone."""
+    out = _alone(element)
+    out.extend(map(_alone, element.iter(inside)))
+    return out
+
+
+def _fixed(light: ET.Element) -> ET.Element:
+    fixed = _with(light, "phase")
+    fixed.set("type", "static")
+    return fixed
 
 
 def _dead_end(junction: ET.Element, edges: Set[str]) -> ET.Element:

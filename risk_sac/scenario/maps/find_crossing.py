@@ -1,20 +1,27 @@
-"""Where on a net a pedestrian may be hidden: at a crossing before which the ego has a lane on its right."""
+"""Where on a net a pedestrian may be hidden: at a crossing before which the ego has a lane on its right.
 
+Or one for those who come the other way on its left: who has just passed the crossing there hides a pedestrian from the
+left. So it is where roads have one lane in each direction.
+"""
+
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 
 from risk_sac.scenario.family import LEAD_IN_S, top_speed
-from risk_sac.scenario.hidden_pedestrian import BODY_M, room_wanted_m
+from risk_sac.scenario.hidden_pedestrian import BODY_M, OCCLUDER_M, room_beyond_m, room_wanted_m
 from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot
-from risk_sac.scenario.maps.net import Lane, Link, Net
-from risk_sac.scenario.maps.ways import AFTER_S
+from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net, wrapped
+from risk_sac.scenario.maps.ways import AFTER_S, Way, track, way_on
 from risk_sac.scenario.place import CrossingPlace, Site, Track
 
 OCCLUDED_S = 4.0  # of driving that the way of who hides the pedestrian goes on
 ONWARD_S = 8.0
+BESIDE_RAD = math.radians(30.0)  # by which lanes beside each other may not be parallel
+MEDIAN_M, SHIFTED_M = 2.0, 6.0  # between them, and from where one ends to where the other begins
 
 
 def spots(net: Net) -> Iterator[Spot]:
@@ -35,15 +42,15 @@ def place(net: Net, spot: Spot) -> CrossingPlace:
     """
     edge = net.edges[spot.id]
     crossing = net.crossings_of[edge.end, edge.id][0]
-    if len(edge.drivable) < 2:
-        raise NoFit(f"{edge.id!r} has 1 lane for cars; wanted 2, so that a vehicle can hide the pedestrian")
     check_limit(edge.drivable[0])
-    ego_lane, ego, occluder, link = _lanes(net, edge.drivable)
+    beyond = len(edge.drivable) < 2
+    find = _with_oncoming if beyond else _with_neighbour
+    ego_lane, ego, occluder, link = find(net, edge, crossing)
     kind = "signalised" if crossing.signal is not None else "unsignalised"
+    hidden = "from behind a vehicle that came the other way" if beyond else "from behind a vehicle in the next lane"
     return CrossingPlace(
         net="",
-        summary=f"Crossing {crossing.id!r} of {edge.id!r}, {kind}: a pedestrian steps out from behind a vehicle in the "
-        "adjacent lane.",
+        summary=f"Crossing {crossing.id!r} of {edge.id!r}, {kind}: a pedestrian steps out {hidden}.",
         lanes=len(edge.drivable),
         speed_limit_mps=ego_lane.limit_mps,
         lane_width_m=ego_lane.width_m,
@@ -53,31 +60,71 @@ def place(net: Net, spot: Spot) -> CrossingPlace:
                 signalised=signal_of(net, (crossing.signal, link.signal)) is not None,
                 ego=ego,
                 occluder=occluder,
-                oncoming=_oncoming(net, edge.id, crossing.edges),
-                walk=walk_over(net, crossing, ego_lane.way_out_rad),
+                beyond=beyond,
+                oncoming=() if beyond else _oncoming(net, edge.id, crossing.edges),
+                walk=walk_over(net, crossing, ego_lane.way_out_rad + (math.pi if beyond else 0.0)),
             ),
         ),
     )
 
 
-def _lanes(net: Net, lanes: tuple[Lane, ...]) -> tuple[Lane, Track, Track, Link]:
+def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[Lane, Track, Track, Link]:
     """The leftmost lane that leads on for an episode and has one to its right that leads anywhere."""
     why = ""
-    for right, own in reversed(list(pairwise(lanes))):
-        ego, because = _straight(net, own, AFTER_S)
+    for right, own in reversed(list(pairwise(edge.drivable))):
+        ego, because = _ego(net, own)
         occluder, hidden_because = _straight(net, right, OCCLUDED_S)
         if ego is None or occluder is None:
             why = why or because or hidden_because
             continue
-        wanted_m = room_wanted_m(own.limit_mps)
         least_m = BODY_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
-        if ego.room_m < wanted_m:
-            why = why or f"{own.edge!r} can be come from for {ego.room_m:.0f} m; wanted {wanted_m:.0f} m"
-        elif occluder.room_m < least_m:
+        if occluder.room_m < least_m:
             why = why or f"the lane beside can be come from for {occluder.room_m:.0f} m; wanted {least_m:.0f} m"
         else:
             return own, ego, occluder, net.onward[own.id][0]
     raise NoFit(why)
+
+
+def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[Lane, Track, Track, Link]:
+    """The one lane, and the lane beside it on which others leave the crossing the other way."""
+    (own,) = edge.drivable
+    lanes = [net.edges[id_].drivable[-1] for id_ in crossing.edges if id_ in net.edges and net.edges[id_].drivable]
+    beside = [lane for lane in lanes if net.edges[lane.edge].start == edge.end and _is_beside(own, lane)]
+    if not beside:
+        raise NoFit(
+            f"{edge.id!r} has 1 lane for cars, and none beside it for those who come the other way; wanted one of the "
+            "two, so that a vehicle can hide the pedestrian"
+        )
+    ego, why = _ego(net, own)
+    if ego is None:
+        raise NoFit(why)
+    way = way_on(net, beside[0], (BODY_M + OCCLUDER_M) / beside[0].limit_mps + OCCLUDED_S)
+    if not isinstance(way, Way):
+        raise NoFit(way)
+    occluder = track(net, way, 0.0, BODY_M + OCCLUDER_M)
+    if occluder.room_m < room_beyond_m():
+        came = f"those who come the other way can be come from for {occluder.room_m:.0f} m"
+        raise NoFit(f"{came}; wanted {room_beyond_m():.0f} m")
+    return own, ego, occluder, net.onward[own.id][0]
+
+
+def _is_beside(own: Lane, other: Lane) -> bool:
+    """Whether a lane begins beside the end of another, on its left, and leads back."""
+    (x, y), (to_x, to_y) = own.line[-1], other.line[0]
+    cos, sin = math.cos(own.way_out_rad), math.sin(own.way_out_rad)
+    left_m = (to_y - y) * cos - (to_x - x) * sin
+    along_m = (to_x - x) * cos + (to_y - y) * sin
+    back = abs(wrapped(other.way_in_rad - own.way_out_rad)) > math.pi - BESIDE_RAD
+    return back and 0.0 < left_m <= (own.width_m + other.width_m) / 2 + MEDIAN_M and abs(along_m) <= SHIFTED_M
+
+
+def _ego(net: Net, own: Lane) -> tuple[Track | None, str]:
+    """The ego's track, if there is room; or why there is not."""
+    ego, why = _straight(net, own, AFTER_S)
+    wanted_m = room_wanted_m(own.limit_mps)
+    if ego is not None and ego.room_m < wanted_m:
+        return None, f"{own.edge!r} can be come from for {ego.room_m:.0f} m; wanted {wanted_m:.0f} m"
+    return ego, why
 
 
 def _straight(net: Net, lane: Lane, onward_s: float) -> tuple[Track | None, str]:

@@ -12,6 +12,7 @@ from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot
 from risk_sac.scenario.maps.net import Edge, Link, Net, wrapped
+from risk_sac.scenario.maps.waiting import waits_in_the_way
 from risk_sac.scenario.maps.ways import AFTER_S, Way, track, way_on
 from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
 
@@ -19,6 +20,7 @@ ATTACKERS = ("oncoming", "from_left", "from_right")
 ONCOMING_RAD, BESIDE_RAD = math.radians(135.0), math.radians(45.0)
 ONWARD_S = 8.0  # of driving that an attacker's way goes on behind the junction
 FEWEST_ROADS = 2  # that lead to a junction
+UNREGULATED = "unregulated"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,8 @@ def place(net: Net, spot: Spot) -> JunctionPlace:
             legs[name] = found
         else:
             whys.append(why)
+    if not legs and at.type == UNREGULATED:
+        raise NoFit(f"the junction {at.id!r} is {UNREGULATED}: nobody lets anybody pass there; wanted one with rules")
     if not legs:
         raise NoFit("; ".join(whys) or f"no way across {at.id!r} crosses or joins one of those from {edge.id!r}")
     approaches = {name: other for name, other in others.items() if name in legs} | {"ego": own}
@@ -123,6 +127,11 @@ def leg(net: Net, road: Approach, name: str, onward_s: float) -> tuple[Leg | Non
 
 def turn(net: Net, link: Link, onward_s: float) -> Track | str:
     """The track over a link, or what is in the way."""
+    if (lane := waits_in_the_way(net, link)) is not None:
+        return (
+            f"who turns from {link.source.edge!r} to {link.target.edge!r} waits in the junction where it reaches into "
+            f"{lane.id!r}, the way of those it waits for"
+        )
     length_m = link.source.length_m
     way = way_on(net, link.source, onward_s + length_m / link.source.limit_mps, through=link)
     return track(net, way, length_m) if isinstance(way, Way) else way

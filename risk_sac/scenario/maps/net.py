@@ -115,6 +115,8 @@ class Net:
     back: dict[str, list[Link]] = field(default_factory=lambda: defaultdict(list))  # by the lane they lead to
     cycles_s: dict[str, float] = field(default_factory=dict)  # of the signals
     inside: dict[str, list[Lane]] = field(default_factory=lambda: defaultdict(list))  # drivable, by junction
+    # Inside junctions, by a lane's id: the lanes of those whom one lets pass before one drives onto it.
+    waits_for: dict[str, tuple[Lane, ...]] = field(default_factory=dict)
 
     @cached_property
     def arriving(self) -> Mapping[str, list[Edge]]:
@@ -194,7 +196,10 @@ def _net(root: ET.Element) -> Net:
             net.edges[edge.attrib["id"]] = Edge(edge.attrib["id"], edge.attrib["from"], edge.attrib["to"], lanes)
     index_of: dict[str, int] = {}
     for junction in root.iter("junction"):
-        if junction.get("type") != "internal":
+        if junction.get("type") == "internal":
+            foes = [inner[lane] for lane in junction.get("intLanes", "").split() if lane in inner]
+            net.waits_for[junction.attrib["id"]] = tuple(lane for lane in foes if lane.drivable)
+        else:
             net.junctions[junction.attrib["id"]] = _junction(junction)
             index_of |= {lane: i for i, lane in enumerate(junction.get("intLanes", "").split())}
     lights = _link(net, root, inner, index_of)

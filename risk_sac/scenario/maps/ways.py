@@ -1,5 +1,6 @@
 """Ways through a net, lane by lane: what leads to a place, and what leads on from it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from risk_sac.scenario.maps.net import Lane, Link, Net
@@ -68,12 +69,24 @@ class _Search:
         return False
 
 
-def way_back(net: Net, last: Lane, metres: float) -> Way:
-    """The straightest way to a lane, up to so much of it before that lane; shorter where the map ends."""
+def way_back(net: Net, last: Lane, metres: float, onward: Sequence[str] = ()) -> Way:
+    """The straightest way to a lane, up to so much of it before that lane; shorter where the map ends.
+
+    It also ends where a lane forks into several of the next road, and whoever comes from there would be driven by SUMO
+    into another of them.
+
+    Args:
+      net: where.
+      last: the lane.
+      metres: how much is wanted.
+      onward: the edges that are driven after the lane's.
+    """
     lanes, links, length_m = [last], list[Link](), 0.0
     while length_m < metres:
         been = {lane.edge for lane in lanes}
-        before = [link for link in net.back.get(lanes[0].id, ()) if link.source.edge not in been]
+        following = [*(lane.edge for lane in lanes[1:]), *onward]
+        arriving = net.back.get(lanes[0].id, ())
+        before = [link for link in arriving if link.source.edge not in been and _is_taken(net, link, following)]
         if not before:
             break
         link = min(before, key=_bend)
@@ -92,7 +105,7 @@ def track(net: Net, on: Way, reference_m: float, beyond_m: float = 0.0) -> Track
       reference_m: from the beginning of that lane.
       beyond_m: so far beyond the reference somebody may start.
     """
-    back = way_back(net, on.lanes[0], BEFORE_M - reference_m)
+    back = way_back(net, on.lanes[0], BEFORE_M - reference_m, [lane.edge for lane in on.lanes[1:]])
     been = {lane.edge for lane in on.lanes}
     first = next((i + 1 for i in reversed(range(len(back.lanes) - 1)) if back.lanes[i].edge in been), 0)
     lanes, links = [*back.lanes[first:], *on.lanes[1:]], [*back.links[first:], *on.links]
@@ -106,6 +119,28 @@ def track(net: Net, on: Way, reference_m: float, beyond_m: float = 0.0) -> Track
     pieces = tuple(_piece(lane, reach) for lane, reach in zip(lanes, reach_m, strict=True))
     most = max(i for i, piece in enumerate(pieces) if i <= own or piece.reach_m > -beyond_m)
     return Track(pieces=pieces[: most + 1], onward=tuple(piece.edge for piece in pieces[most + 1 :]))
+
+
+def _is_taken(net: Net, link: Link, following: Sequence[str]) -> bool:
+    """Whether SUMO's drivers take a link, of those that lead from its lane to the same road.
+
+    They take the one to the lane from which they come farthest along their route without a lane change, and of equals
+    the one to the right.
+    """
+    alike = [each for each in net.onward[link.source.id] if each.target.edge == link.target.edge]
+    return len(alike) == 1 or link is max(
+        alike, key=lambda each: (_reach(net, each.target, following), -each.target.index)
+    )
+
+
+def _reach(net: Net, lane: Lane, following: Sequence[str]) -> int:
+    """Along how many of the edges that follow a lane leads."""
+    lanes = {lane.id}
+    for reached, edge in enumerate(following):
+        lanes = {link.target.id for id_ in lanes for link in net.onward.get(id_, ()) if link.target.edge == edge}
+        if not lanes:
+            return reached
+    return len(following)
 
 
 def edges_on(*tracks: Track) -> set[str]:

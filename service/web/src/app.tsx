@@ -8,6 +8,8 @@ import { CampaignScreen } from "./screens/campaign/screen";
 import { CampaignsScreen } from "./screens/campaigns/screen";
 import { CompareScreen } from "./screens/compare/screen";
 import { FailuresScreen } from "./screens/failures/screen";
+import { MapScreen } from "./screens/maps/map";
+import { MapsScreen } from "./screens/maps/screen";
 import { NewScreen } from "./screens/new/screen";
 import { PairScreen } from "./screens/pair/screen";
 import { ReplayScreen } from "./screens/replay/screen";
@@ -33,6 +35,7 @@ export function App() {
         <nav aria-label="Main">
           <Tab to="#/campaigns">Campaigns</Tab>
           <Tab to="#/new">New campaign</Tab>
+          <Tab to="#/maps">Maps</Tab>
           <Tab to="#/compare">Compare</Tab>
           <a href={absolute("docs")}>API</a>
         </nav>
@@ -57,6 +60,7 @@ function screen({ parts, query }: Place): ComponentChildren {
   const [room = "campaigns", id, part, failure, twin, kind] = parts;
   if (room === "campaigns" && id === undefined) return <CampaignsScreen query={query} />;
   if (room === "new") return <NewScreen query={query} />;
+  if (room === "maps" && part === undefined) return id === undefined ? <MapsScreen /> : <MapScreen id={id} key={id} />;
   if (room === "compare") return <CompareScreen query={query} />;
   if (room === "campaigns" && id !== undefined) {
     if (part === undefined) return <CampaignScreen id={id} key={id} />;

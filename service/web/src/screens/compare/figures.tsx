@@ -1,9 +1,10 @@
 /** The report's figures, fetched with the key and shown from memory. */
 
-import { useEffect, useState } from "preact/hooks";
+import { useState } from "preact/hooks";
 import { useAsked } from "../../api/asked";
-import { call, download } from "../../api/client";
+import { download } from "../../api/client";
 import type { Body } from "../../api/types";
+import { usePicture } from "../../ui/picture";
 import { Shown } from "../../ui/states";
 
 type Figure = Body<"Figure">;
@@ -67,27 +68,4 @@ function Picture({ figure }: { figure: Figure }) {
       </figcaption>
     </figure>
   );
-}
-
-/** A picture as an address that lasts as long as the component does. */
-function usePicture(path: string | undefined): { url?: string; error?: string } {
-  const [state, setState] = useState<{ url?: string; error?: string }>({});
-  useEffect(() => {
-    if (path === undefined) return;
-    const left = new AbortController();
-    let url: string | undefined;
-    call(path, { signal: left.signal })
-      .then((response) => response.blob())
-      .then((blob) => {
-        if (!left.signal.aborted) setState({ url: (url = URL.createObjectURL(blob)) });
-      })
-      .catch((error: Error) => {
-        if (!left.signal.aborted) setState({ error: error.message });
-      });
-    return () => {
-      left.abort();
-      if (url) URL.revokeObjectURL(url);
-    };
-  }, [path]);
-  return state;
 }

@@ -221,7 +221,8 @@ function Switch({ field: { title, about }, path }: { field: Field; path: Path })
 /** Some of a few names, each with a box; `abouts` has a word on each. */
 export function Choices({ field, path, abouts = {} }: { field: Field; path: Path; abouts?: Values }) {
   const { id, value, change, wrong } = useField<string[]>(path, true);
-  const options = field.shape.kind === "list" && field.shape.item.kind === "choice" ? field.shape.item.options : [];
+  const offered = field.shape.kind === "list" && field.shape.item.kind === "choice" ? field.shape.item.options : [];
+  const options = [...new Set([...offered, ...value])]; // a clone may have what a form does not offer: a place of a map
   const toggle = (option: string) => options.filter((each) => (each === option) !== value.includes(each));
   return (
     <fieldset class={wrong.length ? "choices is-wrong" : "choices"} id={id}>

@@ -84,10 +84,15 @@ export interface Cost {
   episodes: number;
 }
 
+const TRAFFICS = 2; // of an i.i.d. phase: undisturbed, and with random adversaries
+
 /** What a campaign costs: runs, and episodes in all of them. */
-export function costOf(spec: Values): Cost {
+export function costOf(spec: Values, families = (spec.families as unknown[]).length): Cost {
   const length = (name: string) => (spec[name] as unknown[]).length;
   const budget = spec.budget as { episodes: number | null; evaluation_episodes: number | null };
-  const runs = length("families") * length("methods") * length("seeds");
-  return { runs, episodes: runs * ((budget.episodes ?? 0) + (budget.evaluation_episodes ?? 0)) };
+  const iid = spec.iid as { episodes: number | null } | null | undefined;
+  const searches = families * length("methods") * length("seeds");
+  const drawn = iid ? families * TRAFFICS : 0;
+  const episodes = searches * ((budget.episodes ?? 0) + (budget.evaluation_episodes ?? 0)) + drawn * (iid?.episodes ?? 0);
+  return { runs: searches + drawn, episodes };
 }

@@ -15,12 +15,13 @@ type Name = keyof typeof FORMS;
 
 export function Preview({ body }: { body: Values }) {
   const [name, setName] = useState<Name>("curl");
+  const names = (Object.keys(FORMS) as Name[]).filter((each) => each === "curl" || !("network" in body)); // spec files name families
   const text = name === "curl" ? curl(absolute("v1/campaigns"), textOf(body), hasKey()) : yaml(body);
   return (
     <section class="card preview" aria-labelledby="preview-title">
       <div class="row">
         <h2 id="preview-title">The same as</h2>
-        {(Object.keys(FORMS) as Name[]).map((each) => (
+        {names.map((each) => (
           <button key={each} type="button" aria-pressed={each === name} onClick={() => setName(each)}>
             {FORMS[each].title}
           </button>

@@ -10,6 +10,7 @@ import { bodyOf, isPerfect, NOT_OF_PERFECT, textOf } from "./body";
 import { useChecked } from "./checked";
 import { Choices, Fields, Group, SchemaField } from "./field";
 import { FormContext, type Wrong } from "./form";
+import { grounded, groundOf, OnMap, useExtent, type Ground } from "./ground";
 import { OddFields } from "./odd";
 import { applied, isOf, PRESETS } from "./presets";
 import { Preview } from "./preview";
@@ -23,6 +24,7 @@ type Known = [Description, Body<"Families">, Body<"Methods">];
 
 export function NewScreen({ query }: { query: URLSearchParams }) {
   const from = query.get("from");
+  const ground = groundOf(query);
   const description = useAsked<Description>("openapi.json");
   const families = useAsked<Body<"Families">>("v1/families");
   const methods = useAsked<Body<"Methods">>("v1/methods");
@@ -39,10 +41,10 @@ export function NewScreen({ query }: { query: URLSearchParams }) {
               <Shown asked={methods} what="the methods">
                 {(search) => {
                   const given: Known = [described, known, search];
-                  if (from === null) return <CampaignForm key="" known={given} />;
+                  if (from === null) return <CampaignForm key={JSON.stringify(ground)} known={given} ground={ground} />;
                   return (
                     <Shown asked={cloned} what="the campaign to begin with">
-                      {(spec) => <CampaignForm key={from} known={given} from={{ id: from, spec }} />}
+                      {(spec) => <CampaignForm key={from} known={given} from={{ id: from, spec }} ground={null} />}
                     </Shown>
                   );
                 }}
@@ -58,14 +60,20 @@ export function NewScreen({ query }: { query: URLSearchParams }) {
 interface Begun {
   known: Known;
   from?: { id: string; spec: Values };
+  /** Where on a map, if on one. */
+  ground: Ground | null;
 }
 
-function CampaignForm({ known: [description, families, methods], from }: Begun) {
+function CampaignForm({ known: [description, families, methods], from, ground }: Begun) {
   const shape = useMemo(() => posted(description, "/v1/campaigns"), [description]);
   const [spec, setSpec] = useState<Values>(() =>
     from ? (filled(shape, from.spec) as Values) : applied(PRESETS[0]!, filled(shape, {}) as Values),
   );
-  const body = useMemo(() => bodyOf(shape, spec), [shape, spec]);
+  const body = useMemo(() => {
+    const whole = bodyOf(shape, spec);
+    return ground ? grounded(ground, whole) : whole;
+  }, [shape, spec]);
+  const extent = useExtent(ground);
   const text = textOf(body);
   const verdict = useChecked(text);
   const { submit, refused, busy } = useSubmit(text);
@@ -75,7 +83,7 @@ function CampaignForm({ known: [description, families, methods], from }: Begun) 
     () => ({ spec, wrong, change: (path: Path, value: Json) => setSpec((before) => put(before, path, value) as Values) }),
     [spec, wrong],
   );
-  const chosen = families.items.filter(({ name }) => (spec.families as string[]).includes(name));
+  const chosen = ground ? [] : families.items.filter(({ name }) => (spec.families as string[]).includes(name));
   const field = fieldsOf(shape);
   const tally = (name: string) => leaves(body[name]);
   return (
@@ -91,7 +99,11 @@ function CampaignForm({ known: [description, families, methods], from }: Begun) 
           <Presets spec={spec} choose={setSpec} />
           <section class="card">
             <SchemaField field={field("label")} path={["label"]} />
-            <Choices field={field("families")} path={["families"]} abouts={summaries(families.items)} />
+            {ground ? (
+              <OnMap ground={ground} extent={extent} />
+            ) : (
+              <Choices field={field("families")} path={["families"]} abouts={summaries(families.items)} />
+            )}
             <Choices field={field("methods")} path={["methods"]} abouts={summaries(methods.items)} />
             <SchemaField field={{ ...field("seeds"), about: "Each method is run once with each; 0-4 is five of them." }} path={["seeds"]} />
           </section>
@@ -99,12 +111,17 @@ function CampaignForm({ known: [description, families, methods], from }: Begun) 
             <h2>Budget of each run</h2>
             <Fields shape={field("budget").shape} path={["budget"]} />
           </section>
+          <section class="card">
+            <SchemaField field={{ ...field("iid"), title: "I.i.d. phase", about: aboutOf(field("iid")) }} path={["iid"]} />
+          </section>
           <Group title="Ego" about={field("ego").shape.kind === "object" ? aboutOf(field("ego")) : ""} path={["ego"]} changed={tally("ego") > 0} open={tally("ego") > 0}>
             <Fields shape={egoShape(field("ego").shape, spec)} path={["ego"]} />
           </Group>
-          <Group title="Operational design domain" about={aboutOf(field("odd"))} path={["odd"]} changed={tally("odd") > 0} open={tally("odd") > 0}>
-            <OddFields shape={field("odd").shape} families={chosen} />
-          </Group>
+          {!ground && (
+            <Group title="Operational design domain" about={aboutOf(field("odd"))} path={["odd"]} changed={tally("odd") > 0} open={tally("odd") > 0}>
+              <OddFields shape={field("odd").shape} families={chosen} />
+            </Group>
+          )}
           <Group title="Requirements" path={["requirements"]} changed={tally("requirements") > 0} open={tally("requirements") > 0}>
             <Requirements shape={itemOf(field("requirements").shape)} signals={families.signals} families={chosen} />
           </Group>
@@ -113,7 +130,7 @@ function CampaignForm({ known: [description, families, methods], from }: Begun) 
           </Group>
         </div>
         <aside class="grid beside" aria-label="What it comes to">
-          <Submit spec={spec} verdict={verdict} wrong={wrong} refused={why} busy={busy} />
+          <Submit spec={spec} places={ground ? extent : null} verdict={verdict} wrong={wrong} refused={why} busy={busy} />
           <Preview body={body} />
         </aside>
       </form>

@@ -8,6 +8,8 @@ import type { Values } from "./schema";
 
 interface Ready {
   spec: Values;
+  /** On a map: how many places, where it is known. */
+  places: number | undefined | null;
   verdict: Verdict;
   wrong: readonly Wrong[];
   /** Why the last try was refused, where no field is to blame. */
@@ -15,9 +17,9 @@ interface Ready {
   busy: boolean;
 }
 
-export function Submit({ spec, verdict, wrong, refused, busy }: Ready) {
-  const { runs, episodes } = costOf(spec);
+export function Submit({ spec, places, verdict, wrong, refused, busy }: Ready) {
   const length = (name: string) => (spec[name] as unknown[]).length;
+  const { runs, episodes } = costOf(spec, places === null ? length("families") : (places ?? 0));
   return (
     <section class="card submit" aria-label="Start">
       <div class="tiles">
@@ -31,8 +33,9 @@ export function Submit({ spec, verdict, wrong, refused, busy }: Ready) {
         </span>
       </div>
       <p class="help">
-        {plural(length("families"), "family", "families")} × {plural(length("methods"), "method", "methods")} ×{" "}
+        {places === null ? plural(length("families"), "family", "families") : plural(places ?? 0, "place", "places")} × {plural(length("methods"), "method", "methods")} ×{" "}
         {plural(length("seeds"), "seed", "seeds")}
+        {spec.iid && ", and the i.i.d. phase"}
       </p>
       <button class="primary start" disabled={busy}>
         {busy ? "Starting …" : "Start the campaign"}

@@ -1,0 +1,75 @@
+"""The place that a bundle carries, so that it can be played where nobody has the map.
+
+What may come from anybody reaches the simulator only if it is what `risk_sac.scenario.maps.cut` writes: a net's
+elements and nothing else. SUMO writes files that a parameter of a signal names, and reads those that XML includes.
+"""
+
+from collections.abc import MutableMapping
+from typing import Any
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from risk_sac.config import SHIPPED, FamilyName
+from risk_sac.errors import ConfigError
+from risk_sac.scenario import library
+from risk_sac.scenario.place import PLACES
+
+PLACE, NET = "place", "place_net"  # names of the arrays
+ELEMENTS = {"net", "location", "type", "edge", "lane", "tlLogic", "phase"}
+ELEMENTS |= {"junction", "request", "connection", "roundabout"}
+
+
+def carried(family: FamilyName) -> dict[str, NDArray[np.uint8]]:
+    """The arrays of a family's place; none of a shipped one.
+
+    Raises:
+      ConfigError: the library does not have it.
+    """
+    if family in SHIPPED:
+        return {}
+    place, net = library.files_of(family)
+    return {PLACE: np.frombuffer(place, dtype=np.uint8), NET: np.frombuffer(net, dtype=np.uint8)}
+
+
+def unpack(family: FamilyName, arrays: MutableMapping[str, NDArray[Any]]) -> None:
+    """Takes the arrays of a place out of a bundle's, and puts it into the library of this machine.
+
+    Raises:
+      ValueError: they are no place that could be played at, or another one.
+      OSError: the library cannot be written.
+    """
+    text, net = arrays.pop(PLACE, None), arrays.pop(NET, None)
+    if text is None or net is None or family in SHIPPED:
+        return
+    try:
+        PLACES.validate_json(text.tobytes())
+        check_net(net.tobytes())
+        library.put(family, text.tobytes(), net.tobytes())
+    except (ValidationError, ConfigError, expat.ExpatError) as error:
+        raise ValueError(f"the place that it carries cannot be played at: {error}") from error
+
+
+def check_net(net: bytes) -> None:
+    """Refuses a net that has more than a piece of a map.
+
+    Raises:
+      ValueError: it names what else it has.
+      ExpatError: it is no XML.
+    """
+
+    def begun(name: str, attributes: dict[str, str]) -> None:
+        if name not in ELEMENTS:
+            raise ValueError(f"its net has a <{name}>; wanted {', '.join(sorted(ELEMENTS))} alone")
+        if any("$" in value for value in attributes.values()):  # which SUMO replaces by what the environment has
+            raise ValueError(f"a <{name}> of its net says $; wanted none")
+
+    def refused(*_: object) -> None:
+        raise ValueError("its net has a DOCTYPE; wanted none")
+
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = begun
+    parser.StartDoctypeDeclHandler = refused
+    parser.Parse(net, True)

@@ -1,0 +1,129 @@
+"""Maps of one's own on the page: from a file to a campaign at one of its places."""
+
+import json
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+import sumo_nets
+from tests.server import Service
+from tests.web.conftest import PHONE
+
+NET = Path(sumo_nets.__path__[0]) / "dense" / "dense.net.xml"
+HOSTILE = "<img src=x onerror=alert(1)> a very long label " + "x" * 100
+
+
+@pytest.fixture(scope="module")
+def network(service: Service) -> str:
+    """A map that the service has, under a hostile label."""
+    headers = {"content-type": "application/xml"}
+    answer = service.client.post("/v1/networks", params={"label": HOSTILE}, content=NET.read_bytes(), headers=headers)
+    return str(answer.raise_for_status().json()["id"])
+
+
+def upload(page: Page, file: Path, label: str = "") -> None:
+    page.get_by_label("Map", exact=True).set_input_files(file)
+    page.get_by_role("textbox", name="Label").fill(label)
+    page.get_by_role("button", name="Upload").click()
+
+
+def test_from_a_file_to_a_campaign_at_one_of_its_places(page_at: Callable[..., Page], service: Service) -> None:
+    page = page_at("maps")
+    upload(page, NET, "my town")
+    expect(page.get_by_role("heading", level=1)).to_have_text("my town")
+    network = page.url.rsplit("/", 1)[1]
+    found = service.client.get(f"/v1/networks/{network}/places").raise_for_status().json()["items"]
+    places = page.get_by_role("region", name="Places")
+    expect(places.get_by_role("heading")).to_have_text(f"{len(found)} places")
+    expect(page.get_by_alt_text("The map from above")).to_be_visible()
+    page.get_by_label("Pattern").select_option("junction")
+    page.get_by_label("Search").fill("from_north")
+    wanted = [each for each in found if each["pattern"] == "junction" and "from_north" in json.dumps(each)]
+    expect(places.locator(".spots").first.locator("li")).to_have_count(len(wanted))
+    page.get_by_role("link", name="Start a campaign: Junction at from_north").click()
+    page.get_by_role("checkbox", name="archive", exact=True).uncheck()
+    page.get_by_label("Episodes", exact=True).fill("2")
+    page.get_by_label("I.i.d. phase: none").check()
+    page.locator("#field-iid\\.episodes").fill("3")
+    expect(page.locator(".tile").first).to_contain_text("8")  # 2 searched, 2 x 3 drawn
+    sent = json.loads(shlex.split(page.get_by_role("region", name="The campaign as curl").inner_text())[-1])
+    assert sent == {
+        "network": network,
+        "pattern": "junction",
+        "place": "from_north",
+        "methods": ["random"],
+        "budget": {"episodes": 2},
+        "iid": {"episodes": 3},
+    }
+    page.get_by_role("button", name="Start the campaign").click()
+    expect(page).to_have_url(re.compile("#/campaigns/c[0-9a-f]+$"))
+    campaign = service.get(page.url.rsplit("/", 1)[1])
+    assert campaign["spec"]["iid"]["episodes"] == 3
+    assert [family.split("_")[0] for family in campaign["families"]] == ["junction"]
+    page.goto(f"{service.client.base_url}/page/#/new?from={campaign['id']}")
+    expect(page.get_by_role("checkbox", name=campaign["families"][0])).to_be_checked()  # a clone keeps its place
+    service.client.post(f"/v1/campaigns/{campaign['id']}/cancel")
+
+
+def test_all_places_of_a_pattern_are_counted_before_they_are_started(
+    page_at: Callable[..., Page], network: str
+) -> None:
+    page = page_at(f"maps/{network}")
+    card = page.get_by_role("region", name="Junction", exact=True)
+    card.get_by_role("link", name="Start a campaign at all 4").click()
+    expect(page.get_by_text("4 places × 2 methods × 1 seed")).to_be_visible()
+    expect(page.get_by_role("status")).to_contain_text("The service would take it")
+
+
+def test_a_map_that_is_refused_says_why(page_at: Callable[..., Page], tmp_path: Path) -> None:
+    page = page_at("maps", allowed=("422",))
+    page.get_by_role("button", name="Upload").click()
+    expect(page.get_by_role("alert")).to_have_text("Choose a file first.")
+    bad = tmp_path / "left.net.xml"
+    bad.write_text('<net version="1.20"><edge id="a" from="b" to="c"></edge></net>')
+    upload(page, bad)
+    expect(page.get_by_role("alert")).to_contain_text("edge 'a'")
+
+
+def test_a_place_that_is_gone_is_told_beside_its_field(page_at: Callable[..., Page], network: str) -> None:
+    page = page_at(f"new?network={network}&pattern=junction&place=nowhere", allowed=("422",))
+    expect(page.locator("#field-network").get_by_role("alert")).to_contain_text("no edge 'nowhere'")
+
+
+def test_a_map_is_deleted_after_a_question(page_at: Callable[..., Page], service: Service) -> None:
+    page = page_at("maps")
+    upload(page, NET, "to be deleted")
+    expect(page.get_by_role("heading", level=1)).to_have_text("to be deleted")
+    page.get_by_role("link", name="Maps").first.click()
+    page.get_by_role("button", name="Delete to be deleted").click()
+    page.get_by_role("button", name="Delete for good").click()
+    expect(page.get_by_role("link", name="to be deleted")).to_have_count(0)
+    labels = [each["label"] for each in service.client.get("/v1/networks").json()["items"]]
+    assert "to be deleted" not in labels
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_maps_keep_the_rules_of_accessibility(
+    scheme: str, page_at: Callable[..., Page], network: str, check_axe: Callable[[Page], None]
+) -> None:
+    page = page_at("maps", color_scheme=scheme)
+    page.get_by_role("link", name="<img").wait_for()
+    check_axe(page)
+    page.get_by_role("link", name="<img").click()
+    page.get_by_alt_text("The map from above").wait_for()
+    page.get_by_text("Why elsewhere not").click()
+    check_axe(page)
+
+
+def test_a_phone_shows_maps_without_scrolling_sideways(page_at: Callable[..., Page], network: str) -> None:
+    page = page_at("maps", viewport=PHONE)
+    page.get_by_role("link", name="<img").click()
+    page.get_by_alt_text("The map from above").wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    page.get_by_role("link", name=re.compile("^Start a campaign: Junction")).first.click()
+    page.get_by_text("of a map of yours").wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
