@@ -1,7 +1,10 @@
 """A failure in one file, replayed elsewhere; and files that are no such thing."""
 
+import hashlib
 import io
 import json
+import os
+import re
 import shutil
 import subprocess
 import sys
@@ -14,13 +17,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+import sumo_nets
 from risk_sac.cli import main
 from risk_sac.errors import ConfigError
+from risk_sac.failures import carried
 from risk_sac.failures.bundle import MANIFEST, MOST_ARRAYS, MOST_FILE_BYTES, read_bundle
 from risk_sac.failures.trajectory import trajectory_digest
 from risk_sac.run_folder.results import read_results
+from risk_sac.scenario import library
 
 RUN = ["--family", "dense", "--method", "random", "--seed", "1", "--episodes", "20"]
+NET = Path(sumo_nets.__path__[0]) / "dense" / "dense.net.xml"
 Arrays = dict[str, np.ndarray]
 
 
@@ -100,7 +107,7 @@ def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, capsys: pytest.
     ("change", "complaint"),
     [
         (lambda arrays: arrays["x_m"].__imul__(2.0), "is damaged: its arrays do not have the digest"),
-        (lambda arrays: manifest(arrays, format=3), "has a manifest of another version, or none: format"),
+        (lambda arrays: manifest(arrays, format=4), "has a manifest of another version, or none: format"),
         (lambda arrays: manifest(arrays, spec={"family": "low"}), "has a manifest of another version, or none: spec"),
         (lambda arrays: manifest(arrays, world={}), "was found on another dense/dense.net.xml"),
         (lambda arrays: arrays.pop(MANIFEST), "is no bundle of a failure, or is damaged"),
@@ -240,3 +247,73 @@ def test_a_failure_that_does_not_repeat_gets_no_bundle(
     assert main(["bundle", str(run), contact.id, "--out", str(tmp_path / "a.npz")]) == 1
     assert "does not repeat here" in capsys.readouterr().err.replace("\n", " ")
     assert not (tmp_path / "a.npz").exists()
+
+
+@pytest.fixture(scope="module")
+def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bundle of a contact on somebody's map, whose library of places is gone."""
+    folder = tmp_path_factory.mktemp("placed")
+    net = ["--network", str(NET), "--pattern", "junction", "--place", "from_west"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(library.VARIABLE, str(folder / "places"))
+        assert main(["run", *net, *RUN[2:], "--out", str(folder / "run")]) == 0
+        contact = read_results(folder / "run").contacts[0]
+        assert main(["bundle", str(folder / "run"), contact.id, "--out", str(folder / "failure.npz")]) == 0
+    shutil.rmtree(folder / "places")
+    return folder / "failure.npz"
+
+
+def replayed_elsewhere(file: Path, folder: Path) -> "subprocess.CompletedProcess[str]":
+    """In a process that has an empty library of places."""
+    command = [sys.executable, "-m", "risk_sac", "replay", str(file)]
+    elsewhere = os.environ | {library.VARIABLE: str(folder / "places")}
+    return subprocess.run(command, cwd=folder, env=elsewhere, capture_output=True, text=True)
+
+
+def test_a_failure_on_a_map_is_played_again_where_nobody_has_the_map(placed: Path, tmp_path: Path) -> None:
+    told = replayed_elsewhere(placed, tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert "every array is as recorded" in told.stdout.replace("\n", " ")
+    assert len(list((tmp_path / "places").iterdir())) == 1
+
+
+def repack(arrays: Arrays, net: bytes) -> None:
+    """Another net under a name that has its digest, as somebody would who wants it to be loaded."""
+    text = arrays[carried.PLACE].tobytes()
+    arrays[carried.NET] = np.frombuffer(net, dtype=np.uint8)
+    digest = hashlib.sha256(text + b"\0" + net).hexdigest()[: library.DIGITS]
+    spec = json.loads(str(arrays[MANIFEST]))["spec"] | {"family": f"junction_{digest}"}
+    manifest(arrays, spec=spec)
+
+
+@pytest.mark.parametrize(
+    ("inside", "says"),
+    [
+        ('<tlLogic id="t"><param key="file" value="/tmp/x"/></tlLogic>', "its net has a <param>"),
+        ('<include href="/etc/passwd"/>', "its net has a <include>"),
+        ('<type id="${HOME}"/>', "says $"),
+        ("</edge>", "cannot be played at: mismatched tag"),
+    ],
+)
+def test_a_carried_net_that_says_more_than_roads_reaches_nobody(
+    placed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: str, says: str
+) -> None:
+    monkeypatch.setenv(library.VARIABLE, str(tmp_path / "places"))
+    file = changed(placed, tmp_path / "a.npz", lambda arrays: repack(arrays, f"<net>{inside}</net>".encode()))
+    with pytest.raises(ConfigError, match=re.escape(says)):
+        read_bundle(file)
+    assert not (tmp_path / "places").exists()
+
+
+def test_a_bundle_that_lost_its_place_or_carries_another_is_refused(
+    placed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(library.VARIABLE, str(tmp_path / "places"))
+    told = replayed_elsewhere(changed(placed, tmp_path / "a.npz", lambda arrays: arrays.pop(carried.NET)), tmp_path)
+    assert (told.returncode, "there is no place 'junction_" in told.stderr.replace("\n", " ")) == (2, True), told.stderr
+    doctype = np.frombuffer(b"<!DOCTYPE net [<!ENTITY a 'b'>]><net/>", dtype=np.uint8)
+    with pytest.raises(ConfigError, match="DOCTYPE"):
+        read_bundle(changed(placed, tmp_path / "b.npz", lambda arrays: arrays.update({carried.NET: doctype})))
+    other = np.frombuffer(b"<net/>", dtype=np.uint8)
+    with pytest.raises(ConfigError, match="not what its name says"):
+        read_bundle(changed(placed, tmp_path / "c.npz", lambda arrays: arrays.update({carried.NET: other})))

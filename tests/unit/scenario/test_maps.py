@@ -1,18 +1,26 @@
+import os
+from contextlib import closing
 from pathlib import Path
 
 import libsumo
 import numpy as np
 import pytest
+from shapely import LineString, Point, box
+from shapely.affinity import affine_transform
 
 import sumo_nets
+from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, MapError
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, SHIPPED, family_at, family_named
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import place_at, survey
 from risk_sac.scenario.maps.keep import Map
-from risk_sac.scenario.maps.net import read_net
+from risk_sac.scenario.maps.net import Lane, Link, Net, read_net
+from risk_sac.scenario.maps.waiting import waits_in_the_way
+from risk_sac.scenario.maps.ways import way_back
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch
+from risk_sac.sim.sumo import SumoSimulation
 from tests.maps import osm_town
 
 NETS = Path(sumo_nets.__path__[0])
@@ -166,3 +174,83 @@ def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str
     file.write_text(content)
     with pytest.raises(MapError, match=says):
         present_net(file, tmp_path)
+
+
+def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(
+    town: Map, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(library.VARIABLE, str(tmp_path))
+    fits = [fit for fit in survey(town.net, ("crossing",)).fits if fit.place.sites[0].beyond]
+    assert len(fits) > 10
+    family = family_named(town.keep(fits[0]))
+    scene = family.space.from_unit(np.full(family.space.dimension, 0.5)).values
+    hidden = {"occluder_distance_m": 0.5, "occluder_speed_mps": 0.0}
+    hidden |= {"pedestrian_setback_m": 0.3, "pedestrian_speed_mps": 0.0}
+    with closing(SumoSimulation(EgoConfig())) as sim:
+        frame = sim.reset(family.layout({**scene, **hidden}), 1)
+    ego, occluder, pedestrian = (frame.ids.index(id_) for id_ in ("ego", "occluder", "pedestrian"))
+    at = [Point(x, y) for x, y in zip(frame.x_m, frame.y_m, strict=True)]
+    cos, sin = np.cos(frame.heading_rad[occluder]), np.sin(frame.heading_rad[occluder])
+    body = affine_transform(box(-4.0, -1.2, 4.0, 1.2), [cos, -sin, sin, cos, at[occluder].x, at[occluder].y])
+    walk = fits[0].place.sites[0].walk
+    over = [Point(walk.x_m + m * walk.along_x, walk.y_m + m * walk.along_y) for m in np.arange(0.0, 12.0, 0.5)]
+    assert sum(LineString([at[ego], point]).crosses(body) for point in over) >= 4  # 2 m of its way, or more
+    ahead, aside = at[pedestrian].x - at[ego].x, at[pedestrian].y - at[ego].y
+    assert aside * np.cos(frame.heading_rad[ego]) - ahead * np.sin(frame.heading_rad[ego]) > 3.0  # on its left
+    assert np.cos(frame.heading_rad[occluder] - frame.heading_rad[ego]) < -0.9
+
+
+FORK = (
+    "<net>"
+    '<edge id="a" from="0" to="1"><lane id="a_0" index="0" speed="10" length="200" shape="0,0 200,0"/></edge>'
+    '<edge id="b" from="1" to="2"><lane id="b_0" index="0" speed="10" length="90" shape="210,-2 300,-2"/>'
+    '<lane id="b_1" index="1" speed="10" length="90" shape="210,2 300,2"/></edge>'
+    '<edge id="c" from="2" to="3"><lane id="c_0" index="0" speed="10" length="900" shape="310,-2 1210,-2"/>'
+    '<lane id="c_1" index="1" speed="10" length="900" shape="310,2 1210,2"/></edge>'
+    '<connection from="a" to="b" fromLane="0" toLane="0" dir="s"/>'
+    '<connection from="a" to="b" fromLane="0" toLane="1" dir="s"/>'
+    '{right}<connection from="b" to="c" fromLane="1" toLane="1" dir="s"/></net>'
+)
+RIGHT = '<connection from="b" to="c" fromLane="0" toLane="0" dir="s"/>'
+
+
+@pytest.mark.parametrize(("right", "comes_from"), [(RIGHT, []), ("", ["a"])])
+def test_nobody_is_placed_before_a_fork_that_would_lead_it_into_another_lane(
+    tmp_path: Path, right: str, comes_from: list[str]
+) -> None:
+    """Of lanes that lead on alike, SUMO's drivers take the right one; of others the one that leads on."""
+    file = tmp_path / "map.net.xml"
+    file.write_text(FORK.format(right=right))
+    net = read_net(file)
+    way = way_back(net, net.lane("b_1"), 150.0, ["c"])
+    assert [lane.edge for lane in way.lanes] == [*comes_from, "b"]
+
+
+@pytest.mark.parametrize(("x_m", "stands_clear"), [(0.0, True), (-6.0, False)])
+def test_who_waits_askew_in_the_way_of_others_is_told_from_who_stands_clear(x_m: float, stands_clear: bool) -> None:
+    """The middle of its front is 1.6 m from the middle of the lane that it is to cross, as SUMO has it."""
+
+    def lane(id_: str, *line: tuple[float, float]) -> Lane:
+        return Lane(id_, id_, 0, 10.0, 3.2, 10.0, line, True)
+
+    before, behind = lane("i_0", (x_m, -5.6), (0.0, -1.6)), lane("i_1", (0.0, -1.6), (-3.0, 6.0))
+    across, crossed_before = lane("across", (10.0, 0.0), (-10.0, 0.0)), lane("crossed", (9.0, -3.0), (-9.0, -3.0))
+    joined = lane("joined", (3.0, -6.0), (-3.0, 6.0))
+    net = Net(waits_for={"i_1": (crossed_before, joined, across)})
+    link = Link(
+        lane("from", (0.0, -20.0), (0.0, -10.0)), lane("to", (-3.0, 6.0), (-3.0, 9.0)), (before, behind), None, 0
+    )
+    assert waits_in_the_way(net, link) is (None if stands_clear else across)
+
+
+def test_places_that_nobody_names_go_when_they_are_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(library.VARIABLE, str(tmp_path))
+    named, new, old = (library.keep(shipped(name), b"<net/>") for name in ("low", "mixed", "dense"))
+    (tmp_path / "of somebody else").mkdir()
+    for path in (named, old, "of somebody else"):
+        os.utime(tmp_path / path, (0, 0))
+    assert library.prune(tmp_path, {named}, 3600.0) == [old]
+    assert {path.name for path in tmp_path.iterdir()} == {named, new, "of somebody else"}
+    os.utime(tmp_path / new, (0, 0))
+    assert library.keep(shipped("mixed"), b"<net/>") == new  # wanted again
+    assert library.prune(tmp_path, (), 3600.0) == [named]
