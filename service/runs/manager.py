@@ -19,7 +19,7 @@ from service.runs.unused_places import UnusedPlaces
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.states import State, TriageState
-from service.store.stored import StoredCampaign, StoredRun, StoredTriage
+from service.store.stored import StoredCampaign, StoredTriage
 from service.store.writing import Ledger
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
 
@@ -69,6 +69,11 @@ class Manager:
     def cluster(self) -> Cluster | None:
         """The cluster that runs execute on; None where they execute on this machine."""
         return self._executor.cluster
+
+    @property
+    def workers(self) -> int:
+        """Runs that are executed at once; 0 while there is nowhere to execute them."""
+        return int(min(self._settings.max_workers, self._executor.slots))
 
     def start(self) -> None:
         """Take up what an earlier server left, then work the queue.
@@ -266,11 +271,11 @@ class Manager:
             self._ledger.end_run(number, State.FAILED, f"{reason}; {times}")
 
     def _launch_waiting(self) -> None:
-        while len(self._active) < min(self._settings.max_workers, self._executor.slots):
+        while len(self._active) < self.workers:
             number = self._next()
             if number is None:
                 return
-            self._launch(self._store.run(number))
+            self._launch(self._store.campaign_of(number))
 
     def _next(self) -> int | None:
         """The run that has waited longest, of the project that has the fewest at work."""
@@ -279,9 +284,9 @@ class Manager:
         able = [project for project in waiting if not exhausted(self._store.usage(project), self._settings)]
         return min(((at_work[project], waiting[project]) for project in able), default=(0, None))[1]
 
-    def _launch(self, run: StoredRun) -> None:
-        folder = self._settings.run_folder(run.campaign_id, run.id)
-        campaign = self._store.campaign(run.campaign_id)
+    def _launch(self, campaign: StoredCampaign) -> None:
+        (run,) = campaign.runs
+        folder = self._settings.run_folder(campaign.id, run.id)
         self._ledger.start_run(run.number)
         self._active[run.number] = active = Active(run, campaign.project)
         try:

@@ -24,7 +24,6 @@ from service.store.stored import (
     StoredCampaign,
     StoredChange,
     StoredEpisode,
-    StoredRun,
     StoredTriage,
     Usage,
 )
@@ -219,11 +218,12 @@ class Store:
         with self._reading() as session:
             return {row.project: row.number for row in session.execute(query)}
 
-    def run(self, number: int) -> StoredRun:
-        """The run with this number, which there is."""
+    def campaign_of(self, number: int) -> StoredCampaign:
+        """The campaign of the run with this number, which there is, without its other runs: they may be thousands."""
         with self._reading() as session:
             row = session.get_one(RunRow, number)
-            return StoredRun.from_row(row, row.campaign.id)
+            campaign = row.campaign
+            return StoredCampaign.from_row(campaign, self._shown_revision(campaign.revision), alone=row)
 
     def usage(self, project: str) -> Usage:
         """What a project takes of the service now."""

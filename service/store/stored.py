@@ -95,9 +95,9 @@ class StoredCampaign:
     runs: tuple[StoredRun, ...]
 
     @classmethod
-    def from_row(cls, row: CampaignRow, revision: str) -> Self:
-        """The snapshot of a campaign and its runs."""
-        runs = tuple(StoredRun.from_row(run, row.id) for run in row.runs)
+    def from_row(cls, row: CampaignRow, revision: str, alone: RunRow | None = None) -> Self:
+        """The snapshot of a campaign and its runs, or of one of them alone."""
+        runs = tuple(StoredRun.from_row(run, row.id) for run in (row.runs if alone is None else (alone,)))
         read = {"state": State(row.state), "spec_json": row.spec, "revision": revision, "runs": runs}
         return cls(**_columns(cls, row) | read)
 

@@ -273,7 +273,9 @@ def _settle(session: Session, campaign: CampaignRow) -> None:
     """Let a campaign follow its runs, and show that something of it has changed."""
     campaign.revision += 1
     current = State(campaign.state)
-    new = campaign_state(current, [State(run.state) for run in campaign.runs])
+    # What states there are, without the runs themselves: they may be thousands, and each start and end comes by here.
+    states = session.scalars(select(RunRow.state).filter_by(campaign_number=campaign.number).distinct())
+    new = campaign_state(current, {State(state) for state in states})
     if new is current:
         return
     campaign.state = new

@@ -14,19 +14,19 @@ from service.views.progress import progress
 from service.views.series import load_series
 
 
-def campaign_body(campaign: StoredCampaign, settings: ServiceSettings) -> Campaign:
-    """A campaign in full."""
+def campaign_body(campaign: StoredCampaign, workers: int) -> Campaign:
+    """A campaign in full; `workers` as `progress` has it."""
     return Campaign(
-        **dict(summary_body(campaign, settings)),
+        **dict(summary_body(campaign, workers)),
         runs=[Run.model_validate(run) for run in campaign.runs],
         spec=campaign.spec,
     )
 
 
-def summary_body(campaign: StoredCampaign, settings: ServiceSettings) -> CampaignSummary:
-    """A campaign in a list."""
+def summary_body(campaign: StoredCampaign, workers: int) -> CampaignSummary:
+    """A campaign in a list; `workers` as `progress` has it."""
     stored = {name: getattr(campaign, name) for name in CampaignSummary.model_fields.keys() - {"progress"}}
-    return CampaignSummary.model_validate(stored | {"progress": progress(campaign, settings.max_workers)})
+    return CampaignSummary.model_validate(stored | {"progress": progress(campaign, workers)})
 
 
 def episode_body(episode: StoredEpisode) -> Episode:

@@ -23,7 +23,7 @@ def progress(campaign: StoredCampaign, workers: int) -> Progress:
 
     Args:
       campaign: the campaign.
-      workers: runs the server executes at once.
+      workers: runs that are executed at once; 0 while that is unknown.
     """
     runs, searches = campaign.runs, campaign.searches
     present = _present(searches)
@@ -43,7 +43,7 @@ def retry_after_s(campaign: StoredCampaign, workers: int) -> int | None:
 
 
 def eta_s(runs: Sequence[StoredRun], workers: int) -> float | None:
-    """Seconds until all runs have ended, or None before the first episode has.
+    """Seconds until all runs have ended; None before the first episode has, or while there is nowhere to execute them.
 
     eta = max(longest run at work, work left / workers)
 
@@ -52,11 +52,11 @@ def eta_s(runs: Sequence[StoredRun], workers: int) -> float | None:
 
     Args:
       runs: all runs of the campaign.
-      workers: runs executed at once, at least 1.
+      workers: runs that are executed at once; 0 while that is unknown.
     """
     busy_s = sum(run.busy_s for run in runs)
     done = sum(run.episodes_done for run in runs)
-    if done == 0:
+    if done == 0 or workers == 0:
         return None
     left = [_left(run, busy_s / done) for run in runs if not run.state.final]
     return max(max(left, default=0.0), sum(left) / workers)

@@ -99,7 +99,7 @@ def list_campaigns(
         method=method,
         label=label,
     )
-    items = [summary_body(campaign, service.settings) for campaign in page.items]
+    items = [summary_body(campaign, service.manager.workers) for campaign in page.items]
     cursor = service.cursors.encode(page.last, LISTED, caller.sees)
     body = CampaignPage(items=items, next=cursor).model_dump_json().encode()
     tag = entity_tag(blake2b(body, digest_size=8).hexdigest())
@@ -124,7 +124,7 @@ def delete_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -
 @router.get("/{campaign_id}", response_model=Campaign, responses=UNKNOWN | LIVE)
 def get_campaign(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """State, progress and runs of a campaign."""
-    return _kept(campaign_id, request, service, caller, lambda found: campaign_body(found, service.settings))
+    return _kept(campaign_id, request, service, caller, lambda found: campaign_body(found, service.manager.workers))
 
 
 @router.get("/{campaign_id}/results", response_model=Results, responses=UNKNOWN | LIVE)
@@ -171,8 +171,8 @@ def _kept(
     """An answer about one campaign, which the cache keeps."""
     revision = service.store.revision(campaign_id, caller.sees)
     campaign = service.store.campaign(campaign_id, caller.sees)
-    # The revision that was read, which may be newer. A body depends on it, on the version and on one setting.
-    tag = entity_tag(campaign.revision, __version__, str(service.settings.max_workers))
+    # The revision that was read, which may be newer. A body depends on it, on the version and on how many are at work.
+    tag = entity_tag(campaign.revision, __version__, str(service.manager.workers))
     headers = caching(tag) | _retry_after(campaign, service)
     if has(request, tag):  # before the body is made, which of many episodes takes seconds
         return Response(status_code=304, headers=headers)
@@ -183,11 +183,11 @@ def _kept(
 
 def _accepted(campaign: StoredCampaign, service: Context) -> Response:
     headers = {"Location": f"/v1/campaigns/{campaign.id}"} | _retry_after(campaign, service)
-    body = campaign_body(campaign, service.settings).model_dump_json()
+    body = campaign_body(campaign, service.manager.workers).model_dump_json()
     return Response(body, status_code=202, headers=headers, media_type="application/json")
 
 
 def _retry_after(campaign: StoredCampaign, service: Context) -> dict[str, str]:
     """The header that says when to ask again; none once the campaign has ended."""
-    wait_s = retry_after_s(campaign, service.settings.max_workers)
+    wait_s = retry_after_s(campaign, service.manager.workers)
     return {} if wait_s is None else {"Retry-After": str(wait_s)}

@@ -81,6 +81,13 @@ def test_a_run_that_loses_its_cluster_again_and_again_has_not_failed(execute, me
     assert manager.restarts == {Cause.LOST: 6}
 
 
+@pytest.mark.parametrize(("slots", "wanted"), [(math.inf, 7), (3, 3), (0, 0)])
+def test_as_many_are_at_work_as_may_be_and_as_there_is_room_for(store, tmp_path, slots, wanted):
+    executor = Scripted()
+    executor.slots = slots
+    assert Manager(ServiceSettings(data_dir=tmp_path, max_workers=7), store, executor).workers == wanted
+
+
 def test_a_worker_that_stops_although_nobody_asked_was_told_to_by_somebody_else(execute, metrics):
     stopped = Finished(finished=False, metrics=metrics, evaluation=None, digest="", versions={}, wall_s=1.0)
     run, _, manager = execute([stopped, Exited(None, Cause.ENDED, 0)], [Failed(reason="no"), Exited(None)])

@@ -39,8 +39,9 @@ RUN = StoredRun(
 )
 
 
-def test_there_is_no_eta_before_the_first_episode():
+def test_there_is_no_eta_before_the_first_episode_or_without_anybody_to_work():
     assert eta_s([RUN, RUN], workers=2) is None
+    assert eta_s([replace(RUN, episodes_done=20, busy_s=40.0)], workers=0) is None
 
 
 @pytest.mark.parametrize(
