@@ -1,4 +1,4 @@
-"""Builds the image, runs it, and says in one line whether it does what it should."""
+"""Builds the image, runs it, runs the service on a cluster, and says in one line whether all does what it should."""
 
 import argparse
 import signal
@@ -8,7 +8,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from smoke_test import image
+from smoke_test import cluster, image
 from smoke_test.engines import NAMES, Engine, engines, no_engine
 from smoke_test.errors import NoEngineError, SmokeError
 from smoke_test.namespaces import delete, end_processes, own_processes
@@ -24,12 +24,16 @@ def main() -> int:
         prog="docker/smoke", description=__doc__, epilog=f"Exit status: 0 passed, 1 failed, {UNTRIED} no engine."
     )
     parser.add_argument("--engine", choices=NAMES, help="only this one (default: the first that works)")
+    parser.add_argument(
+        "--only", choices=CASES, action="append", help="image: the image; cluster: two nodes of a Ray cluster"
+    )
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     own_processes()
     folder = Path(tempfile.mkdtemp(prefix="risk-sac-smoke-"))
     try:
-        print(f"smoke PASSED: {_smoke(folder, options.engine)}")
+        told = [CASES[name](folder, options) for name in options.only or CASES]
+        print(f"smoke PASSED: {'; '.join(told)}")
     except NoEngineError as error:
         print(f"smoke NOT RUN: {error}")
         return UNTRIED
@@ -45,9 +49,9 @@ def main() -> int:
     return 0
 
 
-def _smoke(folder: Path, wanted: str | None) -> str:
+def _image(folder: Path, options: argparse.Namespace) -> str:
     start = time.monotonic()
-    engine, base = _working_engine(folder, wanted)
+    engine, base = _working_engine(folder, options.engine)
     print(f"smoke: {engine.name} builds on {base}")
     image.build(engine, base, folder)
     built = time.monotonic()
@@ -58,6 +62,20 @@ def _smoke(folder: Path, wanted: str | None) -> str:
             engine.attempt("image", "rm", "--force", image.IMAGE, image.STAND_IN)
     took = f"{time.monotonic() - built:.0f} s after a build of {built - start:.0f} s"
     return f"{told}; {took}"
+
+
+def _cluster(folder: Path, options: argparse.Namespace) -> str:
+    start = time.monotonic()
+    try:
+        cluster.check_possible()
+    except NoEngineError as error:
+        if options.only:
+            raise
+        return f"the cluster was left out: {error}"
+    return f"{cluster.ClusterStory(folder).told()}; {time.monotonic() - start:.0f} s"
+
+
+CASES = {"image": _image, "cluster": _cluster}
 
 
 def _working_engine(folder: Path, wanted: str | None) -> tuple[Engine, str]:

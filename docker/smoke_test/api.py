@@ -49,9 +49,9 @@ class Api:
         while True:
             page = self._call("GET", path, None, query, 200, names)
             yield from page["items"]
-            if page.get("next_cursor") is None:
+            if page["next"] is None:
                 return
-            query["cursor"] = page["next_cursor"]
+            query["cursor"] = page["next"]
 
     def wait_ready(self, within_s: float) -> None:
         """Until the service can work.

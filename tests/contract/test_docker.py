@@ -13,6 +13,7 @@ from smoke_test.workflow import Workflow
 from risk_sac.config import CampaignSpec
 from service.host.settings_table import BEGIN, END, with_table
 from service.settings import ServiceSettings
+from tests.contract.kuberay import RAY_CLUSTER
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "service" / "README.md").read_text(encoding="utf-8")
@@ -114,76 +115,49 @@ def test_script_is_executable_bash(script):
     subprocess.run(["bash", "-n", ROOT / script], check=True)
 
 
-# What `kubectl` would say of a RayCluster: the fields of ray.io/v1 that KubeRay 1.x requires, and those that are used.
-RAY_CLUSTER = {
-    "type": "object",
-    "required": ["apiVersion", "kind", "metadata", "spec"],
-    "properties": {
-        "apiVersion": {"const": "ray.io/v1"},
-        "kind": {"const": "RayCluster"},
-        "spec": {
-            "type": "object",
-            "required": ["headGroupSpec"],
-            "additionalProperties": False,
-            "properties": {
-                "rayVersion": {"type": "string"},
-                "enableInTreeAutoscaling": {"type": "boolean"},
-                "headGroupSpec": {
-                    "type": "object",
-                    "required": ["rayStartParams", "template"],
-                    "additionalProperties": False,
-                    "properties": {
-                        "serviceType": {"type": "string"},
-                        "rayStartParams": {"type": "object", "additionalProperties": {"type": "string"}},
-                        "template": {"$ref": "#/$defs/pod"},
-                    },
-                },
-                "workerGroupSpecs": {
-                    "type": "array",
-                    "items": {
-                        "type": "object",
-                        "required": ["groupName", "minReplicas", "maxReplicas", "rayStartParams", "template"],
-                        "additionalProperties": False,
-                        "properties": {
-                            "groupName": {"type": "string"},
-                            **{name: {"type": "integer"} for name in ("replicas", "minReplicas", "maxReplicas")},
-                            "rayStartParams": {"type": "object", "additionalProperties": {"type": "string"}},
-                            "template": {"$ref": "#/$defs/pod"},
-                        },
-                    },
-                },
-            },
-        },
-    },
-    "$defs": {
-        "pod": {
-            "type": "object",
-            "required": ["spec"],
-            "properties": {
-                "spec": {
-                    "type": "object",
-                    "required": ["containers"],
-                    "properties": {"containers": {"type": "array", "minItems": 1, "items": {"required": ["name"]}}},
-                }
-            },
-        }
-    },
-}
+@pytest.fixture
+def manifest():
+    return {each["kind"]: each for each in yaml.safe_load_all(KUBERAY)}
 
 
-def test_manifest_for_kuberay_has_the_fields_that_its_schema_wants():
-    documents = {each["kind"]: each for each in yaml.safe_load_all(KUBERAY)}
-    jsonschema_rs.validator_for(RAY_CLUSTER).validate(documents["RayCluster"])
-    spec = documents["RayCluster"]["spec"]
+def test_manifest_for_kuberay_is_what_its_operator_takes(manifest):
+    jsonschema_rs.validator_for(RAY_CLUSTER).validate(manifest["RayCluster"])
+    spec = manifest["RayCluster"]["spec"]
     (extra,) = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["ray"]
     assert extra == f"ray=={spec['rayVersion'].rpartition('.')[0]}.*"
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("headGroupSpec", "rayStartParams", "num-cpus"), 0),
+        (("headGroupSpec", "template", "spec", "containers", 0, "env", 0, "value"), 1),
+        (("workerGroupSpecs", 0, "template", "spec", "containers", 0, "resources", "limits", "memory"), "8 GB"),
+        (("workerGroupSpecs", 0, "template", "spec", "container"), []),
+        (("workerGroupSpecs", 0, "maxReplica"), 3),
+    ],
+)
+def test_manifest_with_a_slip_is_not(manifest, place, value):
+    *path, last = place
+    inner = manifest["RayCluster"]["spec"]
+    for each in path:
+        inner = inner[each]
+    inner[last] = value
+    with pytest.raises(jsonschema_rs.ValidationError):
+        jsonschema_rs.validator_for(RAY_CLUSTER).validate(manifest["RayCluster"])
+
+
+def test_all_pods_of_the_manifest_want_a_token_and_are_of_one_image(manifest):
+    spec = manifest["RayCluster"]["spec"]
     pods = [spec["headGroupSpec"]["template"], *(group["template"] for group in spec["workerGroupSpecs"])]
-    pods.append(documents["Deployment"]["spec"]["template"])
-    for pod in pods:
-        (container,) = pod["spec"]["containers"]
+    pods.append(manifest["Deployment"]["spec"]["template"])
+    containers = [container for pod in pods for container in pod["spec"]["containers"]]
+    assert len(containers) == 3
+    assert {container["image"] for container in containers} == {"localhost/risk-sac"}
+    for container in containers:
         environment = {each["name"]: each for each in container["env"]}
         assert environment["RAY_AUTH_MODE"]["value"] == "token"
-        assert "secretKeyRef" in environment["RAY_AUTH_TOKEN"]["valueFrom"]
+        assert environment["RAY_AUTH_TOKEN"]["valueFrom"]["secretKeyRef"] == {"name": "ray-token", "key": "token"}
 
 
 def test_compose_has_a_cluster_of_a_head_and_two_workers_that_want_a_token(compose):
