@@ -7,12 +7,14 @@ import sys
 
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.execution.executors import executor_named
 from service.api.guards.connections import Server
 from service.app import create_app
 from service.host.allocator import share_arenas
 from service.host.environment import MISUSED, read_settings
 from service.host.logs import set_up_logs
 from service.keys.exposure import check_exposure
+from service.workers.program import program
 
 ANSWERS_END_S = 2  # for answers and streams at work when the server is told to stop; workers are stopped after that
 SWITCH_S = 0.001  # for which a busy thread may hold up the event loop, and with it all answers; 5 ms by default
@@ -28,12 +30,14 @@ def main() -> None:
             os.environ[registry.FILE] = str(settings.egos.absolute())
         registry.cards()  # an operator who has registered nonsense hears of it now
         check_exposure(settings)
+        executor = executor_named(settings.executor)(program(settings))  # tries a cluster, which takes seconds
     except ConfigError as error:
-        print(error, file=sys.stderr)  # noqa: T201 - before there is a log
+        said = str(error)
+        print(said if error.field in said else f"{error.field}: {said}", file=sys.stderr)  # noqa: T201 - no log yet
         sys.exit(MISUSED)
     except RiskSacError as error:
         sys.exit(str(error))
-    app = create_app(settings)
+    app = create_app(settings, executor)
     # What the imports left is no garbage; to look through it again and again would hold up all answers for 0.1 s.
     gc.collect()
     gc.freeze()

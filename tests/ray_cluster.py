@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -23,6 +23,7 @@ ROOT = Path(__file__).parents[1]
 STORE_BYTES = 80_000_000
 LONG_S = 300
 GONE_S = 30
+STARTED = b"Ray runtime started"  # and the head knows of it
 # Nothing that a test does not need: each process of Ray that is started in advance takes a second of a processor.
 FRUGAL = {
     "RAY_USAGE_STATS_ENABLED": "0",
@@ -30,6 +31,10 @@ FRUGAL = {
     "RAY_prestart_worker_first_driver": "false",
     "RAY_enable_worker_prestart": "false",
 }
+
+
+# Of a head: nobody looks at its cluster, or makes it larger.
+HEAD_ALONE = ("--include-dashboard=false", "--no-monitor")
 
 
 class Cluster:
@@ -67,28 +72,33 @@ class Cluster:
         for number in range(nodes):
             self.add(number)
 
-    def add(self, number: int, **environment: str) -> None:
-        """Starts a node; 0 is the head. `ray start --block` stays beside what it started."""
+    def add(self, number: int, prefix: Sequence[str] = (), **environment: str) -> None:
+        """Starts a node; 0 is the head. `ray start --block` stays beside what it started.
+
+        Args:
+          number: of the node.
+          prefix: a command that executes the one after it.
+          environment: variables of its own.
+        """
         where = (
-            ["--head", f"--port={self.port}", "--include-dashboard=false", f"--temp-dir={self.temp}"]
+            ["--head", f"--port={self.port}", *HEAD_ALONE, f"--temp-dir={self.temp}"]
             if number == 0
             else [f"--address=127.0.0.1:{self.port}"]
         )
         with self._log.open("ab") as log:
+            before = log.tell()
             start = psutil.Popen(
-                [sys.executable, "-m", "ray.scripts.scripts", "start", *where, f"--num-cpus={self.cpus}",
-                 f"--object-store-memory={STORE_BYTES}", "--disable-usage-stats", "--block"],
+                [*prefix, sys.executable, "-m", "ray.scripts.scripts", "start", *where, f"--num-cpus={self.cpus}",
+                 f"--object-store-memory={STORE_BYTES}", "--include-log-monitor=false", "--disable-usage-stats",
+                 "--block"],
                 env=os.environ | self.environment | environment,
                 stdout=log, stderr=log, stdin=subprocess.DEVNULL, start_new_session=True, cwd=ROOT,
             )  # fmt: skip
         self.nodes[number] = start
-        self._started(number)
-
-    def _started(self, number: int) -> None:
         deadline = time.monotonic() + LONG_S
-        while not any("raylet" in name for name in self.names(number)):
-            assert self.nodes[number].is_running(), self._log.read_text()[-3000:]
-            assert time.monotonic() < deadline, self._log.read_text()[-3000:]
+        while STARTED not in (said := self._log.read_bytes()[before:]):
+            assert start.poll() is None, said[-3000:].decode()
+            assert time.monotonic() < deadline, said[-3000:].decode()
             time.sleep(0.1)
 
     def names(self, number: int) -> list[str]:

@@ -30,7 +30,7 @@ HEAD, SERVER, NODES = "head", "server", ("node-1", "node-2")
 PORT, RAY_PORT = 8000, 6379
 START_S = 120.0
 CAMPAIGN_S = 400.0
-CAMPAIGN = {"families": ["low"], "methods": ["random"], "seeds": [1, 2, 3, 4], "budget": {"episodes": 8}}
+CAMPAIGN = {"families": ["low"], "methods": ["random"], "seeds": [1, 2], "budget": {"episodes": 6}}
 # Ray starts no more than it needs: the machine may be a small one.
 FRUGAL = ["--disable-usage-stats", "--object-store-memory=80000000", "--include-log-monitor=false", "--block"]
 

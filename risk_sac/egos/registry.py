@@ -56,6 +56,21 @@ def cards() -> tuple[EgoCard, ...]:
     return tuple(sorted(found, key=lambda card: card.name))
 
 
+def installed() -> dict[str, str]:
+    """Versions of the Python egos of this machine, by name; where one cannot be used, why.
+
+    Raises:
+      ConfigError: two have the same name.
+    """
+    found = {}
+    for name, point in _points().items():
+        try:
+            found[name] = python_card(point).version
+        except ConfigError as error:
+            found[name] = str(error)
+    return found
+
+
 def card_of(name: str) -> EgoCard:
     """The card of one ego.
 

@@ -1,8 +1,8 @@
 """Where runs execute: the seam between who wants them, the command line or the service, and whatever has processors."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Generic, Protocol, TypeVar
@@ -55,7 +55,11 @@ class Program(Generic[Word]):
     inherited: tuple[int, ...] = ()
     """Open files that a worker on this machine keeps open, as a lock is."""
     inputs: tuple[Path, ...] = ()
-    """Text files that the arguments name; a worker on another machine is given copies."""
+    """Files that the arguments name; a worker on another machine is given copies."""
+    within: Path | None = None
+    """Folder that holds those of all runs, for executors that have to bring other machines to it."""
+    environment: Mapping[str, str] = field(default_factory=dict)
+    """Variables that it finds beside those of whoever starts it."""
     lease_s: float = math.inf
     """It is killed once it neither says anything nor uses its processor for so long, s."""
     stall_s: float = math.inf

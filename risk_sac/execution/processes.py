@@ -89,7 +89,9 @@ def program(spec_file: Path, lock: int) -> Program[Never]:
         picked = ["--family", spec.family, "--method", spec.method, "--seed", str(spec.seed)]
         return ["-m", "risk_sac", "run", "--spec", str(spec_file), *picked, "--out", str(folder)]
 
-    return Program(arguments=arguments, log=LOG, hear=None, inherited=(lock,), inputs=(spec_file,))
+    return Program(
+        arguments=arguments, log=LOG, hear=None, inherited=(lock,), inputs=(spec_file,), within=spec_file.parent
+    )
 
 
 class Queue:

@@ -45,7 +45,7 @@ class Subprocess:
                 stdin=subprocess.PIPE if talks else subprocess.DEVNULL,
                 stdout=subprocess.PIPE if talks else log,
                 stderr=log,
-                env=os.environ | THREADS,
+                env={**os.environ, **THREADS, **program.environment},
                 pass_fds=program.inherited,
                 bufsize=0,
                 start_new_session=True,  # Ctrl-C is for whoever started us; the worker hears of it from us

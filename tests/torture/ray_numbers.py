@@ -1,64 +1,133 @@
 """`python -m tests.torture.ray_numbers WHAT …`: what runs cost on a Ray cluster of this machine, and what they outlive.
 
-throughput --runs 12         the same campaign locally and on two nodes, with as many workers: digests and times
+throughput --runs 12         the same campaign locally and on two nodes, with as many workers: digests, times and
+                             processor time, by turns
 overhead --runs 5            from the start of a run to its first episode, locally and on a warm cluster
 scale --runs 1000 --slots 64 stand-ins that sleep, through the service: the server's share of a processor, lost runs
-kills --of worker --times 30 kill -9 at random moments of a worker, a raylet, the head or the server
+kills --of worker --times 30 kill -9 at random moments of a worker, a raylet, the head or the server; or a node hangs
 
 Each ends with a line that has its figures and the machine's load while they were taken.
 """
 
 import argparse
-import json
+import contextlib
 import os
 import random
 import signal
-import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import psutil
 
 from service.workers.messages import Finished
 from tests.builders import run_metrics
-from tests.ray_cluster import ROOT, Cluster, running
+from tests.ray_cluster import Cluster, running
 from tests.server import Service, servers
 
 LONG_S = 3600.0
+FEW = {"seeds": [0], "budget": {"episodes": 2}}
 
 
 def throughput(options: argparse.Namespace) -> str:
-    """Both ways after one another, first and last locally: the machine's other load changes meanwhile."""
-    seeds = options.runs // 2
-    campaign = ["--families", "low", "--methods", "risk-sac", "random", "--seeds", str(seeds)]
-    campaign += ["--episodes", str(options.episodes), "--verify", "0"]
-
-    def took(name: str, executor: str) -> float:
-        began = time.monotonic()
-        command = [sys.executable, "-m", "risk_sac", "evaluate", *campaign, "--jobs", "2", "--executor", executor]
-        subprocess.run([*command, "--out", str(options.folder / name)], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
-        return time.monotonic() - began
-
-    took_s = {"local": [took("local", "local")]}
-    with running(options.folder, nodes=2, cpus=1):
-        took("warm", "ray") if options.warm else None
-        took_s["ray"] = [took("ray", "ray")]
-    took_s["local"].append(took("local again", "local"))
-    same = digests(options.folder / "ray") == digests(options.folder / "local")
-    ratio = median(took_s["local"]) / took_s["ray"][0]
-    local = " and ".join(f"{each:.0f}" for each in took_s["local"])
+    """By turns locally and on two nodes, since the machine's other load changes; nothing is counted of any start."""
+    campaign = {
+        "families": ["low"], "methods": ["risk-sac", "random"], "seeds": list(range(options.runs // 2)),
+        "budget": {"episodes": options.episodes},
+    }  # fmt: skip
+    spent: dict[str, list[Spent]] = {"local": [], "Ray": []}
+    found = []
+    for turn in range(options.turns):
+        with servers(options.folder / "local") as serve:
+            service = serve("service.worker", data_dir=options.folder / f"local-{turn}", max_workers=2, lease_s=60)
+            service.wait(service.post(**campaign | FEW), LONG_S)  # what is compiled once is compiled
+            spent["local"].append(executed(service, campaign, found, ()))
+        with (
+            running(options.folder, nodes=2, cpus=1) as cluster,
+            servers(options.folder / "ray") as serve,
+        ):
+            service = serve("service.worker", data_dir=options.folder / f"ray-{turn}", max_workers=1024, lease_s=60)
+            service.wait(service.post(**campaign | FEW), LONG_S)  # and Ray's processes are there
+            spent["Ray"].append(executed(service, campaign, found, tuple(cluster.nodes.values())))
+    for where, turns in spent.items():
+        for each in turns:
+            print(f"  {where}: {each}", file=sys.stderr)
+    wall = sum(each.wall_s for each in spent["local"]) / sum(each.wall_s for each in spent["Ray"])
+    processor = sum(each.total_s for each in spent["local"]) / sum(each.total_s for each in spent["Ray"])
+    taken = ", ".join(f"{where} {' and '.join(f'{each.wall_s:.0f}' for each in spent[where])} s" for where in spent)
     return (
-        f"{len(digests(options.folder / 'ray'))} runs, same digests: {same}; local {local} s, "
-        f"two nodes {took_s['ray'][0]:.0f} s, throughput {ratio:.2f} of local"
+        f"{len(found[0])} runs, same digests: {all(each == found[0] for each in found)}; {taken}: "
+        f"throughput {wall:.3f} of local; by processor time {processor:.3f}"
     )
 
 
-def digests(folder: Path) -> dict[str, str]:
-    """Of a comparison's runs."""
-    return {path.parent.name: json.loads(path.read_text())["digest"] for path in folder.glob("runs/*/results.json")}
+@dataclass(frozen=True)
+class Spent:
+    """What a campaign took, s."""
+
+    wall_s: float
+    processor_s: dict[str, float]  # by what the process is called
+
+    @property
+    def total_s(self) -> float:
+        """Of all processes."""
+        return sum(self.processor_s.values())
+
+    def __str__(self) -> str:
+        parts = sorted(self.processor_s.items(), key=lambda item: -item[1])
+        shown = ", ".join(f"{name} {taken_s:.1f}" for name, taken_s in parts if taken_s >= 0.05)
+        return f"{self.wall_s:.1f} s; processor {self.total_s:.1f} s: {shown}"
+
+
+def executed(
+    service: Service, campaign: dict[str, Any], found: list[dict[str, str]], roots: tuple[psutil.Process, ...]
+) -> Spent:
+    """What a campaign takes; `found` gets its digests."""
+    everybody = (psutil.Process(service.process.pid), *roots)
+    before = used_s(everybody)
+    began = time.monotonic()
+    campaign_id = service.post(**campaign)
+    waited(service, [campaign_id])
+    wall_s = time.monotonic() - began
+    used = used_s(everybody)
+    found.append({run["id"]: run["digest"] for run in service.get(campaign_id, "/results")["runs"]})
+    return Spent(wall_s, {name: used[name] - before.get(name, 0.0) for name in used})
+
+
+def used_s(roots: Iterable[psutil.Process]) -> dict[str, float]:
+    """Processor time of processes with all that they have started, by what they are called; those that ended, too."""
+    used: Counter[str] = Counter()
+    for root in roots:
+        for process in (root, *root.children(recursive=True)):
+            with contextlib.suppress(psutil.Error):
+                times, name = process.cpu_times(), called(process)
+                used[name] += times.user + times.system
+                used[f"ended under {name}"] += times.children_user + times.children_system
+    return used
+
+
+def called(process: psutil.Process) -> str:
+    """What a process is, in a word."""
+    command = process.cmdline()
+    if len(command) > 2 and command[1] in ("-m", "-u", "-IS"):
+        return Path(command[2]).name
+    return Path(command[0]).name.split("-")[0] if command else process.name()
+
+
+def waited(service: Service, campaigns: list[str]) -> list[dict[str, Any]]:
+    """Campaigns that have ended; asked for as seldom as a client should."""
+    ended = []
+    for each in campaigns:
+        while (seen := service.get(each))["state"] not in ("succeeded", "failed", "cancelled"):
+            time.sleep(1.0)
+        ended.append(seen)
+    return ended
 
 
 def overhead(options: argparse.Namespace) -> str:
@@ -103,7 +172,7 @@ def scale(options: argparse.Namespace) -> str:
             service.post(seeds=list(range(first, min(first + 100, options.runs))), budget={"episodes": 1})
             for first in range(0, options.runs, 100)
         ]
-        states = [run["state"] for each in campaigns for run in service.wait(each, LONG_S)["runs"]]
+        states = [run["state"] for each in waited(service, campaigns) for run in each["runs"]]
         took_s = time.monotonic() - began
         shares = [(cpu_s(process) - before) / took_s for process, before in zip((server, bridge), spent, strict=True)]
     ideal_s = -(-options.runs // options.slots) * options.sleep_s
@@ -158,8 +227,9 @@ def kills(options: argparse.Namespace) -> str:
             " ".join(each.cmdline()[:4]) for each in workers(service)
         ] + [str(each) for each in service.data_dir.glob("campaigns/*/*/.attempts")]  # fmt: skip
     changed = sum(each != undisturbed for each in outcomes)
+    what = "a node that hangs" if options.of == "hang" else f"kill -9 of a {options.of}"
     return (
-        f"kill -9 of a {options.of}, {done} times in {len(campaigns)} campaigns: {changed} campaigns with another "
+        f"{what}, {done} times in {len(campaigns)} campaigns: {changed} campaigns with another "
         f"digest or other episodes; left behind: {left or 'nothing'}"
     )
 
@@ -209,13 +279,25 @@ def _head(cluster: Cluster, service: Service, chance: random.Random) -> bool:
     return bool(killed)
 
 
+def _hang(cluster: Cluster, service: Service, chance: random.Random) -> bool:
+    """All processes of a node stand still for longer than its lease, and then go on."""
+    if not any("raylet" in name for name in cluster.names(1)):  # the head has given it up since the last time
+        cluster.end(1)
+        cluster.add(1)
+    at_work = any("service.worker" in each.cmdline() for each, _ in cluster.processes(1))
+    cluster.kill(1, "", number_of_signal=signal.SIGSTOP)
+    time.sleep(chance.uniform(12, 40))
+    cluster.kill(1, "", number_of_signal=signal.SIGCONT)
+    return at_work
+
+
 def _server(cluster: Cluster, service: Service, chance: random.Random) -> bool:
     service.stop(signal.SIGKILL)
     service.start()
     return True
 
 
-KILL = {"worker": _worker, "raylet": _raylet, "head": _head, "server": _server}
+KILL = {"worker": _worker, "raylet": _raylet, "head": _head, "server": _server, "hang": _hang}
 
 
 def main() -> None:
@@ -224,7 +306,7 @@ def main() -> None:
     parser.add_argument("what", choices=("throughput", "overhead", "scale", "kills"))
     parser.add_argument("--runs", type=int)
     parser.add_argument("--episodes", type=int, default=30)
-    parser.add_argument("--warm", action="store_true")
+    parser.add_argument("--turns", type=int, default=2)
     parser.add_argument("--slots", type=int, default=64)
     parser.add_argument("--sleep-s", type=float, default=30.0)
     parser.add_argument("--of", choices=KILL, default="worker")

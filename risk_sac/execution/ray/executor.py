@@ -12,7 +12,9 @@ from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Cause, Cluster, Exited, Program, Word
 from risk_sac.execution.mailbox import Mailbox
+from risk_sac.execution.ray.beside import beside
 from risk_sac.execution.ray.link import Link
+from risk_sac.execution.ray.scratch import BESIDE
 from risk_sac.execution.ray.settings import read_settings
 from risk_sac.execution.ray.words import Order, exited_of
 
@@ -57,7 +59,7 @@ class RayExecutor(Generic[Word]):
         self._ordered: dict[int, _Ordered] = {}
         self._lock = threading.RLock()
         self._own = link is None
-        self._link = link or Link()
+        self._link = link or Link(program.within)
         self._link.attach(self)
 
     @property
@@ -92,8 +94,8 @@ class RayExecutor(Generic[Word]):
         token = secrets.token_hex(8)
         own = self._settings.ray_scratch_dir / f"{folder.name}-{attempt}-{token}"
         scratch = own / folder.name
-        copies = {str(path): own / path.name for path in self._program.inputs}
-        arguments = [str(copies.get(each, each)) for each in self._program.arguments(spec, scratch)]
+        copies = {str(path): str(own / BESIDE / path.name) for path in self._program.inputs}
+        taken = beside(spec, self._program.inputs, own / BESIDE)
         hear = self._program.hear
         return Order(
             number=number,
@@ -102,8 +104,9 @@ class RayExecutor(Generic[Word]):
             spec=spec.model_dump_json(),
             folder=str(folder.resolve()),
             scratch=str(scratch),
-            arguments=tuple(arguments),
-            inputs={str(copies[str(path)]): path.read_text(encoding="utf-8") for path in self._program.inputs},
+            arguments=tuple(copies.get(each, each) for each in self._program.arguments(spec, scratch)),
+            beside=taken.files,
+            environment=taken.environment | dict(self._program.environment),
             log=self._program.log,
             hear=None if hear is None else f"{hear.__module__}:{hear.__qualname__}",
             lease_s=_finite(self._program.lease_s),

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import IO, Any, Protocol
 
 from risk_sac.errors import ConfigError
@@ -40,8 +41,11 @@ class Link:
       losses: how often it was lost.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, within: Path | None = None) -> None:
         """Reaches the cluster.
+
+        Args:
+          within: folder that holds those of all runs; None leaves untried whether the nodes see it.
 
         Raises:
           ConfigError: it cannot be reached, or cannot do what it will have to; the field is the variable to look at.
@@ -51,7 +55,8 @@ class Link:
         self._listener: Listener | None = None
         self._lock = threading.Lock()
         self._closed = threading.Event()
-        first = Bridge()
+        self._within = within
+        first = Bridge(within)
         self._bridge: Bridge | None = first
         threading.Thread(target=self._listen, args=(first,), name="ray", daemon=True).start()
 
@@ -104,7 +109,7 @@ class Link:
         wait_s = FIRST_WAIT_S
         while not self._closed.wait(wait_s):
             try:
-                bridge = Bridge()
+                bridge = Bridge(self._within)
             except ConfigError as error:
                 logger.warning("the cluster cannot be reached: %s: %s", error.field, error)
                 wait_s = min(2 * wait_s, LONGEST_WAIT_S)
@@ -124,14 +129,14 @@ class Link:
 class Bridge:
     """The process that knows Ray."""
 
-    def __init__(self) -> None:
-        """Starts it and waits until it has checked the cluster.
+    def __init__(self, within: Path | None) -> None:
+        """Starts it and waits until it has checked the cluster; `within` as `Link` has it.
 
         Raises:
           ConfigError: something is wrong with the cluster, or with what the settings say of it.
         """
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "risk_sac.execution.ray.bridge"],
+            [sys.executable, "-m", "risk_sac.execution.ray.bridge", *([] if within is None else [str(within)])],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C is for whoever started us

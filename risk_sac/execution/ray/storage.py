@@ -4,6 +4,7 @@ ROOT/<attempt>-<token>/fence            is there as long as anybody wants what t
 ROOT/<attempt>-<token>/blobs/<sha256>   a file
 ROOT/<attempt>-<token>/manifest.json    name -> SHA-256 of all files at one moment; sealed, and written after them
 ROOT/<attempt>-<token>/seed.json        the same of what the attempt begins with; the server writes it
+ROOT/<attempt>-<token>/beside.json      the same of what its worker reads beside the run's folder
 
 An attempt writes to its own folder alone, so that one that was given up can do no harm.
 """
@@ -23,7 +24,7 @@ from risk_sac.errors import DamagedError
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.seal import seal, unseal
 
-FENCE, BLOBS, MANIFEST, SEED = "fence", "blobs", "manifest.json", "seed.json"
+FENCE, BLOBS, MANIFEST, SEED, BESIDE = "fence", "blobs", "manifest.json", "seed.json", "beside.json"
 OWN = ".attempts"  # in a run's folder, where the storage is that folder
 KEY = ".storage-key"
 
@@ -201,12 +202,19 @@ def adopt(place: Place, name: str, folder: Path, known: dict[str, str]) -> None:
     raise OSError(f"files of {name} are gone from the storage")
 
 
-def sow(place: Place, folder: Path) -> bool:
-    """Gives an attempt what the run's folder holds; whether there was anything."""
-    manifest = {name: place.put((folder / name).read_bytes()) for name in _files(folder)}
-    if manifest:
-        place.write_manifest(SEED, manifest)
-    return bool(manifest)
+def sow(place: Place, name: str, files: Mapping[str, Path]) -> None:
+    """Gives an attempt files of this machine, by a manifest of their own; none without any.
+
+    Raises:
+      OSError: the storage refuses, or a file cannot be read.
+    """
+    if files:
+        place.write_manifest(name, {file: place.put(path.read_bytes()) for file, path in files.items()})
+
+
+def files_in(folder: Path) -> dict[str, Path]:
+    """All files of a folder that an attempt may read or write, by their path in it."""
+    return {name: folder / name for name in _files(folder)}
 
 
 def _files(folder: Path) -> dict[str, tuple[int, int, int]]:

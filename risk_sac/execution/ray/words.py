@@ -18,7 +18,8 @@ class Order:
     folder: str  # of the run, on the server's machine
     scratch: str  # the folder that the worker is given, on its node
     arguments: tuple[str, ...]  # for the Python interpreter
-    inputs: dict[str, str]  # text of files that the arguments name, by their place on the node
+    beside: dict[str, str]  # paths on the server's machine of what the worker reads there, by their place on the node
+    environment: dict[str, str]  # variables that the worker finds
     log: str
     hear: str | None  # module:function
     lease_s: float | None  # None: for ever; JSON has no infinity

@@ -1,0 +1,191 @@
+"""What is wrong with a cluster is told at the start, with the setting to blame."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import psutil
+import pytest
+
+from risk_sac.errors import ConfigError
+from risk_sac.execution.ray.link import Link
+from tests.ray_cluster import ROOT, Cluster, needs_ray, running
+
+LONG_S = 300
+TINY = ["--families", "low", "--methods", "random", "--seeds", "1", "--episodes", "1", "--out", "out"]
+# As if Ray were not installed, wherever it is.
+WITHOUT_RAY = """
+import sys
+from importlib.machinery import PathFinder
+class Without(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        return None if name.partition(".")[0] == "ray" else super().find_spec(name, path, target)
+sys.meta_path[sys.meta_path.index(PathFinder)] = Without
+"""
+ANOTHER_PYTHON = """
+import collections, sys
+Version = collections.namedtuple("Version", "major minor micro releaselevel serial")
+sys.version_info = Version(*sys.version_info[:2], 99, *sys.version_info[3:])
+"""
+may_unshare = pytest.mark.skipif(
+    subprocess.run(["unshare", "-m", "true"], capture_output=True, check=False).returncode != 0,
+    reason="mount namespaces are root's",
+)
+
+
+def path_with(*folders: Path) -> dict[str, str]:
+    """An environment in which these folders come before what is installed."""
+    return {"PYTHONPATH": os.pathsep.join([*map(str, folders), str(ROOT), os.environ.get("PYTHONPATH", "")])}
+
+
+def distribution(folder: Path, name: str, version: str, entry_points: str = "") -> Path:
+    """What a package leaves when it is installed into a folder."""
+    info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
+    info.mkdir(parents=True)
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    (info / "entry_points.txt").write_text(entry_points)
+    return folder
+
+
+@pytest.mark.parametrize("command", [["risk_sac", "evaluate", *TINY], ["service"]], ids=lambda command: command[0])
+def test_without_ray_the_setting_that_wants_it_is_named(command, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(WITHOUT_RAY)
+    settings = {"RISK_SAC_EXECUTOR": "ray", "RISK_SAC_DATA_DIR": str(tmp_path / "data"), "RISK_SAC_PORT": "1"}
+    shown = subprocess.run(
+        [sys.executable, "-m", *command], env=os.environ | path_with(tmp_path) | settings, cwd=tmp_path,
+        capture_output=True, text=True, timeout=LONG_S, check=False,
+    )  # fmt: skip
+    assert shown.returncode != 0
+    text = " ".join(shown.stderr.split())
+    assert "RISK_SAC_EXECUTOR" in text
+    assert "pip install risk-sac[ray]" in text
+    assert not list(tmp_path.glob("out/runs/*"))
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with running(tmp_path_factory.mktemp("cluster"), nodes=1, cpus=1, RISK_SAC_RAY_LEASE_S="10") as cluster:
+        yield cluster
+
+
+def refusal(within: Path | None = None) -> ConfigError:
+    with pytest.raises(ConfigError) as caught:
+        Link(within).close()
+    return caught.value
+
+
+def wait_until(holds: Callable[[], object]) -> None:
+    deadline = time.monotonic() + LONG_S
+    while not holds():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        time.sleep(0.1)
+
+
+@needs_ray
+@pytest.mark.parametrize(
+    ("environment", "field", "said"),
+    [
+        ({"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1"}, "RISK_SAC_RAY_ADDRESS", "nothing answers"),
+        ({"RISK_SAC_RAY_ADDRESS": "somewhere"}, "RISK_SAC_RAY_ADDRESS", "wanted `auto` or HOST:PORT"),
+        ({"RISK_SAC_RAY_ADDRESS": "auto", "RISK_SAC_RAY_JOIN": "1"}, "RISK_SAC_RAY_ADDRESS", "no cluster to join"),
+        ({"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1", "RISK_SAC_RAY_JOIN": "1"}, "RISK_SAC_RAY_ADDRESS", "nothing answers"),
+        ({"RISK_SAC_RAY_CPUS_PER_RUN": "3"}, "RISK_SAC_RAY_CPUS_PER_RUN", "no node of the cluster has as much"),
+        ({"RISK_SAC_RAY_CPUS_PER_RUN": "none"}, "RISK_SAC_RAY_CPUS_PER_RUN", "got 'none'"),
+        ({"RISK_SAC_RAY_STORAGE": "cloud://runs"}, "RISK_SAC_RAY_STORAGE", "this machine cannot use"),
+        ({"RISK_SAC_RAY_STORAGE": "file:///proc/runs"}, "RISK_SAC_RAY_STORAGE", "this machine cannot use"),
+        ({"RISK_SAC_RAY_SCRATCH_DIR": "/proc/runs"}, "RISK_SAC_RAY_SCRATCH_DIR", "cannot write to"),
+        ({"RAY_AUTH_TOKEN": "0" * 32}, "RISK_SAC_RAY_ADDRESS", "with its token"),
+    ],
+)
+def test_settings_that_cannot_work_are_named(cluster, monkeypatch, tmp_path, environment, field, said):
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    error = refusal(tmp_path)
+    assert error.field == field
+    assert said in str(error)
+    assert list(tmp_path.iterdir()) == []
+
+
+@needs_ray
+def test_a_server_with_another_ray_is_refused(cluster, monkeypatch, tmp_path):
+    import ray
+
+    # All of the installed Ray but the file that has its version.
+    overlay = tmp_path / "ray"
+    overlay.mkdir()
+    for each in Path(ray.__file__).parent.iterdir():
+        (overlay / each.name).symlink_to(each)
+    (overlay / "_version.py").unlink()
+    (overlay / "_version.py").write_text('version = "2.1.0"\ncommit = ""\n')
+    monkeypatch.setenv("PYTHONPATH", path_with(tmp_path)["PYTHONPATH"])
+    error = refusal()
+    assert error.field == "RISK_SAC_RAY_ADDRESS"
+    assert f"Ray: {ray.__version__}" in str(error)
+    assert "Ray: 2.1.0" in str(error)
+
+
+@needs_ray
+def test_an_ego_that_the_server_has_and_a_node_lacks_is_named(cluster, monkeypatch, tmp_path):
+    distribution(tmp_path, "example-ego", "1", "[risk_sac.egos]\nexample = example_ego:Example\n")
+    (tmp_path / "example_ego.py").write_text("class Example:\n    version = '7'\n    response_time_s = 0.5\n")
+    monkeypatch.setenv("PYTHONPATH", path_with(tmp_path)["PYTHONPATH"])
+    error = refusal()
+    assert error.field == "RISK_SAC_RAY_ADDRESS"
+    assert "the ego example is missing; wanted 7+" in str(error)
+
+
+@needs_ray
+def test_a_node_with_another_python_and_other_packages_is_refused_before_any_run(cluster, tmp_path):
+    distribution(tmp_path, "risk-sac", "0.0.1")
+    (tmp_path / "sitecustomize.py").write_text(ANOTHER_PYTHON)
+    # Ray refuses such a Python by itself, unless it is told to look at minor versions alone.
+    cluster.add(1, RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL="minor", **path_with(tmp_path))
+    try:
+        error = refusal()
+    finally:
+        cluster.end(1)
+    assert error.field == "RISK_SAC_RAY_ADDRESS"
+    python = ".".join(map(str, sys.version_info[:3]))
+    assert f"python is {sys.version_info[0]}.{sys.version_info[1]}.99; wanted {python}" in str(error)
+    assert "risk-sac is 0.0.1; wanted" in str(error)
+
+
+@needs_ray
+@may_unshare
+@pytest.mark.parametrize("told", [True, False])
+def test_a_node_that_does_not_see_the_storage_is_refused_before_any_run(cluster, monkeypatch, tmp_path, told):
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    hidden = ["unshare", "-m", "sh", "-c", 'mount -t tmpfs none "$0" && exec "$@"', str(shared)]
+    if told:
+        monkeypatch.setenv("RISK_SAC_RAY_STORAGE", f"file://{shared}")
+    cluster.add(1, prefix=hidden)
+    try:
+        error = refusal(shared)
+    finally:
+        cluster.end(1)
+    assert error.field == "RISK_SAC_RAY_STORAGE"
+    assert "what the server has just written is not to be seen there" in str(error)
+    assert list(shared.iterdir()) == []
+    with closing(Link(shared)):  # without that node all is well
+        pass
+
+
+@needs_ray
+@pytest.mark.parametrize("killed", [False, True])
+def test_a_machine_that_joins_is_a_node_without_room_for_as_long_as_its_bridge_lives(cluster, monkeypatch, killed):
+    monkeypatch.setenv("RISK_SAC_RAY_JOIN", "true")
+    with closing(Link()) as link:
+        (bridge,) = [each for each in psutil.Process().children() if "risk_sac.execution.ray.bridge" in each.cmdline()]
+        joined = bridge.children(recursive=True)
+        assert any("raylet" in each.name() for each in joined)
+        wait_until(lambda: sorted(node.slots for node in link.cluster.nodes if node.alive) == [0, 1])
+        if killed:
+            bridge.kill()
+            assert psutil.wait_procs(joined, LONG_S)[1] == []
+    assert psutil.wait_procs(joined, LONG_S)[1] == []
