@@ -30,9 +30,9 @@ class TwinPlay(Record):
         Args:
           ego: the other ego, or None: nobody attacked.
           collision: that it ended in, if it did.
-          name: of the other ego; its profile if not given.
+          name: of the other ego; its driver's or its profile's if not given.
         """
-        changed = "nobody attacks" if ego is None else f"ego: {name or ego.profile}"
+        changed = "nobody attacks" if ego is None else f"ego: {name or ego.driver or ego.profile}"
         touches = (
             f"touches {collision.other_id} at {collision.ego_speed_mps:.1f} m/s" if collision else "touches nobody"
         )

@@ -8,14 +8,16 @@ Source: protobuf.dev, "Encoding".
 
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.resources import files
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from risk_sac.egos.remote.varint import read_varint, varint, varints
+
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5  # wire types
-LONGEST_VARINT = 70  # bits
+DOUBLE = struct.Struct("<d")
 
 Message = Mapping[str, Any]
 """Field -> value; a field that was not told is absent if it is a message, else 0, empty or an empty list."""
@@ -28,23 +30,44 @@ class Field(NamedTuple):
     number: int
     type: str  # double, string, a message's name; else a number without a fraction
     repeated: bool
+    key: bytes  # that it begins with
 
 
-Schema = Mapping[str, tuple[Field, ...]]
-"""Message -> its fields."""
+class Schema(dict[str, tuple[Field, ...]]):
+    """Message -> its fields; and what reading one takes, made ready, for it is done in each step.
+
+    Attributes:
+      numbered: message -> number -> field.
+      untold: message -> name of each field, whether it is repeated, and what it is where nothing was told; without
+        single messages, which are absent then.
+    """
+
+    def __init__(self, messages: Mapping[str, Sequence[Field]]) -> None:
+        super().__init__({name: tuple(fields) for name, fields in messages.items()})
+        self.numbered = {name: {field.number: field for field in fields} for name, fields in self.items()}
+        nothing: Mapping[str, Any] = {"double": 0.0, "string": ""}
+        self.untold = {
+            name: [(f.name, f.repeated, nothing.get(f.type, 0)) for f in fields if f.repeated or f.type not in self]
+            for name, fields in self.items()
+        }
 
 
 def read_schema(file: str) -> Schema:
     """The messages of a file of this folder, in which each field has a line of its own."""
-    proto = (files(__package__) / file).read_text(encoding="utf-8")
-    found: dict[str, list[Field]] = {}
-    fields: list[Field] = []
-    for line in proto.splitlines():
+    found: dict[str, list[tuple[str, int, str, bool]]] = {}
+    fields: list[tuple[str, int, str, bool]] = []
+    for line in (files(__package__) / file).read_text(encoding="utf-8").splitlines():
         if begins := re.match(r"message (\w+)", line):
             fields = found[begins[1]] = []
         elif field := re.match(r"\s+(repeated )?(\w+) (\w+) = (\d+);", line):
-            fields.append(Field(field[3], int(field[4]), field[2], bool(field[1])))
-    return {name: tuple(fields) for name, fields in found.items()}
+            fields.append((field[3], int(field[4]), field[2], bool(field[1])))
+    wires = {"double": FIXED64, "string": BYTES} | dict.fromkeys(found, BYTES)
+
+    def made(name: str, number: int, type_: str, repeated: bool) -> Field:
+        wire = BYTES if repeated else wires.get(type_, VARINT)
+        return Field(name, number, type_, repeated, varint(number << 3 | wire))
+
+    return Schema({name: [made(*each) for each in told] for name, told in found.items()})
 
 
 SCHEMA = read_schema("ego.proto")
@@ -63,20 +86,20 @@ def encode(name: str, message: Message, schema: Schema = SCHEMA) -> bytes:
         value = message.get(field.name)
         if value is None:
             continue
-        if field.type == "double" and field.repeated:
-            parts.append(_told(field, np.asarray(value, dtype="<f8").tobytes()))
-        elif field.type == "double":
-            parts.append(_varint(field.number << 3 | FIXED64) + struct.pack("<d", value))
+        if field.type == "double":
+            if field.repeated:
+                parts.append(_told(field, np.asarray(value, dtype="<f8").tobytes()))
+            else:
+                parts.append(field.key + DOUBLE.pack(value))
         elif field.type == "string":
             parts += [_told(field, each.encode()) for each in (value if field.repeated else (value,))]
         elif field.type in schema:
-            parts += [
-                _told(field, encode(field.type, each, schema)) for each in (value if field.repeated else (value,))
-            ]
+            every = value if field.repeated else (value,)
+            parts += [_told(field, encode(field.type, each, schema)) for each in every]
         elif field.repeated:
-            parts.append(_told(field, b"".join(map(_varint, value))))
+            parts.append(_told(field, b"".join(map(varint, value))))
         else:
-            parts.append(_varint(field.number << 3 | VARINT) + _varint(value))
+            parts.append(field.key + varint(value))
     return b"".join(parts)
 
 
@@ -86,8 +109,8 @@ def decode(name: str, data: bytes, schema: Schema = SCHEMA) -> dict[str, Any]:
     Raises:
       ValueError: these bytes are none of such a message's.
     """
-    fields = {field.number: field for field in schema[name]}
-    message = {field.name: _nothing(field) for field in schema[name] if field.repeated or field.type not in schema}
+    fields = schema.numbered[name]
+    message: dict[str, Any] = {each: [] if repeated else nothing for each, repeated, nothing in schema.untold[name]}
     try:
         for number, wire, value in _parts(data):
             field = fields.get(number)
@@ -98,26 +121,20 @@ def decode(name: str, data: bytes, schema: Schema = SCHEMA) -> dict[str, Any]:
     return message
 
 
-def _nothing(field: Field) -> Any:
-    if field.repeated:
-        return []
-    return {"double": 0.0, "string": ""}.get(field.type, 0)
-
-
 def _parts(data: bytes) -> Iterator[tuple[int, int, Any]]:
     """Number, wire type and raw value of each part."""
     at = 0
     while at < len(data):
-        key, at = _read_varint(data, at)
+        key, at = read_varint(data, at)
         number, wire = key >> 3, key & 7
         value: int | bytes
         if wire == VARINT:
-            value, at = _read_varint(data, at)
+            value, at = read_varint(data, at)
         elif wire in (FIXED64, FIXED32):
             length = 8 if wire == FIXED64 else 4
             value, at = data[at : at + length], at + length
         elif wire == BYTES:
-            length, at = _read_varint(data, at)
+            length, at = read_varint(data, at)
             value, at = data[at : at + length], at + length
         else:
             raise ValueError(f"wire type {wire}; wanted one of protocol buffers 3")
@@ -127,50 +144,31 @@ def _parts(data: bytes) -> Iterator[tuple[int, int, Any]]:
 
 
 def _value(field: Field, wire: int, value: Any, before: Any, schema: Schema) -> Any:
-    """What a part says of its field."""
+    """What a part says of its field; to a repeated one it adds."""
+    found: Any
     if field.type == "double":
-        numbers = np.frombuffer(value, dtype="<f8").tolist()
-        return [*before, *numbers] if field.repeated else numbers[0]
+        if not field.repeated:
+            return (
+                DOUBLE.unpack(value)[0] if len(value) == DOUBLE.size else np.frombuffer(value, dtype="<f8").tolist()[0]
+            )
+        before += np.frombuffer(value, dtype="<f8").tolist()
+        return before
     if field.type == "string":
-        return [*before, value.decode()] if field.repeated else value.decode()
-    if field.type in schema:
+        found = value.decode()
+    elif field.type in schema:
         found = decode(field.type, value, schema)
-        return [*before, found] if field.repeated else found
-    if not field.repeated:
+    elif not field.repeated:
         return value + 0
-    return [*before, value] if wire == VARINT else [*before, *_varints(value)]
+    elif wire != VARINT:
+        before += varints(value)
+        return before
+    else:
+        found = value
+    if not field.repeated:
+        return found
+    before.append(found)
+    return before
 
 
 def _told(field: Field, data: bytes) -> bytes:
-    return _varint(field.number << 3 | BYTES) + _varint(len(data)) + data
-
-
-def _varint(value: int) -> bytes:
-    if 0 <= value < 128:
-        return bytes((value,))
-    groups = []
-    value &= (1 << 64) - 1
-    while value > 127:
-        groups.append(value & 127 | 128)
-        value >>= 7
-    return bytes((*groups, value))
-
-
-def _read_varint(data: bytes, at: int) -> tuple[int, int]:
-    value = shift = 0
-    while shift < LONGEST_VARINT:
-        byte = data[at]
-        at += 1
-        value |= (byte & 127) << shift
-        if byte < 128:
-            return value, at
-        shift += 7
-    raise ValueError("a number of more than 64 bits")
-
-
-def _varints(data: bytes) -> list[int]:
-    values, at = [], 0
-    while at < len(data):
-        value, at = _read_varint(data, at)
-        values.append(value)
-    return values
+    return field.key + varint(len(data)) + data
