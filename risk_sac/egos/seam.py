@@ -85,7 +85,7 @@ class Ego(Protocol):
 
     The class says three things of itself as plain literals, which are read without running it: `version`,
     `response_time_s` (the time within which it responds to a danger, from which its requirements follow) and, if it is
-    not 1, `deadline_s` for each of its answers. The first line of its docstring is its summary.
+    not 60, `deadline_s` for each of its answers. The first line of its docstring is its summary.
     """
 
     def reset(self, episode: Episode) -> None:
