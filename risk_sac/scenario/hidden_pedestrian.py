@@ -32,7 +32,7 @@ NEAREST_M, FARTHEST_M = 25.0, 90.0  # the ego from the crossing
 FOLLOWING_M = 25.0  # from the ego's front to its follower's
 BODY_M = 8.0
 OCCLUDER_MPS = 12.0
-OCCLUDER_M = 25.0  # the farthest from the crossing
+OCCLUDER_M = 25  # the farthest from the crossing
 ONCOMING, ONCOMING_MPS = 4, 10.0
 ONCOMING_M, SPACING_M = 60.0, 30.0  # the first of them from the crossing, and the others from one another
 

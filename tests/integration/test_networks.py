@@ -84,6 +84,7 @@ def test_networks_that_sumos_tools_make_are_taken(client: httpx.Client, made: Pa
     response = post(client, (made / f"{name}.net.xml").read_bytes())
     assert response.status_code == 201, response.text
     assert response.json()["edges"] > 1
+    assert any("keeps to the left" in said for said in response.json()["warnings"]) == (name == "left-hand")
 
 
 def test_networks_are_listed_in_pages_and_deleted(serve: Callable[..., Service]) -> None:

@@ -67,6 +67,8 @@ def place(net: Net, spot: Spot) -> JunctionPlace:
             whys.append(why)
     if not legs and at.type == UNREGULATED:
         raise NoFit(f"the junction {at.id!r} is {UNREGULATED}: nobody lets anybody pass there; wanted one with rules")
+    if not legs and all(link.index is None for link in own.links):
+        raise NoFit(f"the net has no lanes inside {at.id!r}, so who crosses whom is unknown; wanted internal links")
     if not legs:
         raise NoFit("; ".join(whys) or f"no way across {at.id!r} crosses or joins one of those from {edge.id!r}")
     approaches = {name: other for name, other in others.items() if name in legs} | {"ego": own}

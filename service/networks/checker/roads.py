@@ -32,12 +32,14 @@ class Net:
         self._references: list[tuple[str, str, str]] = []  # what is named, how it is called, by whom
         self._connections: list[Attributes] = []
         self._length_m = 0.0
-        self._cars = False
+        self._cars = self._left = False
         self._box = [float("inf"), float("inf"), float("-inf"), float("-inf")]
 
     def element(self, tag: str, attributes: Attributes, parent: str) -> None:
         """See `Observer.element`."""
         match tag:
+            case "net":
+                self._left = attributes.get("lefthand", "false").lower() in ("true", "1")
             case "edge":
                 self._edge(attributes)
             case "lane":
@@ -84,6 +86,8 @@ class Net:
         driven = {name for name, edge in self.edges.items() if edge.function in _DRIVEN}
         if not self._cars:
             found.append("no edge has a lane for passenger cars: no pattern will fit")
+        if self._left:
+            found.append("traffic keeps to the left: no pattern will fit")
         if not any("tl" in connection for connection in self._connections):
             found.append("there are no traffic lights")
         if not self._connections and len(driven) > 1:
