@@ -56,12 +56,17 @@ def attend(order: Order, root: str, lease_s: float, expected: Versions) -> Itera
     if other:
         yield Report(exited=Exited(f"a node has joined whose {other}", Cause.CRASHED))
         return
-    with scratch(Path(order.scratch)) as folder:
-        attempt = yield from _meanwhile(lambda: _Attempt(order, folder, Place(root)), lease_s / BEATS)
-        try:
-            yield from attempt.reports(lease_s)
-        finally:
-            attempt.kill()
+    attempt: _Attempt | None = None
+    try:
+        with scratch(Path(order.scratch)) as folder:
+            attempt = yield from _meanwhile(lambda: _Attempt(order, folder, Place(root)), lease_s / BEATS)
+            try:
+                yield from attempt.reports(lease_s)
+            finally:
+                attempt.kill()
+    finally:
+        if attempt is not None:  # and its folder is gone, too; until then this process may be killed
+            attempt.over()
 
 
 def _meanwhile(work: Callable[[], Result], beat_s: float) -> Generator[Report, None, Result]:
@@ -111,6 +116,10 @@ class _Attempt:
             deadline = time.monotonic() + GONE_S
             while self._local.pid(1) is not None and time.monotonic() < deadline:
                 self._local.events(0.05)
+
+    def over(self) -> None:
+        """Nothing of it is left that its caretaker would have to see to."""
+        if self._pid is not None:
             _caretaker().over(self._pid)
 
     def reports(self, lease_s: float) -> Iterator[Report]:
