@@ -150,6 +150,8 @@ def test_show_refuses_what_run_did_not_write(tmp_path: Path, capsys: pytest.Capt
     [
         (["--family", "high"], "family: "),
         (["--family", "low", "--method", "magic"], "method: "),
+        (["--family", "low", "--ego", "nobody-s"], "ego.driver: "),
+        (["--family", "low", "--ego", "No/body"], "spec: "),
         (["--family", "low", "--episodes", "-3"], "budget.episodes: "),
         (["--family", "low", "--seed", "-1"], "seed: "),
         ([], "family: "),
