@@ -134,6 +134,7 @@ def table(name: str, address: str, card: EgoCard) -> str:
         "version": card.version,
         "summary": card.summary,
         "response_time_s": card.response_time_s,
+        "deadline_s": card.deadline_s,
     }
     return "\n".join([f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in told.items())])
 
