@@ -118,6 +118,8 @@ class _Somewhere(Settings):
     lane_width_m: float
     signal: Signal | None = None
     ground: Ground = Ground()
+    wary: bool = False
+    """Whether drivers stop for an ego that stands askew; not so where the shipped families are, whose results stay."""
 
 
 class Stretch(_Somewhere):

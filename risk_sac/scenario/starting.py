@@ -23,6 +23,7 @@ class Surroundings(TypedDict):
     signal: str | None
     signal_offset_s: float
     friction: float
+    wary: bool
 
 
 def surroundings(place: Stretch | CrossingPlace | JunctionPlace, xi: Mapping[str, float]) -> Surroundings:
@@ -37,6 +38,7 @@ def surroundings(place: Stretch | CrossingPlace | JunctionPlace, xi: Mapping[str
         signal=None if place.signal is None else place.signal.id,
         signal_offset_s=xi.get("signal_offset_s", 0.0),
         friction=xi["friction"],
+        wary=place.wary,
     )
 
 

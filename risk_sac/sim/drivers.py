@@ -1,14 +1,19 @@
 """The drivers of an episode's vehicles, and what each is told before a step."""
 
+import math
+
 import libsumo
 
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.driver import OWN_CHOICE_MPS, Driver
 from risk_sac.sim.ego import Belief
+from risk_sac.sim.lookout import project
 from risk_sac.sim.placing import emergency_decel_mps2
 from risk_sac.sim.reading import Reading
 from risk_sac.sim.roads import Roads
 from risk_sac.types import STEP_S, Bools, Floats, Role
+
+ASKEW_M = 0.1  # by which a corner of the ego may be beside where SUMO's models have it
 
 
 class Drivers:
@@ -31,6 +36,7 @@ class Drivers:
         self._released: dict[str, Driver] = {}
         self._ego: Driver | None = Driver(layout.ego.id, reaction_time_s, emergency)
         self._walkers = bool(layout.pedestrians)
+        self._ego_id, self._wary = layout.ego.id, layout.wary
         self._roads = roads
 
     def release_ego(self) -> None:
@@ -51,13 +57,24 @@ class Drivers:
         """
         if self._ego is not None:
             self._tell_ego(self._ego, reading, belief, braking_mps2)
-        if not self._walkers:
+        askew = self._wary and self._is_askew(reading)
+        if not self._walkers and not self._wary:
             return
+        candidates = reading.walks
+        if askew:
+            candidates = candidates.copy()
+            candidates[0] = True
         for row, id_ in enumerate(reading.vehicles):
             driver = self._others.get(id_)
-            if driver is not None and (reading.near[row] or driver.telling):
-                driver.wanted_mps2 = self._decide(driver, row, reading, reading.frame.state, reading.walks)
+            if driver is not None and (askew or reading.near[row] or driver.telling):
+                driver.wanted_mps2 = self._decide(driver, row, reading, reading.frame.state, candidates)
                 driver.tell(*reading.speed_and_accel[row])
+
+    def _is_askew(self, reading: Reading) -> bool:
+        """Whether the ego's body reaches elsewhere than the box along its lane that SUMO's models go by."""
+        frame = reading.frame
+        _, _, way_rad = project(self._roads.along(self._ego_id).path.points, float(frame.x_m[0]), float(frame.y_m[0]))
+        return abs(math.sin(float(frame.heading_rad[0]) - way_rad)) * float(frame.length_m[0]) / 2 > ASKEW_M
 
     def _tell_ego(self, ego: Driver, reading: Reading, belief: Belief, braking_mps2: float) -> None:
         speed, accel = reading.speed_and_accel[0]

@@ -48,7 +48,7 @@ def with_ground(net: Net, fit: Fit) -> Fit:
     place = fit.place
     walked = isinstance(place, CrossingPlace) or (isinstance(place, JunctionPlace) and place.walk is not None)
     ground = ground_around(net, fit.spot.x_m, fit.spot.y_m, walked=walked)
-    return Fit(fit.spot, place.model_copy(update={"ground": ground}))
+    return Fit(fit.spot, place.model_copy(update={"ground": ground, "wary": True}))
 
 
 def _spots(net: Net, patterns: Collection[Pattern]) -> Iterator[Spot]:

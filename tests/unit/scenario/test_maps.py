@@ -104,6 +104,7 @@ def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town:
         assert town.keep(fit) == name
         family = family_named(name)
         layout = family.layout(family.space.from_unit(np.full(family.space.dimension, 0.5)).values)
+        assert layout.wary
         libsumo.start(["sumo", "-n", layout.net, "--no-step-log", "--no-warnings"])
         try:
             for start in (layout.ego, *layout.vehicles):
