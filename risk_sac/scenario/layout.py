@@ -49,6 +49,4 @@ class Layout:
     signal: str | None = None  # id of the traffic light
     signal_offset_s: float = 0.0  # where in its cycle the episode starts
     friction: float = 1.0
-    wary: bool = (
-        False  # whether drivers stop for an ego that stands askew, of which SUMO tells them a box along its lane
-    )
+    wary: bool = False  # whether drivers stop for an ego that stands askew; SUMO tells them of a box along its lane
