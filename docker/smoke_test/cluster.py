@@ -48,6 +48,11 @@ def check_possible() -> None:
     ]
     if lacking:
         raise NoEngineError(f"a cluster in network namespaces needs {', '.join(lacking)}")
+    try:
+        with Hosts((HEAD,)):
+            pass
+    except subprocess.CalledProcessError as error:
+        raise NoEngineError(f"network namespaces cannot be made here: {error.stderr.strip()}") from error
 
 
 class ClusterStory:
