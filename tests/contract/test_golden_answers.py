@@ -26,6 +26,7 @@ from tests.contract.serving import serving
 GOLDEN = Path(__file__).with_name("golden")
 RECORD = os.environ.get("RISK_SAC_RECORD") == "1"
 HEADERS = ("allow", "cache-control", "content-type", "etag", "location", "retry-after", "vary")
+TAGGED_BY_FILE = ("/thumbnail.svg", "/roads")  # by the series' digest: one zlib packs a file otherwise than the next
 ENDED, LIVE, CANCELLED = (f"/v1/campaigns/{each}" for each in (ENDED_ID, LIVE_ID, CANCELLED_ID))
 ASKED = {
     "entrance": ("GET", "/"),
@@ -167,6 +168,8 @@ def test_every_documented_route_that_is_read_is_asked_for(client):
 def shown(response: httpx.Response) -> dict[str, Any]:
     """What is compared of a response; a body that is no JSON as its lines."""
     headers = {name: response.headers[name] for name in HEADERS if name in response.headers}
+    if "etag" in headers and response.url.path.endswith(TAGGED_BY_FILE):
+        headers["etag"] = "…"
     if "json" in headers.get("content-type", ""):
         body = response.json()
         body.pop("platform", None)

@@ -141,7 +141,7 @@ def test_an_ego_that_the_server_has_and_a_node_lacks_is_named(cluster, monkeypat
 
 @needs_ray
 def test_a_node_with_another_python_and_other_packages_is_refused_before_any_run(cluster, tmp_path):
-    distribution(tmp_path, "risk-sac", "0.0.1")
+    distribution(tmp_path, "gpytorch", "0.0.1")  # ours may lie in the working directory, which is looked at first
     (tmp_path / "sitecustomize.py").write_text(ANOTHER_PYTHON)
     # Ray refuses such a Python by itself, unless it is told to look at minor versions alone.
     cluster.add(1, RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL="minor", **path_with(tmp_path))
@@ -152,7 +152,7 @@ def test_a_node_with_another_python_and_other_packages_is_refused_before_any_run
     assert error.field == "RISK_SAC_RAY_ADDRESS"
     python = ".".join(map(str, sys.version_info[:3]))
     assert f"python is {sys.version_info[0]}.{sys.version_info[1]}.99; wanted {python}" in str(error)
-    assert "risk-sac is 0.0.1; wanted" in str(error)
+    assert "gpytorch is 0.0.1; wanted" in str(error)
 
 
 @needs_ray
