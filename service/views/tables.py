@@ -1,5 +1,6 @@
 """All episodes of a campaign in a format of other tools, made by a process of its own: the packages take 150 MB."""
 
+import contextlib
 import logging
 import subprocess
 import tempfile
@@ -31,8 +32,11 @@ class Table:
     @classmethod
     def of(cls, folders: Sequence[Path], format: FormatName) -> "Table":
         """Of those that have results by now, which may be none."""
-        begun = tuple(folder for folder in folders if (folder / RESULTS).exists())
-        return cls(begun, tuple((folder / RESULTS).stat().st_mtime_ns for folder in begun), format)
+        written_ns = {}
+        for folder in folders:
+            with contextlib.suppress(FileNotFoundError):
+                written_ns[folder] = (folder / RESULTS).stat().st_mtime_ns
+        return cls(tuple(written_ns), tuple(written_ns.values()), format)
 
 
 class Tables(Products[Table]):
