@@ -21,7 +21,7 @@ from risk_sac.geometry import overlapping_pairs, relative_view
 from risk_sac.observation import Encoder
 from risk_sac.observation_layout import LIMIT
 from risk_sac.problem import Problem
-from risk_sac.records import Collision
+from risk_sac.records import Collision, Grade
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import adversaries_cost, broken_hard_rule
@@ -152,9 +152,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         collision = None if contact is None else self._judge(contact)
         self._touched |= self._in_contact()
         cost = self._cost(before, self._frame, previous, self._measures)
-        worth = 0.0
-        if collision is not None and collision.valid:
-            worth = 1.0 if collision.preventable else self._reward.unpreventable
+        worth = self._worth(collision) if collision is not None and collision.valid else 0.0
         reward = risk_reward(
             self._measures.signals["ttc_s"],
             self._measures.signals["rss_margin"],
@@ -270,6 +268,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             previous.assessment.gap_m,
             STEP_S,
         )
+
+    def _worth(self, failure: Collision) -> float:
+        """Share of the bonus that a valid failure is paid."""
+        if failure.preventable:
+            return 1.0
+        judged = failure.judgement
+        return self._reward.unpreventable if judged and judged.grade is Grade.IDEAL else self._reward.unavoidable
 
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame

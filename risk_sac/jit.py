@@ -20,6 +20,7 @@ COMPILED = (  # where compiled functions are, and the constants that are compile
     "observation.py",
     "observation_layout.py",
     "types.py",
+    "agents/priority.py",
     "agents/sum_tree.py",
     "egos/bicycle.py",
     "egos/pilot.py",

@@ -102,8 +102,10 @@ def episode(run: RunState, guard: CrashGuard) -> EpisodeRecord:
         return _record(run, seed, scene.values, tally, rejected=infeasible.reason)
     except EgoFailed as failed:
         return _invalid(run, seed, scene.values, tally, point, failed)
-    actor.begin(genes)
     own = actor is agent
+    actor.begin(genes)
+    if not own:
+        agent.begin(genes)
     for step in range(run.problem.family.horizon_steps):  # Alg. 1, l. 6
         guard.step(step)
         action = actor.act(observation, explore=learning)  # Alg. 1, l. 7

@@ -15,6 +15,7 @@ from torch import Tensor
 
 from risk_sac.agents.agent import Agent, UpdateResult
 from risk_sac.agents.ddpg import DdpgAgent
+from risk_sac.agents.decisions import Decision, Held
 from risk_sac.agents.device import choose_device, random_batch
 from risk_sac.agents.lagrangian import DualVariable
 from risk_sac.agents.replay import Batch, Replay, RiskPrioritizedReplay, Transition, UniformReplay
@@ -45,8 +46,11 @@ class Learner:
         Raises:
           ConfigError: the device that `config` names is not there.
         """
+        steps, discount = config.agent.decision_steps, config.agent.discount
+        self._held, self._decision = Held(steps), Decision(steps, discount)
+        config = config.model_copy(update={"agent": config.agent.model_copy(update={"discount": discount**steps})})
         self._method = method
-        self._config = config
+        self._config = config  # with the γ of a decision
         self._reward = TrainingReward(method, config)
         self._action_size = action_size
         make = {"sac": self._sac, "ddpg": self._ddpg, "sb3": self._sb3}[method.agent]
@@ -72,13 +76,13 @@ class Learner:
         return self._agent.temperature
 
     def begin(self, genes: Floats) -> None:
-        """An episode begins; there are no genes."""
+        """An episode begins, whoever acts in it; there are no genes."""
+        self._held.begin()
+        self._decision.begin()
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
-        """Action in [-1, 1], `action_size`; uniformly random in the first `warmup_steps` explored steps."""
-        if explore and self._steps < self._config.agent.warmup_steps:
-            return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
-        return self._agent.act(observation, explore)  # Alg. 1, l. 7
+        """Action in [-1, 1], `action_size`, held for `decision_steps`; uniformly random in the first `warmup_steps`."""
+        return self._held.act(partial(self._decide, observation, explore))
 
     def frozen(self) -> FrozenPolicy:
         """The policy as it is now, without exploration."""
@@ -94,7 +98,9 @@ class Learner:
         self._steps += 1
         if own and self._steps > self._config.agent.warmup_steps:
             self._dual.update(transition.cost)  # Alg. 1, l. 15-16
-        self._replay.add(transition)  # Alg. 1, l. 12
+        decided = self._decision.add(transition)
+        if decided is not None:
+            self._replay.add(decided)  # Alg. 1, l. 12
 
     def update(self) -> UpdateResult | None:
         """Learn from memory at the pace of `updates_per_step`; None during the warm-up and between two updates.
@@ -114,7 +120,7 @@ class Learner:
         return result
 
     def state(self) -> dict[str, Any]:
-        """Everything the next step depends on, generators included; tensors, arrays and plain values."""
+        """Everything the next episode depends on, generators included; tensors, arrays and plain values."""
         return {
             "device": self.device,
             "agent": self._agent.state(),
@@ -139,6 +145,11 @@ class Learner:
         self._dual.value = state["dual_variable"]
         self._generator.bit_generator.state = state["generator"]
         self._steps, self._updates = state["steps"], state["updates"]
+
+    def _decide(self, observation: Vector, explore: bool) -> Vector:
+        if explore and self._steps < self._config.agent.warmup_steps:
+            return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
+        return self._agent.act(observation, explore)  # Alg. 1, l. 7
 
     def _sac(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
         return SacAgent(observation_size, action_size, self._config.agent, self._config.sac, seed, device)

@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 
 from risk_sac.config.learner import ReplayConfig
+from risk_sac.jit import compiled
 from risk_sac.types import Floats
 
 # No term counts for more than ten average ones, so that one outlier cannot fill the batch.
@@ -36,11 +37,6 @@ class TermScales:
         real = spread > 1e-9 * np.maximum(1.0, np.abs(lowest))
         return cls(lowest, np.divide(1.0, spread, out=np.zeros_like(spread), where=real))
 
-    def normalise(self, terms: Floats) -> Floats:
-        """Terms on the common scale, `3 x n` in [0, 10]."""
-        scaled = (terms - self.lowest[:, None]) * self.inverse_spread[:, None]
-        return np.minimum(np.maximum(scaled, 0.0), TERM_CAP)
-
 
 def priority(terms: Floats, scales: TermScales, config: ReplayConfig) -> Floats:
     """Priorities of transitions.
@@ -57,9 +53,23 @@ def priority(terms: Floats, scales: TermScales, config: ReplayConfig) -> Floats:
     Returns:
       `n`, at least ε > 0.
     """
-    td_error, accumulated_reward, risk = scales.normalise(terms)
-    weighted = config.td_weight * td_error + config.return_weight * accumulated_reward + config.robustness_weight * risk
-    return np.asarray(np.maximum(weighted, config.priority_floor), np.float64)
+    weights = config.td_weight, config.return_weight, config.robustness_weight
+    return _priorities(terms, scales.lowest, scales.inverse_spread, weights, config.priority_floor)
+
+
+@compiled
+def _priorities(
+    terms: Floats, lowest: Floats, inverse_spread: Floats, weights: tuple[float, float, float], floor: float
+) -> Floats:
+    # A loop: of a batch, numpy's dozen calls cost more than what they do.
+    priorities = np.empty(terms.shape[1])
+    for i in range(len(priorities)):
+        weighted = 0.0
+        for term in range(len(weights)):
+            scaled = (terms[term, i] - lowest[term]) * inverse_spread[term]
+            weighted += weights[term] * min(max(scaled, 0.0), TERM_CAP)
+        priorities[i] = max(weighted, floor)
+    return priorities
 
 
 def importance_weights(probabilities: Floats, size: int, correction: float) -> Floats:

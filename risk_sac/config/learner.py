@@ -29,6 +29,8 @@ class AgentConfig(Settings):
     warmup_steps: Annotated[int, Field(ge=0, le=10_000_000)] = 1000
     """Environment steps before the first update, the warm start's among them; the policy's own ones are uniformly
     random."""
+    decision_steps: Annotated[int, Field(ge=1, le=50)] = 5
+    """Environment steps for which the policy holds an action; they make one transition of the memory."""
     updates_per_step: Annotated[float, Field(ge=0, le=20)] = 0.25
     """One update in four environment steps: an update costs as much as several of them."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
@@ -87,7 +89,9 @@ class RewardConfig(Settings):
     valid_collision: Weight = 20.0
     """Bonus for a valid collision that the careful driver would have prevented."""
     unpreventable: Fraction = 0.5
-    """Share of that bonus for any other valid collision."""
+    """Share of that bonus where only full braking at once would have prevented it."""
+    unavoidable: Fraction = 0.1
+    """Share of that bonus where that would not have, either."""
     degenerate_collision: Weight = 4.0
     """Penalty for contact that a validity rule refuses."""
     ttc_weight: Weight = 0.2

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from risk_sac.agents.decisions import Held
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.config import EgoConfig, RunSpec, method_of
 from risk_sac.env import RiskSacEnv
@@ -163,7 +164,9 @@ def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:
         if policy is None:
             rest = env.problem.family.horizon_steps - len(actions)
             actions = np.vstack((actions, np.zeros((rest, actions.shape[1]), dtype=actions.dtype)))
-        return _played(env, bundle, actions, policy)
+            return _played(env, bundle, actions, None)
+        held = Held(spec.learner.agent.decision_steps)
+        return _played(env, bundle, actions, lambda observation: held.act(partial(policy, observation)))
 
 
 def _follow(spec: RunSpec, bundle: Bundle) -> Played:

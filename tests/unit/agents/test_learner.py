@@ -22,7 +22,9 @@ from risk_sac.errors import CheckpointError, NotFinite
 
 Make = Callable[..., Transition]
 CONFIG = LearnerConfig(
-    agent=AgentConfig(hidden_sizes=(8,), batch_size=16, discount=0.98, warmup_steps=20),
+    agent=AgentConfig(
+        hidden_sizes=(8,), batch_size=16, discount=0.98, warmup_steps=20, decision_steps=1, updates_per_step=0.25
+    ),
     replay=ReplayConfig(capacity=1000),
     lagrangian=LagrangianConfig(learning_rate=0.01, cost_limit=0.1),
 )
@@ -131,6 +133,21 @@ def test_what_a_guide_does_costs_the_policy_nothing(transition: Make) -> None:
     assert subject.dual_variable == 0.0
     subject.observe(transition(cost=0.6))
     assert subject.dual_variable > 0.0
+
+
+def test_the_policy_decides_every_few_steps_and_its_memory_holds_decisions(random_transition: Make) -> None:
+    agent = CONFIG.agent.model_copy(update={"decision_steps": 4})
+    subject = learner(config=CONFIG.model_copy(update={"agent": agent}))
+    stream = np.random.default_rng(0)
+    for _ in range(2):  # episodes, of which the second begins with a decision of its own
+        subject.begin(np.empty(0))
+        actions = []
+        for _ in range(10):
+            actions.append(subject.act(np.ones(3, np.float32)).tolist())
+            subject.observe(random_transition(stream))
+        assert [actions.index(each) for each in actions] == [0] * 4 + [4] * 4 + [8] * 2
+    assert len(subject._replay) == 2 * 2
+    assert subject._config.agent.discount == pytest.approx(0.98**4)
 
 
 def test_nothing_is_learned_from_an_empty_memory() -> None:
