@@ -22,9 +22,9 @@ class AgentConfig(Settings):
     batch_size: Annotated[int, Field(ge=1, le=4096)] = 256
     discount: Annotated[float, Field(ge=0.01, le=0.9999)] = 0.99
     """γ; 0.99 at 0.1 s looks about 10 s ahead."""
-    actor_learning_rate: LearningRate = 3e-4
+    actor_learning_rate: LearningRate = 1e-3
     critic_learning_rate: LearningRate = 1e-3
-    target_rate: Annotated[float, Field(ge=1e-5, le=1)] = 0.005
+    target_rate: Annotated[float, Field(ge=1e-5, le=1)] = 0.01
     """τ of the target networks' moving average."""
     warmup_steps: Annotated[int, Field(ge=0, le=10_000_000)] = 1000
     """Environment steps before the first update, the warm start's among them; the policy's own ones are uniformly
@@ -41,7 +41,7 @@ class AgentConfig(Settings):
 class SacConfig(Settings):
     """Soft Actor-Critic (Haarnoja et al. 2018), Eq. 4."""
 
-    temperature_learning_rate: LearningRate = 3e-4
+    temperature_learning_rate: LearningRate = 1e-3
     initial_temperature: Annotated[float, Field(ge=1e-6, le=MOST_TEMPERATURE)] = 0.02
     """α at the start."""
     target_entropy_per_action: Annotated[float, Field(ge=-10, le=0.5)] = -1.0
@@ -90,7 +90,7 @@ class RewardConfig(Settings):
     """Bonus for a valid collision that the careful driver would have prevented."""
     unpreventable: Fraction = 0.5
     """Share of that bonus where only full braking at once would have prevented it."""
-    unavoidable: Fraction = 0.1
+    unavoidable: Fraction = 0.25
     """Share of that bonus where that would not have, either."""
     degenerate_collision: Weight = 4.0
     """Penalty for contact that a validity rule refuses."""
@@ -108,7 +108,7 @@ class RewardConfig(Settings):
 class WarmStartConfig(Settings):
     """Episodes of an archive search that fill a learner's memory before its policy acts; the same for all learners."""
 
-    episodes: Annotated[int, Field(ge=0, le=10_000)] = 60
+    episodes: Annotated[int, Field(ge=0, le=10_000)] = 150
     """At most; 0: the policy acts from the first episode on, uniformly at random for `warmup_steps`."""
     failures: Annotated[int, Field(ge=1, le=10_000)] = 15
     """Valid failures that are enough."""

@@ -21,7 +21,7 @@ from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.errors import InfeasibleScene, SceneError
 from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
-from risk_sac.records import Collision
+from risk_sac.records import Collision, Grade
 from risk_sac.risk.encounter import time_to_encounter
 from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
 from risk_sac.scenario.families import FAMILIES
@@ -342,7 +342,9 @@ def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low: Ri
         for step, (_, reward, terminated, _, _) in enumerate(outcomes[1:], start=1):
             bonus = 0.0
             if terminated and collision is not None:
-                worth = 1.0 if collision.preventable else config.unpreventable
+                assert collision.judgement is not None
+                shares = {Grade.CAREFUL: 1.0, Grade.IDEAL: config.unpreventable, Grade.UNAVOIDABLE: config.unavoidable}
+                worth = shares[collision.judgement.grade]
                 bonus = worth * config.valid_collision if collision.valid else -config.degenerate_collision
             at = LEAD_IN_STEPS + step
             assert reward == pytest.approx(reward_by_hand(series, at, config, bonus), abs=1e-9)
@@ -354,7 +356,7 @@ def test_a_contact_pays_its_bonus_only_if_it_is_valid(low: RiskSacEnv) -> None:
     assert any(valid)
     assert not all(valid)
     for outcomes, is_valid in zip(contacts, valid, strict=True):
-        assert outcomes[-1][1] > 9.0 if is_valid else outcomes[-1][1] < -1.0
+        assert outcomes[-1][1] > 1.9 if is_valid else outcomes[-1][1] < -1.0
 
 
 def test_a_contact_is_recorded_with_its_facts(low: RiskSacEnv) -> None:
