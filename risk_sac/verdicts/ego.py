@@ -9,14 +9,16 @@ from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence
 
 RECENT_S = 3.0
+RECENT_M = 12.0  # a quarter of a circle of 8 m: an ego that creeps through its turn is turning
 TURN_RAD = math.radians(20.0)  # more than a lane change takes
 LANE_CHANGE_M = 1.0
 STANDING_MPS = 0.5
 
 
 def manoeuvre(evidence: Evidence) -> str:
-    """straight, left_turn, right_turn or lane_change: what the ego drove in the last 3 s."""
-    first = evidence.since(RECENT_S)
+    """straight, left_turn, right_turn or lane_change: what the ego drove in the last 3 s or 12 m, whichever is more."""
+    driven_m = np.cumsum(evidence.speed_mps[:, 0]) * evidence.step_s
+    first = min(evidence.since(RECENT_S), int(np.searchsorted(driven_m, driven_m[-1] - RECENT_M)))
     heading = np.unwrap(evidence.heading_rad[first:, 0])
     turned = float(heading[-1] - heading[0])
     if abs(turned) > TURN_RAD:

@@ -9,7 +9,7 @@ from risk_sac.verdicts.place import ground
 from risk_sac.verdicts.reference import grade, reference_outcomes
 from risk_sac.verdicts.signature import signature
 
-DEFINITIONS = 3  # raise it with whatever changes a verdict; what was judged before says by which it was
+DEFINITIONS = 4  # raise it with whatever changes a verdict; what was judged before says by which it was
 
 
 def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflict | None = None) -> Judgement:
