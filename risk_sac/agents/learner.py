@@ -63,7 +63,8 @@ class Learner:
         self._replay: Replay = replay(observation_size, action_size, config.replay)
         self._dual = DualVariable(config.lagrangian, enabled=method.lagrangian)
         self._generator = np.random.default_rng(seed)
-        self._steps, self._updates = 0, 0
+        self._acted = False
+        self._steps, self._updates = 0, 0  # steps: its own, and those of others before the first of them
 
     @property
     def dual_variable(self) -> float:
@@ -95,7 +96,8 @@ class Learner:
           transition: the step.
           own: whether this learner acted, and nobody else.
         """
-        self._steps += 1
+        self._acted |= own
+        self._steps += own or not self._acted
         if own and self._steps > self._config.agent.warmup_steps:
             self._dual.update(transition.cost)  # Alg. 1, l. 15-16
         decided = self._decision.add(transition)
@@ -105,7 +107,9 @@ class Learner:
     def update(self) -> UpdateResult | None:
         """Learn from memory at the pace of `updates_per_step`; None during the warm-up and between two updates.
 
-        What the warm-up left undone is made up for, a step's share and at least one update at a time.
+        What the warm-up left undone is made up for, a step's share and at least one update at a time. Choice: what
+        others do between its own episodes is learnt from, but calls for no further update; else a policy that takes
+        turns would pay for all of them.
 
         Raises:
           NotFinite: learning has diverged.
@@ -127,6 +131,7 @@ class Learner:
             "replay": self._replay.state(),
             "dual_variable": self._dual.value,
             "generator": self._generator.bit_generator.state,
+            "acted": self._acted,
             "steps": self._steps,
             "updates": self._updates,
         }
@@ -144,7 +149,7 @@ class Learner:
         self._agent.load(state["agent"])
         self._dual.value = state["dual_variable"]
         self._generator.bit_generator.state = state["generator"]
-        self._steps, self._updates = state["steps"], state["updates"]
+        self._acted, self._steps, self._updates = state["acted"], state["steps"], state["updates"]
 
     def _decide(self, observation: Vector, explore: bool) -> Vector:
         if explore and self._steps < self._config.agent.warmup_steps:

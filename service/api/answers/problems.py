@@ -150,8 +150,12 @@ async def _left(request: Request, error: Exception) -> Response:
 
 
 def _methods(request: Request, of_first: str) -> set[str]:
-    """Methods that some route answers at this path; Starlette names only those of the first."""
+    """Methods that some route answers at this path; Starlette names only those of the first.
+
+    A path without parameters is meant before one with them, as OpenAPI has it: `check` is no campaign's id.
+    """
     paths: dict[str, dict[str, Any]] = request.app.openapi()["paths"]
-    matching = (methods for path, methods in paths.items() if compile_path(path)[0].match(request.url.path))
-    found = {method.upper() for methods in matching for method in methods} | set(of_first.split(", "))
+    asked = request.url.path
+    matching = [paths[asked]] if asked in paths else [paths[p] for p in paths if compile_path(p)[0].match(asked)]
+    found = {method.upper() for methods in matching for method in methods} or set(of_first.split(", "))
     return found | {"HEAD"} if "GET" in found else found

@@ -126,6 +126,18 @@ def test_updates_that_the_warm_up_left_undone_are_made_up_for_one_a_step(random_
     assert steps_of_updates(0.25, 41, 80, random_transition) == [*range(41, 54), *range(56, 81, 4)]
 
 
+def test_updates_keep_pace_with_own_steps_and_with_those_that_came_before_them(random_transition: Make) -> None:
+    subject, updates = learner(), []
+    subject._update_once = lambda: updates.append(1)  # type: ignore[method-assign]
+    stream = np.random.default_rng(0)
+    for own, steps, expected in ((False, 40, 0), (True, 40, 20), (False, 400, 20), (True, 40, 30)):
+        for _ in range(steps):
+            subject.observe(random_transition(stream), own=own)
+            if own:
+                subject.update()
+        assert len(updates) == expected
+
+
 def test_what_a_guide_does_costs_the_policy_nothing(transition: Make) -> None:
     subject = learner("sac-lag")
     for _ in range(CONFIG.agent.warmup_steps + 5):
