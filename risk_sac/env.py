@@ -21,7 +21,7 @@ from risk_sac.geometry import overlapping_pairs, relative_view
 from risk_sac.observation import Encoder
 from risk_sac.observation_layout import LIMIT
 from risk_sac.problem import Problem
-from risk_sac.records import Collision, Grade
+from risk_sac.records import Collision
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import adversaries_cost, broken_hard_rule
@@ -273,8 +273,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """Share of the bonus that a valid failure is paid."""
         if failure.preventable:
             return 1.0
-        judged = failure.judgement
-        return self._reward.unpreventable if judged and judged.grade is Grade.IDEAL else self._reward.unavoidable
+        return self._reward.unpreventable if failure.avoidable else self._reward.unavoidable
 
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame

@@ -169,6 +169,11 @@ class Collision(Record):
         """Whether it is valid and the careful driver would have prevented it."""
         return self.valid and self.judgement is not None and self.judgement.grade is Grade.CAREFUL
 
+    @property
+    def avoidable(self) -> bool:
+        """Whether it is valid, and the careful driver or full braking at once would have prevented it."""
+        return self.valid and self.judgement is not None and self.judgement.grade is not Grade.UNAVOIDABLE
+
 
 Phase = Literal["search", "evaluation", "iid"]
 # As records and ids name a phase. Of `iid` alone a bound on how often the ego fails may be drawn; nothing pools it.
@@ -291,6 +296,8 @@ class RunMetrics(Record):
     """Environment steps per distinct failure; null without one."""
     preventable: int = 0
     """Valid collisions that the careful driver would have prevented, repetitions included."""
+    avoidable: int = 0
+    """These, and those that only full braking at once would have prevented."""
     distinct_preventable: int = 0
     """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
     covered: int = 0

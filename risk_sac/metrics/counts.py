@@ -16,6 +16,7 @@ class Counts:
     failures: int = 0
     distinct_failures: int = 0
     preventable: int = 0
+    avoidable: int = 0
     distinct_preventable: int = 0
     artefacts: int = 0
     unresponsive: int = 0

@@ -27,6 +27,11 @@ def preventable_collision_rate(counts: Counts) -> float:
     return _share(counts.preventable, counts.driven)
 
 
+def avoidable_collision_rate(counts: Counts) -> float:
+    """ACR: valid collisions that were not unavoidable per episode, rejected scenes included, invalid ones not."""
+    return _share(counts.avoidable, counts.driven)
+
+
 def newest_effective_collision_rate(tally: Tally) -> float:
     """ECR over the newest episodes."""
     return _share(tally.newest_failures, tally.newest_episodes)
@@ -124,6 +129,15 @@ METRICS = (
         meaning="preventable failures / episodes: valid ones that the careful driver would have prevented",
         figure=Kept(field="pcr", formula=preventable_collision_rate, interval=True),
         trials=_all,
+    ),
+    Metric(
+        name="acr",
+        symbol="ACR",
+        meaning="avoidable failures / episodes: valid ones that the careful driver, or full braking at once, would "
+        "have prevented",
+        figure=Derived(formula=avoidable_collision_rate),
+        trials=_all,
+        tested=False,
     ),
     Metric(
         name="ecr_last",

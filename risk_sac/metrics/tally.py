@@ -88,6 +88,7 @@ class Tally(Counts):
         self.failures += 1
         self.distinct_failures += new
         self.preventable += record.collision.preventable
+        self.avoidable += record.collision.avoidable
         if record.collision.preventable:  # whichever of its kind came first
             self.distinct_preventable += self._distinct_preventable.add(record.collision)
         judged = record.collision.judgement

@@ -45,6 +45,8 @@ class Cell:
     """Sum over the runs; what two runs found alike counts twice."""
     preventable: int
     """Valid collisions that the careful driver would have prevented, repetitions included."""
+    avoidable: int
+    """These, and those that only full braking at once would have prevented."""
     distinct_preventable: int
     """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
     artefacts: int

@@ -13,7 +13,7 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.records import Outcome, RunMetrics
+from risk_sac.records import Grade, Outcome, RunMetrics
 from risk_sac.verdicts.distinct import distinct_failures
 from risk_sac.verdicts.taxonomy import kind_of
 from tests.builders import judgement
@@ -128,7 +128,7 @@ def test_figures_stay_in_their_ranges(records):
     funnel = Funnel.of(metrics)
     assert funnel.contacts >= funnel.valid >= funnel.distinct >= funnel.preventable >= 0
     assert metrics.unresponsive <= metrics.failures
-    assert metrics.distinct_preventable <= metrics.preventable
+    assert metrics.distinct_preventable <= metrics.preventable <= metrics.avoidable <= metrics.failures
 
 
 @settings(deadline=None)
@@ -142,6 +142,7 @@ def test_incremental_equals_batch(records):
     assert metrics.window_pcr == preventable_collision_rate(counted(records[-WINDOW:]))
     assert metrics.distinct_preventable == len(distinct_failures([hit for hit in hits if hit.preventable]))
     judged = [hit for hit in hits if hit.judgement is not None]
+    assert metrics.avoidable == sum(hit.judgement.grade in (Grade.CAREFUL, Grade.IDEAL) for hit in judged)
     assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(judged)
     assert sum(metrics.signatures.values()) == len(judged)
     assert metrics.covered == len({kind_of(hit, hit.judgement) for hit in judged})
@@ -169,7 +170,7 @@ def test_the_dispersion_of_many_failures():
 
 def test_metrics_from_before_contacts_were_judged_can_still_be_read():
     stored = feed(RUN).model_dump()
-    new = ("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts")
+    new = ("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts", "avoidable")
     for name in (*new, "covered", "unresponsive", "signatures", "conflicts_by_second", "contacts_by_second"):
         del stored[name]
     metrics = RunMetrics.model_validate(stored)

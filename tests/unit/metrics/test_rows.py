@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from risk_sac.metrics import COUNTS, METRICS, RATIOS, Counts, Kept, Tally, outcome_features, wilson_interval
 from risk_sac.metrics.features import Spread
 from risk_sac.metrics.rows import (
+    avoidable_collision_rate,
     cost_rate,
     distinct_failure_rate,
     effective_collision_rate,
@@ -35,6 +36,7 @@ def test_formula_literals():
         episodes=8,
         failures=4,
         preventable=2,
+        avoidable=3,
         distinct_failures=3,
         environment_steps=600,
         steps_to_failure=900,
@@ -45,6 +47,7 @@ def test_formula_literals():
         newest_preventable=1,
     )
     assert (effective_collision_rate(tally), preventable_collision_rate(tally)) == (0.5, 0.25)
+    assert avoidable_collision_rate(tally) == 0.375
     assert (newest_effective_collision_rate(tally), newest_preventable_collision_rate(tally)) == (0.6, 0.2)
     assert efficiency_score(tally) == 1 - 900 / (8 * 150) == 0.25
     assert cost_rate(tally) == 0.25
@@ -54,7 +57,7 @@ def test_formula_literals():
 
 def test_formulas_of_a_run_without_episodes():
     tally = Tally(horizon_steps=150)
-    assert effective_collision_rate(tally) == preventable_collision_rate(tally) == 0
+    assert effective_collision_rate(tally) == preventable_collision_rate(tally) == avoidable_collision_rate(tally) == 0
     assert newest_effective_collision_rate(tally) == newest_preventable_collision_rate(tally) == 0
     assert efficiency_score(tally) == cost_rate(tally) == 0
     assert outcome_dispersion(tally) is distinct_failure_rate(tally) is None

@@ -191,7 +191,11 @@ def test_versions_that_differ_are_all_named(spec, runs):
 def test_figures_are_those_that_have_something_to_show(comparison, spec, runs):
     assert set(figure_names(comparison)) == {
         *("ecr_low", "pcr_low", "lambda_low", "alpha_low", "times_low", "times_low_evaluation"),
-        *(f"bars_{name}{phase}" for name in ("ecr", "pcr", "es", "rho_c", "ofd") for phase in ("", "_evaluation")),
+        *(
+            f"bars_{name}{phase}"
+            for name in ("ecr", "pcr", "acr", "es", "rho_c", "ofd")
+            for phase in ("", "_evaluation")
+        ),
     }
     control = spec.model_copy(update={"methods": ("no-adversary",)})
     assert "lambda_low" not in figure_names(compare(control, runs, ""))
