@@ -14,6 +14,7 @@ from risk_sac.config import METHODS, AgentConfig, LearnerConfig, MethodName, Rep
 STEPS = 10_000
 CONFIG = LearnerConfig(
     agent=AgentConfig(
+        decision_steps=1,
         updates_per_step=1,
         hidden_sizes=(64, 64),
         batch_size=64,
