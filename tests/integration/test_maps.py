@@ -16,7 +16,7 @@ from risk_sac.scenario import library
 from risk_sac.scenario.maps.found import Pattern
 from risk_sac.scenario.maps.keep import Map
 from risk_sac.types import Frame
-from tests.maps import osm_town, turned
+from tests.maps import osm_roundabout, osm_town, turned
 from tests.server import Service
 
 NETS = Path(sumo_nets.__path__[0])
@@ -69,6 +69,7 @@ def test_from_an_extract_of_a_town_to_the_results_of_a_campaign_on_it(service: S
     taken = service.client.post("/v1/networks", content=osm_town(), headers=XML)
     assert taken.status_code == 201, taken.text
     assert any("angle" in warning for warning in taken.json()["warnings"])
+    assert any("on which side people drive" in warning for warning in taken.json()["warnings"])
     home = taken.headers["location"]
     places = service.client.get(f"{home}/places").raise_for_status().json()
     assert {place["pattern"] for place in places["items"]} == {"car_following", "crossing", "junction"}
@@ -109,6 +110,7 @@ def _refuses(service: Service, ground: dict[str, str]) -> None:
     [
         ('<!DOCTYPE osm [<!ENTITY a SYSTEM "file:///etc/passwd">]><osm>&a;</osm>', "got a DOCTYPE"),
         ("<osm><node", "no well-formed XML"),
+        (f"<osm>{osm_roundabout(clockwise=True)}</osm>", "left-hand traffic: the roundabout way 99 runs clockwise"),
         ("<osm></osm>", "netconvert cannot convert the map"),
         ("<OpenDRIVE>" + "<road>" * 30 + "</road>" * 30 + "</OpenDRIVE>", "nested more than 20 deep"),
         ("<OpenDRIVE><include file='/etc/passwd'/></OpenDRIVE>", "netconvert cannot convert the map"),

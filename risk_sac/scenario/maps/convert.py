@@ -15,6 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from risk_sac.errors import MapError
+from risk_sac.scenario.maps.sides import side_remarks
 
 PRESENT = (1, 16)  # nets since then say all that is read
 HEAD_BYTES = 4096
@@ -61,7 +62,7 @@ def present_net(file: Path, folder: Path) -> Converted:
       folder: an existing one, to write to.
 
     Raises:
-      MapError: it is none of them, or netconvert refuses it or is not there.
+      MapError: it is none of them, or has left-hand traffic, or netconvert refuses it or is not there.
       OSError: it cannot be read.
     """
     plain = _unpacked(file, folder)
@@ -69,8 +70,9 @@ def present_net(file: Path, folder: Path) -> Converted:
     if format_ is Format.NET and version >= PRESENT:
         return Converted(plain, ())
     out = folder / "converted.net.xml"
+    sides = side_remarks(plain) if format_ is Format.OSM else []
     said = _run(format_, plain, out, file.name)
-    return Converted(out, tuple(remarks(said, "Warning")))
+    return Converted(out, (*sides, *remarks(said, "Warning")))
 
 
 def conversion(format_: Format, source: str, target: str) -> list[str]:

@@ -15,6 +15,7 @@ from defusedxml.ElementTree import DefusedXMLParser
 
 from risk_sac.errors import MapError
 from risk_sac.scenario.maps.convert import Format, conversion, netconvert, remarks
+from risk_sac.scenario.maps.sides import side_remarks
 from service.networks.errors import UploadError
 from service.networks.limits import MAX_FOREIGN_DEPTH, MAX_FOREIGN_ELEMENTS, MAX_VALUE, WALL_S
 
@@ -65,10 +66,12 @@ def converted(data: bytes, root: str) -> tuple[bytes, list[str]]:
       root: name of its root element, one of `FORMATS`.
 
     Raises:
-      UploadError: the map is no well-formed XML, or too large, or netconvert refuses it or is not installed.
+      UploadError: the map is no well-formed XML, or too large, or has left-hand traffic, or netconvert refuses it or is
+        not installed.
     """
     Path(MAP).write_text(_anew(data), encoding="utf-8")
     try:
+        sides = side_remarks(Path(MAP)) if FORMATS[root] is Format.OSM else []
         program, environment = netconvert()
     except MapError as error:
         raise UploadError(str(error)) from error
@@ -81,7 +84,7 @@ def converted(data: bytes, root: str) -> tuple[bytes, list[str]]:
     net = NOTES.sub(b"", Path(CONVERTED).read_bytes())
     for name in (MAP, CONVERTED):
         Path(name).unlink()
-    return net, remarks(said, "Warning")
+    return net, [*sides, *remarks(said, "Warning")]
 
 
 def _anew(data: bytes) -> str:
