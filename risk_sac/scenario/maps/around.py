@@ -31,13 +31,13 @@ def ground_around(net: Net, x_m: float, y_m: float, *, walked: bool) -> Ground:
     crossings = [
         quad
         for crossing in net.crossings
-        if _near(crossing.line, x_m, y_m, CROSSINGS_M)
+        if is_near(crossing.line, x_m, y_m, CROSSINGS_M)
         for quad in ribbon(crossing.line, crossing.width_m)
     ]
-    lanes = [lane for edge in net.edges.values() for lane in edge.drivable if _near(lane.line, x_m, y_m, WALKED_M)]
+    lanes = [lane for edge in net.edges.values() for lane in edge.drivable if is_near(lane.line, x_m, y_m, WALKED_M)]
     for junction in net.junctions.values():
         if math.hypot(junction.x_m - x_m, junction.y_m - y_m) <= 3 * WALKED_M:
-            lanes += [lane for lane in net.inside.get(junction.id, ()) if _near(lane.line, x_m, y_m, WALKED_M)]
+            lanes += [lane for lane in net.inside.get(junction.id, ()) if is_near(lane.line, x_m, y_m, WALKED_M)]
     return Ground(
         crossings=_rounded(crossings),
         roadway=_rounded(_roadway(lanes, x_m, y_m)),
@@ -60,7 +60,7 @@ def walk_over(net: Net, crossing: Crossing, driven_rad: float) -> Walk:
     lines = [lane.line for lane in net.inside.get(crossing.junction, ())]
     for _ in range(round(MOST_BACK_M / BACK_M)):
         stood = [(x + off_m * along_y, y - off_m * along_x) for off_m in (-BESIDE_M, 0.0, BESIDE_M)]
-        if not any(_near(line, *point, CLEAR_M) for line in lines for point in stood):
+        if not any(is_near(line, *point, CLEAR_M) for line in lines for point in stood):
             break
         x, y = x - BACK_M * along_x, y - BACK_M * along_y
     return Walk(x_m=x, y_m=y, along_x=along_x, along_y=along_y)
@@ -76,10 +76,10 @@ def signal_of(net: Net, ids: Iterable[str | None]) -> Signal | None:
 
 def _roadway(lanes: Sequence[Lane], x_m: float, y_m: float) -> list[list[Point]]:
     quads = (quad for lane in lanes for quad in ribbon(lane.line, lane.width_m))
-    return [quad for quad in quads if _near((*quad, quad[0]), x_m, y_m, WALKED_M)]
+    return [quad for quad in quads if is_near((*quad, quad[0]), x_m, y_m, WALKED_M)]
 
 
-def _near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> bool:
+def is_near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> bool:
     """Whether a line comes so near to a point."""
     for (ax, ay), (bx, by) in pairwise(line):
         dx, dy = bx - ax, by - ay

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from risk_sac.scenario import junction
+from risk_sac.scenario.maps.abreast import ROOM_M, too_near
 from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot
@@ -133,6 +134,11 @@ def turn(net: Net, link: Link, onward_s: float) -> Track | str:
         return (
             f"who turns from {link.source.edge!r} to {link.target.edge!r} waits in the junction where it reaches into "
             f"{lane.id!r}, the way of those it waits for"
+        )
+    if (beside := too_near(net, link)) is not None:
+        return (
+            f"the ways of lanes {link.source.id!r} and {beside.source.id!r} to {link.target.edge!r} come nearer than "
+            f"{ROOM_M} m to each other: two cannot drive there beside each other"
         )
     length_m = link.source.length_m
     way = way_on(net, link.source, onward_s + length_m / link.source.limit_mps, through=link)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from risk_sac.scenario.maps.abreast import too_near
 from risk_sac.scenario.maps.net import Lane, Link, Net
 from risk_sac.scenario.place import Piece, Track
 
@@ -59,7 +60,7 @@ class _Search:
         been = {lane.edge for lane in lanes}
         following = [through] if through else sorted(self._net.onward.get(lanes[-1].id, ()), key=_bend)
         for link in following:
-            if link.target.edge in been or self._tries == 0:
+            if link.target.edge in been or self._tries == 0 or too_near(self._net, link) is not None:
                 continue
             self._tries -= 1
             inside_s = sum(lane.length_m / lane.limit_mps for lane in link.inside)
@@ -86,7 +87,11 @@ def way_back(net: Net, last: Lane, metres: float, onward: Sequence[str] = ()) ->
         been = {lane.edge for lane in lanes}
         following = [*(lane.edge for lane in lanes[1:]), *onward]
         arriving = net.back.get(lanes[0].id, ())
-        before = [link for link in arriving if link.source.edge not in been and _is_taken(net, link, following)]
+        before = [
+            link
+            for link in arriving
+            if link.source.edge not in been and _is_taken(net, link, following) and too_near(net, link) is None
+        ]
         if not before:
             break
         link = min(before, key=_bend)

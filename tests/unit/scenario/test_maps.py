@@ -13,13 +13,15 @@ from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, MapError
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, SHIPPED, family_at, family_named
+from risk_sac.scenario.maps.abreast import too_near
 from risk_sac.scenario.maps.convert import present_net
+from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.finder import place_at, survey
 from risk_sac.scenario.maps.keep import Map
 from risk_sac.scenario.maps.net import Lane, Link, Net, read_net
 from risk_sac.scenario.maps.waiting import waits_in_the_way
-from risk_sac.scenario.maps.ways import way_back
-from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch
+from risk_sac.scenario.maps.ways import Way, way_back, way_on
+from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch, Track
 from risk_sac.sim.sumo import SumoSimulation
 from tests.maps import osm_town
 
@@ -242,6 +244,35 @@ def test_who_waits_askew_in_the_way_of_others_is_told_from_who_stands_clear(x_m:
         lane("from", (0.0, -20.0), (0.0, -10.0)), lane("to", (-3.0, 6.0), (-3.0, 9.0)), (before, behind), None, 0
     )
     assert waits_in_the_way(net, link) is (None if stands_clear else across)
+
+
+BEND = (
+    "<net>"
+    '<edge id=":1_0" function="internal">'
+    '<lane id=":1_0_0" index="0" speed="10" length="30" shape="-2,0 9,3 17,8 20,20"/>'
+    '<lane id=":1_0_1" index="1" speed="10" length="25" shape="-2,3 {middle} 17,20"/></edge>'
+    '<edge id="a" from="0" to="1"><lane id="a_0" index="0" speed="10" length="200" shape="-202,0 -2,0"/>'
+    '<lane id="a_1" index="1" speed="10" length="200" shape="-202,3 -2,3"/></edge>'
+    '<edge id="b" from="1" to="2"><lane id="b_0" index="0" speed="10" length="900" shape="20,20 20,920"/>'
+    '<lane id="b_1" index="1" speed="10" length="900" shape="17,20 17,920"/></edge>'
+    '<connection from="a" to="b" fromLane="0" toLane="0" via=":1_0_0" dir="l"/>'
+    '<connection from="a" to="b" fromLane="1" toLane="1" via=":1_0_1" dir="l"/></net>'
+)
+
+
+@pytest.mark.parametrize(("middle", "there_is_room"), [("7,6 14,11", True), ("9,4.5 16,9", False)])
+def test_nobody_is_led_over_a_junction_that_two_abreast_have_no_room_on(
+    tmp_path: Path, middle: str, there_is_room: bool
+) -> None:
+    file = tmp_path / "map.net.xml"
+    file.write_text(BEND.format(middle=middle))
+    net = read_net(file)
+    for lane, other in (("a_0", "a_1"), ("a_1", "a_0")):
+        (link,) = net.onward[lane]
+        assert too_near(net, link) is (None if there_is_room else net.onward[other][0])
+        assert isinstance(turn(net, link, 10.0), Track) == there_is_room
+        assert isinstance(way_on(net, net.lane(lane), 40.0), Way) == there_is_room
+        assert len(way_back(net, link.target, 150.0).lanes) == (2 if there_is_room else 1)
 
 
 def test_places_that_nobody_names_go_when_they_are_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
