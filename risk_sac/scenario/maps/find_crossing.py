@@ -10,6 +10,7 @@ from itertools import pairwise
 
 from risk_sac.scenario.family import LEAD_IN_S, top_speed
 from risk_sac.scenario.hidden_pedestrian import BODY_M, OCCLUDER_M, room_beyond_m, room_wanted_m
+from risk_sac.scenario.maps.abreast import truck_reaches
 from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.find_stretch import check_limit
@@ -69,19 +70,23 @@ def place(net: Net, spot: Spot) -> CrossingPlace:
 
 
 def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[Lane, Track, Track, Link]:
-    """The leftmost lane that leads on for an episode and has one to its right that leads anywhere."""
+    """The leftmost lane that leads on for an episode and has one to its right that leads anywhere, and clear of it."""
     why = ""
     for right, own in reversed(list(pairwise(edge.drivable))):
-        ego, because = _ego(net, own)
-        occluder, hidden_because = _straight(net, right, OCCLUDED_S)
-        if ego is None or occluder is None:
-            why = why or because or hidden_because
+        driven, hiding = _ego(net, own), _straight(net, right, OCCLUDED_S)
+        if isinstance(driven, str) or isinstance(hiding, str):
+            why = why or (driven if isinstance(driven, str) else str(hiding))
             continue
+        (ego, link), (occluder, beside) = driven, hiding
         least_m = BODY_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
         if occluder.room_m < least_m:
             why = why or f"the lane beside can be come from for {occluder.room_m:.0f} m; wanted {least_m:.0f} m"
+        elif truck_reaches(net, beside, link):
+            why = (
+                why or f"a truck that drives on from {right.id!r} reaches into the way of who drives on from {own.id!r}"
+            )
         else:
-            return own, ego, occluder, net.onward[own.id][0]
+            return own, ego, occluder, link
     raise NoFit(why)
 
 
@@ -95,9 +100,10 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[Lane, Trac
             f"{edge.id!r} has 1 lane for cars, and none beside it for those who come the other way; wanted one of the "
             "two, so that a vehicle can hide the pedestrian"
         )
-    ego, why = _ego(net, own)
-    if ego is None:
-        raise NoFit(why)
+    driven = _ego(net, own)
+    if isinstance(driven, str):
+        raise NoFit(driven)
+    ego, link = driven
     way = way_on(net, beside[0], (BODY_M + OCCLUDER_M) / beside[0].limit_mps + OCCLUDED_S)
     if not isinstance(way, Way):
         raise NoFit(way)
@@ -105,7 +111,7 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[Lane, Trac
     if occluder.room_m < room_beyond_m():
         came = f"those who come the other way can be come from for {occluder.room_m:.0f} m"
         raise NoFit(f"{came}; wanted {room_beyond_m():.0f} m")
-    return own, ego, occluder, net.onward[own.id][0]
+    return own, ego, occluder, link
 
 
 def _is_beside(own: Lane, other: Lane) -> bool:
@@ -118,24 +124,24 @@ def _is_beside(own: Lane, other: Lane) -> bool:
     return back and 0.0 < left_m <= (own.width_m + other.width_m) / 2 + MEDIAN_M and abs(along_m) <= SHIFTED_M
 
 
-def _ego(net: Net, own: Lane) -> tuple[Track | None, str]:
-    """The ego's track, if there is room; or why there is not."""
-    ego, why = _straight(net, own, AFTER_S)
+def _ego(net: Net, own: Lane) -> tuple[Track, Link] | str:
+    """The ego's track, if there is room, and the link it begins with; or why there is none."""
+    found = _straight(net, own, AFTER_S)
     wanted_m = room_wanted_m(own.limit_mps)
-    if ego is not None and ego.room_m < wanted_m:
-        return None, f"{own.edge!r} can be come from for {ego.room_m:.0f} m; wanted {wanted_m:.0f} m"
-    return ego, why
+    if not isinstance(found, str) and found[0].room_m < wanted_m:
+        return f"{own.edge!r} can be come from for {found[0].room_m:.0f} m; wanted {wanted_m:.0f} m"
+    return found
 
 
-def _straight(net: Net, lane: Lane, onward_s: float) -> tuple[Track | None, str]:
-    """The track over the straightest link of a lane that leads on so far."""
+def _straight(net: Net, lane: Lane, onward_s: float) -> tuple[Track, Link] | str:
+    """The track over the straightest link of a lane that leads on so far, and that link; or why there is none."""
     why = f"lane {lane.id!r} leads nowhere"
     for link in sorted(net.onward.get(lane.id, ()), key=lambda link: abs(link.turn_rad)):
         found = turn(net, link, onward_s)
         if isinstance(found, Track):
-            return found, ""
+            return found, link
         why = found
-    return None, why
+    return why
 
 
 def _oncoming(net: Net, own: str, crossed: tuple[str, ...]) -> tuple[Track, ...]:

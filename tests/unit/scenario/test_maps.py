@@ -1,3 +1,4 @@
+import math
 import os
 from contextlib import closing
 from pathlib import Path
@@ -13,7 +14,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, MapError
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, SHIPPED, family_at, family_named
-from risk_sac.scenario.maps.abreast import too_near
+from risk_sac.scenario.maps.abreast import too_near, truck_reaches
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.finder import place_at, survey
@@ -248,31 +249,67 @@ def test_who_waits_askew_in_the_way_of_others_is_told_from_who_stands_clear(x_m:
 
 BEND = (
     "<net>"
-    '<edge id=":1_0" function="internal">'
-    '<lane id=":1_0_0" index="0" speed="10" length="30" shape="-2,0 9,3 17,8 20,20"/>'
-    '<lane id=":1_0_1" index="1" speed="10" length="25" shape="-2,3 {middle} 17,20"/></edge>'
-    '<edge id="a" from="0" to="1"><lane id="a_0" index="0" speed="10" length="200" shape="-202,0 -2,0"/>'
-    '<lane id="a_1" index="1" speed="10" length="200" shape="-202,3 -2,3"/></edge>'
-    '<edge id="b" from="1" to="2"><lane id="b_0" index="0" speed="10" length="900" shape="20,20 20,920"/>'
-    '<lane id="b_1" index="1" speed="10" length="900" shape="17,20 17,920"/></edge>'
+    '<edge id=":1_0" function="internal"><lane id=":1_0_0" index="0" speed="10" length="30" shape="{outer}"/>'
+    '<lane id=":1_0_1" index="1" speed="10" length="25" shape="{inner}"/></edge>'
+    '<edge id="a" from="0" to="1"><lane id="a_0" index="0" speed="10" length="200" shape="{before_0}"/>'
+    '<lane id="a_1" index="1" speed="10" length="200" shape="{before_1}"/></edge>'
+    '<edge id="b" from="1" to="2"><lane id="b_0" index="0" speed="10" length="900" shape="{behind_0}"/>'
+    '<lane id="b_1" index="1" speed="10" length="900" shape="{behind_1}"/></edge>'
+    '<junction id="1" type="priority" x="0" y="0" incLanes="a_0 a_1" intLanes=":1_0_0 :1_0_1" shape="0,0 20,0 20,20"/>'
     '<connection from="a" to="b" fromLane="0" toLane="0" via=":1_0_0" dir="l"/>'
     '<connection from="a" to="b" fromLane="1" toLane="1" via=":1_0_1" dir="l"/></net>'
 )
+WIDE, NARROW = "7,6 14,11", "9,4.5 16,9"
 
 
-@pytest.mark.parametrize(("middle", "there_is_room"), [("7,6 14,11", True), ("9,4.5 16,9", False)])
+def bend(file: Path, middle: str, *, to_the_left: bool) -> Net:
+    """Two lanes that turn; the inner way is drawn through `middle`."""
+    lines = {"outer": "-2,0 9,3 17,8 20,20", "inner": f"-2,3 {middle} 17,20"}
+    lines |= {"before_0": "-202,0 -2,0", "before_1": "-202,3 -2,3"}
+    lines |= {"behind_0": "20,20 20,920", "behind_1": "17,20 17,920"}
+    if not to_the_left:  # mirrored, and the lanes change places: their indices count from the right
+        lines = {name: line.replace(",", ",-") for name, line in lines.items()}
+        for one, other in (("outer", "inner"), ("before_0", "before_1"), ("behind_0", "behind_1")):
+            lines[one], lines[other] = lines[other], lines[one]
+    file.write_text(BEND.format(**lines))
+    return read_net(file)
+
+
+@pytest.mark.parametrize("to_the_left", [True, False])
+@pytest.mark.parametrize(("middle", "there_is_room"), [(WIDE, True), (NARROW, False)])
 def test_nobody_is_led_over_a_junction_that_two_abreast_have_no_room_on(
-    tmp_path: Path, middle: str, there_is_room: bool
+    tmp_path: Path, middle: str, there_is_room: bool, to_the_left: bool
 ) -> None:
-    file = tmp_path / "map.net.xml"
-    file.write_text(BEND.format(middle=middle))
-    net = read_net(file)
+    net = bend(tmp_path / "map.net.xml", middle, to_the_left=to_the_left)
     for lane, other in (("a_0", "a_1"), ("a_1", "a_0")):
         (link,) = net.onward[lane]
         assert too_near(net, link) is (None if there_is_room else net.onward[other][0])
         assert isinstance(turn(net, link, 10.0), Track) == there_is_room
         assert isinstance(way_on(net, net.lane(lane), 40.0), Way) == there_is_room
         assert len(way_back(net, link.target, 150.0).lanes) == (2 if there_is_room else 1)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("radius_m", "reaches"), [(12.0, False), (0.5, True)])
+def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(
+    radius_m: float, reaches: bool, side: float
+) -> None:
+    """It turns away from a car that drives straight on 3.2 m beside it."""
+    quarter = [math.radians(10.0 * i) for i in range(10)]
+    arc = [(radius_m * math.sin(a), -side * radius_m * (1.0 - math.cos(a))) for a in quarter]
+
+    def link(id_: str, *lines: list[tuple[float, float]]) -> Link:
+        source, middle, target = (Lane(id_, id_, 0, 1.0, 3.2, 10.0, tuple(line), True) for line in lines)
+        return Link(source, target, (middle,), None, 0)
+
+    away = (radius_m, -side * (radius_m + 90.0))
+    truck = link("right", [(-90.0, 0.0), (0.0, 0.0)], arc, [arc[-1], away])
+    straight = [(x, side * 3.2) for x in (-90.0, 0.0, 20.0, 90.0)]
+    car = link("left", straight[:2], straight[1:3], straight[2:])
+    assert truck_reaches(Net(onward={"right": [truck], "left": [car]}), truck, car) == reaches
+    farther = link("left", straight[:2], [straight[1], (20.0, side * 9.0)], [(20.0, side * 9.0), (90.0, side * 9.0)])
+    forked = Net(onward={"right": [truck], "left": [farther, car]})
+    assert truck_reaches(forked, truck, farther) == reaches
 
 
 def test_places_that_nobody_names_go_when_they_are_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
