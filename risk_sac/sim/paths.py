@@ -72,19 +72,31 @@ def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:
 
 
 def _next_lane(route: Sequence[str], lane: str) -> str | None:
-    edge = lane.rpartition("_")[0]
-    wanted = None
+    edge = _edge(lane)
+    links = libsumo.lane.getLinks(lane)
+    following: tuple[str, ...] = ()
     if edge in route:
-        position = route.index(edge)
-        if position + 1 == len(route):
-            return None
-        wanted = route[position + 1]
-    for link in libsumo.lane.getLinks(lane):
-        approached, via = link[0], link[4]
-        if wanted is None or approached.rpartition("_")[0] == wanted:
-            following: str = via or approached
-            return following
-    return None
+        following = tuple(route[route.index(edge) + 1 :])
+        links = [link for link in links if following and _edge(link[0]) == following[0]]
+    if not links:
+        return None
+    # Of the lanes that one forks into, SUMO's drivers take the one that leads farthest; of equals the first, the right.
+    link = max(links, key=lambda link: _reach(following[1:], link[0]))
+    return str(link[4] or link[0])  # what leads there across the junction, if that has lanes
+
+
+def _reach(edges: Sequence[str], lane: str) -> int:
+    """Along how many of the edges that follow a lane leads."""
+    lanes = {lane}
+    for reached, edge in enumerate(edges):
+        lanes = {link[0] for id_ in lanes for link in libsumo.lane.getLinks(id_) if _edge(link[0]) == edge}
+        if not lanes:
+            return reached
+    return len(edges)
+
+
+def _edge(lane: str) -> str:
+    return lane.rpartition("_")[0]
 
 
 def _path(lanes: Sequence[str]) -> Path:

@@ -1,9 +1,12 @@
 """Predicted paths beside what SUMO's drivers then drive, on every net."""
 
 import math
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import libsumo
 import numpy as np
@@ -13,7 +16,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.sim.lookout import project
-from risk_sac.sim.paths import AHEAD_M, HEADING, STATION, Paths
+from risk_sac.sim.paths import AHEAD_M, HEADING, STATION, Paths, X
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Role
 
@@ -91,3 +94,40 @@ def test_a_path_is_made_once_and_forgotten_with_its_net(sim: SumoSimulation) -> 
     assert paths.of(("e1", "e2"), "e1_2") is first
     paths.clear()
     assert paths.of(("e1", "e2"), "e1_2") is not first
+
+
+NODES = '<node id="0" x="0" y="0"/><node id="1" x="100" y="0"/><node id="2" x="200" y="0"/><node id="3" x="500" y="0"/>'
+EDGES = (
+    '<edge id="a" from="0" to="1" numLanes="1"/><edge id="b" from="1" to="2" numLanes="2"/>'
+    '<edge id="c" from="2" to="3" numLanes="1"/><edge id="d" from="2" to="4" numLanes="1"/>'
+)
+LINK = '<connection from="{}" to="{}" fromLane="{}" toLane="{}"/>'
+
+
+@pytest.mark.parametrize("own", [0, 1])
+def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(
+    sim: SumoSimulation, tmp_path: Path, own: int
+) -> None:
+    """The other one leads off the route, to the right or to the left."""
+    links = [("a", "b", 0, 0), ("a", "b", 0, 1), ("b", "c", own, 0), ("b", "d", 1 - own, 0)]
+    parts = {
+        "nodes": NODES + f'<node id="4" x="300" y="{-80 if own else 80}"/>',
+        "edges": EDGES,
+        "connections": "".join(LINK.format(*link) for link in links),
+    }
+    options = []
+    for name, content in parts.items():
+        (tmp_path / name).write_text(f"<{name}>{content}</{name}>")
+        options += [f"--{name[:-1]}-files", tmp_path / name]
+    net = tmp_path / "fork.net.xml"
+    command = [Path(sys.executable).parent / "netconvert", *options, "--no-turnarounds", "-o", net]
+    subprocess.run(command, capture_output=True, check=True)
+    layout = replace(alone("low", ("a", "b", "c"), 0, 50.0), net=str(net), signal=None)
+    sim.reset(layout, 0)
+    points = sim.along("ego").path.points
+    assert points[X, -1] > 300.0
+    for _ in range(140):
+        frame = sim.step()
+        _, offset_m, _ = project(points, float(frame.x_m[0]), float(frame.y_m[0]))
+        assert abs(offset_m) < 0.73
+    assert libsumo.vehicle.getRoadID("ego") == "c"
