@@ -33,6 +33,7 @@ AHEAD_S = 6.0  # of driving to where it crosses
 MET_STEPS = 120
 STANDING_MPS = 0.5
 OFFSETS = 41  # of a cycle that are looked at
+MET_M = 5.0  # who comes no nearer to a pedestrian has not met it
 ALIKE_M = 0.5  # by which the least distances from the left and from the right may differ
 
 
@@ -55,10 +56,18 @@ class Tried:
         return not self.invalid and self.played > 0
 
     @property
-    def mirrored(self) -> bool:
-        """Whether the ego let pedestrians from both sides pass alike."""
+    def unlike(self) -> str | None:
+        """How pedestrians from the left and from the right come out differently; None: the ego lets both pass alike."""
         left, right = self.sides
-        return min(left, right) > 0.0 and abs(left - right) <= ALIKE_M
+        if min(left, right) > MET_M:
+            within = f"within {MET_STEPS * STEP_S:.0f} s"
+            return f"the ego meets no pedestrian {within}: it comes no nearer than {min(left, right):.1f} m"
+        touched = [name for name, least_m in zip(("left", "right"), self.sides, strict=True) if least_m == 0.0]
+        if touched:
+            return f"a pedestrian from the {' and from the '.join(touched)} is touched"
+        if abs(left - right) > ALIKE_M:
+            return f"a pedestrian from the left is left {left:.1f} m, one from the right {right:.1f} m"
+        return None
 
 
 def sample(fits: Sequence[Fit], count: int, seed: int) -> list[Fit]:

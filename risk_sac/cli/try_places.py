@@ -30,14 +30,13 @@ def try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:
 
 
 def _wrong(tried: "Tried") -> list[str]:
-    left, right = tried.sides
     whys = list(dict.fromkeys(tried.invalid))
     if not tried.played and not tried.invalid:
         whys.append(f"all scenes are refused: {dict(tried.rejected)}")
     if tried.touched_by_nobody:
         whys.append(f"{tried.touched_by_nobody} contacts although nobody attacks")
-    if not tried.mirrored:
-        whys.append(f"a pedestrian from the left is left {left:.1f} m, one from the right {right:.1f} m")
+    if tried.unlike is not None:
+        whys.append(tried.unlike)
     return whys
 
 
@@ -54,7 +53,7 @@ def _table(found: Survey, tried: Sequence["Tried"]) -> Table:
             sum(each.rejected.total() for each in own),
             sum(len(each.invalid) for each in own),
             sum(each.touched_by_nobody for each in own),
-            sum(each.mirrored for each in own),
+            sum(each.unlike is None for each in own),
         )
         table.add_row(escape(pattern), *map(str, row))
     return table
