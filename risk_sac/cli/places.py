@@ -17,7 +17,7 @@ from risk_sac.cli.text import counted
 from risk_sac.cli.try_places import try_places
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, survey
-from risk_sac.scenario.maps.found import Fit, Misfit, Survey
+from risk_sac.scenario.maps.found import TITLES, Fit, Misfit, Pattern, Survey
 from risk_sac.scenario.maps.keep import Map
 from risk_sac.scenario.maps.net import read_net
 
@@ -40,7 +40,7 @@ def add_places(commands: Commands) -> None:
 
 
 def _places(options: argparse.Namespace) -> int:
-    patterns = (options.pattern,) if options.pattern else tuple(FINDERS)
+    patterns: tuple[Pattern, ...] = (options.pattern,) if options.pattern else tuple(FINDERS)
     with TemporaryDirectory() as folder:
         converted = present_net(options.network, Path(folder))
         net = read_net(converted.file)
@@ -63,10 +63,11 @@ def _places(options: argparse.Namespace) -> int:
     return OK
 
 
-def _tell(pattern: str, found: Survey, most: int, *, why: bool) -> None:
+def _tell(pattern: Pattern, found: Survey, most: int, *, why: bool) -> None:
     fits = [fit for fit in found.fits if fit.spot.pattern == pattern]
     misfits = [misfit for misfit in found.misfits if misfit.spot.pattern == pattern]
-    console.print(f"{pattern}: {counted(len(fits), 'place')}; does not fit at {len(misfits)}", highlight=False)
+    counts = f"{counted(len(fits), 'place')}; does not fit at {len(misfits)}"
+    console.print(f"{TITLES[pattern]} ({pattern}): {counts}", highlight=False)
     if fits:
         console.print(_table("what", [(fit.spot.id, fit.place.summary) for fit in fits], most))
     if why and misfits:

@@ -11,9 +11,13 @@ from matplotlib.figure import Figure
 from risk_sac.canvas import canvas, picture
 from risk_sac.failures.from_above import SURFACE_COLOURS
 from risk_sac.failures.roads import Surface, read_surfaces
-from risk_sac.scenario.maps.found import Survey
+from risk_sac.scenario.maps.found import TITLES, Pattern, Survey
 
-MARKS = {"car_following": ("o", "tab:blue"), "crossing": ("s", "tab:orange"), "junction": ("^", "tab:green")}
+MARKS: dict[Pattern, tuple[str, str]] = {
+    "car_following": ("o", "tab:blue"),
+    "crossing": ("s", "tab:orange"),
+    "junction": ("^", "tab:green"),
+}
 WIDTH_IN, DPI = 9.0, 130
 HEIGHT_IN = (4.5, 12.0)  # the least and the most; in between it goes by the map's
 NAMED = 60  # so many names can be told apart
@@ -38,7 +42,8 @@ def _figure(net: Path, found: Survey) -> Figure:
     for pattern, (marker, colour) in MARKS.items():
         spots = [fit.spot for fit in found.fits if fit.spot.pattern == pattern]
         x, y = [spot.x_m for spot in spots], [spot.y_m for spot in spots]
-        axis.scatter(x, y, s=16, color=colour, marker=marker, alpha=0.8, label=f"{pattern} ({len(spots)})", zorder=3)
+        label = f"{TITLES[pattern]} ({len(spots)})"
+        axis.scatter(x, y, s=16, color=colour, marker=marker, alpha=0.8, label=label, zorder=3)
     if len(found.fits) <= NAMED:
         for x_m, y_m, names in _names(found):
             axis.annotate(names, (x_m, y_m), (3, 3), textcoords="offset points", fontsize=5, zorder=4)

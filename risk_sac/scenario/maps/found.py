@@ -9,6 +9,11 @@ from risk_sac.scenario.maps.net import Net
 from risk_sac.scenario.place import Place
 
 Pattern = Literal["car_following", "crossing", "junction"]
+TITLES: dict[Pattern, str] = {  # what people read
+    "car_following": "Car following",
+    "crossing": "Hidden pedestrian",
+    "junction": "Junction",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
