@@ -111,6 +111,7 @@ def _refuses(service: Service, ground: dict[str, str]) -> None:
         ('<!DOCTYPE osm [<!ENTITY a SYSTEM "file:///etc/passwd">]><osm>&a;</osm>', "got a DOCTYPE"),
         ("<osm><node", "no well-formed XML"),
         (f"<osm>{osm_roundabout(clockwise=True)}</osm>", "left-hand traffic: the roundabout way 99 runs clockwise"),
+        ('<OpenDRIVE><road id="2" rule="LHT"/></OpenDRIVE>', "left-hand traffic: road 2 has rule=LHT"),
         ("<osm></osm>", "netconvert cannot convert the map"),
         ("<OpenDRIVE>" + "<road>" * 30 + "</road>" * 30 + "</OpenDRIVE>", "nested more than 20 deep"),
         ("<OpenDRIVE><include file='/etc/passwd'/></OpenDRIVE>", "netconvert cannot convert the map"),

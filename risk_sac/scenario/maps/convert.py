@@ -70,7 +70,7 @@ def present_net(file: Path, folder: Path) -> Converted:
     if format_ is Format.NET and version >= PRESENT:
         return Converted(plain, ())
     out = folder / "converted.net.xml"
-    sides = side_remarks(plain) if format_ is Format.OSM else []
+    sides = side_remarks(plain) if format_ is not Format.NET else []
     said = _run(format_, plain, out, file.name)
     return Converted(out, (*sides, *remarks(said, "Warning")))
 

@@ -1,8 +1,10 @@
-"""On which side people drive in an OpenStreetMap extract, which netconvert does not ask.
+"""On which side people drive on a map in another format, which netconvert does not ask.
 
-Evidence is `driving_side` on a way or a relation, and each roundabout that is one closed way: it is drawn in the
-direction of driving, which is clockwise where people drive on the left.
-Source: https://wiki.openstreetmap.org/wiki/Key:driving_side, https://wiki.openstreetmap.org/wiki/Tag:junction=roundabout
+In an OpenStreetMap extract, evidence is `driving_side` on a way or a relation, and each roundabout that is one closed
+way: it is drawn in the direction of driving, which is clockwise where people drive on the left. A road of OpenDRIVE has
+a rule, which is right-hand traffic where it is left out.
+Source: https://wiki.openstreetmap.org/wiki/Key:driving_side, https://wiki.openstreetmap.org/wiki/Tag:junction=roundabout,
+  ASAM OpenDRIVE, `rule` of `<road>`
 """
 
 from collections.abc import Callable, Sequence
@@ -14,11 +16,11 @@ from risk_sac.errors import MapError
 from risk_sac.scenario.ground import Point
 
 LEFT, RIGHT = "left", "right"
-UNKNOWN = "the extract does not say on which side people drive: it is read as right-hand traffic"
+UNKNOWN = "the map does not say on which side people drive: it is read as right-hand traffic"
 
 
 def side_remarks(file: Path) -> list[str]:
-    """What whoever reads an extract as right-hand traffic should know.
+    """What whoever reads a map as right-hand traffic should know.
 
     Choice: where the evidence contradicts itself, as where one road has its sides swapped, most of it decides.
 
@@ -34,7 +36,7 @@ def side_remarks(file: Path) -> list[str]:
     right = [where for where, side in said if side == RIGHT]
     if left and len(left) >= len(right):
         more = f" (and {len(left) - 1} more like it)" if len(left) > 1 else ""
-        raise MapError(f"the extract has left-hand traffic: {left[0]}{more}; wanted right-hand traffic")
+        raise MapError(f"the map has left-hand traffic: {left[0]}{more}; wanted right-hand traffic")
     return [] if right else [UNKNOWN]
 
 
@@ -67,7 +69,7 @@ def _area(line: Sequence[Point]) -> float:
 
 
 class _Ways:
-    """Ways and relations as far as they say something; told by the parser."""
+    """Ways, relations and roads as far as they say something; told by the parser."""
 
     def __init__(self) -> None:
         self.tagged: list[tuple[str, str]] = []  # as `_said` has it
@@ -80,6 +82,9 @@ class _Ways:
         match tag:
             case "way" | "relation":
                 self._id, self._nodes, self._tags = attributes.get("id", "?"), [], {}
+            case "road":
+                side = LEFT if attributes.get("rule") == "LHT" else RIGHT
+                self.tagged.append((f"road {attributes.get('id', '?')} has rule={attributes.get('rule')}", side))
             case "nd":
                 self._nodes.append(attributes.get("ref", ""))
             case "tag":
@@ -104,8 +109,8 @@ def _parse(file: Path, start: Callable[[str, dict[str, str]], None], end: Callab
         with file.open("rb") as stream:
             parser.ParseFile(stream)
     except (ExpatError, KeyError, ValueError) as error:
-        raise MapError(f"{file.name} is no OSM extract: {error!r}") from error
+        raise MapError(f"{file.name} is no map: {error!r}") from error
 
 
 def _refuse_doctype(*_: object) -> None:
-    raise MapError("the extract has a DOCTYPE; wanted a document without")
+    raise MapError("the map has a DOCTYPE; wanted a document without")

@@ -71,7 +71,7 @@ def converted(data: bytes, root: str) -> tuple[bytes, list[str]]:
     """
     Path(MAP).write_text(_anew(data), encoding="utf-8")
     try:
-        sides = side_remarks(Path(MAP)) if FORMATS[root] is Format.OSM else []
+        sides = side_remarks(Path(MAP))
         program, environment = netconvert()
     except MapError as error:
         raise UploadError(str(error)) from error

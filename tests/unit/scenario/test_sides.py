@@ -56,6 +56,22 @@ def test_an_extract_that_says_nothing_is_read_as_right_hand_traffic_and_that_is_
     assert side_remarks(extract) == [UNKNOWN]
 
 
+@pytest.mark.parametrize(
+    ("rules", "keeps_left"),
+    [((), None), (('rule="LHT"',), True), (('rule="RHT"',), False), (("",), False), (('rule="LHT"', "", ""), False)],
+)
+def test_opendrive_says_by_the_rules_of_its_roads_on_which_side_people_drive(
+    extract: Path, rules: tuple[str, ...], keeps_left: bool | None
+) -> None:
+    roads = "".join(f'<road id="20" {rule}/>' for rule in rules)
+    extract.write_text(f"<OpenDRIVE>{roads}</OpenDRIVE>")
+    if keeps_left:
+        with pytest.raises(MapError, match="left-hand traffic: road 20 has rule=LHT; wanted"):
+            side_remarks(extract)
+    else:
+        assert side_remarks(extract) == ([UNKNOWN] if keeps_left is None else [])
+
+
 def test_roundabouts_are_read_whatever_comes_first(extract: Path) -> None:
     nodes, mark, ways = osm_roundabout(clockwise=True).partition("<way")
     extract.write_text(f"<osm>{mark}{ways}{nodes}</osm>")
@@ -67,8 +83,8 @@ def test_roundabouts_are_read_whatever_comes_first(extract: Path) -> None:
     ("content", "says"),
     [
         ('<!DOCTYPE osm [<!ENTITY a "b">]><osm/>', "has a DOCTYPE"),
-        ("<osm><node", "is no OSM extract"),
-        (f"<osm>{osm_roundabout(clockwise=True).replace('lat=', 'height=')}</osm>", "is no OSM extract: KeyError"),
+        ("<osm><node", "is no map"),
+        (f"<osm>{osm_roundabout(clockwise=True).replace('lat=', 'height=')}</osm>", "is no map: KeyError"),
     ],
 )
 def test_what_is_no_extract_is_refused(extract: Path, content: str, says: str) -> None:
