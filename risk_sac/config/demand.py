@@ -1,5 +1,6 @@
 """How much memory a run comes to need, told before it begins."""
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -40,7 +41,7 @@ def demand_bytes(spec: RunSpec, observation_size: int, action_size: int, horizon
 
     parameters: P floats; of a network that learns 4 live (value, gradient, two moments of Adam) and 6 in a checkpoint
     (values and moments, copied and written), of a target 2 and 2.
-    replay: a row for each step of the search, up to the capacity, `IN_CHECKPOINT` times.
+    replay: a row for each decision of the search, up to the capacity, `IN_CHECKPOINT` times.
     batch: what enters and leaves each layer of four networks at once.
     """
     method, agent, episodes = method_of(spec.method), spec.learner.agent, spec.budget.episodes
@@ -53,10 +54,10 @@ def demand_bytes(spec: RunSpec, observation_size: int, action_size: int, horizon
     critics, actor_targets = (2, 0) if stochastic else (1, 1)
     floats = (10 + 4 * actor_targets) * parameters(actor) + (10 + 4) * critics * parameters(critic)
     row = FLOAT * (2 * observation_size + action_size + 5) + (4 * DOUBLE if method.replay == "rper" else 0)
-    steps = min(spec.learner.replay.capacity, episodes * horizon_steps)
+    decisions = min(spec.learner.replay.capacity, episodes * math.ceil(horizon_steps / agent.decision_steps))
     return demand | {
         "learner.agent.hidden_sizes": FLOAT * floats,
-        "learner.replay.capacity": IN_CHECKPOINT * row * steps,
+        "learner.replay.capacity": IN_CHECKPOINT * row * decisions,
         "learner.agent.batch_size": FLOAT * agent.batch_size * 4 * 2 * sum(critic),
     }
 

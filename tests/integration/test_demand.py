@@ -50,7 +50,7 @@ print(memory("VmHWM") - before)
 
 
 def run(method: str = "risk-sac", *, episodes: int = 5, capacity: int = 1000, **agent: object) -> RunSpec:
-    agent = {"hidden_sizes": [8], "batch_size": 8, "warmup_steps": 0, "device": "cpu"} | agent
+    agent = {"hidden_sizes": [8], "batch_size": 8, "warmup_steps": 0, "decision_steps": 1, "device": "cpu"} | agent
     learner = {"agent": agent, "replay": {"capacity": capacity}}
     data = {"family": "low", "method": method, "seed": 0, "budget": {"episodes": episodes}, "learner": learner}
     return RunSpec.model_validate(data)
@@ -74,6 +74,16 @@ def test_the_estimate_is_within_a_factor_of_what_is_allocated(spec: RunSpec, tmp
     estimate, allocated = sum(demand.values()) - demand["budget.episodes"], json.loads(said.stdout)
     assert allocated > 100 * 2**20
     assert 0.6 < estimate / allocated < 1.67, demand
+
+
+def test_the_memory_holds_decisions() -> None:
+    demands = [
+        demand_bytes(run(episodes=30, capacity=100_000, decision_steps=steps), OBSERVATION, ACTION, 150)
+        for steps in (1, 5, 7)
+    ]
+    rows = [each["learner.replay.capacity"] for each in demands]
+    assert rows[0] == 5 * rows[1]
+    assert rows[0] * 22 == 150 * rows[2]  # 150 / 7 is less than 22
 
 
 def campaign(methods: list[str], **learner: object) -> CampaignSpec:
