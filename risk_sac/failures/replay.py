@@ -8,6 +8,7 @@ which costs more than what is played.
 
 import json
 import multiprocessing
+import os
 import signal
 import sys
 from collections.abc import Mapping, Sequence
@@ -58,7 +59,8 @@ def _prepared(folders: Sequence[Path]) -> Prepared:
 
 
 def _say(folder: Path, **told: object) -> None:
-    print(json.dumps({"folder": str(folder)} | told), flush=True)  # noqa: T201 - to whoever started it
+    """Tells whoever started it, in one write: several processes share the output, and `print` may end a line later."""
+    os.write(sys.stdout.fileno(), f"{json.dumps({'folder': str(folder)} | told)}\n".encode())
 
 
 def _tell(runs: Prepared) -> None:

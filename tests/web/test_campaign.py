@@ -139,6 +139,7 @@ def test_cancelling_asks_first(page_at: Callable[..., Page], service: Service) -
     page = page_at(f"campaigns/{running}")
     page.get_by_role("button", name="Cancel").click()
     question = page.get_by_role("dialog", name="Cancel this campaign?")
+    expect(question).to_be_visible()
     page.keyboard.press("Escape")
     expect(question).to_have_count(0)
     assert service.get(running)["state"] in ("queued", "running")
