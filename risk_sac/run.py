@@ -85,8 +85,9 @@ class RunState:
     def learning(self) -> bool:
         """Whether the next episode is one of the search; in the evaluation the policy is frozen."""
         budget, played = self.spec.budget, self._search.episodes
-        spent = bool(played) and budget.cpu_s is not None and self._episode_cpu_s[played - 1] >= budget.cpu_s
-        return played < budget.episodes and not spent
+        if played < budget.least_episodes or budget.cpu_s is None:
+            return played < budget.episodes
+        return played < budget.episodes and self._episode_cpu_s[played - 1] < budget.cpu_s
 
     @property
     def phase(self) -> Phase:

@@ -31,6 +31,9 @@ def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, method
         "--cpu-s", type=float, metavar="S", help="processor time after which a search ends (default: none)"
     )
     parser.add_argument(
+        "--least-episodes", type=int, metavar="N", help="search episodes that --cpu-s does not cut off (default: 1)"
+    )
+    parser.add_argument(
         "--iid", type=int, metavar="N", help="end with N scenes that no search has chosen, for bounds (default: none)"
     )
     parser.add_argument("--iid-seed", type=int, metavar="S", help="of those scenes (default: 0)")
@@ -57,7 +60,7 @@ def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:
     Raises:
       ConfigError: so many seeds are too many.
     """
-    names = ("families", "methods", "episodes", "evaluation_episodes", "cpu_s")
+    names = ("families", "methods", "episodes", "evaluation_episodes", "cpu_s", "least_episodes")
     flags = {name: getattr(options, name) for name in names}
     return flags | {"seeds": _seeds(options, seeds), "iid": _iid(options)}
 

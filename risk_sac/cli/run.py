@@ -29,13 +29,16 @@ def add_run(commands: Commands) -> None:
     run.add_argument(
         "--cpu-s", type=float, metavar="S", help="processor time after which the search ends (default: none)"
     )
+    run.add_argument(
+        "--least-episodes", type=int, metavar="N", help="search episodes that --cpu-s does not cut off (default: 1)"
+    )
     run.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
     run.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags go first")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
 
 
 def _run(options: argparse.Namespace) -> int:
-    names = ("family", "method", "seed", "episodes", "evaluation_episodes", "cpu_s")
+    names = ("family", "method", "seed", "episodes", "evaluation_episodes", "cpu_s", "least_episodes")
     families = families_on_map(options)
     if families:
         options.family = families[0]

@@ -64,6 +64,14 @@ class Budget(Settings):
     cpu_s: Annotated[float, Field(ge=0.1, le=1e7)] | None = None
     """Processor time after which a search ends that has episodes left, s; how many it has played then depends on the
     processor."""
+    least_episodes: Annotated[int, Field(ge=1, le=100_000)] = 1
+    """Search episodes that are played whatever the processor time, so that one run serves two budgets."""
+
+    @model_validator(mode="after")
+    def _least_is_affordable(self) -> Self:
+        if self.least_episodes > self.episodes:
+            raise ValueError(f"least_episodes is {self.least_episodes}; wanted at most episodes, {self.episodes}")
+        return self
 
     @property
     def total_episodes(self) -> int:

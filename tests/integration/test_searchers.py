@@ -96,3 +96,8 @@ def test_a_search_ends_when_its_processor_time_is_spent_and_is_then_evaluated(tm
     assert 0 < phases.count("train") < 50
     assert len(phases) == phases.count("train") + 2
     assert records == played(tmp_path, spec("random", budget))  # told again, and not gone on with
+
+
+def test_processor_time_does_not_cut_off_the_least_episodes(tmp_path: Path) -> None:
+    budget = Budget(episodes=50, least_episodes=6, cpu_s=0.1)  # which the third episode at the latest has spent
+    assert len(played(tmp_path, spec("random", budget))) == 6
