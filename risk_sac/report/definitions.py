@@ -1,6 +1,7 @@
 """What the words and figures of the page mean."""
 
 from risk_sac.metrics import METRICS, RATIOS, Metric, Ratio
+from risk_sac.report.comparison import DECLARED, REFERENCE, RIVALS
 from risk_sac.report.paired import LEVEL
 
 ROWS: dict[str, Metric | Ratio] = {row.name: row for row in (*METRICS, *RATIOS)}
@@ -39,9 +40,10 @@ def definitions() -> str:
         "paired bootstrap 95 % interval.",
         "- A12 (Vargha-Delaney): chance that a run of the first method has the larger value; 0.5 is no difference.",
         "- p: Wilcoxon signed-rank, two-sided, exact also with ties; zero differences are left out.",
-        "- p (Holm): corrected over all methods and metrics of one family and phase, which are one family of "
-        "hypotheses, and by itself for distinct preventable failures within a budget, the hypotheses declared before "
-        f"any run; bold below {LEVEL:g}.",
+        "- p (Holm): corrected over the hypotheses of one family and phase that were declared before any run, apart "
+        f"for {' and '.join(symbol(name) for name in DECLARED)} of {REFERENCE} against {' and '.join(RIVALS)} and for "
+        "distinct preventable failures within a budget, and over all the other methods and metrics together; bold "
+        f"below {LEVEL:g}.",
         f"- {symbol('distinct_per_1000_steps')} is tested in place of its reciprocal, "
         f"{symbol('steps_per_distinct_failure')}, because a run without a failure has it too.",
     ]

@@ -9,7 +9,7 @@ from risk_sac.metrics import Estimate
 from risk_sac.records import Phase
 from risk_sac.report.budgets import HEADLINE, LIMITS, found_within
 from risk_sac.report.cells import Cell, metrics_of
-from risk_sac.report.comparison import Comparison
+from risk_sac.report.comparison import Comparison, declared
 from risk_sac.report.definitions import ROWS, definitions, symbol
 from risk_sac.report.kinds import clusters, signatures, studies
 from risk_sac.report.page import DASH, interval, number, percent, table
@@ -176,7 +176,11 @@ def _tests(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     tests = [test for test in comparison.tests if (test.family, test.phase) == (family, phase)]
     if not tests:
         return ""
-    return f"### {comparison.reference} against the others: {family}, {phase}\n\n" + _tested(tests)
+    title = f"### {comparison.reference} against the others: {family}, {phase}\n\n"
+    parts = [test for test in tests if declared(test)], [test for test in tests if not declared(test)]
+    if not all(parts):
+        return title + _tested(tests)
+    return f"{title}Declared before any run:\n\n{_tested(parts[0])}The rest:\n\n{_tested(parts[1])}"
 
 
 def _tested(tests: Sequence[PairedTest]) -> str:

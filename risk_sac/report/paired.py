@@ -31,7 +31,7 @@ class PairedTest:
     p: float | None
     """Wilcoxon signed-rank, exact, two-sided; null with fewer than two pairs."""
     p_holm: float | None
-    """Corrected over all tests of the same family and phase."""
+    """Corrected over the tests of the same family and phase that were declared beforehand, or over all others."""
     a12: float | None
     """Vargha-Delaney: chance that the reference's value is the larger one."""
 

@@ -6,6 +6,8 @@ import pytest
 from risk_sac.config import CampaignSpec
 from risk_sac.metrics import bootstrap_interval, wilson_interval
 from risk_sac.report import compare
+from risk_sac.report.comparison import declared
+from risk_sac.report.statistics import holm
 from risk_sac.scenario.families import FAMILIES
 
 HORIZON = FAMILIES["low"].horizon_steps
@@ -105,6 +107,9 @@ def test_holm_corrects_over_family_and_phase(comparison):
     assert len(search) == 2 * 6
     with_p = [test for test in search if test.p is not None]
     assert all(test.p_holm >= test.p for test in with_p)
+    ours = [test for test in search if declared(test)]
+    assert {(test.metric, test.method) for test in ours} == {("ecr", "sac"), ("pcr", "sac")}
+    assert [test.p_holm for test in ours] == holm([test.p for test in ours])
     ofd = [test for test in search if test.metric == "ofd"]
     assert all(
         (test.pairs, test.p, test.p_holm, test.difference, test.a12) == (0, None, None, None, None) for test in ofd

@@ -131,7 +131,7 @@ def test_page_names_the_rules_that_make_an_artefact(comparison):
 def test_page_says_what_two_pairs_cannot_show(comparison):
     page = table_markdown(comparison)
     assert (
-        "The smallest p that 2 pairs can give is 0.5; corrected over 10 tests it is at best 1. So no corrected" in page
+        "The smallest p that 2 pairs can give is 0.5; corrected over 2 tests it is at best 1. So no corrected" in page
     )
     assert "that takes 9 seeds" in page
 

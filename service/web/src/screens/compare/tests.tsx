@@ -65,7 +65,7 @@ function TestTable({ tests, caption }: { tests: Test[]; caption: string }) {
             <th scope="col" class="rate">Difference, 95 % interval</th>
             <th scope="col" class="number" title="Chance that a run of the reference has the larger value; 0.5 is no difference">A12</th>
             <th scope="col" class="number" title="Wilcoxon signed-rank, two-sided">p</th>
-            <th scope="col" class="number" title="Corrected over all methods and measures of the family">p (Holm)</th>
+            <th scope="col" class="number" title="Corrected over what was declared beforehand, or over all the rest">p (Holm)</th>
             <th scope="col" class="number">Pairs</th>
           </tr>
         </thead>
