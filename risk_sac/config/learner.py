@@ -31,8 +31,9 @@ class AgentConfig(Settings):
     random."""
     decision_steps: Annotated[int, Field(ge=1, le=50)] = 5
     """Environment steps for which the policy holds an action; they make one transition of the memory."""
-    updates_per_step: Annotated[float, Field(ge=0, le=20)] = 0.25
-    """One update in four environment steps: an update costs as much as several of them."""
+    updates_per_step: Annotated[float, Field(ge=0, le=20)] = 1.0
+    """Updates in an environment step, so five in a decision. An update costs as much as several steps: fewer find
+    failures sooner, and come to a worse policy."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """Where the networks live; `auto` takes the GPU where there is one that updates them faster than the processor.
     Results are reproducible on equal devices only."""
@@ -79,8 +80,9 @@ class LagrangianConfig(Settings):
     """η_λ."""
     cost_limit: Fraction = 0.2
     """d, on the policy's mean realism cost per step, which is in [0, 1]; undisturbed traffic costs 0.01 to 0.05."""
-    maximum: Annotated[float, Field(ge=1e-6, le=1000)] = 0.5
-    """Cap on λ, so that a burst of cost cannot drown the risk reward for good."""
+    maximum: Annotated[float, Field(ge=1e-6, le=1000)] = 0.15
+    """Cap on λ, so that a burst of cost cannot drown the risk reward for good; at 0.5 an episode would pay for its cost
+    what a failure is worth."""
 
 
 class RewardConfig(Settings):
