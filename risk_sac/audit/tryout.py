@@ -23,18 +23,19 @@ from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
 from risk_sac.scenario.maps.found import Fit
 from risk_sac.sim.commands import Walker
-from risk_sac.sim.paths import STATION
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Role, Signal
 
 LEFT, RIGHT = 1, -1
 ASIDE_M, PACE_MPS = 6.0, 1.4  # where the pedestrian comes from, and how fast
 AHEAD_S = 6.0  # of driving to where it crosses
+WALKED_STEPS = round(ASIDE_M / PACE_MPS / STEP_S)
+DRIVING_MPS = 2.0  # who is slower is not driven past, but stops as a matter of course
 MET_STEPS = 120
 STANDING_MPS = 0.5
 OFFSETS = 41  # of a cycle that are looked at
 MET_M = 5.0  # who comes no nearer to a pedestrian has not met it
-ALIKE_M = 0.5  # by which the least distances from the left and from the right may differ
+ALIKE_M = 1.0  # by which least distances may differ: who changes lanes, or turns, comes nearer to one side
 
 
 @dataclass(slots=True)
@@ -59,6 +60,8 @@ class Tried:
     def unlike(self) -> str | None:
         """How pedestrians from the left and from the right come out differently; None: the ego lets both pass alike."""
         left, right = self.sides
+        if math.isinf(min(left, right)):
+            return "the ego stands where nobody is in its way: no pedestrian can meet it"
         if min(left, right) > MET_M:
             within = f"within {MET_STEPS * STEP_S:.0f} s"
             return f"the ego meets no pedestrian {within}: it comes no nearer than {min(left, right):.1f} m"
@@ -126,6 +129,9 @@ def _episode(env: RiskSacEnv, tried: Tried, draw: np.random.Generator, *, contro
 def meet(sim: SumoSimulation, family: str, side: int) -> float:
     """Least distance of an ego, alone on the road, to a pedestrian that would meet it; 0 if it touches it.
 
+    The pedestrian crosses where the ego drives when nobody is there, and is in the middle of its way at that moment:
+    in bends, and where the ego changes lanes, as well as on a straight road.
+
     Args:
       sim: plays it.
       family: of the place; the ego starts as in the middle of its scenes.
@@ -134,24 +140,17 @@ def meet(sim: SumoSimulation, family: str, side: int) -> float:
     found = family_named(family)
     middle = found.layout(found.space.from_unit(np.full(found.space.dimension, 0.5)).values)
     alone = _at_green(sim, replace(middle, vehicles=(), pedestrians=()), _cycle_s(found))
-    sim.reset(alone, 1)
-    speed = max(alone.ego.speed_mps, 1.0)
-    ahead_m = AHEAD_S * speed + ASIDE_M
-    path, station_m, _ = sim.along(alone.ego.id)
-    i = min(int(np.searchsorted(path.points[STATION], station_m + ahead_m)), path.points.shape[1] - 1) - 1
-    x, y, start_m, heading = path.points[:4, i]
-    along_m, cos, sin = station_m + ahead_m - start_m, math.cos(heading), math.sin(heading)
-    there = x + along_m * cos, y + along_m * sin
-    x, y = there[0] - side * ASIDE_M * sin, there[1] + side * ASIDE_M * cos
+    there = _driven_to(sim, alone)
+    if there is None:
+        return math.inf
+    arrives, x, y, heading = there
+    x, y = x - side * ASIDE_M * math.sin(heading), y + side * ASIDE_M * math.cos(heading)
     towards = heading - side * math.pi / 2
     start = PedestrianStart(id="walker", role=Role.ADVERSARY, x_m=x, y_m=y, heading_rad=towards, speed_mps=0.0)
     sim.reset(replace(alone, pedestrians=(start,)), 1)
-    least_m, walks = math.inf, False
-    frame = sim.step()
-    for _ in range(MET_STEPS):
-        left_m = math.hypot(there[0] - float(frame.x_m[0]), there[1] - float(frame.y_m[0]))
-        walks = walks or left_m <= frame.ego_speed_mps * ASIDE_M / PACE_MPS
-        pace = PACE_MPS if walks else 0.0
+    least_m = math.inf
+    for step in range(1, MET_STEPS + 1):
+        pace = PACE_MPS if step > arrives - WALKED_STEPS else 0.0
         x, y = x + pace * STEP_S * math.cos(towards), y + pace * STEP_S * math.sin(towards)
         sim.apply({}, {"walker": Walker(x, y, towards, pace)})
         frame = sim.step()
@@ -159,6 +158,16 @@ def meet(sim: SumoSimulation, family: str, side: int) -> float:
         if frame.ego_speed_mps >= STANDING_MPS:  # who stands is walked into, whatever it does
             least_m = min(least_m, 0.0 if view.overlap[0] else float(view.gap[0]))
     return least_m
+
+
+def _driven_to(sim: SumoSimulation, alone: Layout) -> tuple[int, float, float, float] | None:
+    """In which step the ego drives where after AHEAD_S, if nobody is there: step, x, y, heading; None: it stands."""
+    sim.reset(alone, 1)
+    for step in range(1, MET_STEPS + 1):
+        frame = sim.step()
+        if step * STEP_S >= AHEAD_S and frame.ego_speed_mps >= DRIVING_MPS:
+            return step, float(frame.x_m[0]), float(frame.y_m[0]), float(frame.heading_rad[0])
+    return None
 
 
 def _cycle_s(family: Family) -> float:

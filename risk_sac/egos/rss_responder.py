@@ -7,7 +7,7 @@ from risk_sac.egos.road import lane_keeping
 from risk_sac.egos.seam import Control, Episode, Perceived, Vehicle
 from risk_sac.risk.rss import lateral, opposite_direction, same_direction
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.sim.lookout import project
+from risk_sac.sim.lookout import BEHIND_M, BEYOND_M, project, stretch
 from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, X, Y
 
 RSS = RssParameters(response_s=0.3, brake_min_mps2=6.0, brake_max_mps2=8.0)
@@ -49,7 +49,8 @@ class RssResponder:
 def dangerous(perceived: Perceived, column: int) -> bool:
     """Whether the distances to somebody ahead, along the path and across it, are both smaller than RSS's."""
     p, state = perceived, perceived.state
-    station, across, way = project(p.path, state[X, column], state[Y, column])
+    near = stretch(p.path, p.station_m - BEHIND_M, p.station_m + REACH_M + BEYOND_M)
+    station, across, way = project(near, state[X, column], state[Y, column])
     cos, sin = abs(math.cos(state[HEADING, column] - way)), abs(math.sin(state[HEADING, column] - way))
     half_length, half_width = state[LENGTH, column] / 2, state[WIDTH, column] / 2
     gap_m = station - half_length * cos - half_width * sin - p.station_m

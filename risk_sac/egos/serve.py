@@ -7,7 +7,7 @@ import argparse
 import json
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -34,7 +34,8 @@ from risk_sac.types import STEP_S, Floats, Kind, Signal
 
 logger = logging.getLogger(__name__)
 
-MOST_SESSIONS = 64  # a client that died closed nothing; the oldest goes
+MOST_SESSIONS = 64  # who never acted closed nothing; the oldest goes
+SPARE_THREADS = 16  # beside one for each session: to start and to close them
 
 
 @dataclass(slots=True)
@@ -71,23 +72,35 @@ class Sessions:
             self._sessions[request["session"]] = session
         return {"version": self._version}
 
-    def act(self, request: Message, context: Any) -> Message:
-        """One step."""
+    def act(self, requests: Iterator[Message], context: Any) -> Iterator[Message]:
+        """An episode's steps; the session is over with them, also if the client is gone."""
+        name = ""
+        try:
+            for request in requests:
+                name = request["session"]
+                yield self._step(request, context)
+        finally:
+            self._end(name)
+
+    def close(self, request: Message, context: Any) -> Message:
+        """An episode is over."""
+        self._end(request["session"])
+        return {}
+
+    def _step(self, request: Message, context: Any) -> Message:
         session = self._sessions.get(request["session"])
         if session is None:
             context.abort(grpc.StatusCode.NOT_FOUND, f"there is no session {request['session']!r}")
         assert session is not None
         if "path" in request:
             session.path = path_of(request["path"])
-        return command_message(session.ego.act(perceived_of(request, session.path)))
+        return command_message(session.ego.act(perceived_of(request, session.path)), request["time_s"])
 
-    def close(self, request: Message, context: Any) -> Message:
-        """An episode is over."""
+    def _end(self, name: str) -> None:
         with self._lock:
-            session = self._sessions.pop(request["session"], None)
+            session = self._sessions.pop(name, None)
         if session is not None:
             session.ego.close()
-        return {}
 
 
 def warm_up(ego: Ego) -> None:
@@ -104,23 +117,24 @@ def warm_up(ego: Ego) -> None:
     ego.close()
 
 
-def serve(sessions: Sessions, address: str, threads: int = 4) -> tuple[grpc.Server, int]:
+def serve(sessions: Sessions, address: str) -> tuple[grpc.Server, int]:
     """A server at work, and its port.
 
     Raises:
       RuntimeError: the address cannot be listened on.
     """
-    answers = {"Start": sessions.start, "Act": sessions.act, "Close": sessions.close}
+    answers = {
+        "Start": partial(grpc.unary_unary_rpc_method_handler, sessions.start),
+        "Act": partial(grpc.stream_stream_rpc_method_handler, sessions.act),
+        "Close": partial(grpc.unary_unary_rpc_method_handler, sessions.close),
+    }
     handlers = {
-        name: grpc.unary_unary_rpc_method_handler(
-            answers[name],
-            request_deserializer=partial(decode, request),
-            response_serializer=partial(encode, reply),
-        )
+        name: answers[name](request_deserializer=partial(decode, request), response_serializer=partial(encode, reply))
         for name, (request, reply) in METHODS.items()
     }
     # Without the option a second server would share the port, and every other session.
-    server = grpc.server(ThreadPoolExecutor(threads), options=[("grpc.so_reuseport", 0)])
+    threads = ThreadPoolExecutor(MOST_SESSIONS + SPARE_THREADS)
+    server = grpc.server(threads, options=[("grpc.so_reuseport", 0)])
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
     port = server.add_insecure_port(address)
     server.start()

@@ -29,6 +29,7 @@ MARGIN_M = 0.375  # on either side of the vehicle's body: the room in which a la
 YIELDING_MPS2 = 2.5  # of crossing traffic; SUMO's drivers, who stop well before the junction, never need more for it
 SAME_WAY_COS = 0.5
 MOVING_MPS = 0.5
+BEHIND_M, BEYOND_M = 60.0, 10.0  # of a path beside what is driven meanwhile, on which others are looked for
 NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
 
 
@@ -78,6 +79,21 @@ def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
             station = path_station[i] + along
             offset = across
     return station, offset, points[PATH_HEADING, nearest]
+
+
+@compiled
+def stretch(points: Floats, first_m: float, last_m: float) -> Floats:
+    """The segments of a path between two stations.
+
+    A path may come back beside itself, as behind a roundabout. Who is on the ego's way now would be found where the ego
+    comes by much later, were the whole path looked at.
+    """
+    stations, first, last = points[STATION], 0, points.shape[1] - 1
+    while first + 1 < last and stations[first + 1] <= first_m:
+        first += 1
+    while last - 1 > first and stations[last - 1] >= last_m:
+        last -= 1
+    return points[:, first : last + 1]
 
 
 @compiled
@@ -142,11 +158,12 @@ def targets(
     corridor = width_m / 2 + MARGIN_M
     kept, fastest = foreseen(points, front_m, speed_mps, 0.0), foreseen(points, front_m, speed_mps, accel_mps2)
     reach = fastest[-1] - front_m + length_m
+    near = stretch(points, front_m - BEHIND_M, fastest[-1] + BEYOND_M)
     for i in range(n):
         if i == own or not candidate[i]:
             continue
         speed, half_length, half_width = math.hypot(vx[i], vy[i]), state[LENGTH, i] / 2, state[WIDTH, i] / 2
-        s_now, _, way = project(points, x[i], y[i])
+        s_now, _, way = project(near, x[i], y[i])
         if abs(s_now - front_m) > reach + speed * LOOK_S:
             continue
         v_along = vx[i] * math.cos(way) + vy[i] * math.sin(way)
@@ -158,7 +175,7 @@ def targets(
         cos, sin = _turned(heading[i] - way)
         for k in range(round(look / TICK_S) + 1):
             t = k * TICK_S
-            s, d, way_then = project(points, x[i] + vx[i] * t, y[i] + vy[i] * t)
+            s, d, way_then = project(near, x[i] + vx[i] * t, y[i] + vy[i] * t)
             if way_then != way:
                 way = way_then
                 cos, sin = _turned(heading[i] - way)

@@ -1,7 +1,9 @@
 """Where a vehicle will drive: the centre line of its lanes along its route, junctions included."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import libsumo
@@ -11,6 +13,8 @@ from risk_sac.types import Floats
 
 AHEAD_M = 120.0  # of road beyond a lane's own end: at 16 m/s more than anybody looks ahead
 SAME_POINT_M = 1e-3
+SHIFT_M = 1.0  # by which a lane may begin beside or before the end of the one that leads to it
+TAPER_M = 5.0  # of the way to that lane on which the path makes up for it
 
 
 # Rows of a path's points.
@@ -100,9 +104,14 @@ def _edge(lane: str) -> str:
 
 
 def _path(lanes: Sequence[str]) -> Path:
-    shapes = [libsumo.lane.getShape(lane) for lane in lanes]
-    points = np.array([point for shape in shapes for point in shape])
-    limit = np.repeat([libsumo.lane.getMaxSpeed(lane) for lane in lanes], [len(shape) for shape in shapes])
+    lines = [np.array(libsumo.lane.getShape(lane)) for lane in lanes]
+    return path_along(lines, [libsumo.lane.getMaxSpeed(lane) for lane in lanes])
+
+
+def path_along(lines: Sequence[Floats], limits_mps: Sequence[float]) -> Path:
+    """The path along the lines of lanes that follow each other, `points x 2` each, and their limits."""
+    lines = joined(lines)
+    points, limit = np.concatenate(lines), np.repeat(limits_mps, [len(line) for line in lines])
     # Where lanes meet there are two points; the one that stays is the first of the lane that follows.
     apart = np.append(np.hypot(*np.diff(points, axis=0).T) > SAME_POINT_M, True)
     points, limit = points[apart], limit[apart]
@@ -110,3 +119,25 @@ def _path(lanes: Sequence[str]) -> Path:
     station = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
     heading = np.arctan2(steps[:, 1], steps[:, 0])
     return Path.of(points[:, 0], points[:, 1], station, np.append(heading, heading[-1]), limit)
+
+
+def joined(lines: Sequence[Floats]) -> list[Floats]:
+    """The lines of lanes that follow each other, without the step from one to the next.
+
+    Nets are rounded to centimetres, and some are drawn less exactly, so that a lane begins a little beside
+    where the one before it ends. The step there is a segment of the path in any direction, across it or back. Whoever
+    is near it would be taken to be on the path for a moment, and gone from it in the next.
+
+    Args:
+      lines: `points x 2` each.
+
+    Returns:
+      The same; of a lane that leads to such a step the last `TAPER_M` are left out.
+    """
+    found = list(lines)
+    for i, (line, following) in enumerate(pairwise(lines)):
+        if SAME_POINT_M < math.dist(line[-1], following[0]) <= SHIFT_M:
+            last_m = math.dist(line[-2], line[-1])
+            off = [line[-1] + (line[-2] - line[-1]) * TAPER_M / last_m] if last_m > TAPER_M else []
+            found[i] = np.array([*line[:-1], *off])
+    return found

@@ -1,13 +1,14 @@
 """Our end of the protocol: an ego in another process, as one of ours."""
 
 import uuid
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import grpc
 
 from risk_sac.egos.guard import CRASH, DEADLINE, MALFORMED
-from risk_sac.egos.remote.messages import METHODS, SERVICE, command_of, observation, start_request
+from risk_sac.egos.remote.messages import METHODS, PROTOCOL, SERVICE, command_of, observation, start_request
+from risk_sac.egos.remote.turns import Late, Turns
 from risk_sac.egos.remote.wire import Message, decode, encode
 from risk_sac.egos.seam import Command, Episode, Perceived
 from risk_sac.errors import EgoFailed
@@ -34,6 +35,7 @@ class RemoteEgo:
         self._channel: Any = None
         self._call: Mapping[str, Any] = {}
         self._session = ""
+        self._turns: Turns | None = None
         self._path: Floats | None = None
 
     def reset(self, episode: Episode) -> None:
@@ -44,27 +46,34 @@ class RemoteEgo:
         """
         if self._channel is None:
             self._channel = grpc.insecure_channel(self._address, options=OPTIONS)
-            self._call = {name: self._channel.unary_unary(f"/{SERVICE}/{name}") for name in METHODS}
+            self._call = {name: self._channel.unary_unary(f"/{SERVICE}/{name}") for name in ("Start", "Close")}
         self._end()
         self._session, self._path = str(uuid.uuid4()), None
-        reply = self._ask("Start", start_request(episode, self._session))
+        start = start_request(episode, self._session)
+        reply = self._asked("Start", start, lambda request: self._call["Start"](request, timeout=self._deadline_s))
         if reply["version"] != self._version:
             raise EgoFailed(
                 f"the ego {self._name!r} is of version {reply['version']!r}; registered is {self._version!r}",
                 reason=VERSION,
             )
+        self._turns = Turns(self._channel.stream_stream(f"/{SERVICE}/Act"), self._deadline_s)
 
     def act(self, perceived: Perceived) -> Command:
         """Tells what is perceived and returns what is commanded.
 
         Raises:
-          EgoFailed: it does not answer in time, or with nothing.
+          EgoFailed: it does not answer in time, or with nothing, or to something else.
         """
+        assert self._turns is not None
         message = observation(perceived, self._session, new_path=perceived.path is not self._path)
         self._path = perceived.path
-        command = command_of(self._ask("Act", message))
+        reply = self._asked("Act", message, self._turns.ask)
+        command = command_of(reply)
         if command is None:
             raise EgoFailed("the ego answered neither a control nor a trajectory", reason=MALFORMED)
+        if reply["time_s"] != message["time_s"]:
+            said = f"an observation of {reply['time_s']!r} s; wanted that of {message['time_s']!r} s"
+            raise EgoFailed(f"the ego {self._name!r} answered {said}", reason=MALFORMED)
         return command
 
     def close(self) -> None:
@@ -75,23 +84,34 @@ class RemoteEgo:
             self._channel = None
 
     def _end(self) -> None:
+        if self._turns is not None:
+            self._turns.close()
+            self._turns = None
         if self._session:
             session, self._session = self._session, ""
             request = encode("CloseRequest", {"session": session})
             self._call["Close"].future(request, timeout=self._deadline_s)  # nobody waits
 
-    def _ask(self, name: str, message: Message) -> Message:
+    def _asked(self, name: str, message: Message, ask: Callable[[bytes], bytes]) -> Message:
         request, reply = METHODS[name]
         try:
-            return decode(reply, self._call[name](encode(request, message), timeout=self._deadline_s))
+            return decode(reply, ask(encode(request, message)))
         except ValueError as error:
             raise EgoFailed(f"the ego {self._name!r} answered {error}", reason=MALFORMED) from error
+        except StopIteration as error:
+            raise EgoFailed(f"the ego {self._name!r} ended the session unasked", reason=CRASH) from error
+        except Late as error:
+            raise self._late() from error
         except grpc.RpcError as error:
             code = error.code()
-            late = code is grpc.StatusCode.DEADLINE_EXCEEDED
+            if code is grpc.StatusCode.DEADLINE_EXCEEDED:
+                raise self._late() from error
             said = f"failed: {code.name}: {error.details()}"
-            if late:
-                said = f"did not answer within {self._deadline_s:g} s"
+            if code is grpc.StatusCode.UNIMPLEMENTED:
+                said = f"does not speak version {PROTOCOL} of the protocol"
             elif code is grpc.StatusCode.UNAVAILABLE:  # whose details name the address
                 said = "is not there: nobody answers at the address that it is registered with"
-            raise EgoFailed(f"the ego {self._name!r} {said}", reason=DEADLINE if late else CRASH) from error
+            raise EgoFailed(f"the ego {self._name!r} {said}", reason=CRASH) from error
+
+    def _late(self) -> EgoFailed:
+        return EgoFailed(f"the ego {self._name!r} did not answer within {self._deadline_s:g} s", reason=DEADLINE)

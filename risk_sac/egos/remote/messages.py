@@ -11,11 +11,11 @@ from risk_sac.egos.remote.wire import SCHEMA, Message
 from risk_sac.egos.seam import Command, Control, Episode, Perceived, Trajectory, Vehicle
 from risk_sac.types import ACCEL, HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Floats, Signal, X, Y
 
-PROTOCOL = 1
-SERVICE = "risk_sac.egos.v1.Ego"
+PROTOCOL = 2
+SERVICE = "risk_sac.egos.v2.Ego"
 METHODS = {  # request and reply
     "Start": ("StartRequest", "StartReply"),
-    "Act": ("Observation", "Command"),
+    "Act": ("Observation", "Command"),  # a stream of each
     "Close": ("CloseRequest", "CloseReply"),
 }
 ROWS = {"x_m": X, "y_m": Y, "heading_rad": HEADING, "vx_mps": VX, "vy_mps": VY, "length_m": LENGTH, "width_m": WIDTH}
@@ -81,9 +81,9 @@ def path_of(message: Message) -> Floats:
     return np.array([*(message[name] for name in PATH), np.cos(heading), np.sin(heading)])
 
 
-def command_message(command: Command) -> Message:
-    """What the ego answers."""
-    return {"control" if isinstance(command, Control) else "trajectory": command._asdict()}
+def command_message(command: Command, time_s: float) -> Message:
+    """What the ego answers to the observation of a time."""
+    return {"control" if isinstance(command, Control) else "trajectory": command._asdict(), "time_s": time_s}
 
 
 def command_of(message: Message) -> Command | None:

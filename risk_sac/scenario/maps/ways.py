@@ -74,7 +74,7 @@ def way_back(net: Net, last: Lane, metres: float, onward: Sequence[str] = ()) ->
     """The straightest way to a lane, up to so much of it before that lane; shorter where the map ends.
 
     It also ends where a lane forks into several of the next road, and whoever comes from there would be driven by SUMO
-    into another of them.
+    into another of them; and at a signal, for whoever starts before it may stand at its red light until the end.
 
     Args:
       net: where.
@@ -90,7 +90,10 @@ def way_back(net: Net, last: Lane, metres: float, onward: Sequence[str] = ()) ->
         before = [
             link
             for link in arriving
-            if link.source.edge not in been and _is_taken(net, link, following) and too_near(net, link) is None
+            if link.signal is None
+            and link.source.edge not in been
+            and _is_taken(net, link, following)
+            and too_near(net, link) is None
         ]
         if not before:
             break

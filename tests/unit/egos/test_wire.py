@@ -16,7 +16,7 @@ OBSERVATION = {
     "signal": 3,
     "stop_line_m": math.inf,
 }
-# protoc --encode=risk_sac.egos.v1.Observation, of the same as text.
+# protoc --encode=risk_sac.egos.v2.Observation, of the same as text.
 BY_PROTOC = bytes.fromhex(
     "0a03c3a43111000000000000f83f1a210a0365676f0a046c656164120200011a10000000000000000000000000000004c038034100000000"
     "0000f07f"

@@ -259,6 +259,20 @@ BEND = (
     '<connection from="a" to="b" fromLane="0" toLane="0" via=":1_0_0" dir="l"/>'
     '<connection from="a" to="b" fromLane="1" toLane="1" via=":1_0_1" dir="l"/></net>'
 )
+
+
+@pytest.mark.parametrize(("signal", "comes_from"), [("", ["a"]), (' tl="t" linkIndex="0"', [])])
+def test_nobody_is_placed_before_a_signal_that_may_be_red_until_the_end(
+    tmp_path: Path, signal: str, comes_from: list[str]
+) -> None:
+    file = tmp_path / "map.net.xml"
+    to_the_left = '<connection from="a" to="b" fromLane="0" toLane="1" dir="s"'
+    file.write_text(FORK.format(right="").replace(to_the_left, to_the_left + signal))
+    net = read_net(file)
+    way = way_back(net, net.lane("b_1"), 150.0, ["c"])
+    assert [lane.edge for lane in way.lanes] == [*comes_from, "b"]
+
+
 WIDE, NARROW = "7,6 14,11", "9,4.5 16,9"
 
 

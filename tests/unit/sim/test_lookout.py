@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shapely import LineString, Point
 
 from risk_sac.sim.lookout import MARGIN_M, near_pedestrians, project, targets
-from risk_sac.sim.paths import Path
+from risk_sac.sim.paths import Path, path_along
 from risk_sac.types import Kind
 from tests.roads import road
 from tests.unit.sim.contacts import CAR, WALKER, WIDTH_M, Actor, frames
@@ -84,6 +84,30 @@ def test_a_driver_that_has_stopped_waits_until_the_pedestrian_has_left_its_corri
 @sides
 def test_who_walks_away_is_no_target(side: int) -> None:
     assert target(walker(50.0, side * 2.0, side * 1.4)) == NOBODY
+
+
+@sides
+@pytest.mark.parametrize("step_m", [0.0, 0.01, -0.01, 0.35, -0.35])
+def test_who_walks_in_where_one_lane_leads_to_another_is_seen_from_either_side(step_m: float, side: int) -> None:
+    """The second lane begins a little beside the first: a path across the road, to whoever is near it."""
+    before, behind = [(0.0, 0.0), (50.0, 0.0)], [(50.0, step_m), (300.0, step_m)]
+    path = path_along([np.array(before), np.array(behind)], [13.9, 13.9])
+    for x in np.arange(48.0, 52.0, 0.25):
+        for enters_s in (0.3, 1.0, 2.0):
+            aside_m = CORRIDOR_M + 0.25 + 1.4 * enters_s
+            found = target(walker(x, side * aside_m + step_m, -side * 1.4), path)
+            assert found == pytest.approx(Target(x - FRONT_M - 0.25, 0.0), abs=0.2), (x, enters_s)
+
+
+@sides
+def test_who_walks_in_between_the_way_there_and_the_way_back_is_seen(side: int) -> None:
+    """Round a roundabout and back, 3.5 m beside: all who are there are nearer to the way back."""
+    angles = np.linspace(-0.5, 0.5, 21)[1:-1] * 1.9 * math.pi
+    there, back = [(0.0, 0.0), (60.0, 0.0)], [(60.0, side * 3.5), (0.0, side * 3.5)]
+    ring = [(75.0 + 14.0 * -math.cos(a), side * (1.75 + 14.0 * math.sin(a))) for a in angles]
+    path = path_along([np.array(line) for line in (there, ring, back)], [13.9, 8.3, 13.9])
+    aside_m = CORRIDOR_M + 0.25 + 1.4
+    assert target(walker(50.0, side * aside_m, -side * 1.4), path) == pytest.approx(Target(29.75, 0.0))
 
 
 @sides

@@ -16,7 +16,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.sim.lookout import project
-from risk_sac.sim.paths import AHEAD_M, HEADING, STATION, Paths, X
+from risk_sac.sim.paths import AHEAD_M, HEADING, STATION, Paths, X, Y, path_along
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Role
 
@@ -131,3 +131,31 @@ def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(
         _, offset_m, _ = project(points, float(frame.x_m[0]), float(frame.y_m[0]))
         assert abs(offset_m) < 0.73
     assert libsumo.vehicle.getRoadID("ego") == "c"
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
+@pytest.mark.parametrize(
+    ("behind", "expected"),
+    [
+        ((100.0, 0.0), [(0, 0), (100, 0), (200, 0)]),  # where the one before it ends
+        ((100.0, 0.01), [(0, 0), (95, 0), (100, 0.01), (200, 0)]),  # as rounded to centimetres
+        ((100.0, 1.0), [(0, 0), (95, 0), (100, 1), (200, 0)]),
+        ((99.5, 0.5), [(0, 0), (95, 0), (99.5, 0.5), (200, 0)]),  # before it
+        ((100.0, 1.1), [(0, 0), (100, 0), (100, 1.1), (200, 0)]),  # another place
+    ],
+)
+def test_a_lane_that_begins_beside_the_end_of_another_is_led_to_without_a_step(
+    side: float, behind: tuple[float, float], expected: list[tuple[float, float]]
+) -> None:
+    x, y = behind
+    lines = [np.array([(0.0, 0.0), (100.0, 0.0)]), np.array([(x, side * y), (200.0, 0.0)])]
+    points = path_along(lines, [13.9, 13.9]).points
+    np.testing.assert_allclose(points[[X, Y]].T, [(x, side * y) for x, y in expected])
+    np.testing.assert_allclose(np.hypot(*np.diff(points[[X, Y]])), np.diff(points[STATION]))
+
+
+def test_of_a_lane_shorter_than_the_way_to_a_step_its_beginning_stays() -> None:
+    lines = [np.array(line) for line in ([(0.0, 0.0), (3.0, 0.0)], [(3.0, 0.3), (9.0, 0.3)], [(9.0, 0.3), (50.0, 0.3)])]
+    np.testing.assert_allclose(
+        path_along(lines, [9.0, 8.0, 7.0]).points[[X, Y]].T, [(0, 0), (3, 0.3), (9, 0.3), (50, 0.3)]
+    )

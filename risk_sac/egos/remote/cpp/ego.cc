@@ -11,10 +11,10 @@
 
 #include "ego.grpc.pb.h"
 
-namespace pb = risk_sac::egos::v1;
+namespace pb = risk_sac::egos::v2;
 
 constexpr char kVersion[] = "cpp-example-1";
-constexpr unsigned kProtocol = 1;
+constexpr unsigned kProtocol = 2;
 constexpr double kHeadwayS = 1.5, kStandstillM = 2.5, kComfortMps2 = 2.0, kSidewaysMps2 = 3.0;
 
 struct Session {
@@ -98,19 +98,31 @@ pb::Control Drive(const Session& session, const pb::Observation& seen) {
 
 class Ego final : public pb::Ego::Service {
   grpc::Status Start(grpc::ServerContext*, const pb::StartRequest* request, pb::StartReply* reply) override {
-    if (request->protocol() != kProtocol) return {grpc::StatusCode::FAILED_PRECONDITION, "wanted protocol 1"};
+    if (request->protocol() != kProtocol) return {grpc::StatusCode::FAILED_PRECONDITION, "wanted protocol 2"};
     const std::lock_guard<std::mutex> lock(mutex_);
     sessions_[request->session()] = {request->vehicle(), {}};
     reply->set_version(kVersion);
     return grpc::Status::OK;
   }
 
-  grpc::Status Act(grpc::ServerContext*, const pb::Observation* seen, pb::Command* command) override {
+  grpc::Status Act(grpc::ServerContext*, grpc::ServerReaderWriter<pb::Command, pb::Observation>* stream) override {
+    pb::Observation seen;
+    std::string session;
+    while (stream->Read(&seen)) {
+      pb::Command command;
+      session = seen.session();
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        const auto found = sessions_.find(session);
+        if (found == sessions_.end()) return {grpc::StatusCode::NOT_FOUND, "there is no such session"};
+        if (seen.has_path()) found->second.path = seen.path();
+        *command.mutable_control() = Drive(found->second, seen);
+      }
+      command.set_time_s(seen.time_s());
+      if (!stream->Write(command)) break;
+    }
     const std::lock_guard<std::mutex> lock(mutex_);
-    const auto found = sessions_.find(seen->session());
-    if (found == sessions_.end()) return {grpc::StatusCode::NOT_FOUND, "there is no such session"};
-    if (seen->has_path()) found->second.path = seen->path();
-    *command->mutable_control() = Drive(found->second, *seen);
+    sessions_.erase(session);
     return grpc::Status::OK;
   }
 

@@ -1,0 +1,172 @@
+"""A session with an ego in another process, over a stream: what is late, out of turn or gone never drives."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from functools import partial
+
+import numpy as np
+import pytest
+
+from risk_sac.egos import Control, Episode, Perceived
+from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message
+from risk_sac.egos.remote.wire import Message, decode, encode
+from risk_sac.egos.seam import Vehicle
+from risk_sac.errors import EgoFailed
+from risk_sac.types import WIDTH, Signal
+
+grpc = pytest.importorskip("grpc")
+
+from risk_sac.egos.remote.client import RemoteEgo  # noqa: E402 - they need gRPC
+from risk_sac.egos.serve import Sessions, serve  # noqa: E402
+
+EPISODE = Episode(seed=0, net="", route=("a",), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1)
+PATIENT_S = 60.0
+Acts = Callable[[Iterator[Message]], Iterator[Message]]
+
+
+def perceived(time_s: float) -> Perceived:
+    kind, state, path = np.zeros(1, dtype=np.int8), np.zeros((WIDTH + 1, 1)), np.zeros((7, 2))
+    return Perceived(time_s, ("ego",), kind, state, path, 1.0, 0.0, Signal.NONE, np.inf)
+
+
+@contextmanager
+def talking(acts: Acts, deadline_s: float = PATIENT_S, service: str = SERVICE) -> Iterator[RemoteEgo]:
+    """A session with a server that answers observations so."""
+    kinds = {"Start": grpc.unary_unary_rpc_method_handler, "Close": grpc.unary_unary_rpc_method_handler}
+    kinds["Act"] = grpc.stream_stream_rpc_method_handler
+    answers = {"Start": lambda *_: {"version": "1"}, "Act": lambda requests, _: acts(requests), "Close": lambda *_: {}}
+    handlers = {
+        name: kinds[name](answers[name], partial(decode, request), partial(encode, reply))
+        for name, (request, reply) in METHODS.items()
+    }
+    server = grpc.server(ThreadPoolExecutor(4))
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(service, handlers),))
+    ego = RemoteEgo("far", f"127.0.0.1:{server.add_insecure_port('127.0.0.1:0')}", "1", deadline_s)
+    server.start()
+    try:
+        ego.reset(EPISODE)
+        yield ego
+    finally:
+        ego.close()
+        server.stop(0)
+
+
+def keeping(request: Message) -> Message:
+    return command_message(Control(1.0, 0.0), request["time_s"])
+
+
+def test_each_answer_has_the_whole_deadline() -> None:
+    def acts(requests: Iterator[Message]) -> Iterator[Message]:
+        for request in requests:
+            time.sleep(0.5)
+            yield keeping(request)
+
+    with talking(acts, deadline_s=4.0) as ego:
+        for step in range(10):
+            assert ego.act(perceived(0.1 * step)) == Control(1.0, 0.0)
+
+
+@pytest.mark.parametrize("answered", [0, 3])
+def test_who_does_not_answer_in_time_has_failed(answered: int) -> None:
+    asked = threading.Event()
+
+    def acts(requests: Iterator[Message]) -> Iterator[Message]:
+        for step, request in enumerate(requests):
+            if step == answered:
+                asked.wait(PATIENT_S)
+            yield keeping(request)
+
+    with talking(acts, deadline_s=2.0) as ego:
+        for step in range(answered):
+            ego.act(perceived(0.1 * step))
+        began = time.monotonic()
+        with pytest.raises(EgoFailed, match="did not answer within 2 s") as failed:
+            ego.act(perceived(9.0))
+        asked.set()
+    assert failed.value.reason == "ego_deadline"
+    assert time.monotonic() - began >= 1.9
+
+
+def twice(requests: Iterator[Message]) -> Iterator[Message]:
+    for request in requests:
+        yield keeping(request)
+        yield keeping(request)
+
+
+def once(requests: Iterator[Message]) -> Iterator[Message]:
+    yield keeping(next(requests))
+
+
+def raising(requests: Iterator[Message]) -> Iterator[Message]:
+    yield keeping(next(requests))
+    raise ValueError("by me")
+
+
+def silent(requests: Iterator[Message]) -> Iterator[Message]:
+    yield keeping(next(requests))
+    yield {"time_s": next(requests)["time_s"]}
+
+
+@pytest.mark.parametrize(
+    ("acts", "reason", "says"),
+    [
+        (twice, "ego_malformed", r"answered an observation of 0\.5 s; wanted that of 0\.6 s"),
+        (silent, "ego_malformed", "neither a control nor a trajectory"),
+        (once, "ego_crash", "ended the session"),
+        (raising, "ego_crash", "by me"),
+    ],
+)
+def test_an_answer_out_of_turn_or_none_is_not_driven(acts: Acts, reason: str, says: str) -> None:
+    with talking(acts) as ego:
+        ego.act(perceived(0.5))
+        with pytest.raises(EgoFailed, match=says) as failed:
+            ego.act(perceived(0.6))
+    assert failed.value.reason == reason
+
+
+def test_an_ego_of_the_first_version_of_the_protocol_is_told_apart() -> None:
+    with (
+        pytest.raises(EgoFailed, match="does not speak version 2 of the protocol"),
+        talking(twice, service="risk_sac.egos.v1.Ego"),
+    ):
+        pass
+
+
+class Counting:
+    """Commands how often it was asked, and tells when it is closed."""
+
+    def __init__(self, closed: threading.Semaphore) -> None:
+        self._closed = closed
+
+    def reset(self, episode: Episode) -> None:
+        self._asked = 0
+
+    def act(self, perceived: Perceived) -> Control:
+        self._asked += 1
+        return Control(float(self._asked), 0.0)
+
+    def close(self) -> None:
+        self._closed.release()
+
+
+def test_thirty_sessions_are_served_at_a_time_and_end_with_their_streams() -> None:
+    closed = threading.Semaphore(0)
+    server, port = serve(Sessions(lambda: Counting(closed), "1"), "127.0.0.1:0")
+    with ExitStack() as stack:
+        stack.callback(server.stop, 0)
+        egos = [RemoteEgo("far", f"127.0.0.1:{port}", "1", PATIENT_S) for _ in range(30)]
+        for ego in egos:
+            ego.reset(EPISODE)
+        for step in range(3):
+            assert [ego.act(perceived(0.1 * step)).accel_mps2 for ego in egos] == [step + 1.0] * 30
+        for ego in egos[:20]:
+            ego.close()
+        for ego in egos[20:]:  # as if the process were gone: nobody closes the session
+            ego._channel.close()
+        for _ in egos:
+            assert closed.acquire(timeout=PATIENT_S)
+        for ego in egos[20:]:
+            ego._turns.close()
