@@ -12,6 +12,7 @@ from risk_sac.types import Floats
 
 CAR = "passenger"  # the class of all vehicles of ours
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
+ROUNDED_M = 0.05  # by which a lane's length may differ from that of its line without a word
 
 
 class Room(NamedTuple):
@@ -28,6 +29,7 @@ class Roads:
         self._net = ""
         self._paths = Paths()
         self._lanes: dict[tuple[tuple[str, ...], str], tuple[float, float, float]] = {}
+        self._stretches: dict[str, float] = {}
         self._routes: dict[str, tuple[str, ...]] = {}
 
     def enter(self, layout: Layout) -> None:
@@ -36,13 +38,13 @@ class Roads:
         if layout.net != self._net:  # another one may use the same names
             self._net = layout.net
             self._lanes.clear()
+            self._stretches.clear()
             self._paths.clear()
 
     def along(self, vehicle: str) -> Along:
         """Where a vehicle is on its path."""
-        get = libsumo.vehicle
-        path = self._paths.of(self._routes[vehicle], get.getLaneID(vehicle))
-        return Along(path, get.getLanePosition(vehicle), get.getLateralLanePosition(vehicle))
+        lane = libsumo.vehicle.getLaneID(vehicle)
+        return self._along(vehicle, lane, libsumo.vehicle.getLateralLanePosition(vehicle))
 
     def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
         """The way ahead of a vehicle whose centre is there: x and y of points, its centre first."""
@@ -63,12 +65,28 @@ class Roads:
           offset_m: of its centre from that of its lane, positive to the left.
           width_m: of its body.
         """
-        get, route = libsumo.vehicle, self._routes[vehicle]
-        lane = get.getLaneID(vehicle)
-        right_lanes, left_lanes, lane_width = self._lane(route, lane)
+        lane = libsumo.vehicle.getLaneID(vehicle)
+        right_lanes, left_lanes, lane_width = self._lane(self._routes[vehicle], lane)
         spare = (lane_width - width_m) / 2 - EDGE_M
         room = Room(left_lanes + spare - offset_m, right_lanes + spare + offset_m)
-        return room, Along(self._paths.of(route, lane), get.getLanePosition(vehicle), offset_m)
+        return room, self._along(vehicle, lane, offset_m)
+
+    def _along(self, vehicle: str, lane: str, offset_m: float) -> Along:
+        """Where a vehicle is on its path, whose lane is known.
+
+        SUMO counts in lengths of the lane, which are those of its edge; on a bend the outer lanes are drawn longer.
+        """
+        path = self._paths.of(self._routes[vehicle], lane)
+        return Along(path, libsumo.vehicle.getLanePosition(vehicle) * self._stretch(lane), offset_m)
+
+    def _stretch(self, lane: str) -> float:
+        """Length of a lane's line / length of the lane; 1 where they differ by rounding."""
+        stretch = self._stretches.get(lane)
+        if stretch is None:
+            drawn_m = float(np.hypot(*np.diff(libsumo.lane.getShape(lane), axis=0).T).sum())
+            length_m = libsumo.lane.getLength(lane)
+            stretch = self._stretches[lane] = drawn_m / length_m if abs(drawn_m - length_m) > ROUNDED_M else 1.0
+        return stretch
 
     def _lane(self, route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
         """Width of the lanes right and left of `lane` that lead on along `route`, and its own."""

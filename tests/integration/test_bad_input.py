@@ -23,7 +23,12 @@ def requirement(formula):
         ('{"families": ["low", "low"]}', "families", "['low', 'low']", "each value once"),
         (low(methods=["sca"]), "methods[0]", '"sca"', "'risk-sac'"),
         (low(episodes=3), "episodes", "3", "one of budget, ego, families"),
-        (low(budget={"episods": 3}), "budget.episods", "3", "one of cpu_s, episodes, evaluation_episodes, least_episodes"),
+        (
+            low(budget={"episods": 3}),
+            "budget.episods",
+            "3",
+            "one of cpu_s, episodes, evaluation_episodes, least_episodes",
+        ),
         (low(budget={"episodes": -1}), "budget.episodes", "-1", ">= 1"),
         (low(budget={"episodes": 3, "least_episodes": 4}), "budget", "4", "at most episodes, 3"),
         (low(budget={"episodes": "3"}), "budget.episodes", '"3"', "an integer"),

@@ -11,6 +11,7 @@ from pathlib import Path
 import libsumo
 import numpy as np
 import pytest
+import sumo_nets
 
 from risk_sac.config import EgoConfig
 from risk_sac.scenario.families import FAMILIES
@@ -94,6 +95,17 @@ def test_a_path_is_made_once_and_forgotten_with_its_net(sim: SumoSimulation) -> 
     assert paths.of(("e1", "e2"), "e1_2") is first
     paths.clear()
     assert paths.of(("e1", "e2"), "e1_2") is not first
+
+
+def test_a_lane_shorter_than_it_is_drawn_has_its_vehicles_where_they_are(sim: SumoSimulation, tmp_path: Path) -> None:
+    """As the outer lanes of a bend are, since an edge has one length."""
+    shipped = (Path(sumo_nets.__file__).parent / "low" / "low.net.xml").read_text()
+    net = tmp_path / "short.net.xml"
+    net.write_text(shipped.replace('length="1200.00"', 'length="1190.00"'))
+    frame = sim.reset(replace(alone("low", ("road",), 1, 600.0), net=str(net)), 0)
+    front_m = float(frame.x_m[0]) + 2.3
+    assert front_m > 605.0
+    assert sim.along("ego").station_m == pytest.approx(front_m, abs=0.05)
 
 
 NODES = '<node id="0" x="0" y="0"/><node id="1" x="100" y="0"/><node id="2" x="200" y="0"/><node id="3" x="500" y="0"/>'
