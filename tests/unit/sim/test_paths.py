@@ -11,8 +11,8 @@ from pathlib import Path
 import libsumo
 import numpy as np
 import pytest
-import sumo_nets
 
+import sumo_nets
 from risk_sac.config import EgoConfig
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
