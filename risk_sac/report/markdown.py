@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from statistics import median
 
-from risk_sac.config import FamilyName, RunSpec
+from risk_sac.config import Budget, FamilyName, RunSpec
 from risk_sac.metrics import Estimate
 from risk_sac.records import Phase
 from risk_sac.report.budgets import HEADLINE, LIMITS, found_within
@@ -55,13 +55,20 @@ def _head(comparison: Comparison) -> str:
         "campaign": f"`{spec.digest}`",
         "runs": f"{len(comparison.runs)} of {len(comparison.runs) + len(comparison.missing)}: "
         f"families {', '.join(spec.families)} × {len(spec.methods)} methods × seeds {', '.join(map(str, spec.seeds))}",
-        "budget of a run": f"{spec.budget.episodes} search episodes, {spec.budget.evaluation_episodes} evaluation "
-        "episodes with the policy frozen",
+        "budget of a run": f"{spec.budget.episodes} search episodes{_cut_short(spec.budget)}, "
+        f"{spec.budget.evaluation_episodes} evaluation episodes with the policy frozen",
         "versions": versions or DASH,
         "platform": f"{platform['machine']}, {platform['cpu']}, Python {platform['python']}",
     }
     lines = (f"- {name}: {value}" for name, value in facts.items())
     return f"# Comparison of methods\n\n```\n{comparison.command}\n```\n\n" + "\n".join(lines) + "\n"
+
+
+def _cut_short(budget: Budget) -> str:
+    """What ends a search before it has played them all."""
+    if budget.cpu_s is None:
+        return ""
+    return f", or as many as {budget.cpu_s:g} s of processor time last for, but at least {budget.least_episodes}"
 
 
 def _missing(comparison: Comparison) -> str:
