@@ -23,7 +23,7 @@ from tests.maps import osm_town
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "risk_sac" / "egos" / "README.md").read_text(encoding="utf-8")
 STORY = README.partition("## The whole way")[2].partition("\n## ")[0]
-EPISODES = 40
+EPISODES = 80
 
 needs_tools = pytest.mark.skipif(
     "CI" not in os.environ and not all(map(shutil.which, ("bash", "curl", "jq"))), reason="needs bash, curl and jq"
