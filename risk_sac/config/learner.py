@@ -33,7 +33,7 @@ class AgentConfig(Settings):
     """Environment steps for which the policy holds an action; they make one transition of the memory."""
     updates_per_step: Annotated[float, Field(ge=0, le=20)] = 1.0
     """Updates in an environment step, so five in a decision. An update costs as much as several steps: fewer find
-    failures sooner, and come to a worse policy."""
+    failures sooner."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """Where the networks live; `auto` takes the GPU where there is one that updates them faster than the processor.
     Results are reproducible on equal devices only."""
