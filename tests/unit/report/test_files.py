@@ -128,6 +128,14 @@ def test_page_names_the_rules_that_make_an_artefact(comparison):
     assert "(conflict_after_release, ego_model_saw, inside_grip, inside_limits, no_spawn_overlap, " in page
 
 
+def test_page_says_what_cuts_a_search_short(comparison):
+    budget = comparison.spec.budget.model_copy(update={"episodes": 9, "cpu_s": 2.5, "least_episodes": 3})
+    page = table_markdown(replace(comparison, spec=comparison.spec.model_copy(update={"budget": budget})))
+    assert (
+        "budget of a run: 9 search episodes, or as many as 2.5 s of processor time last for, but at least 3, " in page
+    )
+
+
 def test_page_says_what_two_pairs_cannot_show(comparison):
     page = table_markdown(comparison)
     assert (
