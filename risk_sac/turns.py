@@ -8,7 +8,7 @@ from risk_sac.verdicts.distinct import DistinctFailures
 NEW, NEW_PREVENTABLE = 1.0, 4.0  # what a distinct failure is worth, and one that is preventable besides
 KEPT = 0.98  # of what an earlier episode counts, after another one by the same searcher
 EXPECTED, EXPECTED_STEPS = 0.05, 1000.0  # worth per steps, of who has not been tried; as much as that is it believed
-LEAST = 0.005  # chance of either; at 0.02 a policy that yields nothing takes a fifth of the processor time
+LEAST = 0.01  # of what is spent, for either; more would be lost on a policy that yields nothing
 
 
 class Turns:
@@ -36,12 +36,12 @@ class Turns:
 
     @property
     def share(self) -> float:
-        """The chance of searcher 1."""
+        """The chance of searcher 1, whose episodes are taken to be as long as the other's."""
         first, second = (
             ((worth + EXPECTED) / (spent + EXPECTED_STEPS)) ** 2
             for worth, spent in zip(self._worth, self._spent, strict=True)
         )
-        return min(max(second / (first + second), LEAST), 1.0 - LEAST)
+        return min(max(second / (first + second), self._chance_of(LEAST)), self._chance_of(1.0 - LEAST))
 
     def tell(self, searcher: int, steps: int, collision: Collision | None) -> None:
         """Takes note of an episode.
@@ -58,3 +58,8 @@ class Turns:
                 worth += NEW_PREVENTABLE * self._preventable.add(collision)
         self._worth[searcher] = KEPT * self._worth[searcher] + worth
         self._spent[searcher] = KEPT * self._spent[searcher] + self._costs[searcher] * steps
+
+    def _chance_of(self, spent: float) -> float:
+        """The chance of searcher 1 that lets it spend this share."""
+        first, second = self._costs
+        return spent * first / (spent * first + (1.0 - spent) * second)

@@ -41,11 +41,21 @@ def test_what_either_has_found_is_new_to_neither() -> None:
     assert turns.share == before  # no valid failure
 
 
-def test_nobody_is_given_up() -> None:
-    turns = Turns((1.0, 1.0), seed=0)
+def test_nobody_is_given_up_and_who_costs_more_is_tried_less() -> None:
+    turns = Turns((1.0, 4.0), seed=0)
     for number in range(200):
         turns.tell(0, 1, failure(f"number {number}", Grade.CAREFUL))
         turns.tell(1, STEPS, None)
-    assert turns.share == LEAST
-    drawn = Counter(turns.next() for _ in range(5000))
-    assert 0.5 * LEAST < drawn[1] / 5000 < 2 * LEAST
+    share = turns.share
+    assert 4.0 * share / (4.0 * share + 1.0 - share) == pytest.approx(LEAST)
+    drawn = Counter(turns.next() for _ in range(20_000))
+    assert 0.5 * share < drawn[1] / 20_000 < 2 * share
+
+
+def test_a_search_that_is_cheaper_is_left_as_little() -> None:
+    turns = Turns((1.0, 4.0), seed=0)
+    for number in range(200):
+        turns.tell(1, 1, failure(f"number {number}", Grade.CAREFUL))
+        turns.tell(0, STEPS, None)
+    rest = 1.0 - turns.share
+    assert rest / (rest + 4.0 * turns.share) == pytest.approx(LEAST)
