@@ -4,17 +4,19 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from risk_sac.scenario.ground import Point, ribbon, triangles
 from risk_sac.scenario.maps.net import Crossing, Lane, Net
+from risk_sac.scenario.maps.swept import CAR_LENGTH_M, CAR_WIDTH_M, outlines
 from risk_sac.scenario.place import Ground, Signal, Walk
 
 CROSSINGS_M = 60.0  # so far from a place a crossing is told of
 WALKED_M = 40.0  # so far a pedestrian may get in an episode
 JUNCTIONS_M = 120.0
 KERB_M = 0.05  # of the crossing before its ends: whoever stands at the kerb is on the road's edge
-CLEAR_M = 1.45  # of the kerb from the middle of a way across the junction: half a car, and what it cuts corners by
-BACK_M, MOST_BACK_M = 0.25, 5.0
-BESIDE_M = 1.9  # from the crossing's axis, that a pedestrian may stand
+CLEAR_M, MOST_BACK_M = 0.3, 5.0  # of the kerb from cars that turn across it, and how far it is moved for that
+BESIDE_M = 1.9 + 0.25  # from the crossing's axis, that a pedestrian may reach
 LEGS = 3  # of a junction where ways can cross
 
 
@@ -56,14 +58,21 @@ def walk_over(net: Net, crossing: Crossing, driven_rad: float) -> Walk:
     (x, y), (to_x, to_y) = line[0], line[1]
     length = math.hypot(to_x - x, to_y - y)
     along_x, along_y = (to_x - x) / length, (to_y - y) / length
-    x, y = x + KERB_M * along_x, y + KERB_M * along_y
-    lines = [lane.line for lane in net.inside.get(crossing.junction, ())]
-    for _ in range(round(MOST_BACK_M / BACK_M)):
-        stood = [(x + off_m * along_y, y - off_m * along_x) for off_m in (-BESIDE_M, 0.0, BESIDE_M)]
-        if not any(is_near(line, *point, CLEAR_M) for line in lines for point in stood):
-            break
-        x, y = x - BACK_M * along_x, y - BACK_M * along_y
-    return Walk(x_m=x, y_m=y, along_x=along_x, along_y=along_y)
+    kerb = Walk(x_m=x, y_m=y, along_x=along_x, along_y=along_y)
+    back_m = _turned_over_m(net, crossing.junction, kerb) - KERB_M
+    return kerb.model_copy(update={"x_m": x - along_x * back_m, "y_m": y - along_y * back_m})
+
+
+def _turned_over_m(net: Net, junction: str, kerb: Walk) -> float:
+    """How far behind a kerb who waits there is clear of the cars that turn round the corner across it."""
+    links = [link for edge in net.arriving[junction] for lane in edge.drivable for link in net.onward.get(lane.id, ())]
+    if not links:
+        return 0.0
+    x, y = np.concatenate([outlines(link, CAR_LENGTH_M, CAR_WIDTH_M) for link in links], axis=1)
+    along_m = (x - kerb.x_m) * kerb.along_x + (y - kerb.y_m) * kerb.along_y
+    across_m = (y - kerb.y_m) * kerb.along_x - (x - kerb.x_m) * kerb.along_y
+    met = (np.abs(across_m) <= BESIDE_M) & (along_m >= -MOST_BACK_M) & (along_m < CLEAR_M)
+    return min(float(CLEAR_M - along_m[met].min()), MOST_BACK_M) if met.any() else 0.0
 
 
 def signal_of(net: Net, ids: Iterable[str | None]) -> Signal | None:

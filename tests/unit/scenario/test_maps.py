@@ -15,11 +15,12 @@ from risk_sac.errors import ConfigError, MapError
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, SHIPPED, family_at, family_named
 from risk_sac.scenario.maps.abreast import too_near, truck_reaches
+from risk_sac.scenario.maps.around import walk_over
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.finder import place_at, survey
 from risk_sac.scenario.maps.keep import Map
-from risk_sac.scenario.maps.net import Lane, Link, Net, read_net
+from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net, read_net
 from risk_sac.scenario.maps.waiting import waits_in_the_way
 from risk_sac.scenario.maps.ways import Way, way_back, way_on
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch, Track
@@ -324,6 +325,29 @@ def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(
     farther = link("left", straight[:2], [straight[1], (20.0, side * 9.0)], [(20.0, side * 9.0), (90.0, side * 9.0)])
     forked = Net(onward={"right": [truck], "left": [farther, car]})
     assert truck_reaches(forked, truck, farther) == reaches
+
+
+@pytest.mark.parametrize("radius_m", [1.5, 4.0, 12.0])
+def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radius_m: float) -> None:
+    """It drives north, 1.6 m from the kerb, and turns right where the crossing ends."""
+    quarter = [math.radians(5.0 * i) for i in range(19)]
+    arc = [(-1.6 + radius_m * (1.0 - math.cos(a)), 2.0 + radius_m * math.sin(a)) for a in quarter]
+    lines = [(-1.6, -60.0), (-1.6, 2.0)], arc, [arc[-1], (90.0, arc[-1][1])]
+    source, middle, target = (
+        Lane(id_, id_, 0, 1.0, 3.2, 10.0, tuple(line), True) for id_, line in zip("abc", lines, strict=True)
+    )
+    crossing = Crossing("crossing", "j", ("a",), ((0.0, 0.0), (-6.4, 0.0)), 4.0, None)
+    net = Net(edges={"a": Edge("a", "i", "j", (source,))}, crossings=[crossing])
+    net.onward["a"] = [Link(source, target, (middle,), None, 0)]
+    walk = walk_over(net, crossing, math.pi / 2)
+    assert (walk.along_x, walk.along_y) == (-1.0, 0.0)
+    waiting = [(walk.x_m + 0.3, y) for y in np.linspace(-1.9, 1.9, 39)]  # as near to the kerb as a scene may have it
+    way = LineString([*lines[0], *arc, *lines[2]])
+    for front_m in np.arange(58.0, 75.0, 0.1):
+        chord = LineString([way.interpolate(front_m), way.interpolate(front_m - 4.6)])
+        car = chord.buffer(1.85 / 2, cap_style="flat")
+        assert min(car.distance(Point(point)) for point in waiting) > 0.25 + 0.15  # half a person, and a little
+    assert (walk.x_m == pytest.approx(-0.05)) == (radius_m == 12.0)  # nobody is sent back without need
 
 
 def test_places_that_nobody_names_go_when_they_are_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
