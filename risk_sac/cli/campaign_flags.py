@@ -9,6 +9,8 @@ from risk_sac.config import METHODS
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
 
+BUDGET = ("episodes", "evaluation_episodes", "cpu_s", "least_episodes")
+
 
 def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, methods: str, seeds: int) -> None:
     """Adds the flags.
@@ -23,7 +25,17 @@ def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, method
     parser.add_argument("--methods", nargs="+", metavar="NAME", help=f"of {', '.join(METHODS)} (default: {methods})")
     parser.add_argument("--seeds", type=int, metavar="N", help=f"how many (default: {seeds})")
     parser.add_argument("--first-seed", type=int, metavar="S", help="the N seeds begin here (default: 0)")
-    parser.add_argument("--episodes", type=int, metavar="N", help="search episodes of each run (default: 300)")
+    add_budget_flags(parser)
+    parser.add_argument(
+        "--iid", type=int, metavar="N", help="end with N scenes that no search has chosen, for bounds (default: none)"
+    )
+    parser.add_argument("--iid-seed", type=int, metavar="S", help="of those scenes (default: 0)")
+    parser.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags go first")
+
+
+def add_budget_flags(parser: argparse.ArgumentParser) -> None:
+    """Adds the flags of a run's budget, which a campaign gives to each of its runs."""
+    parser.add_argument("--episodes", type=int, metavar="N", help="search episodes of a run (default: 300)")
     parser.add_argument(
         "--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)"
     )
@@ -33,11 +45,11 @@ def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, method
     parser.add_argument(
         "--least-episodes", type=int, metavar="N", help="search episodes that --cpu-s does not cut off (default: 1)"
     )
-    parser.add_argument(
-        "--iid", type=int, metavar="N", help="end with N scenes that no search has chosen, for bounds (default: none)"
-    )
-    parser.add_argument("--iid-seed", type=int, metavar="S", help="of those scenes (default: 0)")
-    parser.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags go first")
+
+
+def budget_flags(options: argparse.Namespace) -> dict[str, Any]:
+    """The fields of a budget; None where a flag was not given."""
+    return {name: getattr(options, name) for name in BUDGET}
 
 
 def add_ego_flag(parser: argparse.ArgumentParser) -> None:
@@ -60,8 +72,7 @@ def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:
     Raises:
       ConfigError: so many seeds are too many.
     """
-    names = ("families", "methods", "episodes", "evaluation_episodes", "cpu_s", "least_episodes")
-    flags = {name: getattr(options, name) for name in names}
+    flags = {"families": options.families, "methods": options.methods} | budget_flags(options)
     return flags | {"seeds": _seeds(options, seeds), "iid": _iid(options)}
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from risk_sac.cli.campaign_flags import add_ego_flag, ego_flag
+from risk_sac.cli.campaign_flags import add_budget_flags, add_ego_flag, budget_flags, ego_flag
 from risk_sac.cli.console import INTERRUPTED, OK, Commands, console, or_dash, progress_bar
 from risk_sac.cli.on_map import add_map_flags, families_on_map
 from risk_sac.cli.text import counted
@@ -24,25 +24,18 @@ def add_run(commands: Commands) -> None:
     add_map_flags(run, several=False)
     add_ego_flag(run)
     run.add_argument("--method", metavar="NAME", help=f"one of {', '.join(METHODS)} (default: risk-sac)")
-    run.add_argument("--episodes", type=int, metavar="N", help="search episodes (default: 300)")
-    run.add_argument("--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)")
-    run.add_argument(
-        "--cpu-s", type=float, metavar="S", help="processor time after which the search ends (default: none)"
-    )
-    run.add_argument(
-        "--least-episodes", type=int, metavar="N", help="search episodes that --cpu-s does not cut off (default: 1)"
-    )
+    add_budget_flags(run)
     run.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
     run.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags go first")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
 
 
 def _run(options: argparse.Namespace) -> int:
-    names = ("family", "method", "seed", "episodes", "evaluation_episodes", "cpu_s", "least_episodes")
     families = families_on_map(options)
     if families:
         options.family = families[0]
-    spec = read_spec(options.spec, {name: getattr(options, name) for name in names} | ego_flag(options))
+    named = {name: getattr(options, name) for name in ("family", "method", "seed")}
+    spec = read_spec(options.spec, named | budget_flags(options) | ego_flag(options))
     from risk_sac.execution.runs import run  # here, because loading torch takes seconds
 
     total = spec.budget.total_episodes

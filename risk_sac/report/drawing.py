@@ -39,11 +39,13 @@ class Look:
     width: float = 1.3
 
 
-# Paul Tol's "muted" scheme, safe for the colour-blind; line styles tell apart what a grey print does not.
+# Paul Tol's "muted" scheme, safe for the colour-blind, one for each method that is no control; line styles tell apart
+# what a grey print does not.
 _MUTED = ("#CC6677", "#332288", "#117733", "#882255", "#88CCEE", "#44AA99", "#DDCC77", "#AA4499", "#999933")
 _DASHES = ("-", "--", "-.")
 _OWN = {
     REFERENCE: Look("#000000", "-", 2.0),
+    "bo-only": Look("#555555", "-."),
     "random": Look("#777777", ":"),
     "no-adversary": Look("#BBBBBB", ":"),
 }
