@@ -6,7 +6,9 @@ from risk_sac.records import Collision
 from risk_sac.verdicts.distinct import DistinctFailures
 
 NEW, NEW_PREVENTABLE = 1.0, 4.0  # what a distinct failure is worth, and one that is preventable besides
-KEPT = 0.98  # of what an earlier episode counts, after another one by the same searcher
+# Of what an earlier episode counts, after another one by the same searcher: scripts that find something in one episode
+# of thirty may well go without for fifty, and must not be given up for that.
+KEPT = 0.995
 EXPECTED, EXPECTED_STEPS = 0.05, 1000.0  # worth per steps, of who has not been tried; as much as that is it believed
 LEAST = 0.01  # of what is spent, for either; more would be lost on a policy that yields nothing
 
