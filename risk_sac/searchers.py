@@ -38,7 +38,7 @@ OPTIMIZERS: Mapping[str, Sampler] = {
     "sobol": SobolOptimizer,
     "iid": IidSampler,
 }
-STEP_COSTS = 1.0, 8.0  # of the guide and of a policy that learns as it acts, and makes up for what it has not learnt
+STEP_COSTS = 1.0, 8.0  # processor time: of the guide, and of a policy that learns and makes up for what it has not yet
 
 
 class Searcher(NamedTuple):
