@@ -11,9 +11,9 @@ from itertools import pairwise
 
 from risk_sac.scenario.ground import Point
 from risk_sac.scenario.maps.net import Lane, Link, Net
+from risk_sac.scenario.maps.swept import CAR_LENGTH_M, CAR_WIDTH_M
 
-LENGTH_M, WIDTH_M = 4.6, 1.85  # of a car
-CLEAR_M = WIDTH_M / 2 + 0.1  # of the box of who waits from the middle of a lane that others drive on
+CLEAR_M = CAR_WIDTH_M / 2 + 0.1  # of the box of who waits from the middle of a lane that others drive on
 SAMPLED_M = 0.5
 
 
@@ -35,7 +35,7 @@ def _off_m(waiting: Lane, other: Lane) -> float:
     for px, py in _sampled(other):
         ahead_m = (px - x) * cos + (py - y) * sin
         aside_m = abs((py - y) * cos - (px - x) * sin)
-        off_m = math.hypot(max(ahead_m, -LENGTH_M - ahead_m, 0.0), max(aside_m - WIDTH_M / 2, 0.0))
+        off_m = math.hypot(max(ahead_m, -CAR_LENGTH_M - ahead_m, 0.0), max(aside_m - CAR_WIDTH_M / 2, 0.0))
         least_m = min(least_m, off_m)
     return least_m
 

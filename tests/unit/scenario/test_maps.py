@@ -327,27 +327,30 @@ def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(
     assert truck_reaches(forked, truck, farther) == reaches
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("radius_m", [1.5, 4.0, 12.0])
-def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radius_m: float) -> None:
-    """It drives north, 1.6 m from the kerb, and turns right where the crossing ends."""
+def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radius_m: float, side: float) -> None:
+    """It drives north, 1.6 m from the kerb on its right or its left, and turns to that side behind the crossing."""
     quarter = [math.radians(5.0 * i) for i in range(19)]
-    arc = [(-1.6 + radius_m * (1.0 - math.cos(a)), 2.0 + radius_m * math.sin(a)) for a in quarter]
-    lines = [(-1.6, -60.0), (-1.6, 2.0)], arc, [arc[-1], (90.0, arc[-1][1])]
+    arc = [(side * (-1.6 + radius_m * (1.0 - math.cos(a))), 2.0 + radius_m * math.sin(a)) for a in quarter]
+    lines = [(-1.6 * side, -60.0), (-1.6 * side, 2.0)], arc, [arc[-1], (90.0 * side, arc[-1][1])]
     source, middle, target = (
         Lane(id_, id_, 0, 1.0, 3.2, 10.0, tuple(line), True) for id_, line in zip("abc", lines, strict=True)
     )
-    crossing = Crossing("crossing", "j", ("a",), ((0.0, 0.0), (-6.4, 0.0)), 4.0, None)
+    crossing = Crossing("crossing", "j", ("a",), ((0.0, 0.0), (-6.4 * side, 0.0)), 4.0, None)
     net = Net(edges={"a": Edge("a", "i", "j", (source,))}, crossings=[crossing])
     net.onward["a"] = [Link(source, target, (middle,), None, 0)]
-    walk = walk_over(net, crossing, math.pi / 2)
-    assert (walk.along_x, walk.along_y) == (-1.0, 0.0)
-    waiting = [(walk.x_m + 0.3, y) for y in np.linspace(-1.9, 1.9, 39)]  # as near to the kerb as a scene may have it
+    walk = walk_over(net, crossing, side * math.pi / 2)
+    assert (walk.along_x, walk.along_y) == (-side, 0.0)
+    waiting = [
+        (walk.x_m + 0.3 * side, y) for y in np.linspace(-1.9, 1.9, 39)
+    ]  # as near to the kerb as a scene may have it
     way = LineString([*lines[0], *arc, *lines[2]])
     for front_m in np.arange(58.0, 75.0, 0.1):
         chord = LineString([way.interpolate(front_m), way.interpolate(front_m - 4.6)])
         car = chord.buffer(1.85 / 2, cap_style="flat")
         assert min(car.distance(Point(point)) for point in waiting) > 0.25 + 0.1  # half a person, and a little
-    assert (walk.x_m == pytest.approx(-0.05)) == (radius_m == 12.0)  # nobody is sent back without need
+    assert (walk.x_m == pytest.approx(-0.05 * side)) == (radius_m == 12.0)  # nobody is sent back without need
 
 
 def test_places_that_nobody_names_go_when_they_are_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
