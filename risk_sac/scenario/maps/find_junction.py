@@ -102,7 +102,10 @@ def approach(net: Net, edge: Edge) -> Approach:
         for link in net.onward.get(lane.id, ()):
             by_target[link.target.edge] = link
     if not by_target:
-        raise NoFit(f"{edge.id!r} leads nowhere: none of its lanes for cars has a connection at {edge.end!r}")
+        raise NoFit(
+            f"{edge.id!r} leads nowhere: none of its lanes for cars has a connection at {edge.end!r}, or none that its "
+            "signal ever lets anybody take"
+        )
     return Approach(edge, tuple(sorted(by_target.values(), key=lambda link: -link.turn_rad)))
 
 

@@ -7,7 +7,7 @@ Source: https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html
 import math
 import xml.etree.ElementTree as ET
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +17,7 @@ from risk_sac.scenario.ground import Point
 
 DRIVER = "passenger"  # the class of every vehicle of ours
 TURNAROUND = "t"
+STOP = "rRyYu"  # red, yellow, and red with yellow: of the colours of a signal, those that let nobody go
 DEFAULT_WIDTH_M = 3.2
 
 
@@ -202,20 +203,29 @@ def _net(root: ET.Element) -> Net:
         else:
             net.junctions[junction.attrib["id"]] = _junction(junction)
             index_of |= {lane: i for i, lane in enumerate(junction.get("intLanes", "").split())}
-    lights = _link(net, root, inner, index_of)
+    states = {  # of several programmes, SUMO runs the last
+        light.attrib["id"]: [phase.attrib["state"] for phase in light.iter("phase")] for light in root.iter("tlLogic")
+    }
+    lights = _link(net, root, inner, index_of, states)
     for edge, lane in crossings:
         id_ = edge.attrib["id"]
         at = id_.rpartition("_")[0][1:]
         net.crossings.append(
             Crossing(id_, at, tuple(edge.get("crossingEdges", "").split()), lane.line, lane.width_m, lights.get(id_))
         )
-    for light in root.iter("tlLogic"):  # of several programmes, SUMO runs the last
+    for light in root.iter("tlLogic"):
         net.cycles_s[light.attrib["id"]] = sum(float(phase.attrib["duration"]) for phase in light.iter("phase"))
     return net
 
 
-def _link(net: Net, root: ET.Element, inner: Mapping[str, Lane], index_of: Mapping[str, int]) -> dict[str, str]:
-    """Notes how lanes lead on; returns the signal of each crossing."""
+def _link(
+    net: Net,
+    root: ET.Element,
+    inner: Mapping[str, Lane],
+    index_of: Mapping[str, int],
+    states: Mapping[str, Sequence[str]],
+) -> dict[str, str]:
+    """Notes how lanes lead on, unless a signal never lets anybody go there; returns the signal of each crossing."""
     lights, follows, outer = dict[str, str](), dict[str, str](), []
     for c in root.iter("connection"):
         a, source = c.attrib, f"{c.attrib['from']}_{c.attrib['fromLane']}"
@@ -227,7 +237,7 @@ def _link(net: Net, root: ET.Element, inner: Mapping[str, Lane], index_of: Mappi
             lights[a["to"]] = a["tl"]
     for a, source in outer:
         one, other = net.lane(source), net.lane(f"{a['to']}_{a['toLane']}")
-        if a.get("dir") == TURNAROUND or not (one.drivable and other.drivable):
+        if a.get("dir") == TURNAROUND or not (one.drivable and other.drivable) or _is_closed(a, states):
             continue
         inside, via = [], a.get("via", "")
         while via in inner and via not in inside:
@@ -238,6 +248,12 @@ def _link(net: Net, root: ET.Element, inner: Mapping[str, Lane], index_of: Mappi
         net.onward[one.id].append(link)
         net.back[other.id].append(link)
     return lights
+
+
+def _is_closed(connection: Mapping[str, str], states: Mapping[str, Sequence[str]]) -> bool:
+    """Whether its signal stays red: such programmes are made for somebody to switch between."""
+    phases = states.get(connection.get("tl", ""), ())
+    return bool(phases) and all(state[int(connection["linkIndex"])] in STOP for state in phases)
 
 
 def _lane(edge: str, a: Mapping[str, str]) -> Lane:

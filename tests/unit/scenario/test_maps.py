@@ -274,6 +274,22 @@ def test_nobody_is_placed_before_a_signal_that_may_be_red_until_the_end(
     assert [lane.edge for lane in way.lanes] == [*comes_from, "b"]
 
 
+def test_nobody_is_led_where_a_signal_stays_red(tmp_path: Path) -> None:
+    """As where somebody is to switch between programmes, and SUMO by itself runs the last for ever."""
+    shipped_net = (NETS / "dense" / "dense.net.xml").read_text()
+    stays = '<tlLogic id="centre" type="static" programID="1"><phase duration="1000" state="{}"/></tlLogic><junction'
+    turned = tmp_path / "map.net.xml"
+    turned.write_text(shipped_net.replace("<junction", stays.format("rrrrgGGgrrrrgGGgGrGr"), 1))
+    net = read_net(turned)
+    assert place_at(net, "junction", "from_east").place
+    with pytest.raises(MapError, match=r"'from_south' leads nowhere: .* its signal ever lets anybody take"):
+        place_at(net, "junction", "from_south")
+    turned.write_text(shipped_net.replace("<junction", stays.format("rrrrrrrrrrrrrGGgrrrr"), 1))
+    onward = read_net(turned).onward
+    assert "from_west_2" in onward
+    assert "from_south_1" not in onward
+
+
 WIDE, NARROW = "7,6 14,11", "9,4.5 16,9"
 
 
