@@ -1,4 +1,4 @@
-"""Risk-guided replay against the obvious way to draw by priority, a cumulative sum and a binary search, and against none."""
+"""Risk-guided replay against the obvious one, a cumulative sum and a binary search, and against a uniform one."""
 
 import numpy as np
 import pytest
