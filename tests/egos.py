@@ -1,5 +1,6 @@
 """Egos in processes of their own, for tests."""
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -10,6 +11,9 @@ from typing import ClassVar
 from risk_sac.egos import Control, Episode, Perceived
 from risk_sac.egos.road import lane_keeping
 from risk_sac.types import SPEED
+
+CPP = Path(__file__).parents[1] / "risk_sac" / "egos" / "remote" / "cpp"
+CPP_COMPILES = all(map(shutil.which, ("make", "g++", "protoc", "grpc_cpp_plugin", "pkg-config")))
 
 
 @contextmanager
@@ -34,6 +38,14 @@ def served(name: str, folder: Path, **told: float) -> Iterator[str]:
     """A registered Python ego in a process of its own."""
     command = [sys.executable, "-m", "risk_sac.egos.serve", name]
     with running(command, folder, **told) as table:
+        yield table
+
+
+@contextmanager
+def served_by_cpp(folder: Path, **told: float) -> Iterator[str]:
+    """The example in C++, compiled and at work; only where `CPP_COMPILES`."""
+    subprocess.run(["make", f"OUT={folder}"], cwd=CPP, check=True, stdout=subprocess.DEVNULL)
+    with running([str(folder / "ego")], folder, **told) as table:
         yield table
 
 

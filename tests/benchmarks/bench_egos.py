@@ -1,14 +1,15 @@
 """What a step costs with an ego that drives itself, against SUMO's driver: interleaved, as ratios and milliseconds.
 
 The promise: an ego in our process at most 20 % over SUMO's, what it thinks itself apart; a remote one on loopback at
-most 0.5 ms more than the same ego in our process. Ratios are of processor time, loopback of real time.
+most 0.5 ms more than the same ego in our process. Ratios are of processor time, loopback of real time; of the example
+in C++, where it can be compiled, it is what a step takes more than one with `idm-aeb` in our process.
 
 `shadow` hardly thinks, and drives as fast as SUMO's driver did in the same episode, so that both have as much going on
 around them. A step that ends in a contact is left out: to judge it takes milliseconds, and who drives badly has more.
 """
 
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
@@ -22,7 +23,7 @@ from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
 from risk_sac.scenario.family import LEAD_IN_S
 from risk_sac.types import STEP_S
-from tests.egos import Shadow, served
+from tests.egos import CPP_COMPILES, Shadow, served, served_by_cpp
 
 ROUNDS = 16
 Took = tuple[float, float]  # ms of processor time and of real time
@@ -30,9 +31,13 @@ Took = tuple[float, float]  # ms of processor time and of real time
 
 @contextmanager
 def registered(monkeypatch: pytest.MonkeyPatch, folder: Path) -> Iterator[None]:
-    with served("idm-aeb", folder) as table:
+    with ExitStack() as stack:
+        tables = {"far": stack.enter_context(served("idm-aeb", folder))}
+        if CPP_COMPILES:
+            (folder / "cpp").mkdir()
+            tables["far-cpp"] = stack.enter_context(served_by_cpp(folder / "cpp"))
         file = folder / "egos.toml"
-        file.write_text(f"[far]\n{table}")
+        file.write_text("".join(f"[{name}]\n{table}" for name, table in tables.items()))
         monkeypatch.setenv("RISK_SAC_EGOS", str(file))
         yield
 
@@ -64,9 +69,10 @@ def driven(env: RiskSacEnv) -> list[float]:
 @pytest.mark.bench
 @pytest.mark.parametrize("family", ["low", "mixed", "dense"])
 def test_cost_of_a_step(family: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    far = ("far", "far-cpp") if CPP_COMPILES else ("far",)
     egos = {
         "sumo": EgoConfig(),
-        **{name: EgoConfig(driver=name) for name in ("shadow", "idm-aeb", "r157", "rss", "broken", "far")},
+        **{name: EgoConfig(driver=name) for name in ("shadow", "idm-aeb", "r157", "rss", "broken", *far)},
     }
     monkeypatch.setitem(SHIPPED, "shadow", "tests.egos:Shadow")
     times: dict[str, list[Took]] = {name: [] for name in egos}
@@ -87,5 +93,6 @@ def test_cost_of_a_step(family: str, monkeypatch: pytest.MonkeyPatch, tmp_path: 
         cpu = [ms for ms, _ in each]
         ratio = median(ms / other for ms, other in zip(cpu, sumo, strict=True))
         print(f"{family}: a step with {name} takes {median(cpu):.3f} ms, {ratio:.2f} of SUMO's ({len(each)} episodes)")
-    extra = median(far - near for (_, far), (_, near) in zip(times["far"], times["idm-aeb"], strict=True))
-    print(f"{family}: loopback takes {extra:.3f} ms of a step")
+    for name in far:
+        extra = median(one - near for (_, one), (_, near) in zip(times[name], times["idm-aeb"], strict=True))
+        print(f"{family}: loopback to {name} takes {extra:.3f} ms of a step")

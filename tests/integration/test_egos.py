@@ -1,8 +1,6 @@
 """Egos that drive themselves, in real episodes: in our process, in another one, and when they fail."""
 
 import json
-import shutil
-import subprocess
 import sys
 from contextlib import closing
 from pathlib import Path
@@ -18,7 +16,7 @@ from risk_sac.execution.runs import run
 from risk_sac.records import EpisodeRecord, Outcome
 from risk_sac.run_folder.results import Results
 from risk_sac.types import Frame
-from tests.egos import running, served
+from tests.egos import CPP_COMPILES, served, served_by_cpp
 
 EXAMPLE = '''
 from risk_sac.egos import Control
@@ -232,15 +230,11 @@ def test_a_campaign_keeps_the_version_of_its_ego_and_runs_with_it(shared):
     assert shared.wait(posted["id"])["state"] == "succeeded"
 
 
-@pytest.mark.skipif(
-    not all(map(shutil.which, ("make", "g++", "protoc", "grpc_cpp_plugin", "pkg-config"))), reason="needs C++ and gRPC"
-)
+@pytest.mark.skipif(not CPP_COMPILES, reason="needs C++ and gRPC")
 @pytest.mark.torture
 def test_the_example_in_c_plus_plus_compiles_and_drives(tmp_path, monkeypatch):
     pytest.importorskip("grpc")
-    folder = Path(__file__).parents[2] / "risk_sac/egos/remote/cpp"
-    subprocess.run(["make", f"OUT={tmp_path}"], cwd=folder, check=True)
-    with running([str(tmp_path / "ego")], tmp_path, deadline_s=60) as table:
+    with served_by_cpp(tmp_path, deadline_s=60) as table:
         register(monkeypatch, tmp_path, cpp=table)
         results, records = play(spec_of("cpp", episodes=4), tmp_path / "run")
     assert results.metrics.environment_steps > 200
