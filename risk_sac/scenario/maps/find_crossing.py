@@ -135,7 +135,7 @@ def _ego(net: Net, own: Lane) -> tuple[Track, Link] | str:
 
 def _straight(net: Net, lane: Lane, onward_s: float) -> tuple[Track, Link] | str:
     """The track over the straightest link of a lane that leads on so far, and that link; or why there is none."""
-    why = f"lane {lane.id!r} leads nowhere"
+    why = f"lane {lane.id!r} leads nowhere, or nowhere that its signal ever lets anybody go"
     for link in sorted(net.onward.get(lane.id, ()), key=lambda link: abs(link.turn_rad)):
         found = turn(net, link, onward_s)
         if isinstance(found, Track):

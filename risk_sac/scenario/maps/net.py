@@ -203,9 +203,11 @@ def _net(root: ET.Element) -> Net:
         else:
             net.junctions[junction.attrib["id"]] = _junction(junction)
             index_of |= {lane: i for i, lane in enumerate(junction.get("intLanes", "").split())}
-    states = {  # of several programmes, SUMO runs the last
-        light.attrib["id"]: [phase.attrib["state"] for phase in light.iter("phase")] for light in root.iter("tlLogic")
-    }
+    states: dict[str, list[str]] = {}
+    for light in root.iter("tlLogic"):  # of several programmes, SUMO runs the last
+        phases = list(light.iter("phase"))
+        states[light.attrib["id"]] = [phase.attrib["state"] for phase in phases]
+        net.cycles_s[light.attrib["id"]] = sum(float(phase.attrib["duration"]) for phase in phases)
     lights = _link(net, root, inner, index_of, states)
     for edge, lane in crossings:
         id_ = edge.attrib["id"]
@@ -213,8 +215,6 @@ def _net(root: ET.Element) -> Net:
         net.crossings.append(
             Crossing(id_, at, tuple(edge.get("crossingEdges", "").split()), lane.line, lane.width_m, lights.get(id_))
         )
-    for light in root.iter("tlLogic"):
-        net.cycles_s[light.attrib["id"]] = sum(float(phase.attrib["duration"]) for phase in light.iter("phase"))
     return net
 
 
