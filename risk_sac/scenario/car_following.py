@@ -6,13 +6,12 @@ Source: RISK-SAC, Sec. IV-A.2.
 from collections.abc import Mapping
 
 from risk_sac.scenario.family import EGO, Family, at_most, friction, initial_speed, offset_of, road_odd
-from risk_sac.scenario.layout import Layout, VehicleStart
+from risk_sac.scenario.layout import CAR_LENGTH_M, Layout, VehicleStart
 from risk_sac.scenario.place import Stretch, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.scenario.starting import surroundings, vehicle
 from risk_sac.types import Role
 
-VEHICLE_LENGTH_M = 4.6
 BEHIND_M, AHEAD_M = 15.0, 25.0  # of the neighbours' fronts from the ego's
 LEAST_FOLLOWING_M, MOST_FOLLOWING_M = 10.0, 40.0  # gap behind the ego
 CLEAR_M = 1.0  # that a track has left behind whoever is last on it
@@ -22,7 +21,7 @@ LEAST_BEHIND_M = 8.0  # room that a place must have behind the ego
 
 def family(name: str, place: Stretch) -> Family:
     """The family that this pattern is at a place."""
-    followed = place.ego.room_m >= LEAST_FOLLOWING_M + 2 * VEHICLE_LENGTH_M + CLEAR_M
+    followed = place.ego.room_m >= LEAST_FOLLOWING_M + 2 * CAR_LENGTH_M + CLEAR_M
     beside = {side: track for side, track in (("left", place.left), ("right", place.right)) if track is not None}
 
     def layout(xi: Mapping[str, float]) -> Layout:
@@ -31,12 +30,12 @@ def family(name: str, place: Stretch) -> Family:
         def car(id_: str, role: Role, track: Track, ahead_m: float, speed_mps: float) -> VehicleStart:
             return vehicle(id_, role, track, -ahead_m, speed_mps, lead_m=0.0)
 
-        lead_m = xi["lead_gap_m"] + VEHICLE_LENGTH_M
+        lead_m = xi["lead_gap_m"] + CAR_LENGTH_M
         vehicles = [car("lead", Role.ADVERSARY, place.ego, lead_m, xi["lead_speed_mps"])]
         for side, track in beside.items():
             vehicles.append(car(side, Role.ADVERSARY, track, xi[f"{side}_offset_m"], xi[f"{side}_speed_mps"]))
         if followed:
-            behind_m = -xi["follower_gap_m"] - VEHICLE_LENGTH_M
+            behind_m = -xi["follower_gap_m"] - CAR_LENGTH_M
             vehicles.append(car("follower", Role.BACKGROUND, place.ego, behind_m, ego_speed))
         distant_m = xi["lead_gap_m"] + DISTANT_M
         vehicles.append(car("distant", Role.BACKGROUND, place.ego, distant_m, xi["lead_speed_mps"]))
@@ -69,14 +68,14 @@ def _parameters(place: Stretch, beside: Mapping[str, Track], *, followed: bool) 
         initial_speed("lead_speed_mps", 6, limit, "initial speed of the leader"),
     ]
     for side, track in beside.items():
-        low_m = -at_most(BEHIND_M, track.room_m - VEHICLE_LENGTH_M - CLEAR_M)
+        low_m = -at_most(BEHIND_M, track.room_m - CAR_LENGTH_M - CLEAR_M)
         meaning = f"{side} neighbour's front relative to the ego's"
         found += [
             Parameter(f"{side}_offset_m", "m", low_m, AHEAD_M, meaning),
             initial_speed(f"{side}_speed_mps", 6, limit, f"initial speed of the {side} neighbour"),
         ]
     if followed:
-        high_m = at_most(MOST_FOLLOWING_M, place.ego.room_m - 2 * VEHICLE_LENGTH_M - CLEAR_M)
+        high_m = at_most(MOST_FOLLOWING_M, place.ego.room_m - 2 * CAR_LENGTH_M - CLEAR_M)
         meaning = "gap from the follower's front to the ego's rear"
         found.append(Parameter("follower_gap_m", "m", LEAST_FOLLOWING_M, high_m, meaning))
     return (*found, *offset_of(place.signal), friction())

@@ -11,6 +11,7 @@ from risk_sac.scenario.space import Parameter, SceneSpace
 
 LEAD_IN_S = 1.5  # in which SUMO drives everybody, before the adversaries are released to the policy
 EGO = "ego"
+WALK_OFFSET_M = 1.9  # of a pedestrian from the middle of its way, along the road, at most
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +60,7 @@ def initial_speed(name: str, low: float, limit_mps: float, meaning: str) -> Para
 def walking(offset: str) -> tuple[Parameter, ...]:
     """Of the pedestrian: along the road, from the kerb, and how fast."""
     return (
-        Parameter("pedestrian_offset_m", "m", -1.9, 1.9, offset),
+        Parameter("pedestrian_offset_m", "m", -WALK_OFFSET_M, WALK_OFFSET_M, offset),
         Parameter("pedestrian_setback_m", "m", 0.3, 5, "pedestrian's distance from the kerb"),
         Parameter("pedestrian_speed_mps", "m/s", 0, 2.0, "initial walking speed", "dynamic.pedestrian_speed_mps"),
     )

@@ -22,7 +22,7 @@ from risk_sac.scenario.family import (
     top_speed,
     walking,
 )
-from risk_sac.scenario.layout import Body, Layout, VehicleStart
+from risk_sac.scenario.layout import TRUCK_LENGTH_M, Body, Layout, VehicleStart
 from risk_sac.scenario.place import CrossingPlace, Site
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.scenario.starting import pedestrian, surroundings, vehicle
@@ -30,7 +30,6 @@ from risk_sac.types import Role
 
 NEAREST_M, FARTHEST_M = 25.0, 90.0  # the ego from the crossing
 FOLLOWING_M = 25.0  # from the ego's front to its follower's
-BODY_M = 8.0
 OCCLUDER_MPS = 12.0
 OCCLUDER_M = 25  # the farthest from the crossing
 ONCOMING, ONCOMING_MPS = 4, 10.0
@@ -52,7 +51,7 @@ def family(name: str, place: CrossingPlace) -> Family:
                     "occluder",
                     Role.ADVERSARY,
                     site.occluder,
-                    -occluder_m - BODY_M if site.beyond else occluder_m,
+                    -occluder_m - TRUCK_LENGTH_M if site.beyond else occluder_m,
                     occluder_mps,
                     body=truck,
                 ),
@@ -86,26 +85,26 @@ _CROSSINGS: dict[bool, CrossingType] = {False: "zebra", True: "signalised"}
 
 def room_wanted_m(limit_mps: float) -> float:
     """Before a crossing on the ego's track, at the least."""
-    return NEAREST_M + FOLLOWING_M + BODY_M + LEAD_IN_S * top_speed(limit_mps)
+    return NEAREST_M + FOLLOWING_M + TRUCK_LENGTH_M + LEAD_IN_S * top_speed(limit_mps)
 
 
 def room_beyond_m() -> float:
     """Before a crossing on the track of who comes the other way, at the least."""
-    return LEAD_IN_S * OCCLUDER_MPS + BODY_M
+    return LEAD_IN_S * OCCLUDER_MPS + TRUCK_LENGTH_M
 
 
 def _farthest_m(site: Site, lead_m: float) -> float:
     if site.beyond:
         last = site.occluder.pieces[-1]
-        return at_most(OCCLUDER_M, last.length_m - last.reach_m - BODY_M)
-    return at_most(OCCLUDER_M, site.occluder.room_m - BODY_M - lead_m)
+        return at_most(OCCLUDER_M, last.length_m - last.reach_m - TRUCK_LENGTH_M)
+    return at_most(OCCLUDER_M, site.occluder.room_m - TRUCK_LENGTH_M - lead_m)
 
 
 def _oncoming(site: Site) -> list[VehicleStart]:
     found = []
     for i in range(ONCOMING if site.oncoming else 0):
         track = site.oncoming[i % len(site.oncoming)]
-        if track.room_m >= ONCOMING_M + SPACING_M * i + BODY_M:
+        if track.room_m >= ONCOMING_M + SPACING_M * i + TRUCK_LENGTH_M:
             id_, lead_m = f"oncoming_{i}", SPACING_M * i
             found.append(vehicle(id_, Role.BACKGROUND, track, ONCOMING_M, ONCOMING_MPS, lead_m))
     return found
@@ -118,7 +117,7 @@ def _parameters(place: CrossingPlace) -> tuple[Parameter, ...]:
         odd, kinds_of = "scenery.crossing_types", ("zebra", "signalised")
         kinds.append(Parameter("crossing", "1", 0, 1, "zebra below 0.5, signalised from 0.5", odd, kinds_of))
     lead_m = LEAD_IN_S * top_speed(limit)
-    ego_m = at_most(FARTHEST_M, min(site.ego.room_m for site in place.sites) - FOLLOWING_M - BODY_M - lead_m)
+    ego_m = at_most(FARTHEST_M, min(site.ego.room_m for site in place.sites) - FOLLOWING_M - TRUCK_LENGTH_M - lead_m)
     occluder_m = min(_farthest_m(site, lead_m) for site in place.sites)
     beyond = any(site.beyond for site in place.sites)
     whence = "crossing's far edge to the occluder's rear" if beyond else "occluder's front to the crossing's near edge"

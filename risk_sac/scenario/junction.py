@@ -16,7 +16,7 @@ from risk_sac.scenario.family import (
     top_speed,
     walking,
 )
-from risk_sac.scenario.layout import Layout, VehicleStart
+from risk_sac.scenario.layout import CAR_LENGTH_M, Layout, VehicleStart
 from risk_sac.scenario.place import JunctionPlace, Leg
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.scenario.starting import pedestrian, surroundings, vehicle
@@ -24,7 +24,6 @@ from risk_sac.types import Role
 
 NEAREST_M, FARTHEST_M = 10.0, 90.0  # whoever attacks, and the ego, from the stop line
 LEAST_RANGE_M = 10.0  # of those distances at a place
-BODY_M = 4.6
 STREAM_MPS, STREAM_M = 9.0, 30.0
 WIDEST_GAP_M = 40.0  # of the background
 WHO = {
@@ -71,12 +70,12 @@ def family(name: str, place: JunctionPlace) -> Family:
 
 def room_wanted_m(limit_mps: float) -> float:
     """Before a stop line, at the least."""
-    return NEAREST_M + LEAST_RANGE_M + BODY_M + LEAD_IN_S * top_speed(limit_mps)
+    return NEAREST_M + LEAST_RANGE_M + CAR_LENGTH_M + LEAD_IN_S * top_speed(limit_mps)
 
 
 def room_of_a_stream_m() -> float:
     """Before the stop line of a road with background traffic."""
-    return STREAM_M + 2 * WIDEST_GAP_M + BODY_M + LEAD_IN_S * STREAM_MPS
+    return STREAM_M + 2 * WIDEST_GAP_M + CAR_LENGTH_M + LEAD_IN_S * STREAM_MPS
 
 
 def _approaching(leg: Leg, role: Role, xi: Mapping[str, float]) -> VehicleStart:
@@ -108,7 +107,7 @@ def _leg_parameters(leg: Leg) -> list[Parameter]:
     elif options > 1:
         found.append(Parameter(f"{leg.name}_turn", "1", 0, 1, f"which of {options} ways {who} goes, from the left"))
     room_m = min(track.room_m for track in leg.turns)
-    high_m = at_most(FARTHEST_M, room_m - BODY_M - LEAD_IN_S * top_speed(leg.speed_limit_mps))
+    high_m = at_most(FARTHEST_M, room_m - CAR_LENGTH_M - LEAD_IN_S * top_speed(leg.speed_limit_mps))
     return [
         *found,
         Parameter(f"{leg.name}_distance_m", "m", NEAREST_M, high_m, f"{who}'s front to its stop line"),

@@ -7,6 +7,7 @@ from risk_sac.scenario.ground import Area
 from risk_sac.types import Role
 
 Body = Literal["car", "truck"]
+CAR_LENGTH_M, CAR_WIDTH_M, TRUCK_LENGTH_M = 4.6, 1.85, 8.0  # of the bodies in `sumo_nets/vtypes.add.xml`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,12 +5,13 @@ import math
 import numpy as np
 
 from risk_sac.jit import compiled
+from risk_sac.scenario.layout import CAR_LENGTH_M
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.paths import HEADING, STATION, Path
 from risk_sac.types import Floats
 
 GRID_M = 0.5
-BODY_M = 4.6  # SUMO turns a body while it passes a corner of the lane, over the body's own length
+BODY_M = CAR_LENGTH_M  # SUMO turns a body while it passes a corner of the lane, over the body's own length
 AHEAD_M = 5.0  # so early braking makes way for a bend; more than BODY_M, or a bend is not seen whole as it begins
 NO_BEND_PER_M = 1e-6
 

@@ -6,9 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
+from risk_sac.scenario.family import WALK_OFFSET_M
 from risk_sac.scenario.ground import Point, ribbon, triangles
+from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M
 from risk_sac.scenario.maps.net import Crossing, Lane, Net
-from risk_sac.scenario.maps.swept import CAR_LENGTH_M, CAR_WIDTH_M, outlines
+from risk_sac.scenario.maps.swept import outlines
 from risk_sac.scenario.place import Ground, Signal, Walk
 
 CROSSINGS_M = 60.0  # so far from a place a crossing is told of
@@ -16,7 +18,7 @@ WALKED_M = 40.0  # so far a pedestrian may get in an episode
 JUNCTIONS_M = 120.0
 KERB_M = 0.05  # of the crossing before its ends: whoever stands at the kerb is on the road's edge
 CLEAR_M, MOST_BACK_M = 0.3, 5.0  # of the kerb from cars that turn across it, and how far it is moved for that
-BESIDE_M = 1.9 + 0.25  # from the crossing's axis, that a pedestrian may reach
+BESIDE_M = WALK_OFFSET_M + 0.25  # from the crossing's axis, that a pedestrian may reach
 LEGS = 3  # of a junction where ways can cross
 
 

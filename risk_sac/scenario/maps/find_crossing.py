@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from risk_sac.scenario.family import LEAD_IN_S, top_speed
-from risk_sac.scenario.hidden_pedestrian import BODY_M, OCCLUDER_M, room_beyond_m, room_wanted_m
+from risk_sac.scenario.hidden_pedestrian import OCCLUDER_M, room_beyond_m, room_wanted_m
+from risk_sac.scenario.layout import TRUCK_LENGTH_M
 from risk_sac.scenario.maps.abreast import truck_reaches
 from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.find_junction import turn
@@ -78,7 +79,7 @@ def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[Lane, Track, Tra
             why = why or (driven if isinstance(driven, str) else str(hiding))
             continue
         (ego, link), (occluder, beside) = driven, hiding
-        least_m = BODY_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
+        least_m = TRUCK_LENGTH_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
         if occluder.room_m < least_m:
             why = why or f"the lane beside can be come from for {occluder.room_m:.0f} m; wanted {least_m:.0f} m"
         elif truck_reaches(net, beside, link):
@@ -104,10 +105,10 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[Lane, Trac
     if isinstance(driven, str):
         raise NoFit(driven)
     ego, link = driven
-    way = way_on(net, beside[0], (BODY_M + OCCLUDER_M) / beside[0].limit_mps + OCCLUDED_S)
+    way = way_on(net, beside[0], (TRUCK_LENGTH_M + OCCLUDER_M) / beside[0].limit_mps + OCCLUDED_S)
     if not isinstance(way, Way):
         raise NoFit(way)
-    occluder = track(net, way, 0.0, BODY_M + OCCLUDER_M)
+    occluder = track(net, way, 0.0, TRUCK_LENGTH_M + OCCLUDER_M)
     if occluder.room_m < room_beyond_m():
         came = f"those who come the other way can be come from for {occluder.room_m:.0f} m"
         raise NoFit(f"{came}; wanted {room_beyond_m():.0f} m")

@@ -10,7 +10,6 @@ from risk_sac.scenario.ground import Point
 from risk_sac.scenario.maps.net import Link
 from risk_sac.types import Floats
 
-CAR_LENGTH_M, CAR_WIDTH_M = 4.6, 1.85
 SAMPLED_M = 0.5
 ALONG = 9  # points on each side of it
 

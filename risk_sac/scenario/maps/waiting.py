@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from risk_sac.scenario.ground import Point
+from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M
 from risk_sac.scenario.maps.net import Lane, Link, Net
-from risk_sac.scenario.maps.swept import CAR_LENGTH_M, CAR_WIDTH_M
 
 CLEAR_M = CAR_WIDTH_M / 2 + 0.1  # of the box of who waits from the middle of a lane that others drive on
 SAMPLED_M = 0.5
