@@ -1,8 +1,9 @@
 """What a step costs with an ego that drives itself, against SUMO's driver: interleaved, as ratios and milliseconds.
 
 The promise: an ego in our process at most 20 % over SUMO's, what it thinks itself apart; a remote one on loopback at
-most 0.5 ms more than the same ego in our process. Ratios are of processor time, loopback of real time; of the example
-in C++, where it can be compiled, it is what a step takes more than one with `idm-aeb` in our process.
+most 0.5 ms more than the same ego in our process, if it is compiled: in Python a bare echo by gRPC takes nearly all of
+that. Ratios are of processor time, loopback of real time; of the example in C++, where it can be compiled, it is what a
+step takes more than one with `idm-aeb` in our process.
 
 `shadow` hardly thinks, and drives as fast as SUMO's driver did in the same episode, so that both have as much going on
 around them. A step that ends in a contact is left out: to judge it takes milliseconds, and who drives badly has more.
