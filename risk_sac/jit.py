@@ -26,6 +26,7 @@ COMPILED = (  # where compiled functions are, and the constants that are compile
     "egos/pilot.py",
     "egos/road.py",
     "risk/*.py",
+    "scenario/layout.py",
     "scenario/limits.py",
     "sim/*.py",
     "verdicts/*.py",

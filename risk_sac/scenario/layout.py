@@ -7,7 +7,8 @@ from risk_sac.scenario.ground import Area
 from risk_sac.types import Role
 
 Body = Literal["car", "truck"]
-CAR_LENGTH_M, CAR_WIDTH_M, TRUCK_LENGTH_M = 4.6, 1.85, 8.0  # of the bodies in `sumo_nets/vtypes.add.xml`
+CAR_LENGTH_M, CAR_WIDTH_M = 4.6, 1.85  # as `sumo_nets/vtypes.add.xml` has it
+TRUCK_LENGTH_M, TRUCK_WIDTH_M = 8.0, 2.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

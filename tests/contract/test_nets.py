@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 
 import sumo_nets
-from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, TRUCK_LENGTH_M
+from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, TRUCK_LENGTH_M, TRUCK_WIDTH_M
 
 NETS = Path(sumo_nets.__path__[0])
 
@@ -24,9 +24,8 @@ def test_rebuilding_the_nets_gives_the_same_bytes(tmp_path: Path) -> None:
     assert set(committed) == {"low.net.xml", "mixed.net.xml", "dense.net.xml"}
 
 
-def test_bodies_are_as_long_as_scenes_take_them_to_be() -> None:
-    types = ElementTree.parse(NETS / "vtypes.add.xml").getroot()
-    cars = {(each.get("length"), each.get("width")) for each in types if "truck" not in each.get("id", "")}
-    trucks = {each.get("length") for each in types if "truck" in each.get("id", "")}
-    assert {(float(length or 0), float(width or 0)) for length, width in cars} == {(CAR_LENGTH_M, CAR_WIDTH_M)}
-    assert {float(length or 0) for length in trucks} == {TRUCK_LENGTH_M}
+def test_bodies_are_as_large_as_scenes_take_them_to_be() -> None:
+    sizes: dict[bool, set[tuple[float, float]]] = {False: set(), True: set()}  # by whether it is a truck
+    for each in ElementTree.parse(NETS / "vtypes.add.xml").getroot():
+        sizes["truck" in each.attrib["id"]].add((float(each.attrib["length"]), float(each.attrib["width"])))
+    assert sizes == {False: {(CAR_LENGTH_M, CAR_WIDTH_M)}, True: {(TRUCK_LENGTH_M, TRUCK_WIDTH_M)}}

@@ -28,7 +28,7 @@ MODE_CONSTANT = 3
 TRAJECTORY = 1
 # Choice: what nothing of ours has. Heights are usual ones, and a long body is a truck.
 CAR_HEIGHT_M, TRUCK_HEIGHT_M, WALKER_HEIGHT_M = 1.5, 3.0, 1.75
-TRUCK_LENGTH_M = 6.5
+TRUCK_FROM_M = 6.5
 SIGNAL_ID = 1 << 32  # of the one signal ahead; beyond the ids of actors
 
 
@@ -119,7 +119,7 @@ def trajectory_of(request: bytes, perceived: Perceived, rear_axle_m: float) -> T
 
 def _moving(perceived: Perceived, column: int, number: int) -> Message:
     state = perceived.state[:, column]
-    walks, truck = perceived.kind[column] == Kind.PEDESTRIAN, state[LENGTH] > TRUCK_LENGTH_M
+    walks, truck = perceived.kind[column] == Kind.PEDESTRIAN, state[LENGTH] > TRUCK_FROM_M
     height_m = WALKER_HEIGHT_M if walks else TRUCK_HEIGHT_M if truck else CAR_HEIGHT_M
     base = {
         "dimension": {"length": state[LENGTH], "width": state[WIDTH], "height": height_m},

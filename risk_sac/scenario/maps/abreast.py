@@ -10,13 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from risk_sac.scenario.ground import Point
-from risk_sac.scenario.layout import CAR_WIDTH_M
+from risk_sac.scenario.layout import CAR_WIDTH_M, TRUCK_LENGTH_M, TRUCK_WIDTH_M
 from risk_sac.scenario.maps.around import is_near
 from risk_sac.scenario.maps.net import Link, Net
 from risk_sac.scenario.maps.swept import inside, outlines
 
 ROOM_M = CAR_WIDTH_M + 0.15  # between the middles of the ways of two cars
-TRUCK_LENGTH_M, TRUCK_WIDTH_M = 8.0, 2.4
 
 
 def too_near(net: Net, link: Link) -> Link | None:
