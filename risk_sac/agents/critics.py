@@ -34,7 +34,13 @@ def critic_loss(td_errors: Tensor, weight: Tensor) -> tuple[Tensor, Tensor]:
 
 
 class Critics:
-    """Q_ψi(s, a) of equal shape, their targets Q̄_ψi and their optimiser."""
+    """Q_ψi(s, a) of equal shape, their targets Q̄_ψi and their optimiser.
+
+    Choice: their hidden layers are normalised. A memory of a few thousand transitions, replayed at the pace of the
+    steps, otherwise makes them overrate what the policy might do and nobody has tried.
+
+    Source: Ball et al., "Efficient online reinforcement learning with offline data", 2023, Sec. 4.2 (normalisation).
+    """
 
     def __init__(
         self, count: int, observation_size: int, action_size: int, config: AgentConfig, generator: torch.Generator
@@ -42,7 +48,7 @@ class Critics:
         self._observation_size = observation_size
         self._rate = config.target_rate
         sizes = (observation_size + action_size, *config.hidden_sizes, 1)
-        self._critics = [Mlp(sizes, generator) for _ in range(count)]
+        self._critics = [Mlp(sizes, generator, normalised=True) for _ in range(count)]
         self._targets = copy.deepcopy(self._critics)
         self._parameters = [critic.parameters for critic in self._critics]
         self._target_parameters = [target.parameters for target in self._targets]
@@ -64,10 +70,10 @@ class Critics:
         """
         inputs = torch.cat((observation, action), dim=1)
         passes = [critic.forward(inputs) for critic in self._critics]
-        td_errors = target - torch.stack([activations[-1][:, 0] for activations in passes])
+        td_errors = target - torch.stack([each.output[:, 0] for each in passes])
         loss, gradient = critic_loss(td_errors, weight)
-        for critic, activations, column in zip(self._critics, passes, gradient.unsqueeze(2), strict=True):
-            critic.backward(activations, column)
+        for critic, evaluated, column in zip(self._critics, passes, gradient.unsqueeze(2), strict=True):
+            critic.backward(evaluated, column)
         self._optimizer.step()
         return td_errors, loss
 
@@ -75,13 +81,13 @@ class Critics:
         """min_i Q_ψi(s, a), `batch`, and its gradient in the action, `batch x action_size`."""
         inputs = torch.cat((observation, action), dim=1)
         passes = [critic.forward(inputs) for critic in self._critics]
-        values = torch.stack([activations[-1] for activations in passes])  # critics x batch x 1
+        values = torch.stack([each.output for each in passes])  # critics x batch x 1
         smallest = values.amin(dim=0)
         chosen = (values == smallest).to(values.dtype)
         columns = slice(self._observation_size, None)
         slopes = [
-            critic.input_gradient(activations, column, columns)
-            for critic, activations, column in zip(self._critics, passes, chosen, strict=True)
+            critic.input_gradient(evaluated, column, columns)
+            for critic, evaluated, column in zip(self._critics, passes, chosen, strict=True)
         ]
         return smallest[:, 0], torch.stack(slopes).sum(dim=0)
 
@@ -107,4 +113,4 @@ class Critics:
 
 def _evaluate(networks: list[Mlp], observation: Tensor, action: Tensor) -> Tensor:
     inputs = torch.cat((observation, action), dim=1)
-    return torch.stack([network.forward(inputs)[-1][:, 0] for network in networks])
+    return torch.stack([network.forward(inputs).output[:, 0] for network in networks])

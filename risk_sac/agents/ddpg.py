@@ -107,11 +107,11 @@ class DdpgAgent:
         target = self._target(reward, batch.terminated, batch.next_observation)
         td_errors, loss_q = self._critics.fit(batch.observation, batch.action, target, batch.weight)
 
-        activations = self._policy.forward(batch.observation)
-        action = torch.tanh(activations[-1])
+        evaluated = self._policy.forward(batch.observation)
+        action = torch.tanh(evaluated.output)
         values, slope = self._critics.smallest(batch.observation, action)
         loss_mu, gradient = actor_loss(action, values, slope, batch.weight / batch.weight.mean())
-        self._policy.backward(activations, gradient)
+        self._policy.backward(evaluated, gradient)
         self._actor_optimizer.step()
         self._critics.follow()
         self._target_policy.parameters.lerp_(self._policy.parameters, self._config.target_rate)
@@ -148,6 +148,6 @@ class DdpgAgent:
             self._generator.set_state(state["generator"])
 
     def _target(self, reward: Tensor, terminated: Tensor, next_observation: Tensor) -> Tensor:
-        next_action = torch.tanh(self._target_policy.forward(next_observation)[-1])
+        next_action = torch.tanh(self._target_policy.forward(next_observation).output)
         next_value = self._critics.target_values(next_observation, next_action)[0]
         return deterministic_target(reward, terminated, next_value, self._config.discount)

@@ -8,6 +8,7 @@ target-network step is one operation.
 import math
 from collections.abc import Sequence
 from itertools import accumulate, pairwise
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -27,6 +28,30 @@ ONEDNN_FROM = 128
 _ONEDNN: bool = torch.backends.mkldnn.is_available()  # type: ignore[no-untyped-call]
 
 
+NORM_EPSILON = 1e-5  # added to the variance of a layer, as `nn.LayerNorm` does
+
+
+class Normalised(NamedTuple):
+    """A hidden layer that was normalised."""
+
+    raw: Tensor  # x, `batch x width`
+    mean: Tensor  # `batch x 1`
+    inverse_deviation: Tensor  # `batch x 1`
+
+
+class Pass(NamedTuple):
+    """An evaluation of a network, with what its gradients need."""
+
+    inputs: list[Tensor]  # of each layer, `batch x width`
+    output: Tensor  # `batch x out`
+    hidden: list[Normalised]  # each layer but the last; none of a network that is not normalised
+
+    def since(self, row: int) -> "Pass":
+        """That of the inputs from a row on."""
+        hidden = [Normalised(*(each[row:] for each in layer)) for layer in self.hidden]
+        return Pass([each[row:] for each in self.inputs], self.output[row:], hidden)
+
+
 class Mlp:
     """Perceptron with ReLU between its layers.
 
@@ -34,13 +59,15 @@ class Mlp:
       parameters: all weights and biases, flat; `parameters.grad` is of the same layout and written by `backward`.
     """
 
-    def __init__(self, sizes: Sequence[int], generator: torch.Generator) -> None:
+    def __init__(self, sizes: Sequence[int], generator: torch.Generator, *, normalised: bool = False) -> None:
         """Draws every entry from U(-1/√fan_in, 1/√fan_in), as `nn.Linear` does.
 
         Args:
           sizes: of the input, the hidden layers and the output.
           generator: of the initial values; the network lives on its device.
+          normalised: whether each hidden layer has mean 0 and variance 1 before its ReLU.
         """
+        self._normalised = normalised
         shapes = [shape for fan_in, out in pairwise(sizes) for shape in ((fan_in, out), (out,))]
         ends = [0, *accumulate(math.prod(shape) for shape in shapes)]
         self.parameters = torch.empty(ends[-1], device=generator.device)
@@ -56,23 +83,27 @@ class Mlp:
             weight.uniform_(-bound, bound, generator=generator)
             bias.uniform_(-bound, bound, generator=generator)
 
-    def forward(self, inputs: Tensor) -> list[Tensor]:
+    def forward(self, inputs: Tensor) -> Pass:
         """Evaluates the network.
 
         Args:
           inputs: `batch x in`.
-
-        Returns:
-          What enters each layer, and last the output: `batch x width` each.
         """
-        activations = [inputs]
+        entering, hidden = [inputs], []
         for weight, bias in zip(self._weights[:-1], self._biases[:-1], strict=True):
-            activations.append(_rectified_affine(activations[-1], weight, bias))
-        activations.append(_product(activations[-1], self._weights[-1]).add_(self._biases[-1]))
-        return activations
+            if self._normalised:
+                raw = _product(entering[-1], weight).add_(bias)
+                scaled, *statistics = torch.native_layer_norm(raw, raw.shape[1:], None, None, NORM_EPSILON)
+                hidden.append(Normalised(raw, *statistics))
+                entering.append(scaled.relu_())
+            else:
+                entering.append(_rectified_affine(entering[-1], weight, bias))
+        return Pass(entering, _product(entering[-1], self._weights[-1]).add_(self._biases[-1]), hidden)
 
     def respond(self, inputs: Vector) -> Vector:
         """Evaluates the network for one input; numpy, since for one row torch's operators cost more than what they do.
+
+        It must not be a normalised one.
 
         Args:
           inputs: `in`.
@@ -82,7 +113,8 @@ class Mlp:
         """
         if self.parameters.is_cuda:
             return (
-                self.forward(torch.from_numpy(np.asarray(inputs, np.float32))[None].to(self.parameters.device))[-1][0]
+                self.forward(torch.from_numpy(np.asarray(inputs, np.float32))[None].to(self.parameters.device))
+                .output[0]
                 .cpu()
                 .numpy()
             )
@@ -92,32 +124,37 @@ class Mlp:
         """A copy that acts; the first `action_size` outputs are its means."""
         return FrozenPolicy(tuple(layer.cpu().numpy().copy() for layer in self._layers), action_size)
 
-    def backward(self, activations: Sequence[Tensor], gradient: Tensor) -> None:
+    def backward(self, evaluated: Pass, gradient: Tensor) -> None:
         """Writes the gradient of a loss in the parameters.
 
         Args:
-          activations: as `forward` returned them.
+          evaluated: as `forward` returned it.
           gradient: of the loss in the output, `batch x out`.
         """
         for layer in reversed(range(len(self._weights))):
-            self._weight_gradients[layer].copy_(_product(activations[layer].t(), gradient))
+            self._weight_gradients[layer].copy_(_product(evaluated.inputs[layer].t(), gradient))
             torch.sum(gradient, dim=0, out=self._bias_gradients[layer])
             if layer:
-                gradient = self._through_layer(layer, activations, gradient)
+                gradient = self._through_layer(layer, evaluated, gradient)
 
-    def input_gradient(self, activations: Sequence[Tensor], gradient: Tensor, columns: slice) -> Tensor:
+    def input_gradient(self, evaluated: Pass, gradient: Tensor, columns: slice) -> Tensor:
         """Gradient of a loss in some columns of the inputs, `batch x columns`; arguments as for `backward`."""
         for layer in reversed(range(1, len(self._weights))):
-            gradient = self._through_layer(layer, activations, gradient)
+            gradient = self._through_layer(layer, evaluated, gradient)
         return torch.mm(gradient, self._weights[0][columns].t())
 
-    def _through_layer(self, layer: int, activations: Sequence[Tensor], gradient: Tensor) -> Tensor:
+    def _through_layer(self, layer: int, evaluated: Pass, gradient: Tensor) -> Tensor:
         """From the gradient in a layer's outputs to that in the outputs of the one below, before its ReLU."""
         weight = self._weights[layer].t()
         # An outer product where the output has one column, as that of a critic.
         below = gradient * weight if len(weight) == 1 else _product(gradient, weight)
-        rectified: Tensor = torch.ops.aten.threshold_backward(below, activations[layer], 0)
-        return rectified
+        rectified: Tensor = torch.ops.aten.threshold_backward(below, evaluated.inputs[layer], 0)
+        if not self._normalised:
+            return rectified
+        raw, *statistics = evaluated.hidden[layer - 1]
+        return torch.ops.aten.native_layer_norm_backward(  # type: ignore[no-any-return]
+            rectified, raw, raw.shape[1:], *statistics, None, None, [True, False, False]
+        )[0]
 
 
 def _product(left: Tensor, right: Tensor) -> Tensor:

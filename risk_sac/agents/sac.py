@@ -155,7 +155,7 @@ class SacAgent:
 
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """See `Agent.td_errors`."""
-        drawn = self._sample(self._policy.forward(batch.next_observation)[-1])
+        drawn = self._sample(self._policy.forward(batch.next_observation).output)
         target = self._target(reward, batch.terminated, batch.next_observation, drawn.action, drawn.log_prob)
         return mean_magnitude(target - self._critics.values(batch.observation, batch.action))
 
@@ -163,8 +163,8 @@ class SacAgent:
         """See `Agent.update`."""
         count = len(reward)
         # The policy changes last, so one pass serves the critics' targets and its own step.
-        activations = self._policy.forward(torch.cat((batch.next_observation, batch.observation)))
-        drawn = self._sample(activations[-1])
+        evaluated = self._policy.forward(torch.cat((batch.next_observation, batch.observation)))
+        drawn = self._sample(evaluated.output)
         next_action, next_log_prob = drawn.action[:count], drawn.log_prob[:count]
         target = self._target(reward, batch.terminated, batch.next_observation, next_action, next_log_prob)
         td_errors, loss_q = self._critics.fit(batch.observation, batch.action, target, batch.weight)
@@ -173,7 +173,7 @@ class SacAgent:
         values, slope = self._critics.smallest(batch.observation, own.action)
         temperature = self._log_temperature.exp()
         loss_pi, gradient = actor_loss(own, values, slope, batch.weight / batch.weight.mean(), temperature)
-        self._policy.backward([each[count:] for each in activations], gradient)
+        self._policy.backward(evaluated.since(count), gradient)
         entropy = -own.log_prob.mean()
         _, self._log_temperature.grad = temperature_loss(temperature, entropy, self._target_entropy)
         self._actor_optimizer.step()

@@ -31,9 +31,8 @@ class AgentConfig(Settings):
     random."""
     decision_steps: Annotated[int, Field(ge=1, le=50)] = 5
     """Environment steps for which the policy holds an action; they make one transition of the memory."""
-    updates_per_step: Annotated[float, Field(ge=0, le=20)] = 0.25
-    """Updates in an environment step. One costs as much as several steps, and four times as many come to no better
-    policies."""
+    updates_per_step: Annotated[float, Field(ge=0, le=20)] = 1.0
+    """Updates in an environment step. One costs as much as two or three steps."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """Where the networks live; `auto` takes the GPU where there is one that updates them faster than the processor.
     Results are reproducible on equal devices only."""

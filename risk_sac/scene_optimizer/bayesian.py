@@ -9,6 +9,7 @@ from torch import Tensor
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.scene_optimizer.base import NOBODY, Encounter, State, check_identity, check_told
 from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
+from risk_sac.scene_optimizer.reach import Reach
 from risk_sac.scene_optimizer.sobol import SobolSequence
 from risk_sac.types import Floats
 
@@ -19,6 +20,9 @@ NEIGHBOURS = 64  # candidates around the best scenes; Sobol points alone are spa
 PARENTS = 4
 REFIT_SHARE = 5  # a new fit is due once this part of the kept observations is new
 DEVIATIONS = (0.1, 0.05, 0.025, 0.0125)  # of the steps to neighbours, one round after another
+BEST = 8  # scenes that one is looked for near to
+NEAR_DEVIATIONS = (0.02, 0.05, 0.1)
+CHANGED = 10  # coordinates, of those near ones, on average
 
 
 class BotorchOptimizer:
@@ -27,7 +31,8 @@ class BotorchOptimizer:
     Choice: the policy changes under the optimiser, so only the newest `config.window` observations are kept, and a
     share `config.exploration` of scenes is drawn at random. The acquisition is maximised by rounds of ever smaller
     Gaussian steps around its best candidates: they come within a few tenths of a nat of what gradient ascent reaches,
-    at a fraction of its price.
+    at a fraction of its price. Near one of the best scenes the model's mean is maximised instead, over small steps from
+    that one alone: see `Reach` for why, and when.
 
     Every random number of an ask derives from the seed and the number of asks, so the generator has no state to save
     and neither reads nor moves a global one.
@@ -46,6 +51,8 @@ class BotorchOptimizer:
         self._told = 0
         self._fitted_at = 0  # value of _told at the last refit
         self._hyperparameters: Hyperparameters | None = None
+        self._reach = Reach()
+        self._near: bool | None = None  # how the scene that is out was looked for, if the model proposed it
 
     def ask(self) -> Floats:  # Alg. 1, l. 4
         """See `SceneOptimizer.ask`."""
@@ -69,10 +76,14 @@ class BotorchOptimizer:
         self._points = np.concatenate((self._points, point[None]))[-self._config.window :]
         self._returns = np.append(self._returns, value)[-self._config.window :]
         self._told += 1
-        if mean_return is None:
-            return None
-        self._maximum = update_running_maximum(self._maximum, mean_return, self._config.running_maximum_rate)
-        return objective(mean_return, self._maximum.smoothed)
+        score = None
+        if mean_return is not None:
+            self._maximum = update_running_maximum(self._maximum, mean_return, self._config.running_maximum_rate)
+            score = objective(mean_return, self._maximum.smoothed)
+        if self._near is not None:
+            self._reach.tell(score, near=self._near)
+            self._near = None
+        return score
 
     def scores(self) -> Floats:
         """f_e of every kept observation, oldest first, `n`.
@@ -98,15 +109,30 @@ class BotorchOptimizer:
             self._hyperparameters = surrogate.fit(points, targets, self._hyperparameters)
             self._fitted_at = self._told
         model = surrogate.condition(points, targets, self._hyperparameters)
-        acquisition = surrogate.Posterior(model).log_expected_improvement
-        everywhere = SobolSequence(self._dimension, int(random.integers(2**31))).draw(self._config.candidates)
-        candidates = torch.cat((everywhere, _neighbours(points, targets, DEVIATIONS[0], random)))
-        scores = acquisition(candidates)
-        for deviation in DEVIATIONS:
-            near = _neighbours(candidates, scores, deviation, random)
-            candidates, scores = torch.cat((candidates, near)), torch.cat((scores, acquisition(near)))
+        posterior = surrogate.Posterior(model)
+        acquisition = posterior.log_expected_improvement
+        self._near = bool(random.random() < self._reach.near)
+        if self._near:
+            candidates = torch.from_numpy(self._steps_from_one_of_the_best(values, random))
+            scores, _ = posterior(candidates)
+        else:
+            everywhere = SobolSequence(self._dimension, int(random.integers(2**31))).draw(self._config.candidates)
+            candidates = torch.cat((everywhere, _neighbours(points, targets, DEVIATIONS[0], random)))
+            scores = acquisition(candidates)
+            for deviation in DEVIATIONS:
+                near = _neighbours(candidates, scores, deviation, random)
+                candidates, scores = torch.cat((candidates, near)), torch.cat((scores, acquisition(near)))
         proposal: Floats = candidates[scores.argmax()].numpy()
         return proposal
+
+    def _steps_from_one_of_the_best(self, values: Floats, random: np.random.Generator) -> Floats:
+        """Small Gaussian steps in some of the coordinates, `NEIGHBOURS x d`; the better a scene, the likelier it is."""
+        best = np.argsort(-values, kind="stable")[:BEST]
+        centre = self._points[best[random.integers(len(best), size=2).min()]]
+        step = random.choice(NEAR_DEVIATIONS) * random.standard_normal((NEIGHBOURS, self._dimension))
+        changed = random.random(step.shape) < CHANGED / self._dimension
+        nearby: Floats = np.clip(centre + np.where(changed, step, 0.0), 0.0, 1.0)
+        return nearby
 
     def _refit_after(self) -> int:
         # Each observation changes the fit less as they accumulate, while a fit's price grows with them.
@@ -124,6 +150,7 @@ class BotorchOptimizer:
             "told": self._told,
             "fitted_at": self._fitted_at,
             "hyperparameters": None if self._hyperparameters is None else dict(self._hyperparameters),
+            "reach": self._reach.state(),
         }
 
     def load(self, state: State) -> None:
@@ -135,6 +162,8 @@ class BotorchOptimizer:
         self._maximum = None if state["maximum"] is None else RunningMaximum(*state["maximum"])
         self._asked, self._told, self._fitted_at = state["asked"], state["told"], state["fitted_at"]
         self._hyperparameters = None if state["hyperparameters"] is None else dict(state["hyperparameters"])
+        if "reach" in state:  # older checkpoints have none
+            self._reach.load(state["reach"])
 
 
 def _neighbours(points: Tensor, scores: Tensor, deviation: float, random: np.random.Generator) -> Tensor:

@@ -3,6 +3,7 @@
 import torch
 from torch import Tensor
 from torch.distributions import Normal, TanhTransform
+from torch.nn.functional import layer_norm
 
 from risk_sac.agents.ddpg import DdpgAgent
 from risk_sac.agents.networks import Mlp, bounded_log_std
@@ -17,10 +18,12 @@ class PlainMlp:
     def __init__(self, network: Mlp) -> None:
         self._weights = [weight.detach().clone().requires_grad_() for weight in network._weights]
         self._biases = [bias.detach().clone().requires_grad_() for bias in network._biases]
+        self._normalised = network._normalised
 
     def __call__(self, hidden: Tensor) -> Tensor:
         for weight, bias in zip(self._weights[:-1], self._biases[:-1], strict=True):
-            hidden = torch.relu(hidden @ weight + bias)
+            hidden = hidden @ weight + bias
+            hidden = torch.relu(layer_norm(hidden, hidden.shape[1:]) if self._normalised else hidden)
         return hidden @ self._weights[-1] + self._biases[-1]
 
     def tensors(self) -> list[Tensor]:

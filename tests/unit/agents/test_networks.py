@@ -70,22 +70,40 @@ def test_log_std_stays_within_its_bounds(raw: float) -> None:
 
 
 # Narrow layers, one column at the end, and layers wide enough for oneDNN.
+@pytest.mark.parametrize("normalised", [False, True])
 @pytest.mark.parametrize("sizes", [(5, 16, 12, 3), (5, 16, 12, 1), (130, ONEDNN_FROM, 140, 2)], ids=str)
-def test_values_and_gradients_equal_autograd(sizes: tuple[int, ...]) -> None:
+def test_values_and_gradients_equal_autograd(sizes: tuple[int, ...], normalised: bool) -> None:
     generator = torch.Generator().manual_seed(0)
-    network = Mlp(sizes, generator)
+    network = Mlp(sizes, generator, normalised=normalised)
     plain = PlainMlp(network)
     inputs = torch.randn(ONEDNN_FROM, sizes[0], generator=generator, requires_grad=True)
     slope = torch.randn(ONEDNN_FROM, sizes[-1], generator=generator)
     expected = plain(inputs)
     expected.backward(slope)
-    activations = network.forward(inputs.detach())
-    torch.testing.assert_close(activations[-1], expected.detach(), rtol=1e-5, atol=1e-5)
-    network.backward(activations, slope)
+    evaluated = network.forward(inputs.detach())
+    torch.testing.assert_close(evaluated.output, expected.detach(), rtol=1e-5, atol=1e-5)
+    network.backward(evaluated, slope)
     torch.testing.assert_close(network.parameters.grad, plain.gradient(), rtol=1e-5, atol=1e-4)
     columns = slice(2, 5)
-    partial = network.input_gradient(activations, slope, columns)
+    partial = network.input_gradient(evaluated, slope, columns)
     torch.testing.assert_close(partial, inputs.grad[:, columns], rtol=1e-5, atol=1e-5)
+
+
+def test_a_normalised_layer_has_mean_0_and_variance_1_before_its_relu() -> None:
+    network = Mlp((1, 2, 1), torch.Generator().manual_seed(0), normalised=True)
+    network.parameters.copy_(torch.tensor([1.0, 3.0, 0.0, 0.0, 1.0, 5.0, 0.5]))  # raw (x, 3x), scaled (-1, 1) for x > 0
+    output = network.forward(torch.tensor([[2.0], [70.0], [-4.0]])).output[:, 0]
+    assert output.tolist() == pytest.approx([5.5, 5.5, 1.5], abs=1e-4)
+
+
+def test_a_part_of_a_pass_is_the_pass_of_a_part() -> None:
+    generator = torch.Generator().manual_seed(0)
+    network = Mlp((5, 16, 12, 3), generator, normalised=True)
+    inputs, slope = torch.randn(9, 5, generator=generator), torch.randn(4, 3, generator=generator)
+    network.backward(network.forward(inputs[5:]), slope)
+    expected = network.parameters.grad.clone()
+    network.backward(network.forward(inputs).since(5), slope)
+    torch.testing.assert_close(network.parameters.grad, expected)
 
 
 @given(st.integers(0, 1000))
@@ -117,17 +135,17 @@ def test_a_copy_learns_apart_from_its_original() -> None:
     network = Mlp((3, 4, 1), torch.Generator().manual_seed(0))
     twin = copy.deepcopy(network)
     inputs = torch.ones(1, 3)
-    before = network.forward(inputs)[-1].item()
+    before = network.forward(inputs).output.item()
     twin.parameters.mul_(2.0)  # the layers are views of the flat parameters, in the copy too
-    assert twin.forward(inputs)[-1].item() != pytest.approx(before)
-    assert network.forward(inputs)[-1].item() == before
+    assert twin.forward(inputs).output.item() != pytest.approx(before)
+    assert network.forward(inputs).output.item() == before
 
 
 def test_one_input_gives_what_a_batch_gives() -> None:
     generator = torch.Generator().manual_seed(0)
     network = Mlp((5, 16, 16, 6), generator)
     inputs, noise = torch.randn(40, 5, generator=generator), torch.randn(40, 3, generator=generator)
-    raw = network.forward(inputs)[-1]
+    raw = network.forward(inputs).output
     mean, raw_log_std = raw.chunk(2, dim=1)
     actions, _ = tanh_gaussian(mean, bounded_log_std(raw_log_std), noise)
     for row in range(40):

@@ -300,6 +300,21 @@ def test_finds_the_optimum_of_a_noisy_function_far_more_often_than_sobol():
         assert found >= 4 * by_chance
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_comes_back_to_a_needle_that_a_smooth_model_does_not_see(seed):
+    random = np.random.default_rng(seed)
+    needle = random.uniform(0.2, 0.8, 18)
+
+    def risk(episode: int, u: Floats) -> float:
+        return float(random.normal(scale=0.1) + (np.abs(u - needle)[:8] < 0.12).all())
+
+    optimizer = BotorchOptimizer(18, SceneOptimizerConfig(), seed)
+    for _ in range(3):  # as failures that others have found
+        optimizer.tell(needle, risk(0, needle))
+    asked = drive(optimizer, 100, risk)
+    assert (np.abs(asked[30:] - needle)[:, :8] < 0.12).all(axis=1).mean() > 0.3  # of anywhere: 4e-6
+
+
 def test_learns_to_avoid_rejected_scenes():
     optimizer = BotorchOptimizer(2, SceneOptimizerConfig(exploration=0.0), 0)
     asked = drive(optimizer, 60, lambda episode, u: None if u[0] > 0.5 else float(u[1] + 0.1 * math.sin(episode)))
