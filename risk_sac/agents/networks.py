@@ -15,6 +15,7 @@ import torch
 import torch.nn.functional as F  # noqa: N812  # the name all of torch's users know
 from torch import Tensor
 
+from risk_sac.agents.normalisation import Normalised, before_normalised_relu, normalised_relu
 from risk_sac.frozen_policy import FrozenPolicy, respond
 from risk_sac.types import Vector
 
@@ -26,17 +27,6 @@ LOG_STD_MAX = 2.0
 # is MKL on an AMD processor. torch offers it only as this operator, which some builds lack.
 ONEDNN_FROM = 128
 _ONEDNN: bool = torch.backends.mkldnn.is_available()  # type: ignore[no-untyped-call]
-
-
-NORM_EPSILON = 1e-5  # added to the variance of a layer, as `nn.LayerNorm` does
-
-
-class Normalised(NamedTuple):
-    """A hidden layer that was normalised."""
-
-    raw: Tensor  # x, `batch x width`
-    mean: Tensor  # `batch x 1`
-    inverse_deviation: Tensor  # `batch x 1`
 
 
 class Pass(NamedTuple):
@@ -92,10 +82,9 @@ class Mlp:
         entering, hidden = [inputs], []
         for weight, bias in zip(self._weights[:-1], self._biases[:-1], strict=True):
             if self._normalised:
-                raw = _product(entering[-1], weight).add_(bias)
-                scaled, *statistics = torch.native_layer_norm(raw, raw.shape[1:], None, None, NORM_EPSILON)
-                hidden.append(Normalised(raw, *statistics))
-                entering.append(scaled.relu_())
+                rectified, layer = normalised_relu(_product(entering[-1], weight), bias)
+                entering.append(rectified)
+                hidden.append(layer)
             else:
                 entering.append(_rectified_affine(entering[-1], weight, bias))
         return Pass(entering, _product(entering[-1], self._weights[-1]).add_(self._biases[-1]), hidden)
@@ -148,13 +137,10 @@ class Mlp:
         weight = self._weights[layer].t()
         # An outer product where the output has one column, as that of a critic.
         below = gradient * weight if len(weight) == 1 else _product(gradient, weight)
+        if self._normalised:
+            return before_normalised_relu(below, evaluated.hidden[layer - 1])
         rectified: Tensor = torch.ops.aten.threshold_backward(below, evaluated.inputs[layer], 0)
-        if not self._normalised:
-            return rectified
-        raw, *statistics = evaluated.hidden[layer - 1]
-        return torch.ops.aten.native_layer_norm_backward(  # type: ignore[no-any-return]
-            rectified, raw, raw.shape[1:], *statistics, None, None, [True, False, False]
-        )[0]
+        return rectified
 
 
 def _product(left: Tensor, right: Tensor) -> Tensor:
