@@ -107,9 +107,9 @@ class Learner:
     def update(self) -> UpdateResult | None:
         """Learn from memory at the pace of `updates_per_step`; None during the warm-up and between two updates.
 
-        What the warm-up left undone is made up for, a step's share and at least one update at a time. Choice: what
-        others do between its own episodes is learnt from, but calls for no further update; else a policy that takes
-        turns would pay for all of them.
+        What the warm-up left undone is made up for, a step's share and at least one update at a time; so it never is if
+        the pace is a whole number. Choice: what others do between its own episodes is learnt from, but calls for no
+        further update; else a policy that takes turns would pay for all of them.
 
         Raises:
           NotFinite: learning has diverged.
