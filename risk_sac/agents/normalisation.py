@@ -38,10 +38,7 @@ def normalised_relu(raw: Tensor, bias: Tensor) -> tuple[Tensor, Normalised]:
       max(0, z), `batch x width`, and z with 1/σ.
     """
     if raw.is_cuda:
-        shifted = raw + bias
-        inverse = torch.rsqrt(shifted.var(dim=1, correction=0) + float(EPSILON))
-        scaled = (shifted - shifted.mean(dim=1, keepdim=True)) * inverse[:, None]
-        return scaled.relu(), Normalised(scaled, inverse)
+        return uncompiled_normalised_relu(raw, bias)
     result, scaled, inverse = torch.empty_like(raw), torch.empty_like(raw), torch.empty(raw.shape[0])
     _forward(raw.numpy(), bias.numpy(), result.numpy(), scaled.numpy(), inverse.numpy())
     return result, Normalised(scaled, inverse)
@@ -60,12 +57,25 @@ def before_normalised_relu(gradient: Tensor, layer: Normalised) -> Tensor:
       `batch x width`.
     """
     if gradient.is_cuda:
-        slope = gradient * (layer.scaled > 0.0)
-        along = (slope * layer.scaled).mean(dim=1, keepdim=True) * layer.scaled
-        return (slope - slope.mean(dim=1, keepdim=True) - along) * layer.inverse_deviation[:, None]
+        return uncompiled_before_normalised_relu(gradient, layer)
     result = torch.empty_like(gradient)
     _backward(gradient.numpy(), layer.scaled.numpy(), layer.inverse_deviation.numpy(), result.numpy())
     return result
+
+
+def uncompiled_normalised_relu(raw: Tensor, bias: Tensor) -> tuple[Tensor, Normalised]:
+    """See `normalised_relu`; on any device."""
+    shifted = raw + bias
+    inverse = torch.rsqrt(shifted.var(dim=1, correction=0) + float(EPSILON))
+    scaled = (shifted - shifted.mean(dim=1, keepdim=True)) * inverse[:, None]
+    return scaled.relu(), Normalised(scaled, inverse)
+
+
+def uncompiled_before_normalised_relu(gradient: Tensor, layer: Normalised) -> Tensor:
+    """See `before_normalised_relu`; on any device."""
+    slope = gradient * (layer.scaled > 0.0)
+    along = (slope * layer.scaled).mean(dim=1, keepdim=True) * layer.scaled
+    return (slope - slope.mean(dim=1, keepdim=True) - along) * layer.inverse_deviation[:, None]
 
 
 @compiled_in_any_order
