@@ -1,7 +1,7 @@
 /** Asks before something that cannot be taken back; the browser's own dialog keeps the focus and closes on Escape. */
 
 import type { ComponentChildren } from "preact";
-import { useEffect, useId, useRef, useState } from "preact/hooks";
+import { useId, useLayoutEffect, useRef, useState } from "preact/hooks";
 import "./confirm.css";
 
 interface Question {
@@ -18,7 +18,7 @@ export function Confirm({ title, verb, children, act, close }: Question) {
   const heading = useId();
   const [busy, setBusy] = useState(false);
   const [refused, setRefused] = useState("");
-  useEffect(() => dialog.current!.showModal(), []);
+  useLayoutEffect(() => dialog.current!.showModal(), []);
   const confirmed = async () => {
     setBusy(true);
     try {

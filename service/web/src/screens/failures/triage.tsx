@@ -1,6 +1,6 @@
 /** Triage: what a person made of a failure. It is shown at once, and taken back if the service refuses it. */
 
-import { useEffect, useRef, useState } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import { useAsked } from "../../api/asked";
 import { send } from "../../api/client";
 import { Failed, Loading } from "../../ui/states";
@@ -70,7 +70,7 @@ export function TriageDialog({ campaign, failure, refused, save, close }: Dialog
   const dialog = useRef<HTMLDialogElement>(null);
   const path = `v1/campaigns/${encodeURIComponent(campaign)}/failures/${encodeURIComponent(failure)}`;
   const asked = useAsked<{ triage: Triage | null }>(refused ? null : path);
-  useEffect(() => dialog.current!.showModal(), []);
+  useLayoutEffect(() => dialog.current!.showModal(), []);
   const begun: Begun | undefined = refused?.triage ?? (asked.value && (asked.value.triage ?? { state: "new", comment: "" }));
   return (
     <dialog ref={dialog} class="card triage" aria-labelledby="triage-title" onClose={close} onClick={(event) => event.target === dialog.current && close()}>
