@@ -32,6 +32,11 @@ class PlainMlp:
     def parameters(self) -> Tensor:
         return torch.cat([tensor.detach().ravel() for tensor in self.tensors()])
 
+    def take_over(self, parameters: Tensor) -> None:
+        tensors = self.tensors()
+        for tensor, part in zip(tensors, parameters.split([tensor.numel() for tensor in tensors]), strict=True):
+            tensor.data = part.view_as(tensor).clone()
+
     def gradient(self) -> Tensor:
         return torch.cat([tensor.grad.ravel() for tensor in self.tensors()])
 
