@@ -63,9 +63,9 @@ def test_a_stopped_worker_is_lost_within_5_s_although_it_cannot_end(runs):
     assert not psutil.pid_exists(int(pid))
 
 
-@patience(lease_s=0.6)
+@patience(lease_s=1.2)
 def test_a_worker_that_holds_its_interpreter_up_with_work_keeps_its_lease(runs):
-    busy = "sum(range(5 * 10**7))\n"  # one call into C, so that no other thread gets a turn
+    busy = "sum(range(2 * 10**8))\n"  # one call into C, so that no other thread gets a turn, and longer than the lease
     runs.submit(ALIVE + busy + "say('last')")
     assert outcome(runs.messages()) == (["last"], Cause.ENDED)
 
