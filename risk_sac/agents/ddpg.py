@@ -97,11 +97,13 @@ class DdpgAgent:
         """See `Agent.frozen`."""
         return self._policy.frozen(self._action_size)
 
+    @torch.inference_mode()
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """See `Agent.td_errors`."""
         target = self._target(reward, batch.terminated, batch.next_observation)
         return mean_magnitude(target - self._critics.values(batch.observation, batch.action))
 
+    @torch.inference_mode()
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """See `Agent.update`."""
         target = self._target(reward, batch.terminated, batch.next_observation)

@@ -6,7 +6,9 @@ target-network step is one operation.
 """
 
 import math
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
+from functools import cache
 from itertools import accumulate, pairwise
 from typing import NamedTuple
 
@@ -23,8 +25,9 @@ from risk_sac.types import Vector
 LOG_STD_MIN = -5.0
 LOG_STD_MAX = 2.0
 
-# From this width on oneDNN multiplies faster than what `torch.mm` calls: 1.3 times at 128 and twice at 256 where that
-# is MKL on an AMD processor. torch offers it only as this operator, which some builds lack.
+# From this width on oneDNN may multiply faster than what `torch.mm` calls: 1.3 times at 128 and twice at 256 where that
+# is MKL on an AMD processor, and no faster where it is MKL on an Intel. torch offers it only as this operator, which
+# some builds lack.
 ONEDNN_FROM = 128
 _ONEDNN: bool = torch.backends.mkldnn.is_available()  # type: ignore[no-untyped-call]
 
@@ -145,9 +148,10 @@ class Mlp:
 
 def _product(left: Tensor, right: Tensor) -> Tensor:
     """Matrix product by whatever computes it fastest."""
-    if right.shape[1] == 1:
+    columns = right.shape[1]
+    if columns == 1:
         return torch.mv(left, right[:, 0]).unsqueeze(1)
-    if _for_onednn(left, right):
+    if columns >= ONEDNN_FROM and _for_onednn(left, right):
         return _onednn(left, right, None, "none")
     return torch.mm(left, right)
 
@@ -165,7 +169,27 @@ def _onednn(left: Tensor, right: Tensor, bias: Tensor | None, activation: str) -
 
 
 def _for_onednn(left: Tensor, right: Tensor) -> bool:
-    return _ONEDNN and min(*left.shape, *right.shape) >= ONEDNN_FROM and not left.is_cuda
+    wide = _ONEDNN and min(*left.shape, *right.shape) >= ONEDNN_FROM and not left.is_cuda
+    return wide and _onednn_is_faster()
+
+
+@cache
+def _onednn_is_faster() -> bool:
+    """Measured once in a process.
+
+    Choice: faster by a quarter, each at its best. The two round differently, and processes on one kind of processor are
+    to choose alike: none is known on which the difference is near a quarter.
+    """
+    square = torch.ones(256, 256)
+    rounds = [(_seconds(torch.mm, square, square), _seconds(_onednn, square, square, None, "none")) for _ in range(10)]
+    plain, onednn = map(min, zip(*rounds, strict=True))
+    return plain > 1.25 * onednn
+
+
+def _seconds(multiply: Callable[..., Tensor], *factors: object) -> float:
+    started = time.perf_counter()
+    multiply(*factors)
+    return time.perf_counter() - started
 
 
 def bounded_log_std(raw: Tensor) -> Tensor:

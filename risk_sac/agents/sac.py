@@ -153,12 +153,14 @@ class SacAgent:
         """See `Agent.frozen`."""
         return self._policy.frozen(self._action_size)
 
+    @torch.inference_mode()
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """See `Agent.td_errors`."""
         drawn = self._sample(self._policy.forward(batch.next_observation).output)
         target = self._target(reward, batch.terminated, batch.next_observation, drawn.action, drawn.log_prob)
         return mean_magnitude(target - self._critics.values(batch.observation, batch.action))
 
+    @torch.inference_mode()
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """See `Agent.update`."""
         count = len(reward)
