@@ -31,7 +31,7 @@ def normalised_relu(raw: Tensor, bias: Tensor) -> tuple[Tensor, Normalised]:
     z = (x + b - mean) / σ,  σ² = mean of (x + b - mean)² + ε over the row
 
     Args:
-      raw: x, `batch x width`.
+      raw: x, `batch x width`; z is written over it.
       bias: b, `width`.
 
     Returns:
@@ -39,9 +39,9 @@ def normalised_relu(raw: Tensor, bias: Tensor) -> tuple[Tensor, Normalised]:
     """
     if raw.is_cuda:
         return uncompiled_normalised_relu(raw, bias)
-    result, scaled, inverse = torch.empty_like(raw), torch.empty_like(raw), torch.empty(raw.shape[0])
-    _forward(raw.numpy(), bias.numpy(), result.numpy(), scaled.numpy(), inverse.numpy())
-    return result, Normalised(scaled, inverse)
+    result, inverse = torch.empty_like(raw), torch.empty(raw.shape[0])
+    _forward(raw.numpy(), bias.numpy(), result.numpy(), inverse.numpy())
+    return result, Normalised(raw, inverse)
 
 
 def before_normalised_relu(gradient: Tensor, layer: Normalised) -> Tensor:
@@ -79,23 +79,25 @@ def uncompiled_before_normalised_relu(gradient: Tensor, layer: Normalised) -> Te
 
 
 @compiled_in_any_order
-def _forward(raw: Rows, bias: Rows, result: Rows, scaled: Rows, inverse_deviation: Rows) -> None:
-    rows, width = raw.shape
+def _forward(rows: Rows, bias: Rows, result: Rows, inverse_deviation: Rows) -> None:
+    count, width = rows.shape
     share = np.float32(1.0) / np.float32(width)
-    for i in range(rows):
+    for i in range(count):
         total = np.float32(0.0)
         for j in range(width):
-            scaled[i, j] = raw[i, j] + bias[j]
-            total += scaled[i, j]
+            shifted = rows[i, j] + bias[j]
+            rows[i, j] = shifted
+            total += shifted
         mean, squares = total * share, np.float32(0.0)
         for j in range(width):
-            scaled[i, j] -= mean
-            squares += scaled[i, j] * scaled[i, j]
+            centred = rows[i, j] - mean
+            rows[i, j] = centred
+            squares += centred * centred
         inverse = np.float32(1.0) / np.sqrt(squares * share + EPSILON)
         inverse_deviation[i] = inverse
         for j in range(width):
-            scaled[i, j] *= inverse
-            result[i, j] = max(scaled[i, j], np.float32(0.0))
+            rows[i, j] *= inverse
+            result[i, j] = max(rows[i, j], np.float32(0.0))
 
 
 @compiled_in_any_order
