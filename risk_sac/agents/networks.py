@@ -182,8 +182,8 @@ def _onednn_is_faster() -> bool:
     """
     square = torch.ones(256, 256)
     rounds = [(_seconds(torch.mm, square, square), _seconds(_onednn, square, square, None, "none")) for _ in range(10)]
-    plain, onednn = map(min, zip(*rounds, strict=True))
-    return plain > 1.25 * onednn
+    plain, onednn = np.min(rounds, axis=0)
+    return bool(plain > 1.25 * onednn)
 
 
 def _seconds(multiply: Callable[..., Tensor], *factors: object) -> float:
