@@ -2,7 +2,8 @@
 
 The networks are small, so much of an update in autograd is bookkeeping between the matrix products. Here the
 products are nearly all there is, and each network keeps its parameters in one flat tensor, so that an optimiser or
-target-network step is one operation.
+target-network step is one operation. Agents learn in torch's inference mode: what autograd notes down of each operator,
+even where nothing asks for a gradient, is a seventh of an update.
 """
 
 import math
