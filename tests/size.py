@@ -1,0 +1,33 @@
+"""Counts of the repository against its limits: `python -m tests.size`."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+GENERATED = "_pb2"
+
+
+def counts() -> Iterator[tuple[str, int, int]]:
+    """Yield what is counted, the count of the tracked files, and the limit."""
+    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    python = [name for name in tracked if name.endswith(".py") and GENERATED not in name and (ROOT / name).exists()]
+    product = [name for name in python if name.startswith(("risk_sac/", "service/"))]
+    markdown = [name for name in tracked if name.endswith(".md") and (ROOT / name).exists()]
+    yield "product lines", sum(len(_text(name).splitlines()) for name in product), 36_000
+    yield "product files", len(product), 400
+    yield "test lines", sum(len(_text(name).splitlines()) for name in python if name.startswith("tests/")), 30_000
+    yield "Markdown words", sum(len(_text(name).split()) for name in markdown), 30_000
+
+
+def _text(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+if __name__ == "__main__":
+    too_large = False
+    for what, count, limit in counts():
+        too_large |= count > limit
+        print(f"{what:15} {count:7,} of {limit:,}{' (too many)' if count > limit else ''}")
+    sys.exit(too_large)
