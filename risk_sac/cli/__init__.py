@@ -6,7 +6,6 @@ import sys
 from collections.abc import Sequence
 
 from risk_sac import __version__
-from risk_sac.cli.audit import add_audit
 from risk_sac.cli.campaigns import add_campaigns
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
 from risk_sac.cli.egos import add_egos
@@ -28,7 +27,6 @@ COMMANDS = (
     add_run,
     add_places,
     add_evaluate,
-    add_audit,
     add_egos,
     add_show,
     add_verify,

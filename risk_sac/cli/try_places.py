@@ -13,12 +13,12 @@ from risk_sac.scenario.maps.found import Survey
 from risk_sac.scenario.maps.keep import Map
 
 if TYPE_CHECKING:
-    from risk_sac.audit.tryout import Tried
+    from risk_sac.tryout import Tried
 
 
 def try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:
     """Plays, and prints a row for each pattern; fails if a place does not run, or the ego is touched unattacked."""
-    from risk_sac.audit.tryout import sample, try_out  # here, because loading the simulator takes a second
+    from risk_sac.tryout import sample, try_out  # here, because loading the simulator takes a second
 
     tried = []
     for fit in sample(found.fits, options.tries, options.seed):

@@ -1,7 +1,4 @@
-"""Better egos fail less: the same attacks on each, from the slowest driver to the careful one.
-
-`risk-sac audit` does the same with random search, on as many episodes as it takes.
-"""
+"""Better egos fail less: the same attacks on each, from the slowest driver to the careful one."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -9,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from risk_sac.audit.controls import LADDER
 from risk_sac.config import EgoConfig, FamilyName, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
@@ -17,6 +13,13 @@ from risk_sac.problem import Problem
 from risk_sac.types import Scene
 
 ATTACK_FROM, ATTACK_STEPS = 12, 45  # after the release, and how long it lasts
+RUNGS = {
+    "reaction 1.0 s": EgoConfig(reaction_time_s=1.0),
+    "reaction 0.5 s": EgoConfig(),
+    "reaction 0.1 s": EgoConfig(reaction_time_s=0.1),
+    "reaction 0.1 s, sees all": EgoConfig(profile="perfect"),
+}
+BESIDE = {"reaction 0.5 s, sees all": EgoConfig(sensor=None), "careful": EgoConfig(profile="careful")}
 PHASES = 10  # of the ego's reaction in which attacks begin: who is about to decide is lucky
 
 
@@ -72,15 +75,13 @@ def touched(family: FamilyName, ego: EgoConfig) -> tuple[int, int]:
 
 
 def test_no_ego_fails_more_often_than_the_next_worse_one() -> None:
-    *rungs, careful = LADDER
     totals = []
     for family in ("low", "mixed"):
-        found = {control.name: touched(family, control.ego) for control in (*rungs, careful)}
+        found = {name: touched(family, ego) for name, ego in (RUNGS | BESIDE).items()}
         assert len({count for _, count in found.values()}) == 1, "one budget for all"
-        hits = [found[control.name][0] for control in rungs[:-1]]
+        hits = [found[name][0] for name in RUNGS]
         assert hits == sorted(hits, reverse=True), (family, found)
-        assert found["reaction 0.5 s, sees all"][0] <= found["reaction 0.5 s"][0], (family, found)
-        assert found[careful.name][0] <= found["reaction 0.5 s"][0], (family, found)
+        assert all(found[name][0] <= found["reaction 0.5 s"][0] for name in BESIDE), (family, found)
         totals.append(hits)
     worst, *_, best = np.sum(totals, axis=0)
     assert best < worst, totals

@@ -36,4 +36,4 @@ def test_without_adversaries_nobody_is_touched(family: FamilyName) -> None:
 
 @each_family
 def test_adversaries_that_do_nothing_are_hardly_ever_touched(family: FamilyName) -> None:
-    assert len(contacts(family, controlled=True)) <= 1  # at most 1 % of many episodes; see `risk-sac audit`
+    assert len(contacts(family, controlled=True)) <= 1  # at most 1 % of many episodes

@@ -1,1 +1,0 @@
-"""Does a failure mean something? Controls beside the search: nobody attacks, chance attacks, better and worse egos."""
