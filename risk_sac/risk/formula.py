@@ -1,39 +1,93 @@
-"""The past-time STL that a requirement may be written in: grammar, types, windows, cost.
+"""Past-time STL of a requirement: grammar, types, windows and cost of monitoring.
 
-    formula    = disjunct ["implies" formula]
-    disjunct   = conjunct {"or" conjunct}
-    conjunct   = temporal {"and" temporal}
-    temporal   = unary {"since" [window] unary}
-    unary      = ("not" | "prev" | ("historically" | "once") [window]) unary | comparison
-    comparison = sum [("<=" | "<" | ">=" | ">") sum]
-    sum        = product {("+" | "-") product}
-    product    = factor {("*" | "/") factor}
-    factor     = number | signal | "-" factor | "abs" "(" sum ")" | "(" formula ")"
-    window     = "[" number ["s" | "ms"] ("," | ":") number ["s" | "ms"] "]"      in seconds unless it says ms
-
-Choice: formulas are parsed here and handed to rtamt fully parenthesised, with windows in samples, because
-rtamt's own grammar reads `a - b + c` as `a - (b + c)`, `a/b` as one name and `p q` as `q` alone, drops
-characters that it does not know, and names no position that helps.
+Choice: formulas are parsed here, not by rtamt, whose grammar reads `a - b + c` as `a - (b + c)`, `a/b` as one name and
+`p q` as `q` alone, drops unknown characters, and gives no useful position.
 """
 
 import math
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
+
+from lark import Lark, Token, Transformer, v_args
+from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
 from risk_sac.errors import FormulaError
-from risk_sac.risk.lexer import Token, tokens
 from risk_sac.risk.signals import SIGNALS
 
 MAX_DEPTH = 40  # nested operators
 MAX_COMPARISONS = 4000  # by the windows of one formula in one step, about 1 ms
 MAX_MAGNITUDE = 1e9  # of any number in a formula, so that arithmetic stays finite
 
-_BOUND = re.compile(r"\d{1,6}(\.\d{0,6})?")  # no exponents: 1e999999999 would fill memory as an exact fraction
+# Window bounds are in seconds unless they say ms.
+_GRAMMAR = r"""
+?formula:    disjunct | disjunct IMPLIES formula                       -> operation
+?disjunct:   conjunct | disjunct OR conjunct                           -> operation
+?conjunct:   temporal | conjunct AND temporal                          -> operation
+?temporal:   unary | temporal SINCE window? unary                      -> operation
+?unary:      comparison | (NOT | PREV) unary                           -> operation
+                        | (HISTORICALLY | ONCE) window? unary          -> operation
+?comparison: sum | sum COMPARISON sum                                  -> operation
+?sum:        product | sum (PLUS | MINUS) product                      -> operation
+?product:    factor | product (TIMES | OVER) factor                    -> operation
+?factor:     NUMBER -> number | WORD -> signal | MINUS factor          -> negation
+                    | ABS "(" sum ")" -> operation | "(" formula ")"
+window:      LSQB bound _SEPARATOR bound "]"
+bound:       NUMBER UNIT?
 
-_COMPARISONS = ("<=", "<", ">=", ">")
-_RESERVED = {"historically", "once", "since", "prev", "not", "and", "or", "implies", "abs"}
+COMPARISON.2: /<->|<=|>=|!==?|==?|<|>/
+IMPLIES.1: /implies\b|->/
+OR.1: /or\b|\|\|?/
+AND.1: /and\b|&&?/
+NOT.1: /not\b|!/
+SINCE.1: /(since|S)\b/
+PREV.1: /(prev|Y)\b/
+HISTORICALLY.1: /(historically|H)\b/
+ONCE.1: /(once|O)\b/
+ABS.1: /abs\b/
+UNIT.1: /m?s\b/
+WORD: /[A-Za-z_]\w*/
+NUMBER: /(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?/
+_SEPARATOR: /[,:]/
+PLUS: "+"
+MINUS: "-"
+TIMES: "*"
+OVER: "/"
+LSQB: "["
+%ignore /\s+/
+"""
+ARITHMETIC = ("+", "-", "*", "/", "abs")
+COMPARISONS = ("<=", "<", ">=", ">")
+_EXPECTED = {
+    "WORD": "a signal",
+    "NUMBER": "a number",
+    "LPAR": "'('",
+    "AND": "an operator",
+    "_SEPARATOR": "',' or ':'",
+    "RPAR": "')'",
+    "RSQB": "']'",
+    "$END": "the end",
+}
+_BOUND = re.compile(r"\d{1,6}(\.\d{0,6})?")  # no exponents: 1e999999999 would fill memory as an exact fraction
+_PAST_OF = {
+    **dict.fromkeys(("always", "G"), "historically"),
+    **dict.fromkeys(("eventually", "F"), "once"),
+    **dict.fromkeys(("until", "U", "unless", "W"), "since"),
+    **dict.fromkeys(("next", "X", "s_next", "sX"), "prev"),
+}
+# rtamt's robustness of iff and of equalities has the wrong sign or none: a true `p iff q` can come out negative.
+_REWRITES = {
+    **dict.fromkeys(("iff", "<->"), "(p implies q) and (q implies p)"),
+    "xor": "(p or q) and not (p and q)",
+    **dict.fromkeys(("==", "="), "abs(x - c) <= tolerance"),
+    **dict.fromkeys(("!=", "!=="), "abs(x - c) >= tolerance"),
+    "rise": "p and not prev p",
+    "fall": "not p and prev p",
+    **dict.fromkeys(("s_prev", "sY"), "prev"),
+    **dict.fromkeys(("sqrt", "exp", "pow"), "+, -, *, / by a number, and abs"),
+    **dict.fromkeys(("true", "false"), "a comparison"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +102,9 @@ class Node:
     magnitude: float | None = None  # largest absolute value; None for a formula, which is true or false
     depth: int = 1
 
-    def __str__(self) -> str:
-        """The formula as rtamt reads it, windows in samples."""
-        if not self.children:
-            return self.text
-        operator = self.op + (f"[{self.window[0]},{self.window[1]}]" if self.window else "")
-        operands = [f"({child})" for child in self.children]
-        return operator + operands[0] if len(operands) == 1 else f"{operands[0]} {operator} {operands[1]}"
-
 
 def parse(formula: str, step_s: float, horizon_steps: int) -> Node:
-    """The formula's tree, checked for everything that monitoring it online needs.
+    """Parses a formula and checks that it can be monitored online.
 
     Args:
       formula: past-time STL over the published signals.
@@ -68,8 +114,13 @@ def parse(formula: str, step_s: float, horizon_steps: int) -> Node:
     Raises:
       FormulaError: with position and reason.
     """
-    parser = _Parser(tokens(formula), Fraction(str(step_s)), len(formula))
-    node = parser.whole()
+    try:
+        node: Node = _parser(step_s).parse(formula)  # type: ignore[assignment] # what the transformer makes
+    except UnexpectedCharacters as error:
+        raise _error(f"unknown character {error.char!r}", error.pos_in_stream) from error
+    except UnexpectedToken as error:
+        raise _unexpected(error, formula) from error
+    _require_truth(node)
     back = memory(node)
     if back > horizon_steps:
         raise FormulaError(
@@ -87,7 +138,7 @@ def parse(formula: str, step_s: float, horizon_steps: int) -> Node:
 
 
 def memory(node: Node) -> int:
-    """Samples back that the value of a formula depends on; nested windows add up, unbounded ones count none."""
+    """Samples back that a formula depends on; nested windows add up, unbounded ones count none."""
     own = node.window[1] if node.window else int(node.op == "prev")
     return own + max((memory(child) for child in node.children), default=0)
 
@@ -102,196 +153,133 @@ def comparisons(node: Node) -> int:
 
 
 def signals_of(node: Node) -> set[str]:
-    """Names of the signals that a formula speaks about."""
+    """Names of the signals in a formula."""
     return {node.text} if node.op == "signal" else set[str]().union(*map(signals_of, node.children))
 
 
-class _Parser:
-    """Recursive descent over the grammar above; one method per rule."""
+@cache
+def _parser(step_s: float) -> Lark:
+    """Parser whose windows are in steps of `step_s`."""
+    return Lark(
+        _GRAMMAR,
+        start="formula",
+        parser="lalr",
+        lexer="basic",
+        transformer=_Nodes(Fraction(str(step_s))),
+        lexer_callbacks={"WORD": _supported, "COMPARISON": _supported},
+        g_regex_flags=re.ASCII,
+    )
 
-    def __init__(self, tokens: list[Token], step_s: Fraction, length: int) -> None:
-        self.tokens = [*tokens, Token("end", "the end", length)]
-        self.step_s = step_s
-        self.index = 0
-        self.nesting = 0
 
-    @property
-    def next(self) -> Token:
-        return self.tokens[self.index]
+def _supported(token: Token) -> Token:
+    """Refuses future operators and those without a faithful robustness, with the rewrite."""
+    if token in _PAST_OF:
+        raise _error(
+            f"{token.value!r} looks into the future, which an online monitor does not know; "
+            f"use the past-time operator {_PAST_OF[token]!r}",
+            token.start_pos,
+        )
+    if token in _REWRITES:
+        raise _error(f"{token.value!r} is not supported; use {_REWRITES[token]}", token.start_pos)
+    return token
 
-    def take(self, *texts: str) -> Token | None:
-        token = self.next
-        if token.text not in texts:
-            return None
-        self.index += 1
-        return token
 
-    def expect(self, *texts: str) -> Token:
-        token = self.take(*texts)
-        if token is None:
-            raise self.error(f"got {self.next.text!r}, wanted {' or '.join(map(repr, texts))}")
-        return token
+def _error(reason: str, position: int | None) -> FormulaError:
+    return FormulaError(f"column {position}: {reason}", position=position)
 
-    def error(self, reason: str, position: int | None = None) -> FormulaError:
-        position = self.next.position if position is None else position
-        return FormulaError(f"column {position}: {reason}", position=position)
 
-    def nested(self, rule: Callable[[], Node]) -> Node:
-        """One level deeper; bounded before Python's stack is."""
-        self.nesting += 1
-        if self.nesting > MAX_DEPTH:
-            raise self.error(f"more than {MAX_DEPTH} nested operators")
-        node = rule()
-        self.nesting -= 1
-        return node
+def _unexpected(error: UnexpectedToken, formula: str) -> FormulaError:
+    """Says what was found and what was expected."""
+    accepts = error.accepts
+    if error.token.type == "COMPARISON" and "AND" in accepts:
+        return _error("comparisons cannot be chained; write a <= x and x <= b", error.token.start_pos)
+    at_end = error.token.type == "$END"
+    got, position = ("the end", len(formula)) if at_end else (error.token.value, error.token.start_pos)
+    if accepts == {"NUMBER"}:
+        wanted = "a window bound in seconds such as 0.5"
+    else:
+        words = [word for terminal, word in _EXPECTED.items() if terminal in accepts] or ["the end"]
+        wanted = " or ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+    return _error(f"got {got!r}, wanted {wanted}", position)
 
-    def whole(self) -> Node:
-        node = self.formula()
-        if self.next.kind != "end":
-            raise self.error(f"got {self.next.text!r}, wanted an operator or the end")
-        self.require_truth(node)
-        return node
 
-    def formula(self) -> Node:
-        left = self.disjunct()
-        if token := self.take("implies"):
-            return self.join(token, left, self.nested(self.formula))
-        return left
+@v_args(inline=True)
+class _Nodes(Transformer[Token, Node]):
+    """Builds the tree while lark parses, and checks the type and range of each node."""
 
-    def disjunct(self) -> Node:
-        left = self.conjunct()
-        while token := self.take("or"):
-            left = self.join(token, left, self.conjunct())
-        return left
+    def __init__(self, step_s: Fraction) -> None:
+        super().__init__()
+        self._step_s = step_s
 
-    def conjunct(self) -> Node:
-        left = self.temporal()
-        while token := self.take("and"):
-            left = self.join(token, left, self.temporal())
-        return left
+    def number(self, token: Token) -> Node:
+        value = _bounded(token, float(token))
+        return Node("number", _at(token), text=repr(value), magnitude=value)
 
-    def temporal(self) -> Node:
-        left = self.unary()
-        while token := self.take("since"):
-            window = self.window()
-            left = self.join(token, left, self.unary(), window=window)
-        return left
+    def signal(self, token: Token) -> Node:
+        info = SIGNALS.get(token)
+        if info is None:
+            raise _error(f"unknown signal {token.value!r}; the published ones are {', '.join(SIGNALS)}", _at(token))
+        return Node("signal", _at(token), text=str(token), magnitude=max(abs(info.low), abs(info.high)))
 
-    def unary(self) -> Node:
-        token = self.take("not", "prev", "historically", "once")
-        if token is None:
-            return self.comparison()
-        window = self.window() if token.text in ("historically", "once") else None
-        return self.join(token, self.nested(self.unary), window=window)
+    def negation(self, token: Token, operand: Node) -> Node:
+        zero = Node("number", _at(token), text="0.0", magnitude=0.0)
+        return self.operation(zero, token, operand)
 
-    def comparison(self) -> Node:
-        left = self.sum()
-        token = self.take(*_COMPARISONS)
-        if token is None:
-            return left
-        node = self.join(token, left, self.sum())
-        if self.next.text in _COMPARISONS:
-            raise self.error("comparisons cannot be chained; write a <= x and x <= b")
-        return node
+    def bound(self, token: Token, unit: str = "s") -> int:
+        if not _BOUND.fullmatch(token):
+            raise _error(f"got {token.value!r}, wanted a window bound in seconds such as 0.5", _at(token))
+        seconds = Fraction(token) * (Fraction(1, 1000) if unit == "ms" else 1)
+        steps = seconds / self._step_s
+        if steps.denominator != 1:
+            step = float(self._step_s)
+            raise _error(f"the bound {float(seconds):g} s is no multiple of the {step:g} s step", _at(token))
+        return int(steps)
 
-    def sum(self) -> Node:
-        left = self.product()
-        while token := self.take("+", "-"):
-            left = self.join(token, left, self.product())
-        return left
-
-    def product(self) -> Node:
-        left = self.factor()
-        while token := self.take("*", "/"):
-            right = self.factor()
-            if token.text == "/" and (right.op != "number" or float(right.text) == 0):
-                raise self.error(
-                    "only a number other than 0 can divide; multiply the inequality out instead", right.position
-                )
-            left = self.join(token, left, right)
-        return left
-
-    def factor(self) -> Node:
-        token = self.next
-        self.index += 1
-        match token.kind, token.text:
-            case "number", text:
-                return Node("number", token.position, text=repr(float(text)), magnitude=self.bounded(token, text))
-            case _, "-":
-                zero = Node("number", token.position, text="0.0", magnitude=0.0)
-                return self.join(token, zero, self.nested(self.factor))
-            case _, "abs":
-                self.expect("(")
-                node = self.join(token, self.nested(self.sum))
-                self.expect(")")
-                return node
-            case _, "(":
-                node = self.nested(self.formula)
-                self.expect(")")
-                return node
-            case "word", name if name in SIGNALS:
-                info = SIGNALS[name]
-                return Node("signal", token.position, text=name, magnitude=max(abs(info.low), abs(info.high)))
-            case "word", name if name not in _RESERVED:
-                raise self.error(
-                    f"unknown signal {name!r}; the published ones are {', '.join(SIGNALS)}", token.position
-                )
-        raise self.error(f"got {token.text!r}, wanted a signal, a number or '('", token.position)
-
-    def window(self) -> tuple[int, int] | None:
-        start = self.take("[")
-        if start is None:
-            return None
-        first = self.samples()
-        self.expect(",", ":")
-        last = self.samples()
-        self.expect("]")
+    def window(self, bracket: Token, first: int, last: int) -> tuple[int, int]:
         if first > last:
-            raise self.error(
-                f"the window [{first * self.step_s}, {last * self.step_s}] s ends before it begins", start.position
-            )
+            start_s, end_s = float(first * self._step_s), float(last * self._step_s)
+            raise _error(f"the window [{start_s:g}, {end_s:g}] s ends before it begins", _at(bracket))
         return first, last
 
-    def samples(self) -> int:
-        token = self.next
-        self.index += 1
-        if token.kind != "number" or not _BOUND.fullmatch(token.text):
-            raise self.error(f"got {token.text!r}, wanted a window bound in seconds such as 0.5", token.position)
-        unit = self.take("s", "ms")
-        seconds = Fraction(token.text) * (Fraction(1, 1000) if unit and unit.text == "ms" else 1)
-        count = seconds / self.step_s
-        if count.denominator != 1:
-            step = float(self.step_s)
-            raise self.error(f"the bound {float(seconds):g} s is no multiple of the {step:g} s step", token.position)
-        return int(count)
-
-    def join(self, token: Token, *children: Node, window: tuple[int, int] | None = None) -> Node:
-        """The operator over its operands, which must be numbers or formulas as the operator asks."""
-        arithmetic = token.text in ("+", "-", "*", "/", "abs")
-        for child in children:
-            if arithmetic or token.text in _COMPARISONS:
-                if child.magnitude is None:
-                    raise self.error(f"{token.text!r} wants numbers; got a formula", child.position)
-            else:
-                self.require_truth(child)
-        depth = 1 + max(child.depth for child in children)
+    def operation(self, *parts: Token | tuple[int, int] | Node) -> Node:
+        """An operator with its operands, and its window if it has one."""
+        [token] = [part for part in parts if isinstance(part, Token)]
+        operands = tuple(part for part in parts if isinstance(part, Node))
+        window = next((part for part in parts if isinstance(part, tuple)), None)
+        op = str(token) if token in (*ARITHMETIC, *COMPARISONS) else token.type.lower()
+        for operand in operands:
+            if op not in (*ARITHMETIC, *COMPARISONS):
+                _require_truth(operand)
+            elif operand.magnitude is None:
+                raise _error(f"{op!r} wants numbers; got a formula", operand.position)
+        depth = 1 + max(operand.depth for operand in operands)
         if depth > MAX_DEPTH:
-            raise self.error(f"more than {MAX_DEPTH} nested operators", token.position)
-        position = token.position if len(children) == 1 else children[0].position
-        magnitude = self.magnitude(token, children) if arithmetic else None
-        return Node(token.text, position, children, window=window, magnitude=magnitude, depth=depth)
+            raise _error(f"more than {MAX_DEPTH} nested operators", _at(token))
+        position = _at(token) if len(operands) == 1 else operands[0].position
+        magnitude = _magnitude(token, operands) if op in ARITHMETIC else None
+        return Node(op, position, operands, window=window, magnitude=magnitude, depth=depth)
 
-    def require_truth(self, node: Node) -> None:
-        if node.magnitude is not None:
-            raise self.error("got a number, wanted a comparison such as ttc_s >= 1.5", node.position)
 
-    def magnitude(self, token: Token, children: tuple[Node, ...]) -> float:
-        values = [child.magnitude or 0.0 for child in children]
-        if token.text == "/":
-            return self.bounded(token, values[0] / abs(float(children[1].text)))
-        return self.bounded(token, math.prod(values) if token.text == "*" else sum(values))
+def _at(token: Token) -> int:
+    return token.start_pos or 0
 
-    def bounded(self, token: Token, value: float | str) -> float:
-        if float(value) > MAX_MAGNITUDE:
-            raise self.error(f"the number may reach {float(value):g}; wanted at most {MAX_MAGNITUDE:g}", token.position)
-        return float(value)
+
+def _require_truth(node: Node) -> None:
+    if node.magnitude is not None:
+        raise _error("got a number, wanted a comparison such as ttc_s >= 1.5", node.position)
+
+
+def _magnitude(token: Token, operands: tuple[Node, ...]) -> float:
+    values = [operand.magnitude or 0.0 for operand in operands]
+    if token == "/":
+        divisor = operands[1]
+        if divisor.op != "number" or float(divisor.text) == 0:
+            raise _error("only a number other than 0 can divide; multiply the inequality out instead", divisor.position)
+        return _bounded(token, values[0] / float(divisor.text))
+    return _bounded(token, math.prod(values) if token == "*" else sum(values))
+
+
+def _bounded(token: Token, value: float) -> float:
+    if value > MAX_MAGNITUDE:
+        raise _error(f"the number may reach {value:g}; wanted at most {MAX_MAGNITUDE:g}", _at(token))
+    return value
