@@ -1,17 +1,7 @@
-"""Opening the database: SQLite in the data folder, or PostgreSQL by URL; sound, up to date, and ours alone.
+"""Opens the database: SQLite in the data folder, or PostgreSQL by URL."""
 
-SQLite reads its write-ahead log up to the last commit whose checksums hold and says nothing of what follows: a commit
-that a kill cut off, or one that the disk damaged. Nothing is lost for good by it, since runs tell again what their
-checkpoints know; but it is noticed.
-
-Source: the format of the write-ahead log, sqlite.org/fileformat2.html.
-"""
-
-import logging
-import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import takewhile
 from pathlib import Path
 from sqlite3 import Connection as SqliteConnection
 
@@ -23,13 +13,8 @@ from service.errors import StorageError
 from service.host.private import create_private, make_private
 from service.store.steps import step_forward
 
-logger = logging.getLogger(__name__)
-
 READERS = 8  # requests answered in threads at once; of more, each would only wait longer for the interpreter
 ADVISORY_LOCK = 0x5249534B  # any number that all servers of this project agree on
-
-LOG_HEADER = struct.Struct(">8I")  # magic, version, page size, sequence, two salts, two checksums
-LOG_FRAME = struct.Struct(">6I")  # page, size after a commit, two salts, two checksums
 
 # Options of a connection that will write. On SQLite a transaction that first reads is refused once it writes, without a
 # wait, if another one has written meanwhile.
@@ -46,11 +31,8 @@ def open_database(url: str) -> Engine:
       StorageError: it cannot be opened, is damaged, belongs to a newer version, or is another server's.
     """
     engine = connect(url)
-    logged = _logged_frames(Path(engine.url.database or "")) if engine.dialect.name == "sqlite" else 0
     try:
         with storage_errors("opening the database"):
-            if logged and (dropped := logged - _taken_frames(engine)) > 0:
-                logger.warning("the last %d frames of the journal hold no whole commit; runs tell again", dropped)
             _check(engine)
             step_forward(engine)
     except BaseException:
@@ -148,26 +130,6 @@ def _set_up(connection: SqliteConnection, _: object) -> None:
 
 def _begin(connection: Connection) -> None:
     connection.exec_driver_sql(connection.get_execution_options().get("begin", "BEGIN"))
-
-
-def _logged_frames(database: Path) -> int:
-    """Frames of the write-ahead log's present generation, as it lies there before the database is opened."""
-    log = database.with_name(f"{database.name}-wal")
-    content = log.read_bytes() if log.exists() else b""
-    if len(content) < LOG_HEADER.size:
-        return 0
-    _, _, page_size, _, *salts, _, _ = LOG_HEADER.unpack_from(content)
-    size = LOG_FRAME.size + page_size
-    starts = range(LOG_HEADER.size, len(content) - size + 1, size)
-    generations = (list(LOG_FRAME.unpack_from(content, start)[2:4]) for start in starts)
-    return sum(1 for _ in takewhile(lambda found: found == salts, generations))
-
-
-def _taken_frames(engine: Engine) -> int:
-    """How many of them the database, open now, has taken."""
-    with engine.connect() as connection:
-        taken: int = connection.execute(text("PRAGMA wal_checkpoint(PASSIVE)")).one()[1]
-    return max(0, taken)
 
 
 def _check(engine: Engine) -> None:

@@ -3,15 +3,14 @@
 import time
 import zlib
 from collections.abc import Collection, Iterator
-from contextlib import closing, contextmanager
-from dataclasses import fields
+from contextlib import contextmanager
 
+from pydantic_core import from_json
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, selectinload
 
 from risk_sac.records import Outcome
 from service.errors import StorageError
-from service.store.columns import read_columns
 from service.store.counting import HOUR_S
 from service.store.database import open_database, storage_errors
 from service.store.finding import Judged, episode_page, find_campaign, find_failure, find_run, find_triage
@@ -30,6 +29,7 @@ from service.store.stored import (
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
 
 DAY_HOURS = 24
+BATCH = 1000  # rows in memory at once
 
 
 class Store:
@@ -51,11 +51,6 @@ class Store:
         self.engine = open_database(url)
         self.refusal: str | None = None
         self.revisions = Revisions()
-        try:
-            self._check()
-        except BaseException:
-            self.close()
-            raise
 
     def close(self) -> None:
         """Close all connections."""
@@ -172,13 +167,14 @@ class Store:
         Raises:
           StorageError: one of them is damaged.
         """
-        conditions = [EpisodeRow.campaign_number == number, *Judged(iid=False).conditions()]
+        row = EpisodeRow
+        query = select(row.number, row.run_number, row.phase, row.index, row.outcome, row.record)
+        query = query.where(row.campaign_number == number, *Judged(iid=False).conditions()).order_by(row.number)
         if outcomes:
-            conditions.append(EpisodeRow.outcome.in_(outcomes))
-        names = [field.name for field in fields(PlainEpisode)]
+            query = query.where(row.outcome.in_(outcomes))
         with self._reading() as session:
-            for values in read_columns(session, EpisodeRow, names, *conditions):
-                yield PlainEpisode(*values)
+            for found in session.execute(query.execution_options(yield_per=BATCH)):
+                yield PlainEpisode(*found[:-1], from_json(found.record))
 
     def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredEpisode:
         """The episode with this id in which the ego touched something.
@@ -258,7 +254,11 @@ class Store:
     @contextmanager
     def _reading(self) -> Iterator[Session]:
         with storage_errors("reading"), Session(self.engine) as session:
-            yield session
+            try:
+                yield session
+            except ValueError as error:  # pydantic's, too
+                reason = str(error).partition("\n")[0]
+                raise StorageError(f"a row is damaged ({reason}); restore the database from a copy") from error
 
     def _campaign(self, row: CampaignRow) -> StoredCampaign:
         campaign = StoredCampaign.from_row(row, self._shown_revision(row.revision))
@@ -267,15 +267,3 @@ class Store:
 
     def _shown_revision(self, revision: int) -> str:
         return f"{revision}" if self.refusal is None else f"{revision}-{zlib.crc32(self.refusal.encode()):x}"
-
-    def _check(self) -> None:
-        """Read every campaign and run once, which verifies them, and count the episodes they should have."""
-        counted = select(func.count()).where(EpisodeRow.run_number == RunRow.number).scalar_subquery()
-        with self._reading() as session:
-            for table in (CampaignRow, RunRow):
-                with closing(session.scalars(select(table).execution_options(yield_per=1000))) as rows:
-                    for _ in rows:
-                        pass
-            lacking = session.scalars(select(RunRow.id).where(RunRow.episodes_done != counted)).first()
-        if lacking is not None:
-            raise StorageError(f"database is damaged: run {lacking!r} lacks episodes; restore a copy or move it away")

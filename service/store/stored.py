@@ -10,7 +10,7 @@ from pydantic_core import from_json
 
 from risk_sac.config import IID_METHODS, CampaignSpec, FamilyName, RunSpec
 from risk_sac.metrics import Funnel
-from risk_sac.records import EpisodeRecord, Outcome, RunMetrics
+from risk_sac.records import EpisodeRecord, RunMetrics
 from risk_sac.run_folder.verified import Repetition
 from service.errors import OutdatedError
 from service.store.states import State, TriageState
@@ -195,14 +195,14 @@ class StoredEpisode:
 
 @dataclass(frozen=True, slots=True)
 class PlainEpisode:
-    """An episode of very many, as its row has it: what it recorded is still JSON."""
+    """An episode of very many, whose record is not validated: that costs most of reading it."""
 
     number: int  # in the order of arrival, over all campaigns
     run_number: int
     phase: str
     index: int
-    outcome: Outcome
-    record: str
+    outcome: str
+    record: Mapping[str, Any]  # JSON; a number that is not finite is a string, see `risk_sac.records.Record`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,23 +3,10 @@
 Records of the method are stored as the JSON that the worker sent; what is filtered or counted has a
 column of its own. Numbers are primary keys in order of arrival, so that a page continues where the
 last one ended however much was inserted meanwhile. Its history is in `service.store.migrations`.
-
-Every row carries a checksum of its other columns, because a database notices only some of the bits
-that a disk flips. It is written with the row and verified whenever the row is read.
 """
 
-import zlib
-from collections.abc import Callable
-from functools import cache
-from operator import attrgetter
-from typing import Any
-
-from pydantic_core import to_json
-from sqlalchemy import BigInteger, ForeignKey, Index, Text, event, inspect, text
-from sqlalchemy.orm import DeclarativeBase, Mapped, Mapper, mapped_column, relationship
-from sqlalchemy.sql.schema import ScalarElementColumnDefault
-
-from service.errors import StorageError
+from sqlalchemy import ForeignKey, Index, Text, text
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
 # What is summed up over runs, per family, method and state.
 TALLIED = (
@@ -30,7 +17,6 @@ TALLIED = (
     "preventable",
     "distinct_preventable",
 )
-LATER = {"later": True}  # of a column that came after checksums: summed only where it holds something
 
 
 def _of_judged(name: str, *columns: str) -> Index:
@@ -43,13 +29,7 @@ class Base(DeclarativeBase):
     """Root of the mapped tables."""
 
 
-class Checked:
-    """A row that carries its checksum; None in rows from before there was one."""
-
-    checksum: Mapped[int | None] = mapped_column(BigInteger)
-
-
-class CampaignRow(Checked, Base):
+class CampaignRow(Base):
     """A posted campaign."""
 
     __tablename__ = "campaigns"
@@ -73,11 +53,11 @@ class CampaignRow(Checked, Base):
     started_at: Mapped[float | None]
     finished_at: Mapped[float | None]
     revision: Mapped[int] = mapped_column(default=1)
-    events: Mapped[int] = mapped_column(default=0, info=LATER)  # how many there are, which is the last one's sequence
+    events: Mapped[int] = mapped_column(default=0)  # how many there are, which is the last one's sequence
     runs: Mapped[list["RunRow"]] = relationship(back_populates="campaign", order_by="RunRow.number")
 
 
-class RunRow(Checked, Base):
+class RunRow(Base):
     """One (family, method, seed) of a campaign."""
 
     __tablename__ = "runs"
@@ -106,20 +86,20 @@ class RunRow(Checked, Base):
     rejected: Mapped[int] = mapped_column(default=0)
     raw_collisions: Mapped[int] = mapped_column(default=0)
     failures: Mapped[int] = mapped_column(default=0)
-    distinct_failures: Mapped[int] = mapped_column(default=0, info=LATER)
-    preventable: Mapped[int] = mapped_column(default=0, info=LATER)
-    distinct_preventable: Mapped[int] = mapped_column(default=0, info=LATER)
+    distinct_failures: Mapped[int] = mapped_column(default=0)
+    preventable: Mapped[int] = mapped_column(default=0)
+    distinct_preventable: Mapped[int] = mapped_column(default=0)
     busy_s: Mapped[float] = mapped_column(default=0.0)
     attempts: Mapped[int] = mapped_column(default=0)
     metrics: Mapped[str | None] = mapped_column(Text)
     evaluation: Mapped[str | None] = mapped_column(Text)
     digest: Mapped[str | None]
     versions: Mapped[str] = mapped_column(Text, default="{}")
-    repetitions: Mapped[str | None] = mapped_column(Text, info=LATER)  # of its distinct failures, by episode's index
+    repetitions: Mapped[str | None] = mapped_column(Text)  # of its distinct failures, by episode's index
     campaign: Mapped[CampaignRow] = relationship(back_populates="runs")
 
 
-class EpisodeRow(Checked, Base):
+class EpisodeRow(Base):
     """One episode of a run; a resumed run may report it again, which replaces it."""
 
     __tablename__ = "episodes"
@@ -143,15 +123,15 @@ class EpisodeRow(Checked, Base):
     series: Mapped[str | None]
     series_sha256: Mapped[str | None]
     wall_s: Mapped[float]
-    grade: Mapped[str | None] = mapped_column(info=LATER)  # of a valid failure
-    signature: Mapped[str | None] = mapped_column(info=LATER)  # of a contact
-    broke: Mapped[str | None] = mapped_column(info=LATER)  # what its striker broke, between commas: ",red_light,"
-    funnel: Mapped[str | None] = mapped_column(Text, info=LATER)  # of the run's phase, this episode included
-    sequence: Mapped[int] = mapped_column(info=LATER)  # among the campaign's events: 1, 2, …, with those of `changes`
+    grade: Mapped[str | None]  # of a valid failure
+    signature: Mapped[str | None]  # of a contact
+    broke: Mapped[str | None]  # what its striker broke, between commas: ",red_light,"
+    funnel: Mapped[str | None] = mapped_column(Text)  # of the run's phase, this episode included
+    sequence: Mapped[int]  # among the campaign's events: 1, 2, …, with those of `changes`
     run: Mapped[RunRow] = relationship(lazy="joined", innerjoin=True)
 
 
-class ChangeRow(Checked, Base):
+class ChangeRow(Base):
     """A campaign, or one of its runs, came into another state."""
 
     __tablename__ = "changes"
@@ -166,10 +146,10 @@ class ChangeRow(Checked, Base):
     state: Mapped[str]
     reason: Mapped[str | None]
     at: Mapped[float]
-    sequence: Mapped[int] = mapped_column(info=LATER)  # among the campaign's events: 1, 2, …, with those of `episodes`
+    sequence: Mapped[int]  # among the campaign's events: 1, 2, …, with those of `episodes`
 
 
-class TriageRow(Checked, Base):
+class TriageRow(Base):
     """What people made of a contact."""
 
     __tablename__ = "triages"
@@ -186,7 +166,7 @@ class TriageRow(Checked, Base):
     changed_at: Mapped[float]
 
 
-class UsageRow(Checked, Base):
+class UsageRow(Base):
     """Worker time that a project has used in one hour since the epoch."""
 
     __tablename__ = "usage"
@@ -196,7 +176,7 @@ class UsageRow(Checked, Base):
     busy_s: Mapped[float]
 
 
-class ServerRow(Checked, Base):
+class ServerRow(Base):
     """The one row that the server keeps of itself."""
 
     __tablename__ = "server"
@@ -204,60 +184,3 @@ class ServerRow(Checked, Base):
     number: Mapped[int] = mapped_column(primary_key=True)
     cursor_secret: Mapped[str]  # 32 bytes, hexadecimal
     keys_made_at: Mapped[float | None]  # when the first API key was made, or seen; seconds since the epoch
-
-
-def checksum(row: Checked) -> int:
-    """CRC-32 of a row's columns but its own and the number that the database gives.
-
-    A row from before a column was added keeps its checksum: such columns count only where one of them holds something,
-    and the last ones only up to the last that is not null.
-    """
-    mapper = inspect(type(row))
-    return checksum_of(_summed(mapper)(row), _added(mapper)(row))
-
-
-def checksum_of(values: tuple[Any, ...], added: tuple[Any, ...]) -> int:
-    """The same of values that are at hand: of the first columns, and of those that came later."""
-    while added and added[-1] is None:
-        added = added[:-1]
-    return zlib.crc32(to_json((*values, *added) if any(added) else values, inf_nan_mode="strings"))
-
-
-@cache
-def _summed(mapper: Mapper[Any]) -> Callable[[Checked], tuple[Any, ...]]:
-    return attrgetter(*summed_columns(mapper)[0])
-
-
-@cache
-def _added(mapper: Mapper[Any]) -> Callable[[Checked], tuple[Any, ...]]:
-    names = summed_columns(mapper)[1]
-    return lambda row: tuple(getattr(row, name) for name in names)
-
-
-def summed_columns(mapper: Mapper[Any]) -> tuple[list[str], list[str]]:
-    """Names of the columns that a checksum is formed over: those there were first, and those that came later."""
-    names = [name for name in mapper.columns.keys() if name not in ("number", "checksum")]  # noqa: SIM118
-    later = [name for name in names if mapper.columns[name].info]
-    return [name for name in names if name not in later], later
-
-
-@event.listens_for(Checked, "before_insert", propagate=True)
-@event.listens_for(Checked, "before_update", propagate=True)
-def _seal(mapper: Mapper[Any], connection: object, row: Checked) -> None:
-    for name, column in mapper.columns.items():
-        if getattr(row, name) is None and isinstance(column.default, ScalarElementColumnDefault):
-            setattr(row, name, column.default.arg)  # else the INSERT would fill it in, after this
-    row.checksum = checksum(row)
-
-
-@event.listens_for(Checked, "load", propagate=True)
-@event.listens_for(Checked, "refresh", propagate=True)
-def _verify(row: Checked, *_: object) -> None:
-    if row.checksum is not None and row.checksum != checksum(row):
-        raise damaged(type(row), getattr(row, "id", None) or getattr(row, "number", ""))
-
-
-def damaged(table: type[Checked], name: object) -> StorageError:
-    """What to raise of a row whose checksum does not hold."""
-    local = inspect(table).local_table.name
-    return StorageError(f"row {name} of the table {local!r} is damaged; restore the database from a copy")

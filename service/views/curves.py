@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic_core import from_json
 
 from risk_sac.metrics import WINDOW
 from risk_sac.records import RECORDED, Grade, Outcome
@@ -32,7 +31,7 @@ def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: i
     searches = {run.number: _Search() for run in campaign.searches}
     for each in episodes:
         if each.phase == SEARCH:
-            searches[each.run_number].add(each.outcome, from_json(each.record))
+            searches[each.run_number].add(each.outcome, each.record)
     return Curves(runs=[_curves(run, searches[run.number], points) for run in campaign.searches])
 
 

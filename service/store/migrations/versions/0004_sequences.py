@@ -1,13 +1,11 @@
 """One sequence of events per campaign, of its episodes and changes together."""
 
-import zlib
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from itertools import accumulate
 
 import sqlalchemy as sa
 from alembic import op
-from pydantic_core import to_json
 from sqlalchemy import RowMapping
 
 revision = "0004"
@@ -16,20 +14,10 @@ down_revision = "0003"
 BATCH = 1000  # rows at once
 AT_WORK = ("running", "cancelling")  # states in which there is a worker that may report episodes
 
-# What the checksums of rows were formed over; of an episode also over `JUDGED`, where it holds something.
-CAMPAIGN = (
-    *("id", "project", "label", "idempotency_key", "spec", "state", "reason", "created_at", "started_at"),
-    *("finished_at", "revision"),
-)
-EPISODE = ("campaign_number", "run_number", "phase", "index", "outcome", "record", "series", "series_sha256", "wall_s")
-JUDGED = ("grade", "signature", "broke", "funnel")
-CHANGE = ("campaign_number", "run_id", "state", "reason", "at")
-
-
-campaigns = sa.table("campaigns", *map(sa.column, ("number", "checksum", "events", *CAMPAIGN)))
+campaigns = sa.table("campaigns", *map(sa.column, ("number", "events")))
 runs = sa.table("runs", *map(sa.column, ("number", "id")))
-episodes = sa.table("episodes", *map(sa.column, ("number", "checksum", "sequence", *EPISODE, *JUDGED)))
-changes = sa.table("changes", *map(sa.column, ("number", "checksum", "sequence", *CHANGE)))
+episodes = sa.table("episodes", *map(sa.column, ("number", "campaign_number", "run_number", "sequence")))
+changes = sa.table("changes", *map(sa.column, ("number", "campaign_number", "run_id", "state", "sequence")))
 
 
 def upgrade() -> None:
@@ -44,7 +32,7 @@ def upgrade() -> None:
     for campaign in op.get_bind().execute(sa.select(campaigns).order_by(campaigns.c.number)).mappings().all():
         count = _number_events(campaign["number"])
         if count:
-            _write(campaigns, "events", [(campaign, count)], CAMPAIGN)
+            _write(campaigns, "events", [(campaign, count)])
     op.create_index("episodes_sequence", "episodes", ["campaign_number", "sequence"], unique=True)
     op.drop_index("changes_pages", "changes")
     op.create_index("changes_sequence", "changes", ["campaign_number", "sequence"], unique=True)
@@ -59,9 +47,9 @@ def _number_events(campaign: int) -> int:
     for page in _episode_pages(campaign):
         ranks |= {episode["number"]: rank for rank, episode in enumerate(page, len(ranks))}
         numbered = [(each, ranks[each["number"]] + bisect_left(before, each["number"])) for each in page]
-        _write(episodes, "sequence", numbered, EPISODE, JUDGED)
+        _write(episodes, "sequence", numbered)
     places = [place + ranks[episode] for place, episode in enumerate(before, 1)]
-    _write(changes, "sequence", list(zip(told, places, strict=True)), CHANGE)
+    _write(changes, "sequence", list(zip(told, places, strict=True)))
     return len(ranks) - 1 + len(told)
 
 
@@ -96,25 +84,8 @@ def _episode_pages(campaign: int) -> Iterator[Sequence[RowMapping]]:
         last = page[-1]["number"]
 
 
-def _write(
-    table: sa.TableClause,
-    name: str,
-    numbered: Sequence[tuple[RowMapping, int]],
-    summed: Sequence[str],
-    judged: Sequence[str] = (),
-) -> None:
-    """Rows get their numbers, and a checksum over them; one that is damaged keeps the checksum that shows it."""
-    rows = []
-    for row, number in numbered:
-        values, added = tuple(row[each] for each in summed), tuple(row[each] for each in judged)
-        checksum = row["checksum"]
-        if checksum == _checksum((*values, *added) if any(added) else values):
-            checksum = _checksum((*values, *added, number))
-        rows.append({"row": row["number"], "to": number, "sum": checksum})
-    if rows:
+def _write(table: sa.TableClause, name: str, numbered: Sequence[tuple[RowMapping, int]]) -> None:
+    if numbered:
         changed = sa.update(table).where(table.c.number == sa.bindparam("row"))
-        op.get_bind().execute(changed.values({name: sa.bindparam("to"), "checksum": sa.bindparam("sum")}), rows)
-
-
-def _checksum(values: tuple[object, ...]) -> int:
-    return zlib.crc32(to_json(values, inf_nan_mode="strings"))
+        rows = [{"row": row["number"], "to": number} for row, number in numbered]
+        op.get_bind().execute(changed.values({name: sa.bindparam("to")}), rows)

@@ -21,8 +21,3 @@ def upgrade() -> None:
         sqlite_autoincrement=True,
     )
     op.create_index("triages_episodes", "triages", ["campaign_number", "episode_number"], unique=True)
-
-
-def downgrade() -> None:
-    """Forgets it: the version before has no place for it."""
-    op.drop_table("triages")

@@ -1,7 +1,4 @@
-import os
 import sqlite3
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -9,7 +6,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Grade
+from risk_sac.records import Grade, Outcome
 from service.errors import StorageError
 from service.store import database
 from service.store.finding import Judged
@@ -17,6 +14,7 @@ from service.store.reading import Store
 from service.store.states import State
 from service.store.tables import Base
 from service.store.writing import Ledger
+from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
 
@@ -48,7 +46,7 @@ def test_a_database_from_before_contacts_were_judged_is_brought_up_to_date(tmp_p
     old = sqlite3.connect(tmp_path / "test.db")
     old.executescript(BEFORE_JUDGEMENTS.read_text(encoding="utf-8"))
     old.close()
-    store = Store(f"sqlite:///{tmp_path}/test.db")  # which verifies all campaigns and runs
+    store = Store(f"sqlite:///{tmp_path}/test.db")
     (campaign,) = store.campaigns(limit=2).items
     found, waiting = campaign.runs
     assert (found.failures, found.distinct_failures, found.preventable, found.distinct_preventable) == (2, 2, 0, 0)
@@ -59,23 +57,7 @@ def test_a_database_from_before_contacts_were_judged_is_brought_up_to_date(tmp_p
     assert {each.funnel for each in episodes} == {None}
     assert episodes[1].record.collision.judgement is None
     assert store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.CAREFUL)).items == ()
-    with store.engine.begin() as connection:
-        assert connection.exec_driver_sql("SELECT count(*) FROM episodes WHERE checksum IS NULL").scalar() == 0
-        assert connection.exec_driver_sql("SELECT count(*) FROM runs WHERE checksum IS NULL").scalar() == 0
-        connection.exec_driver_sql("UPDATE episodes SET grade = 'careful' WHERE number = 2")
-    with pytest.raises(StorageError, match="row 2 of the table 'episodes' is damaged"):
-        store.episodes(campaign.id, limit=9)
     store.close()
-
-
-def test_a_run_that_was_damaged_before_is_not_sealed_anew(tmp_path):
-    old = sqlite3.connect(tmp_path / "test.db")
-    old.executescript(BEFORE_JUDGEMENTS.read_text(encoding="utf-8"))
-    old.execute("UPDATE runs SET failures = 3")
-    old.commit()
-    old.close()
-    with pytest.raises(StorageError, match="of the table 'runs' is damaged"):
-        Store(f"sqlite:///{tmp_path}/test.db")
 
 
 def test_the_migrations_lead_to_the_tables(store):
@@ -148,47 +130,34 @@ def test_a_database_of_a_newer_version_is_refused(tmp_path):
         Store(f"sqlite:///{tmp_path}/test.db")
 
 
-WRITE_AND_DIE = """
-import os, sqlite3, sys
-database = sqlite3.connect(sys.argv[1])
-database.execute("PRAGMA journal_mode = WAL")
-database.execute("CREATE TABLE notes (text)")
-for number in range(5):
-    database.execute("INSERT INTO notes VALUES (?)", [str(number) * 3000])
-    database.commit()
-os._exit(0)
-"""
-
-
-@pytest.fixture
-def logged(tmp_path):
-    """A database whose writer was killed after its last commit."""
+def test_a_database_with_a_damaged_page_is_not_opened(tmp_path):
     path = tmp_path / "test.db"
-    subprocess.run([sys.executable, "-c", WRITE_AND_DIE, str(path)], check=True)
-    return path
+    Store(f"sqlite:///{path}").close()
+    content = bytearray(path.read_bytes())
+    content[4096:4200] = bytes(104)  # the head of its second page
+    path.write_bytes(content)
+    with pytest.raises(StorageError, match=r"damaged|malformed"):
+        Store(f"sqlite:///{path}")
 
 
-def test_a_whole_journal_is_taken_without_a_word(logged, caplog):
-    Store(f"sqlite:///{logged}").close()
-    assert "journal" not in caplog.text
-    with sqlite3.connect(logged) as found:
-        assert found.execute("SELECT count(*) FROM notes").fetchone() == (5,)
-    found.close()
+def test_a_record_that_cannot_be_read_is_a_storage_error(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    ledger.add_episodes([(start(store, ledger), episode(0, Outcome.FAILURE))])
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE episodes SET record = substr(record, 2)")
+    with pytest.raises(StorageError, match="a row is damaged"):
+        store.episodes(campaign.id, limit=1)
+    with pytest.raises(StorageError, match="a row is damaged"):
+        list(store.plain_episodes(campaign.number))
 
 
-@pytest.mark.parametrize("at", [-1, -5000, 4000])
-def test_a_journal_with_a_flipped_bit_is_noticed(logged, caplog, at):
-    wal = logged.with_name("test.db-wal")
-    content = bytearray(wal.read_bytes())
-    content[at] ^= 1
-    wal.write_bytes(content)
-    Store(f"sqlite:///{logged}").close()
-    assert "frames of the journal hold no whole commit" in caplog.text
-
-
-def test_a_journal_that_was_cut_at_a_frame_looks_like_one_that_was_shorter(logged, caplog):
-    os.truncate(logged.with_name("test.db-wal"), 32 + 3 * (24 + 4096))
-    Store(f"sqlite:///{logged}").close()
-    with sqlite3.connect(logged) as found:
-        assert found.execute("SELECT count(*) FROM notes").fetchone()[0] < 5
-    found.close()
+def test_a_filter_by_grade_or_signature_uses_its_index(store):
+    if store.engine.dialect.name != "sqlite":
+        pytest.skip("PostgreSQL plans by the size of its tables")
+    with store.engine.connect() as connection:
+        for column in ("grade", "signature"):
+            query = (
+                f"SELECT * FROM episodes WHERE campaign_number = 1 AND {column} = 'x' AND number > 3 ORDER BY number"
+            )
+            (plan,) = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {query}").all()
+            assert f"USING INDEX episodes_{column}s (campaign_number=? AND {column}=? AND number>?)" in plan[-1]

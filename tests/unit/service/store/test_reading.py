@@ -1,14 +1,14 @@
 import math
 
 import pytest
+from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.metrics import Funnel
 from risk_sac.records import Grade, Outcome
-from service.errors import NotFoundError, StorageError
+from service.errors import NotFoundError
 from service.store.counting import to_text
 from service.store.finding import Judged
-from service.store.reading import Store
 from service.store.states import State
 from tests.begun import start
 from tests.builders import judgement
@@ -143,15 +143,6 @@ def test_lists_are_filtered_by_state_family_method_and_label(store, ledger):
     assert found(family="mixed", method="random") == found(state=State.FAILED) == []
 
 
-def test_a_database_that_lost_an_episode_is_not_opened(store, ledger, episode, database_url):
-    ledger.create(SPEC)
-    ledger.add_episodes([(start(store, ledger), episode(0))])
-    with store.engine.begin() as connection:
-        connection.exec_driver_sql("DELETE FROM episodes")
-    with pytest.raises(StorageError, match="run 'low-risk-sac-3' lacks episodes"):
-        Store(database_url)
-
-
 def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, ledger, episode):
     campaign = ledger.create(SPEC)
     numbers = [start(store, ledger) for _ in range(2)]
@@ -217,15 +208,6 @@ def test_plain_episodes_are_the_stored_ones_in_their_order(store, ledger, episod
         (number, index, outcome) for index, outcome in enumerate(outcomes)
     ]
     shown = store.episodes(campaign.id, limit=9).items
-    assert [to_text(each.record) for each in shown] == [each.record for each in found]
+    assert [from_json(to_text(each.record)) for each in shown] == [each.record for each in found]
     some = store.plain_episodes(campaign.number, (Outcome.FAILURE, Outcome.DEGENERATE))
     assert [each.index for each in some] == [0, 2, 3]
-
-
-def test_a_plain_episode_that_changed_on_the_disk_is_noticed(store, ledger, episode):
-    campaign = ledger.create(SPEC)
-    ledger.add_episodes([(start(store, ledger), episode(0, Outcome.FAILURE))])
-    with store.engine.begin() as connection:
-        connection.exec_driver_sql("UPDATE episodes SET funnel = NULL")
-    with pytest.raises(StorageError, match="row 1 of the table 'episodes' is damaged"):
-        list(store.plain_episodes(campaign.number))

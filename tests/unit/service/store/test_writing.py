@@ -2,7 +2,7 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.records import Outcome
-from service.errors import ConflictError, NotFoundError, StorageError, TransitionError
+from service.errors import ConflictError, NotFoundError, TransitionError
 from service.store.finding import Judged
 from service.store.states import State, TriageState
 from service.store.stored import StoredEpisode
@@ -305,13 +305,3 @@ def test_triages_go_with_their_campaign(store, ledger, episode):
     ledger.delete(campaign.id)
     assert store.triages(campaign.number) == {}
     assert store.triage(other.id, "low-risk-sac-3-train-0").comment == other.id
-
-
-def test_a_triage_that_changed_on_the_disk_is_noticed(store, ledger, episode):
-    campaign = ledger.create(SPEC)
-    ledger.add_episodes([(start(store, ledger), episode(0, Outcome.FAILURE))])
-    ledger.triage(campaign.id, "low-risk-sac-3-train-0", TriageState.CONFIRMED, "seen")
-    with store.engine.begin() as connection:
-        connection.exec_driver_sql("UPDATE triages SET comment = 'sean'")
-    with pytest.raises(StorageError, match="row 1 of the table 'triages' is damaged"):
-        store.triage(campaign.id, "low-risk-sac-3-train-0")

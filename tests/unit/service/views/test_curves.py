@@ -5,6 +5,7 @@ import random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec
 from risk_sac.metrics import MetricsAccumulator
@@ -18,7 +19,7 @@ SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
 
 
 def plain(run, record):
-    return PlainEpisode(1, run.number, record.phase, record.index, record.outcome, to_text(record))
+    return PlainEpisode(1, run.number, record.phase, record.index, record.outcome, from_json(to_text(record)))
 
 
 def drawn(count):

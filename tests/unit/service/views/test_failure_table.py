@@ -2,6 +2,8 @@ import json
 import math
 from dataclasses import replace
 
+from pydantic_core import from_json
+
 from risk_sac.config import CampaignSpec
 from risk_sac.records import Grade, Outcome
 from risk_sac.run_folder.verified import Repetition
@@ -18,7 +20,7 @@ FAILURE, REFUSED = Outcome.FAILURE, Outcome.DEGENERATE
 
 def plain(run, index, hit, outcome=FAILURE, phase="train", **changes):
     record = episode_record(index, outcome, phase=phase, collision=hit, **changes)
-    return PlainEpisode(1, run.number, phase, index, outcome, to_text(record))
+    return PlainEpisode(1, run.number, phase, index, outcome, from_json(to_text(record)))
 
 
 def told(table):
@@ -130,8 +132,9 @@ def test_what_people_made_of_a_contact_stands_beside_it(ledger):
 def test_a_record_from_before_minima_were_called_early_is_read(ledger):
     campaign = ledger.create(SPEC)
     contact = plain(campaign.runs[0], 0, collision(min_ttc_s=0.75))
-    older = replace(contact, record=contact.record.replace('"early_min_ttc_s"', '"min_ttc_s"'))
-    assert older.record != contact.record
+    hit = dict(contact.record["collision"])
+    hit["min_ttc_s"] = hit.pop("early_min_ttc_s")
+    older = replace(contact, record={**contact.record, "collision": hit})
     assert failure_table(campaign, [older], {}).min_ttc_s == [0.75]
 
 
