@@ -9,10 +9,9 @@ from risk_sac.failures.clusters import Overview, overview
 from risk_sac.failures.studied import Studied
 from risk_sac.metrics import MetricName
 from risk_sac.records import RECORDED, EpisodeRecord, Phase
-from risk_sac.report.budgets import HEADLINE, PAID_FOR, found_within
 from risk_sac.report.cells import Cell, cell_of, metrics_of
 from risk_sac.report.paired import PairedTest, corrected, paired_tests
-from risk_sac.report.runs import FinishedRun
+from risk_sac.report.runs import HEADLINE, PAID_FOR, FinishedRun, found_within
 
 REFERENCE: MethodName = "risk-sac"
 HEADLINER: MethodName = "risk-sac-diverse"

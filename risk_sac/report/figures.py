@@ -13,9 +13,8 @@ from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import METRICS, WINDOW, Metric, preventable
 from risk_sac.records import EpisodeRecord, Outcome, Phase
-from risk_sac.report.budgets import cpu_s
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.runs import FinishedRun
+from risk_sac.report.runs import FinishedRun, cpu_s
 from risk_sac.types import Floats
 
 Format = Literal["png", "svg"]

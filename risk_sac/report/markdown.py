@@ -7,16 +7,13 @@ from statistics import median
 from risk_sac.config import Budget, FamilyName, RunSpec
 from risk_sac.metrics import Estimate
 from risk_sac.records import Phase
-from risk_sac.report.budgets import HEADLINE, LIMITS, found_within
 from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import Comparison, declared
 from risk_sac.report.definitions import ROWS, definitions, symbol
 from risk_sac.report.kinds import clusters, signatures, studies
-from risk_sac.report.page import DASH, interval, number, percent, table
-from risk_sac.report.paired import LEVEL, PairedTest
-from risk_sac.report.provenance import this_platform
-from risk_sac.report.runs import FinishedRun
-from risk_sac.report.statistics import pairs_needed, smallest_p
+from risk_sac.report.page import DASH, interval, number, percent, table, this_platform
+from risk_sac.report.paired import LEVEL, PairedTest, pairs_needed, smallest_p
+from risk_sac.report.runs import HEADLINE, LIMITS, FinishedRun, found_within
 
 CONTROL = "no-adversary"
 SHARES = ("artefact_rate", "degenerate_rate", "rejected_rate")  # the last columns of the table of methods

@@ -1,7 +1,7 @@
 """A finished run as the report reads it from its folder."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from risk_sac.failures.studied import Studied, read_studies
 from risk_sac.metrics import MetricsAccumulator, Tally, results_digest
 from risk_sac.records import RECORDED, EpisodeRecord, Phase, RunMetrics
 from risk_sac.run_folder.episode_json import records_from_lines
-from risk_sac.run_folder.results import EPISODES, Results, read_results
+from risk_sac.run_folder.results import EPISODES, read_results
 from risk_sac.run_folder.verified import Verified, read_verified
 from risk_sac.scenario.families import family_named
 
@@ -90,12 +90,21 @@ def read_run(folder: Path) -> FinishedRun:
             f"digest {results.digest[:12]} was formed over; delete the folder and run it again"
         )
     verified = read_verified(folder, results.digest)
-    run = finished_run(results, verified.judged(records) if verified else records)
-    return replace(run, verified=verified, studies=read_studies(folder, results.digest))
+    return FinishedRun(
+        spec=results.spec,
+        digest=results.digest,
+        records=verified.judged(records) if verified else records,
+        versions=results.versions or {},
+        wall_s=results.wall_s,
+        cpu_s=results.cpu_s,
+        episode_cpu_s=results.episode_cpu_s,
+        verified=verified,
+        studies=read_studies(folder, results.digest),
+    )
 
 
 def read_records(file: Path) -> tuple[EpisodeRecord, ...]:
-    """Reads a file of episodes, one JSON object per line.
+    """Read a file of episodes, one JSON object per line.
 
     Raises:
         ConfigError: a line is something else.
@@ -108,14 +117,37 @@ def read_records(file: Path) -> tuple[EpisodeRecord, ...]:
         raise ConfigError(f"{file} was not written by a run: {error.errors()[0]['msg']}") from error
 
 
-def finished_run(results: Results, records: tuple[EpisodeRecord, ...]) -> FinishedRun:
-    """Joins what lies in two files."""
-    return FinishedRun(
-        spec=results.spec,
-        digest=results.digest or results_digest(records),
-        records=records,
-        versions=results.versions or {},
-        wall_s=results.wall_s,
-        cpu_s=results.cpu_s,
-        episode_cpu_s=results.episode_cpu_s,
-    )
+NOTHING = Found(0, 0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A budget."""
+
+    name: str
+    spent: Callable[[FinishedRun], Sequence[float]]  # after each search episode
+    most: float
+
+
+def episodes(run: FinishedRun) -> Sequence[float]:
+    """1, 2, … for each search episode."""
+    return range(1, len(run.phase("search")) + 1)
+
+
+def cpu_s(run: FinishedRun) -> Sequence[float]:
+    """Processor time to the end of each search episode, s; empty where it was not measured."""
+    return run.episode_cpu_s[: len(run.phase("search"))]
+
+
+HEADLINE = Limit("30 CPU s", cpu_s, 30.0)
+PAID_FOR = f"preventable within {HEADLINE.name}"
+LIMITS = (Limit("10 CPU s", cpu_s, 10.0), HEADLINE, Limit("300 episodes", episodes, 300.0))
+
+
+def found_within(run: FinishedRun, limit: Limit) -> Found | None:
+    """What the search had found with the last episode that ended within the limit; None if it never got so far."""
+    spent = limit.spent(run)
+    if not spent or spent[-1] < limit.most:
+        return None
+    within = sum(after <= limit.most for after in spent)
+    return run.found[within - 1] if within else NOTHING

@@ -3,22 +3,45 @@
 A bin is looked at by an episode that was played in it; a scene that is refused before its first step tells nothing.
 """
 
-from collections.abc import Iterator, Sequence
-from itertools import combinations
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, Interval, Odd
-from risk_sac.records import EpisodeRecord, Outcome, Record
-from risk_sac.report.evidence.bins import Axis, axis_of
-from risk_sac.report.evidence.bounds import NOT_PLAYED
-from risk_sac.report.evidence.taxonomy import Kinds, kinds
+from risk_sac.records import Collision, ConflictType, EpisodeRecord, Outcome, Record
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.odd import TINY, field, intersect, narrow
-from risk_sac.scenario.space import SceneSpace
+from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Bools, Floats
+from risk_sac.verdicts.taxonomy import CELLS, FailureKind, kind_of
 
 BINS, PAIR_BINS = 10, 4
+NOT_PLAYED = (Outcome.REJECTED, Outcome.INVALID)
+ROLES = ("adversary", "background")
+# What a failure can be in each of the taxonomy's respects, as `FailureKind` has it, and in words.
+VALUES: Mapping[str, Mapping[object, str]] = {
+    "striker": {f"{role} {kind}": f"{kind} ({role})" for role in ROLES for kind in ("vehicle", "pedestrian")},
+    "ego_manoeuvre": {
+        "straight": "the ego goes straight",
+        "left_turn": "the ego turns left",
+        "right_turn": "the ego turns right",
+        "lane_change": "the ego changes lane",
+    },
+    "conflict_type": {
+        ConflictType.CUT_IN: "cut-in",
+        ConflictType.LEADER: "leader",
+        ConflictType.CROSSING: "crossing vehicle",
+        ConflictType.PEDESTRIAN: "pedestrian",
+    },
+    "ego_zone": {zone: f"struck at its {zone}" for zone in ("front", "left", "right")},
+    "visible": {0: "seen for less than 0.6 s", 1: "seen for 0.6 to 2 s", 2: "seen for 2 s or more"},
+    "ego_braked": {True: "braking by 3 m/s² or more", False: "not braking"},
+    "closing_speed": {0: "closing at less than 5 m/s", 1: "closing at 5 to 10 m/s", 2: "closing at 10 m/s or more"},
+}
 
 
 class Bin(Record):
@@ -63,6 +86,22 @@ class PairCoverage(Record):
     """The cells without an episode, by the bins of both."""
 
 
+class Kinds(Record):
+    """What a family's valid failures are, in the taxonomy's terms."""
+
+    cells: int
+    """Of the taxonomy; most of them hold what no ego and no road allows."""
+    hit: Mapping[str, int]
+    """Cell, in words, → failures, the most frequent first."""
+    values: Mapping[str, Mapping[str, int]]
+    """Respect → its values, in words, → failures."""
+
+    @property
+    def never(self) -> tuple[str, ...]:
+        """Values that no failure had."""
+        return tuple(value for counts in self.values.values() for value, count in counts.items() if not count)
+
+
 class Coverage(Record):
     """What was looked at in one family."""
 
@@ -78,8 +117,40 @@ class Coverage(Record):
     kinds: Kinds
 
 
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A parameter and its bins; each holds its lower edge, the last one both."""
+
+    parameter: Parameter
+    names: tuple[str, ...]  # of the bins: a category, or a range in the parameter's unit
+    edges: Floats  # inner ones, one fewer than bins
+
+    def places(self, values: Floats) -> NDArray[np.int64]:
+        """The bin of each value, `n`."""
+        return np.searchsorted(self.edges, values, side="right").astype(np.int64)
+
+
+def axis_of(parameter: Parameter, whole: Parameter, bins: int) -> Axis:
+    """Divide the range of a parameter into bins.
+
+    Args:
+      parameter: as the ODD bounds it.
+      whole: the same as its family has it; its halves are its categories, if it has some.
+      bins: of a number; a category is a bin, and a parameter with a single value is one.
+    """
+    if whole.categories:
+        middle = (whole.low + whole.high) / 2  # belongs to the upper half
+        left = parameter.low < middle, parameter.high >= middle
+        names = tuple(name for name, allowed in zip(whole.categories, left, strict=True) if allowed)
+        return Axis(parameter, names, np.array([middle] if all(left) else []))
+    if parameter.high <= parameter.low:
+        return Axis(parameter, (f"{parameter.low:g}",), np.array([]))
+    edges = np.linspace(parameter.low, parameter.high, bins + 1)
+    return Axis(parameter, tuple(f"{low:.3g} to {high:.3g}" for low, high in pairwise(edges)), edges[1:-1])
+
+
 def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Coverage:
-    """What these episodes looked at.
+    """Count what these episodes looked at.
 
     Args:
       family: of their scenes.
@@ -89,63 +160,54 @@ def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Cove
     whole = intersect(family.odd, odd)
     space = narrow(family.space, whole)
     known = [record for record in records if set(space.names) <= record.scene.keys()]
-    values = np.array([[record.scene[name] for name in space.names] for record in known], dtype=np.float64)
-    counted = _Counted(
-        columns=tuple(values.reshape(-1, space.dimension).T),
-        played=np.array([record.outcome not in NOT_PLAYED for record in known], dtype=bool),
-        failed=np.array([record.outcome is Outcome.FAILURE for record in known], dtype=bool),
-    )
+    columns = [np.array([record.scene[name] for record in known], dtype=np.float64) for name in space.names]
+    played = np.array([record.outcome not in NOT_PLAYED for record in known], dtype=bool)
+    failed = np.array([record.outcome is Outcome.FAILURE for record in known], dtype=bool)
     fine, coarse = (
         [axis_of(*both, bins) for both in zip(space.parameters, family.space.parameters, strict=True)]
         for bins in (BINS, PAIR_BINS)
     )
-    pairs = combinations(range(space.dimension), 2)
+    placed = [(axis, axis.places(column)) for axis, column in zip(coarse, columns, strict=True)]
     return Coverage(
         family=family.name,
-        episodes=int(counted.played.sum()),
-        parameters=tuple(counted.parameter(index, axis) for index, axis in enumerate(fine)),
-        pairs=tuple(counted.pair(pair, (coarse[pair[0]], coarse[pair[1]])) for pair in pairs),
+        episodes=int(played.sum()),
+        parameters=tuple(
+            _parameter(axis, axis.places(column), played, failed) for axis, column in zip(fine, columns, strict=True)
+        ),
+        pairs=tuple(_pair(*both, played, failed) for both in combinations(placed, 2)),
         fixed=tuple(_fixed(whole, space)),
         beyond=tuple(_beyond(whole, space)),
         kinds=kinds(record.collision for record in known),
     )
 
 
-class _Counted:
-    """Episodes, one a row."""
+def _parameter(axis: Axis, places: NDArray[np.int64], played: Bools, failed: Bools) -> ParameterCoverage:
+    counts = [np.bincount(places[rows], minlength=len(axis.names)).tolist() for rows in (played, failed, ~played)]
+    parameter = axis.parameter
+    return ParameterCoverage(
+        **{name: getattr(parameter, name) for name in ("name", "unit", "meaning", "low", "high")},
+        categorical=bool(parameter.categories),
+        bins=tuple(
+            Bin(name=name, played=played, failed=failed, refused=refused)
+            for name, played, failed, refused in zip(axis.names, *counts, strict=True)
+        ),
+    )
 
-    def __init__(self, columns: Sequence[Floats], played: Bools, failed: Bools) -> None:
-        """Takes the values of each scene parameter, `n`, and which episodes were played, and which failed."""
-        self._columns, self.played, self._failed = columns, played, failed
 
-    def parameter(self, index: int, axis: Axis) -> ParameterCoverage:
-        places = axis.places(self._columns[index])
-        played, failed, refused = (
-            np.bincount(places[rows], minlength=len(axis.names)).tolist()
-            for rows in (self.played, self._failed, ~self.played)
-        )
-        told = {name: getattr(axis.parameter, name) for name in ("name", "unit", "meaning", "low", "high")}
-        return ParameterCoverage(
-            **told,
-            categorical=bool(axis.parameter.categories),
-            bins=tuple(
-                Bin(name=name, played=played[at], failed=failed[at], refused=refused[at])
-                for at, name in enumerate(axis.names)
-            ),
-        )
-
-    def pair(self, indices: tuple[int, int], axes: tuple[Axis, Axis]) -> PairCoverage:
-        places = [axis.places(self._columns[index]) for index, axis in zip(indices, axes, strict=True)]
-        played, failed = (np.zeros([len(axis.names) for axis in axes], dtype=bool) for _ in range(2))
-        played[places[0][self.played], places[1][self.played]] = True
-        failed[places[0][self._failed], places[1][self._failed]] = True
-        return PairCoverage(
-            parameters=(axes[0].parameter.name, axes[1].parameter.name),
-            cells=played.size,
-            played=int(played.sum()),
-            failed=int(failed.sum()),
-            never=tuple(f"{axes[0].names[i]} × {axes[1].names[j]}" for i, j in np.argwhere(~played)),
-        )
+def _pair(
+    first: tuple[Axis, NDArray[np.int64]], second: tuple[Axis, NDArray[np.int64]], played: Bools, failed: Bools
+) -> PairCoverage:
+    (one, rows), (other, columns) = first, second
+    cells_played, cells_failed = np.zeros((2, len(one.names), len(other.names)), dtype=bool)
+    cells_played[rows[played], columns[played]] = True
+    cells_failed[rows[failed], columns[failed]] = True
+    return PairCoverage(
+        parameters=(one.parameter.name, other.parameter.name),
+        cells=cells_played.size,
+        played=int(cells_played.sum()),
+        failed=int(cells_failed.sum()),
+        never=tuple(f"{one.names[i]} × {other.names[j]}" for i, j in np.argwhere(~cells_played)),
+    )
 
 
 def _fixed(odd: Odd, space: SceneSpace) -> Iterator[str]:
@@ -164,3 +226,23 @@ def _beyond(odd: Odd, space: SceneSpace) -> Iterator[str]:
         for low, high in ((allowed.low, parameter.low), (parameter.high, allowed.high)):
             if high - low > TINY:
                 yield f"{parameter.name} from {low:g} to {high:g} {parameter.unit}".removesuffix(" 1")
+
+
+def kinds(collisions: Iterable[Collision | None]) -> Kinds:
+    """Count valid failures by cell of the taxonomy; contacts without a judgement are left out."""
+    found = Counter(
+        kind_of(each, each.judgement) for each in collisions if each is not None and each.valid and each.judgement
+    )
+    values = {
+        respect: {
+            words: sum(count for kind, count in found.items() if getattr(kind, respect) == value)
+            for value, words in every.items()
+        }
+        for respect, every in VALUES.items()
+    }
+    return Kinds(cells=CELLS, hit={_in_words(kind): count for kind, count in found.most_common()}, values=values)
+
+
+def _in_words(kind: FailureKind) -> str:
+    parts = (VALUES[respect].get(getattr(kind, respect), "") for respect in FailureKind._fields)
+    return ", ".join(part for part in parts if part)

@@ -1,14 +1,48 @@
-"""What a report says as data: bounds and coverage, those of the search and of the i.i.d. phase apart."""
+"""What a report says as data: bounds of the i.i.d. phase, and coverage of the search and of that phase apart."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 
-from risk_sac.config import FamilyName
-from risk_sac.records import EpisodeRecord, Record
+from risk_sac.config import FamilyName, IidName
+from risk_sac.errors import ConfigError
+from risk_sac.metrics import clopper_pearson, preventable
+from risk_sac.records import RECORDED, EpisodeRecord, Outcome, Record
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.evidence.bounds import Drawn, drawn
-from risk_sac.report.evidence.coverage import Coverage, coverage
+from risk_sac.report.evidence.coverage import NOT_PLAYED, Coverage, coverage
 from risk_sac.report.runs import FinishedRun
 from risk_sac.scenario.families import family_named
+
+CRASHED = "sim_crash"  # the reason of an episode that was left out because the simulator died in it
+
+
+class Bound(Record):
+    """How often something happened, and how often it may happen at most and at least, each with 95 % confidence."""
+
+    count: int
+    low: float
+    """Clopper-Pearson, one-sided."""
+    high: float
+    """Clopper-Pearson, one-sided; an episode without an end counts as one in which it happened."""
+
+
+class Drawn(Record):
+    """What came of the scenes of one family and one kind of traffic."""
+
+    family: FamilyName
+    method: IidName
+    seed: int
+    scenes: int
+    """That were drawn."""
+    refused: int
+    """By C_hard, before the first step: of these scenes nothing is said."""
+    unended: int
+    """In which the simulator died, or the ego failed to drive: what would have happened, nobody knows."""
+    played: int
+    """All others."""
+    contacts: Bound
+    failures: Bound
+    """Valid ones."""
+    preventable: Bound
+    """Valid ones that the careful driver would have prevented."""
 
 
 class FamilyCoverage(Record):
@@ -32,16 +66,15 @@ class Evidence(Record):
 
 
 def gathered(comparison: Comparison) -> Evidence:
-    """The evidence of the runs that have finished.
+    """Gather the evidence of the runs that have finished.
 
     Raises:
       ConfigError: a run of the i.i.d. phase holds other episodes.
     """
-    spec, runs = comparison.spec, comparison.runs
+    spec = comparison.spec
     found: dict[FamilyName, FamilyCoverage] = {}
     for family in spec.families:
-        searched = _records(runs, family)
-        fresh = _records(comparison.drawn, family)
+        searched, fresh = _records(comparison.runs, family), _records(comparison.drawn, family)
         if searched or fresh:
             found[family] = FamilyCoverage(
                 search=coverage(family_named(family), spec.odd, searched),
@@ -54,5 +87,41 @@ def gathered(comparison: Comparison) -> Evidence:
     )
 
 
-def _records(runs: tuple[FinishedRun, ...], family: FamilyName) -> list[EpisodeRecord]:
+def _records(runs: Iterable[FinishedRun], family: FamilyName) -> list[EpisodeRecord]:
     return [record for run in runs if run.spec.family == family for record in run.records]
+
+
+def drawn(run: FinishedRun) -> Drawn:
+    """Bound the rates of one run of an i.i.d. phase.
+
+    Given how many scenes were refused, the others are independent draws from those that are not, so that the binomial
+    distribution holds exactly.
+
+    Raises:
+      ConfigError: an episode of the run belongs to another phase.
+    """
+    if other := {record.phase for record in run.records} - {RECORDED["iid"]}:
+        raise ConfigError(f"{run.spec.id} has episodes of the phase {min(other)!r}; wanted those of its own alone")
+    played = [record for record in run.records if record.outcome not in NOT_PLAYED]
+    unended = sum(record.outcome is Outcome.INVALID or record.reason == CRASHED for record in run.records)
+
+    def bound(happened: Callable[[EpisodeRecord], bool]) -> Bound:
+        count, trials = sum(map(happened, played)), len(played) + unended
+        return Bound(
+            count=count,
+            low=clopper_pearson(count, trials)[0],
+            high=clopper_pearson(count + unended, trials)[1],
+        )
+
+    return Drawn.model_validate(
+        {
+            **{name: getattr(run.spec, name) for name in ("family", "method", "seed")},
+            "scenes": len(run.records),
+            "refused": len(run.records) - len(played) - unended,
+            "unended": unended,
+            "played": len(played),
+            "contacts": bound(lambda record: record.collision is not None),
+            "failures": bound(lambda record: record.outcome is Outcome.FAILURE),
+            "preventable": bound(preventable),
+        }
+    )

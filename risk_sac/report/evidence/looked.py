@@ -5,10 +5,9 @@ from collections.abc import Iterator, Mapping
 from risk_sac.config import IID_METHODS, FamilyName
 from risk_sac.errors import ConfigError
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.evidence.bounds import Bound, Drawn
 from risk_sac.report.evidence.coverage import BINS, PAIR_BINS, Coverage, ParameterCoverage
 from risk_sac.report.evidence.document import Block, Commands, Items, Paragraph, Section, Table
-from risk_sac.report.evidence.gathered import Evidence, FamilyCoverage
+from risk_sac.report.evidence.gathered import Bound, Drawn, Evidence, FamilyCoverage
 from risk_sac.report.evidence.origin import again
 from risk_sac.report.evidence.words import odd_in_words
 from risk_sac.report.page import DASH

@@ -11,8 +11,7 @@ from risk_sac.report.evidence.looked import bounds, coverage, odd
 from risk_sac.report.evidence.origin import Origin, again
 from risk_sac.report.evidence.searched import budget, clusters, funnel, regression
 from risk_sac.report.evidence.words import ego_in_words
-from risk_sac.report.page import DASH
-from risk_sac.report.provenance import this_platform
+from risk_sac.report.page import DASH, this_platform
 
 BANNER = Banner(
     "Search results are no crash rate. The search looks for what goes wrong, so its counts say that something can "

@@ -9,8 +9,7 @@ from risk_sac.failures.clusters import Cluster
 from risk_sac.records import EpisodeRecord, Grade
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Paragraph, Picture, Section, Table
-from risk_sac.report.evidence.origin import Origin
-from risk_sac.report.evidence.pictures import draw
+from risk_sac.report.evidence.origin import Origin, draw
 from risk_sac.report.evidence.words import ego_in_words
 from risk_sac.report.markdown import verified
 from risk_sac.report.page import DASH

@@ -7,8 +7,8 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.report import FinishedRun, compare, figure_bytes, table_markdown
-from risk_sac.report.budgets import Limit, cpu_s, episodes, found_within
 from risk_sac.report.figures import CURVES
+from risk_sac.report.runs import Limit, cpu_s, episodes, found_within
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.metrics import bootstrap_interval, wilson_interval
 from risk_sac.report import compare
 from risk_sac.report.comparison import declared
-from risk_sac.report.statistics import holm
+from risk_sac.report.paired import holm
 from risk_sac.scenario.families import FAMILIES
 
 HORIZON = FAMILIES["low"].horizon_steps

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.metrics import bootstrap_interval
-from risk_sac.report.statistics import holm, pairs_needed, smallest_p, vargha_delaney, wilcoxon_p
+from risk_sac.report.paired import holm, pairs_needed, smallest_p, vargha_delaney, wilcoxon_p
 
 differences = st.lists(st.integers(-6, 6).map(lambda tenths: tenths / 10), max_size=10)
 

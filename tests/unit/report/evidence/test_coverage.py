@@ -4,9 +4,7 @@ import pytest
 
 from risk_sac.config import Interval, Odd
 from risk_sac.records import Outcome
-from risk_sac.report.evidence.bins import axis_of
-from risk_sac.report.evidence.coverage import coverage
-from risk_sac.report.evidence.taxonomy import VALUES, kinds
+from risk_sac.report.evidence.coverage import VALUES, axis_of, coverage, kinds
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import narrow
 from risk_sac.scenario.space import Parameter
