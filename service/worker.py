@@ -148,7 +148,7 @@ def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, rep
 
 def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, replays: int) -> Finished:
     from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
-    from risk_sac.failures.verify import verify
+    from risk_sac.execution.verify import verify
     from risk_sac.report.runs import read_run
     from risk_sac.run_folder.verified import Verified
     from risk_sac.train import train

@@ -21,7 +21,7 @@ def add_verify(commands: Commands) -> None:
 
 
 def _verify(options: argparse.Namespace) -> int:
-    from risk_sac.failures.verify import verify
+    from risk_sac.execution.verify import verify
 
     specs = {folder: read_results(folder).spec for folder in options.runs}
     found = verify(options.runs, options.times, os.cpu_count() or 1)

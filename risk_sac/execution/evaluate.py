@@ -19,7 +19,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executors import executor_named
 from risk_sac.execution.processes import Job, Progress, Queue, program
 from risk_sac.execution.stopping import STOPPING, stop_signal
-from risk_sac.failures.verify import verify
+from risk_sac.execution.verify import verify
 from risk_sac.problem import checked_campaign
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
 from risk_sac.run_folder.verified import TIMES
@@ -56,7 +56,7 @@ def evaluate(
       jobs: processes at a time.
       progress: told how the runs go.
       executor: where they execute, by its name in `risk_sac.execution.executors`.
-      times: how often each distinct failure is replayed, see `risk_sac.failures.verify`; 0: not at all.
+      times: how often each distinct failure is replayed, see `risk_sac.execution.verify`; 0: not at all.
 
     Raises:
       ConfigError: a family's settings pose no problem that can be run, there is no such executor, or the folder

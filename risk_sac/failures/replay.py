@@ -1,15 +1,12 @@
 """Episodes played once more, from their records and the actions that were recorded.
 
-`python -m risk_sac.failures.replay TIMES JOBS FOLDER...` does it with the distinct failures of runs, `TIMES` over, each
-time in a process of its own, `JOBS` of them at once. Each prints a line of JSON for each run. In the process that
-they are forked from nothing was searched and SUMO was never started. It has read the libraries, once for all of them,
-which costs more than what is played.
+`python -m risk_sac.failures.replay FILE TIMES JOBS FOLDER...` replays the distinct failures of runs `TIMES` over, each
+time in a process of its own, `JOBS` of them at once. Each appends a line of JSON for each run to the file. They are
+forked from a process that has read the libraries, which costs more than playing, but has never started SUMO.
 """
 
 import json
 import multiprocessing
-import os
-import signal
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -46,7 +43,7 @@ def _same(folder: Path, results: Results, env: RiskSacEnv) -> list[int]:
 Prepared = Mapping[Path, tuple[Results, RiskSacEnv]]
 
 
-def _prepared(folders: Sequence[Path]) -> Prepared:
+def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:
     """The runs that can be played here; of each other one a line says why not, such as that its ego is not there."""
     found = {}
     for folder in folders:
@@ -54,35 +51,32 @@ def _prepared(folders: Sequence[Path]) -> Prepared:
         try:
             found[folder] = results, RiskSacEnv.of(results.spec)
         except RiskSacError as error:
-            _say(folder, error=f"{type(error).__name__}: {error}")
+            _say(file, folder, error=f"{type(error).__name__}: {error}")
     return found
 
 
-def _say(folder: Path, **told: object) -> None:
-    """Tells whoever started it, in one write: several processes share the output, and `print` may end a line later."""
-    os.write(sys.stdout.fileno(), f"{json.dumps({'folder': str(folder)} | told)}\n".encode())
+def _say(file: Path, folder: Path, **told: object) -> None:
+    """Appends a line in one write, since several processes share the file."""
+    with file.open("ab", buffering=0) as output:
+        output.write(f"{json.dumps({'folder': str(folder)} | told)}\n".encode())
 
 
-def _tell(runs: Prepared) -> None:
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+def _tell(file: Path, runs: Prepared) -> None:
     for folder, (results, env) in runs.items():
         try:
             with closing(env):
-                _say(folder, same=_same(folder, results, env))
+                _say(file, folder, same=_same(folder, results, env))
         except (RiskSacError, OSError, KeyError) as error:  # a key: of a series from before there was a release
-            _say(folder, error=f"{type(error).__name__}: {error}")
+            _say(file, folder, error=f"{type(error).__name__}: {error}")
 
 
-def _main(times: int, jobs: int, folders: list[Path]) -> int:
+def _main(file: Path, times: int, jobs: int, folders: list[Path]) -> int:
     """The greatest exit status of the processes."""
-    runs = _prepared(folders)
+    runs = _prepared(file, folders)
     soft_min(np.zeros(1), 1.0)  # the first call of any compiled function loads what all of them need
-    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))  # and daemons end with their parent's exit
     fork, statuses = multiprocessing.get_context("fork"), [0]
     for first in range(0, times, jobs):
-        processes = [
-            fork.Process(target=_tell, args=(runs,), daemon=True) for _ in range(first, min(first + jobs, times))
-        ]
+        processes = [fork.Process(target=_tell, args=(file, runs)) for _ in range(first, min(first + jobs, times))]
         for process in processes:
             process.start()
         for process in processes:
@@ -92,5 +86,5 @@ def _main(times: int, jobs: int, folders: list[Path]) -> int:
 
 
 if __name__ == "__main__":
-    times, jobs, *folders = sys.argv[1:]
-    sys.exit(_main(int(times), int(jobs), [Path(folder) for folder in folders]))
+    file, times, jobs, *folders = sys.argv[1:]
+    sys.exit(_main(Path(file), int(times), int(jobs), [Path(folder) for folder in folders]))

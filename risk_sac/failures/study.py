@@ -1,12 +1,9 @@
-"""`python -m risk_sac.failures.study FILE`: what takes the simulator to say of a failure.
+"""`python -m risk_sac.failures.study QUESTION ANSWER`: answers what needs the simulator to say of a failure.
 
-The question is a line of JSON on stdin, the answer is written into the file. For whoever must not load the simulator.
-The end of stdin means that nobody waits for the answer any more.
+Both are files. For processes that must not load the simulator.
 """
 
-import os
 import sys
-import threading
 from contextlib import closing
 from pathlib import Path
 
@@ -75,9 +72,8 @@ def _twin(question: Question) -> bytes:
     return twin_bytes(TwinPlay.of(question.twin, played.collision), played.series)
 
 
-def _main(file: Path) -> int:
-    question = Question.model_validate_json(sys.stdin.buffer.readline())
-    threading.Thread(target=_leave_with_asker, daemon=True).start()
+def _main(asked: Path, file: Path) -> int:
+    question = Question.model_validate_json(asked.read_bytes())
     try:
         file.write_bytes(answer(question))
     except (RiskSacError, ValueError) as error:
@@ -86,11 +82,5 @@ def _main(file: Path) -> int:
     return 0
 
 
-def _leave_with_asker() -> None:
-    while os.read(0, 4096):
-        pass
-    os._exit(1)
-
-
 if __name__ == "__main__":
-    sys.exit(_main(Path(sys.argv[1])))
+    sys.exit(_main(*map(Path, sys.argv[1:])))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from service.errors import StorageError
 from service.networks.packaging import SNIFFED_BYTES, Packaging, sniff
-from service.networks.sandbox import LOG, REPORT, UPLOAD
+from service.networks.sandbox import LOG, UPLOAD
 
 
 class Incoming:
@@ -46,7 +46,7 @@ class Incoming:
 
     def strip(self) -> None:
         """Leave only what the checker wrote anew."""
-        for name in (UPLOAD, LOG, REPORT):
+        for name in (UPLOAD, LOG):
             (self.folder / name).unlink()
 
     def discard(self) -> None:

@@ -1,4 +1,4 @@
-"""What the checker says on its stdout, for the server to read; parts of it are parts of response bodies, too.
+"""What the checker reports to the server; parts of it are parts of response bodies, too.
 
 No models of pydantic: to import that would take the checker more time and memory than most uploads.
 """

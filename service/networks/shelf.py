@@ -12,7 +12,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -28,7 +28,7 @@ from service.networks.errors import BusyError
 from service.networks.incoming import Incoming
 from service.networks.packaging import Packaging
 from service.networks.report import CheckReport
-from service.networks.sandbox import CHECKER, inspect
+from service.networks.sandbox import inspect
 from service.networks.schemas import BoundingBox, Network, Record
 from service.store.stored import Page
 
@@ -53,7 +53,6 @@ class Shelf:
         *,
         most: int = MOST,
         at_once: int = UPLOADS_AT_ONCE,
-        checker: Sequence[str] = CHECKER,
     ) -> None:
         """Remove what an earlier server left unfinished.
 
@@ -61,11 +60,9 @@ class Shelf:
           folder: of all projects' networks; made when the first one comes.
           most: networks that one project may have.
           at_once: uploads that may be received or checked at the same time.
-          checker: command that checks an upload.
         """
         self._folder = folder
         self._most = most
-        self._checker = checker
         self._at_once = at_once
         self._at_work = Counter[str | None]()  # uploads, by key
         self._counting = threading.Lock()
@@ -117,7 +114,7 @@ class Shelf:
         self._check_room(project)
         with _refusals("a network cannot be stored"):
             sha256 = incoming.complete(packaging)
-            report = inspect(incoming.folder, packaging, self._checker)
+            report = inspect(incoming.folder, packaging)
             network = _network(report, label, sha256, incoming.bytes)
             incoming.strip()
             (incoming.folder / RECORD).write_bytes(seal(Record(network=network).model_dump_json(indent=2).encode()))

@@ -1,16 +1,13 @@
-"""`python -I -m service.networks.surveyor survey|keep …`: find the places of a network, or put some into the library.
+"""`service.networks.surveyor REPORT survey|keep …`: find the places of a network, or put some into the library.
 
 Started by `service.networks.surveys` in the folder of a network that the checker has written, with bounds on time and
-memory: a search takes seconds in which a server would answer nobody. The last line of stdout is the report.
+memory: a search takes seconds in which a server would answer nobody.
 
     survey                 writes `places.json` and `places.png` beside the net
-    keep PATTERN [PLACE]   keeps that place, or all of the pattern, and prints the names of the families that they are
+    keep PATTERN [PLACE]   keeps that place, or all of the pattern, and reports the names of the families that they are
 """
 
 import json
-import os
-import resource
-import signal
 import sys
 from pathlib import Path
 
@@ -20,7 +17,7 @@ from risk_sac.run_folder.durable import replace_file
 from risk_sac.scenario.maps.finder import FINDERS, survey
 from risk_sac.scenario.maps.found import Fit, Misfit, Pattern
 from risk_sac.scenario.maps.keep import Map
-from service.networks.limits import MAX_PLACES, SURVEY_MEMORY_BYTES, SURVEY_S
+from service.networks.limits import MAX_PLACES, SURVEY_MEMORY_BYTES
 from service.networks.report import PICTURE, PLACES
 
 NET = Path("net.xml")
@@ -28,14 +25,14 @@ NET = Path("net.xml")
 
 def main() -> None:
     """Do what the arguments say, and say what came of it."""
-    _bind()
+    file, action, *arguments = sys.argv[1:]
     try:
-        report = _survey() if sys.argv[1] == "survey" else _keep(*sys.argv[2:])
+        report = _survey() if action == "survey" else _keep(*arguments)
     except ConfigError as error:
         report = {"refused": str(error), "field": error.field}
     except MemoryError:
         report = {"refused": f"the search needs more than {SURVEY_MEMORY_BYTES >> 20} MiB; wanted a smaller network"}
-    sys.stdout.write("\n" + json.dumps(report) + "\n")
+    Path(file).write_text(json.dumps(report))
 
 
 def _survey() -> dict[str, object]:
@@ -65,19 +62,6 @@ def _keep(name: str, place: str | None = None) -> dict[str, object]:
 def _spot(found: Fit | Misfit) -> dict[str, object]:
     spot = found.spot
     return {"pattern": spot.pattern, "place": spot.id, "x_m": spot.x_m, "y_m": spot.y_m}
-
-
-def _bind() -> None:
-    signal.alarm(SURVEY_S)
-    for which, most in (
-        (resource.RLIMIT_CPU, SURVEY_S),
-        (resource.RLIMIT_AS, SURVEY_MEMORY_BYTES),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        _, present = resource.getrlimit(which)
-        most = most if present == resource.RLIM_INFINITY else min(most, present)
-        resource.setrlimit(which, (most, most))
-    os.nice(5)
 
 
 if __name__ == "__main__":

@@ -2,9 +2,6 @@
 
 import json
 import os
-import signal
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -12,21 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from risk_sac.errors import ConfigError
+from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.scenario.library import VARIABLE
 from service.errors import StorageError
 from service.networks.errors import BusyError
-from service.networks.limits import SURVEY_S
+from service.networks.limits import SURVEY_MEMORY_BYTES, SURVEY_S
 from service.networks.report import PICTURE, PLACES
 from service.networks.schemas import Places
 from service.networks.shelf import Shelf
 
-SURVEYOR = (sys.executable, "-I", "-m", "service.networks.surveyor")
+SURVEYOR = "service.networks.surveyor"
+NICENESS = 5
 AT_ONCE = 2
 RETRY_AFTER_S = 5
 MOST_ASKING = 16  # of those threads that answer everybody
 MOST_KEPT = 200  # answers that are remembered; what a network is never changes
-_GRACE_S = 2.0
-_ENDS = (signal.SIGALRM, signal.SIGXCPU, signal.SIGKILL)
 
 
 class Surveys:
@@ -103,26 +100,27 @@ class Surveys:
         with self._turn():
             try:
                 self._library.mkdir(parents=True, exist_ok=True)
-                done = subprocess.run(
-                    [*SURVEYOR, *arguments],
+                result = run_helper(
+                    SURVEYOR,
+                    [ANSWER, *arguments],
+                    wall_s=SURVEY_S,
+                    memory_bytes=SURVEY_MEMORY_BYTES,
+                    niceness=NICENESS,
+                    isolated=True,
                     cwd=folder,
-                    env=environment,
-                    stdin=subprocess.DEVNULL,
-                    capture_output=True,
-                    timeout=SURVEY_S + _GRACE_S,
-                    check=False,
+                    environment=environment,
                 )
             except OSError as error:
                 raise StorageError(f"places cannot be looked for ({error.strerror})") from error
-            except subprocess.TimeoutExpired:
-                raise _too_slow() from None
-        if -done.returncode in _ENDS:
-            raise _too_slow()
+        if result.timed_out:
+            raise ConfigError(
+                f"looking for places takes more than {SURVEY_S} s; wanted a smaller network", field="network"
+            )
         try:
-            report: dict[str, Any] = json.loads(done.stdout.decode().splitlines()[-1])
-        except (ValueError, IndexError) as error:
-            said = done.stderr.decode("utf-8", "replace").strip().splitlines()[-1:]
-            raise StorageError(f"places cannot be looked for (status {done.returncode}: {said})") from error
+            report: dict[str, Any] = json.loads(result.answer)
+        except ValueError as error:
+            said = result.log.splitlines()[-1:]
+            raise StorageError(f"places cannot be looked for (status {result.status}: {said})") from error
         if "refused" in report:
             raise ConfigError(report["refused"], field=report.get("field", "network"))
         return report
@@ -151,7 +149,3 @@ class Surveys:
             yield
         finally:
             self._room.release()
-
-
-def _too_slow() -> ConfigError:
-    return ConfigError(f"looking for places takes more than {SURVEY_S} s; wanted a smaller network", field="network")

@@ -6,12 +6,8 @@ played by the next one. Its id names what is played, so that posting the same ag
 
 import hashlib
 import logging
-import os
 import queue
 import re
-import subprocess
-import sys
-import tempfile
 import threading
 import time
 from pathlib import Path
@@ -20,6 +16,7 @@ from pydantic import ValidationError
 
 from risk_sac.config import EgoConfig
 from risk_sac.egos.registry import pinned
+from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.failures.bundle import code_digest
 from risk_sac.failures.cases import Case
@@ -35,7 +32,7 @@ logger = logging.getLogger(__name__)
 
 FOLDER = "regressions"
 MOST_WAITING, RETRY_S = 16, 10.0
-POLL_S = 0.1
+WALL_S = 24 * 3600.0
 _ID = re.compile(r"([A-Za-z0-9]{1,100})-([0-9a-f]{16})", re.ASCII)
 
 
@@ -157,28 +154,23 @@ class Regressions:
     def _play(self, file: Path) -> None:
         asked = _read(file).model_copy(update={"state": State.RUNNING})
         _write(file, asked)
-        with tempfile.TemporaryDirectory() as folder:
-            ego, told, log = (Path(folder) / name for name in ("ego.yaml", "cases.json", "log"))
-            ego.write_text(asked.ego.model_dump_json())  # JSON is YAML
-            runs = [str(self._settings.run_folder(asked.campaign_id, run)) for run in asked.runs]
-            arguments = ["regress", "--failures", *runs, "--ego", str(ego), "--out", str(told)]
-            with log.open("wb") as errors:
-                command = [sys.executable, "-m", "risk_sac", *arguments]
-                with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors) as process:
-                    ours = os.getpriority(os.PRIO_PROCESS, 0)
-                    os.setpriority(os.PRIO_PROCESS, process.pid, ours + self._settings.worker_niceness)
-                    while process.poll() is None:
-                        if self._stopping.wait(POLL_S):
-                            process.terminate()
-                            return
-            played = {"finished_at": time.time()}
-            if told.exists():
-                cases = Cases.model_validate_json(told.read_bytes()).cases
-                done = asked.model_copy(update=played | {"state": State.SUCCEEDED, "cases": cases})
-            else:
-                said = without_folders(log.read_text(errors="replace").strip()[-500:])
-                reason = said or f"its process ended with status {process.returncode}"
-                done = asked.model_copy(update=played | {"state": State.FAILED, "reason": reason})
+        runs = [str(self._settings.run_folder(asked.campaign_id, run)) for run in asked.runs]
+        result = run_helper(
+            "risk_sac",
+            ["regress", "--failures", *runs, "--ego", QUESTION, "--out", ANSWER],
+            question=asked.ego.model_dump_json().encode(),  # JSON is YAML
+            wall_s=WALL_S,
+            niceness=self._settings.worker_niceness,
+            stopping=self._stopping.is_set,
+        )
+        if self._stopping.is_set():
+            return
+        if result.answer:
+            ended = {"state": State.SUCCEEDED, "cases": Cases.model_validate_json(result.answer).cases}
+        else:
+            said = without_folders(result.log[-500:])
+            ended = {"state": State.FAILED, "reason": said or f"its process ended with status {result.status}"}
+        done = asked.model_copy(update={"finished_at": time.time()} | ended)
         _write(file, done)
 
 

@@ -1,25 +1,24 @@
 """What takes the simulator to say of a failure: asked of a process of its own, see `risk_sac.failures.study`."""
 
 import logging
-import subprocess
-import tempfile
+import threading
 from dataclasses import dataclass
-from pathlib import Path
-from typing import IO
 
 from risk_sac.config import EgoConfig
+from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
 from service.errors import OutdatedError, ServiceError, StorageError
 from service.settings import ServiceSettings
-from service.views.asides import WALL_S, Aside
 from service.views.bodies import series_file
 from service.views.pictures import ContactOfARun
 from service.views.products import Products
 from service.views.series import load_arrays
 
 logger = logging.getLogger(__name__)
+
+WALL_S = 300.0  # a minimisation takes ten on a machine with nothing else to do
 
 
 class CannotBePlayed(ServiceError):
@@ -43,11 +42,11 @@ class Studies(Products[Study]):
 
     def __init__(self, settings: ServiceSettings) -> None:
         super().__init__(self._answer, "failures")
-        self._settings, self._aside = settings, Aside(settings)
+        self._settings, self._stopping = settings, threading.Event()
 
     def stop(self) -> None:
         """Ends what is being played: nobody waits for it any more."""
-        self._aside.stop()
+        self._stopping.set()
 
     def _answer(self, study: Study) -> bytes:
         contact = study.contact
@@ -65,25 +64,22 @@ class Studies(Products[Study]):
             format=study.format,
             twin=None if study.twin in (None, IDLE) else EgoConfig.model_validate({"profile": study.twin}),
         )
-        with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as log:
-            file = Path(folder) / "answer"
-            try:
-                status = self._ask(question, file, log)
-                said = file.read_bytes() if file.exists() else b""
-            except OSError as error:
-                raise StorageError(f"it cannot be played ({error.strerror})") from error
-            log.seek(0)
-            tail = log.read()[-2000:].decode(errors="replace")
-        if status == REFUSED:
-            raise CannotBePlayed(without_folders(said.decode(errors="replace"), path.parent))
-        if status != 0:
-            logger.error("a study ended with status %d: %s", status, tail)
-            raise CannotBePlayed("its process was lost; the log has the reason")
-        return said
-
-    def _ask(self, question: Question, file: Path, log: IO[bytes]) -> int:
-        told = question.model_dump_json().encode() + b"\n"
         try:
-            return self._aside.run("risk_sac.failures.study", [str(file)], log, told)
-        except subprocess.TimeoutExpired as error:
-            raise CannotBePlayed(f"it takes more than {WALL_S:g} s here") from error
+            result = run_helper(
+                "risk_sac.failures.study",
+                [QUESTION, ANSWER],
+                question=question.model_dump_json().encode(),
+                wall_s=WALL_S,
+                niceness=self._settings.worker_niceness,
+                stopping=self._stopping.is_set,
+            )
+        except OSError as error:
+            raise StorageError(f"it cannot be played ({error.strerror})") from error
+        if result.timed_out:
+            raise CannotBePlayed(f"it takes more than {WALL_S:g} s here")
+        if result.status == REFUSED:
+            raise CannotBePlayed(without_folders(result.answer.decode(errors="replace"), path.parent))
+        if result.status != 0:
+            logger.error("a study ended with status %d: %s", result.status, result.log)
+            raise CannotBePlayed("its process was lost; the log has the reason")
+        return result.answer

@@ -2,20 +2,21 @@
 
 import contextlib
 import logging
-import subprocess
-import tempfile
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.run_folder.results import RESULTS
 from service.errors import StorageError
 from service.settings import ServiceSettings
-from service.views.asides import Aside
 from service.views.products import Products
 
 logger = logging.getLogger(__name__)
+
+WALL_S = 300.0  # a table of 100,000 episodes takes ten
 
 KEPT = 1  # of some megabytes; the newest, for those who ask for it at once
 
@@ -44,25 +45,22 @@ class Tables(Products[Table]):
 
     def __init__(self, settings: ServiceSettings) -> None:
         super().__init__(self._written, "tables", KEPT)
-        self._aside = Aside(settings)
+        self._niceness, self._stopping = settings.worker_niceness, threading.Event()
 
     def stop(self) -> None:
         """Ends the one that is being made."""
-        self._aside.stop()
+        self._stopping.set()
 
     def _written(self, table: Table) -> bytes:
-        with tempfile.TemporaryDirectory() as scratch, tempfile.TemporaryFile() as log:
-            file = Path(scratch) / table.format
-            arguments = ["export", *map(str, table.folders), "--format", table.format, "--out", str(file)]
-            try:
-                if (status := self._aside.run("risk_sac", arguments, log)) == 0:
-                    return file.read_bytes()
-                reason = f"status {status}"
-            except subprocess.TimeoutExpired as error:
-                reason = str(error)
-            except OSError as error:
-                raise StorageError(f"the table of episodes cannot be made ({error.strerror})") from error
-            log.seek(0)
-            tail = log.read()[-2000:].decode(errors="replace")
-            logger.error("a table of episodes was not made (%s): %s", reason, tail)
-        raise StorageError("the table of episodes cannot be made; the log has the reason")
+        arguments = ["export", *map(str, table.folders), "--format", table.format, "--out", ANSWER]
+        try:
+            result = run_helper(
+                "risk_sac", arguments, wall_s=WALL_S, niceness=self._niceness, stopping=self._stopping.is_set
+            )
+        except OSError as error:
+            raise StorageError(f"the table of episodes cannot be made ({error.strerror})") from error
+        if result.status != 0:
+            reason = f"more than {WALL_S:g} s" if result.timed_out else f"status {result.status}"
+            logger.error("a table of episodes was not made (%s): %s", reason, result.log)
+            raise StorageError("the table of episodes cannot be made; the log has the reason")
+        return result.answer

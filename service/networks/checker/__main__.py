@@ -1,8 +1,7 @@
-"""`python -I -m service.networks.checker PACKAGING`: check the file `upload` in the current folder.
+"""`service.networks.checker PACKAGING REPORT`: check the file `upload` in the current folder.
 
 Started by `service.networks.sandbox`, which never reads an upload itself. Whatever goes wrong here, by a bug of ours
-or of the simulator's, ends this process and nothing else. What passes is written anew beside the upload; the report
-is one line of JSON on stdout.
+or of the simulator's, ends this process and nothing else. What passes is written anew beside the upload.
 """
 
 import gc
@@ -26,7 +25,6 @@ def main() -> None:
     """Check the upload and say what came of it."""
     gc.disable()  # no cycles arise, and looking for them takes a sixth of the time
     bind()
-    stdout = _take_stdout()
     try:
         report = check(UPLOAD, Packaging(sys.argv[1]))
     except UploadError as error:
@@ -35,15 +33,8 @@ def main() -> None:
         report = CheckReport(
             refused=f"checking it needs more than {limits.MEMORY_BYTES >> 20} MiB; wanted a smaller network"
         )
-    os.write(stdout, json.dumps(asdict(report)).encode() + b"\n")
+    Path(sys.argv[2]).write_text(json.dumps(asdict(report)))
     os._exit(0)  # without the simulator's own clean-up, which may crash
-
-
-def _take_stdout() -> int:
-    """Keep stdout for the report: whatever else is printed, by C++ too, goes to the log."""
-    report = os.dup(1)
-    os.dup2(2, 1)
-    return report
 
 
 if __name__ == "__main__":

@@ -2,22 +2,18 @@
 
 import json
 import logging
-import subprocess
-import sys
-import tempfile
-import time
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from risk_sac.errors import ConfigError
+from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.failures.bundle import code_digest, versions
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import TIMES, Repetition, Verified, distinct_failures, read_verified, write_verified
 
 logger = logging.getLogger(__name__)
-
-POLL_S = 0.05
 
 
 def verify(
@@ -77,17 +73,11 @@ def _replayed(
     folders: Sequence[Path], times: int, jobs: int, stopping: Callable[[], bool]
 ) -> Mapping[Path, Sequence[Collection[int]]]:
     """By run, the failures that were the same, for each process that has replayed it to the end."""
-    command = [sys.executable, "-m", "risk_sac.failures.replay", str(times), str(jobs), *map(str, folders)]
-    with tempfile.TemporaryFile("w+") as output, subprocess.Popen(command, stdout=output) as process:
-        while process.poll() is None:
-            if stopping():
-                process.terminate()
-                process.wait()
-            time.sleep(POLL_S)
-        if process.returncode != 0:
-            logger.warning("replaying failures ended with status %d", process.returncode)
-        output.seek(0)
-        lines = [json.loads(line) for line in output if line.endswith("\n")]
+    arguments = [ANSWER, str(times), str(jobs), *map(str, folders)]
+    result = run_helper("risk_sac.failures.replay", arguments, wall_s=math.inf, stopping=stopping)
+    if result.status != 0:
+        logger.warning("replaying failures ended with status %d: %s", result.status, result.log)
+    lines = [json.loads(line) for line in result.answer.splitlines(keepends=True) if line.endswith(b"\n")]
     for line in lines:
         if "error" in line:
             logger.warning("the failures of %s cannot be replayed: %s", line["folder"], line["error"])

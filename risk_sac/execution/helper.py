@@ -1,0 +1,150 @@
+"""Helper processes: one question, one answer, bounded in time and memory.
+
+`run_helper` starts `python -m risk_sac.execution.helper`, which runs the wanted program in a session of its own and
+kills that session once its starter has gone. Question and answer are files, so a program may print what it likes.
+"""
+
+import contextlib
+import os
+import resource
+import runpy
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+QUESTION, ANSWER = "{question}", "{answer}"  # arguments that stand for the paths of these files
+ANSWER_BYTES = 256 << 20  # read of an answer, at most
+LOG_BYTES = 2000  # read of the end of a log, at most
+POLL_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class HelperResult:
+    """What became of a helper process.
+
+    Attributes:
+      status: exit status; negative for a signal.
+      answer: content of the answer file; empty if there is none.
+      log: end of what the process printed.
+      timed_out: whether it was killed at its time limit.
+    """
+
+    status: int
+    answer: bytes
+    log: str
+    timed_out: bool = False
+
+
+def run_helper(
+    program: str,
+    arguments: Sequence[str],
+    *,
+    wall_s: float,
+    question: bytes = b"",
+    memory_bytes: int = 0,
+    niceness: int = 0,
+    isolated: bool = False,
+    cwd: Path | None = None,
+    environment: Mapping[str, str] | None = None,
+    log: Path | None = None,
+    stopping: Callable[[], bool] = lambda: False,
+) -> HelperResult:
+    """Runs a Python program in a process of its own and waits for its end.
+
+    Args:
+      program: name of a module, or path of a `.py` file.
+      arguments: for it; `QUESTION` and `ANSWER` become the paths of these files.
+      wall_s: the process and all that it started are killed after this time, s.
+      question: content of the question file.
+      memory_bytes: address space that the process may use; 0 sets no limit.
+      niceness: added to that of this process.
+      isolated: neither the working directory nor environment variables decide what is imported.
+      cwd: working directory.
+      environment: all variables; by default those of this process.
+      log: file for what the process prints; by default a temporary one.
+      stopping: asked again and again; once true, the process is killed.
+
+    Raises:
+      OSError: the process cannot be started.
+    """
+    with tempfile.TemporaryDirectory() as scratch:
+        paths = {QUESTION: str(Path(scratch, "question")), ANSWER: str(Path(scratch, "answer"))}
+        Path(paths[QUESTION]).write_bytes(question)
+        log = log or Path(scratch, "log")
+        command = [sys.executable, *(["-I"] if isolated else []), "-m", "risk_sac.execution.helper"]
+        command += [str(niceness), str(memory_bytes), program, *(paths.get(each, each) for each in arguments)]
+        with log.open("wb") as output:
+            process = subprocess.Popen(
+                command,
+                cwd=cwd,
+                env=environment,
+                stdin=subprocess.PIPE,  # its end tells the process that this one has gone
+                stdout=output,
+                stderr=output,
+                start_new_session=True,
+            )
+        with process:
+            timed_out = _waited(process, wall_s, stopping)
+        return HelperResult(process.returncode, _head(Path(paths[ANSWER])), _tail(log), timed_out)
+
+
+def _waited(process: subprocess.Popen[bytes], wall_s: float, stopping: Callable[[], bool]) -> bool:
+    """Waits for the process and kills its whole session; returns whether the time was over."""
+    deadline = time.monotonic() + wall_s
+    try:
+        while not stopping():
+            left_s = deadline - time.monotonic()
+            if left_s <= 0:
+                return True
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(min(left_s, POLL_S))
+                return False
+        return False
+    finally:
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
+
+
+def _head(file: Path) -> bytes:
+    if not file.exists():
+        return b""
+    with file.open("rb") as stream:
+        return stream.read(ANSWER_BYTES)
+
+
+def _tail(file: Path) -> str:
+    with file.open("rb") as stream:
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(0, size - LOG_BYTES))
+        return stream.read().decode("utf-8", "backslashreplace").strip()
+
+
+def _main(niceness: str, memory_bytes: str, program: str, *arguments: str) -> None:
+    os.nice(int(niceness))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if int(memory_bytes):
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        most = int(memory_bytes) if hard == resource.RLIM_INFINITY else min(int(memory_bytes), hard)
+        resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    threading.Thread(target=_leave_with_starter, daemon=True).start()
+    sys.argv[1:] = arguments  # `runpy` replaces the first
+    if program.endswith(".py"):
+        runpy.run_path(program, run_name="__main__")
+    else:
+        runpy.run_module(program, run_name="__main__", alter_sys=True)
+
+
+def _leave_with_starter() -> None:
+    while os.read(0, 4096):
+        pass
+    os.killpg(0, signal.SIGKILL)
+
+
+if __name__ == "__main__":
+    _main(*sys.argv[1:])

@@ -1,0 +1,93 @@
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
+
+LONG_S = 60
+CHILD = "import os, subprocess, sys, time; child = subprocess.Popen(['sleep', '60'])\n"
+TELL_CHILD = "open(sys.argv[1], 'w').write(str(child.pid))\n"
+
+
+@pytest.fixture
+def run(tmp_path):
+    def run(code, *arguments, wall_s=LONG_S, **options):
+        program = tmp_path / "program.py"
+        program.write_text(code)
+        return run_helper(str(program), arguments, wall_s=wall_s, **options)
+
+    return run
+
+
+def wait_until_gone(pid):
+    deadline = time.monotonic() + LONG_S
+    while psutil.pid_exists(pid) and psutil.Process(pid).status() != psutil.STATUS_ZOMBIE:
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def test_what_a_helper_prints_does_not_disturb_its_answer(run):
+    code = "import sys; print('noise'); open(sys.argv[2], 'wb').write(open(sys.argv[1], 'rb').read() + b'!')"
+    result = run(code, QUESTION, ANSWER, question=b"\x00asked")
+    assert (result.status, result.answer, result.log) == (0, b"\x00asked!", "noise")
+
+
+def test_a_helper_that_fails_tells_the_end_of_what_it_printed(run):
+    result = run("import sys; print('x' * 10_000_000); sys.exit('the last words')")
+    assert (result.status, result.answer, result.timed_out) == (1, b"", False)
+    assert result.log.endswith("x\nthe last words")
+    assert len(result.log) <= 2000
+
+
+def test_a_helper_that_takes_too_long_is_killed_with_all_that_it_started(run):
+    result = run(CHILD + TELL_CHILD + "time.sleep(60)", ANSWER, wall_s=3)
+    assert (result.status, result.timed_out) == (-9, True)
+    wait_until_gone(int(result.answer))
+
+
+def test_what_a_helper_leaves_behind_is_killed(run):
+    wait_until_gone(int(run(CHILD + TELL_CHILD, ANSWER).answer))
+
+
+def test_a_helper_that_is_not_wanted_any_more_is_killed(run, tmp_path):
+    code = "import time; open('begun', 'w').close(); time.sleep(60)"
+    result = run(code, cwd=tmp_path, stopping=(tmp_path / "begun").exists)
+    assert (result.status, result.timed_out) == (-9, False)
+
+
+def test_a_helper_is_nicer_and_has_the_memory_that_it_is_given(run):
+    result = run("import os; print(os.nice(0)); bytearray(1 << 30)", niceness=3, memory_bytes=1 << 29)
+    assert result.log.startswith(f"{os.nice(0) + 3}\n")
+    assert result.log.endswith("MemoryError")
+
+
+def test_a_helper_and_its_children_leave_with_a_starter_that_is_killed(tmp_path):
+    program, told = tmp_path / "program.py", tmp_path / "told"
+    tell = "open('new', 'w').write(f'{os.getpid()} {child.pid}'); os.rename('new', 'told'); time.sleep(60)"
+    program.write_text(CHILD + tell)
+    code = f"from risk_sac.execution.helper import run_helper; run_helper({str(program)!r}, [], wall_s=60)"
+    starter = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path)
+    deadline = time.monotonic() + LONG_S
+    while not told.exists():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+    starter.kill()
+    starter.wait()
+    for pid in told.read_text().split():
+        wait_until_gone(int(pid))
+
+
+def test_an_isolated_helper_imports_nothing_from_its_working_directory(tmp_path):
+    (tmp_path / "json.py").write_text("print('mine')")
+    result = run_helper("json.tool", ["--help"], wall_s=LONG_S, isolated=True, cwd=tmp_path)
+    assert "mine" not in result.log
+
+
+def test_a_helper_that_cannot_be_started_raises(tmp_path):
+    with pytest.raises(OSError, match="No such file"):
+        run_helper("json.tool", [], wall_s=1, cwd=Path(tmp_path, "missing"))
