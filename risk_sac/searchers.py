@@ -1,31 +1,34 @@
-"""Who searches: a method's own sampler and agent, and the archive search that a learner is warmed by.
+"""Pairs each method's scene sampler with its agent, and a learner with the archive search that warms it.
 
-Source: RISK-SAC, Algorithm 1, l. 1-2; warm start and turns are ours.
+Source: RISK-SAC, Algorithm 1, l. 1-2. Choice: warm start and turns are ours.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
 
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.random import RandomAgent
+from risk_sac.agents.replay import Transition
 from risk_sac.agents.scripted import ScriptedAgent
 from risk_sac.config import RunSpec, method_of
 from risk_sac.problem import Problem
-from risk_sac.records import EpisodeRecord, Outcome
+from risk_sac.records import Collision, EpisodeRecord, Outcome
 from risk_sac.scene_optimizer import (
     NOBODY,
     ArchiveOptimizer,
     BotorchOptimizer,
+    DiscountedBandit,
     Encounter,
     IidSampler,
     SceneOptimizer,
     SobolOptimizer,
 )
-from risk_sac.turns import Turns
-from risk_sac.types import Floats
+from risk_sac.types import Floats, Scene, Vector
+from risk_sac.verdicts.distinct import DistinctFailures
 
-Actor = Learner | RandomAgent | ScriptedAgent | ScriptFollower
 CONTROLS: Mapping[str, type[RandomAgent | ScriptedAgent]] = {
     "scripted": ScriptedAgent,
     "random": RandomAgent,
@@ -38,25 +41,72 @@ OPTIMIZERS: Mapping[str, Sampler] = {
     "sobol": SobolOptimizer,
     "iid": IidSampler,
 }
-STEP_COSTS = 1.0, 8.0  # processor time: of the guide, and of a policy that learns and makes up for what it has not yet
+GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
+STEP_COSTS = 1.0, 8.0  # processor time of an environment step: of the guide, and of a policy with its share of updates
+NEW, NEW_PREVENTABLE = 1.0, 4.0  # worth of a distinct failure, and what is added if it is preventable
+# Scripts that find a failure in one episode of thirty may find none in fifty and still be worth their time.
+DISCOUNT = 0.995
+PRIOR_WORTH, PRIOR_STEPS = 0.05, 1000.0
+LEAST = 0.01  # share of the processor time for either; more would be lost on a policy that yields nothing
+
+
+class Actor(Protocol):
+    """One joint policy that drives all adversaries."""
+
+    @property
+    def genes(self) -> int:
+        """Coordinates of a proposed point, behind those of the scene, that say how it acts."""
+
+    @property
+    def can_stop_early(self) -> bool:
+        """Whether the rest of the episode is not worth playing."""
+
+    @property
+    def device(self) -> str:
+        """Where its networks live."""
+
+    @property
+    def dual_variable(self) -> float:
+        """λ; 0 without one."""
+
+    @property
+    def temperature(self) -> float:
+        """α; 0 without one."""
+
+    def begin(self, genes: Floats) -> None:
+        """Begins an episode."""
+
+    def act(self, observation: Vector, explore: bool) -> Vector:
+        """Returns the joint action in [-1, 1], two entries per adversary."""
+
+    def observe(self, transition: Transition, *, own: bool) -> None:
+        """Stores a step; `own` is False if another actor acted."""
+
+    def update(self) -> object:
+        """Learns from what is stored."""
+
+    def state(self) -> dict[str, Any]:
+        """Returns all that the next episode depends on."""
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continues from `state()`."""
 
 
 class Searcher(NamedTuple):
-    """Who makes an episode."""
+    """A scene sampler and the actor that plays its scenes."""
 
-    optimizer: SceneOptimizer  # proposes the scene, and the genes of scripts where the actor follows some
+    sampler: SceneOptimizer
     actor: Actor
 
 
 class Searchers:
-    """A method's own searcher and, beside a learner, its guide.
+    """A method's own searcher and, beside a learner, its guide: an archive search.
 
-    Choice: a learner's memory is filled by an archive search that goes on until it has found failures enough, and not
-    by uniform actions, which hardly find any. All learners are warmed alike.
+    Choice: a learner's memory is filled by an archive search until that has found failures enough, because uniform
+    actions hardly find any. All learners are warmed alike.
 
     Attributes:
-      agent: the method's, which drives the adversaries once it is warm, and learns.
-      scene_size: coordinates of a proposed point that say the scene; those behind are the genes of scripts.
+      agent: the method's own actor, which learns from all episodes of the search.
     """
 
     def __init__(self, spec: RunSpec, problem: Problem, observation_size: int, action_size: int) -> None:
@@ -68,74 +118,111 @@ class Searchers:
             self.agent = ScriptFollower(problem.family)
         else:
             self.agent = Learner(observation_size, action_size, method, spec.learner, spec.stream)
-        self.scene_size = problem.space.dimension
+        self._space = problem.space
         self._spec = spec
         self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
         self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if method.learns else None
-        self._turns = Turns(STEP_COSTS, spec.stream) if method.takes_turns else None
+        self._turns = Turns(spec.stream) if method.takes_turns else None
         self._next = self._own
         self._episodes, self._failures = 0, 0  # of the search
 
     def next(self, *, learning: bool) -> Searcher:
-        """Who makes the next episode.
+        """Chooses the searcher of the next episode.
 
         Args:
-          learning: whether it is one of the search; in the evaluation the method's own searcher is on its own.
+          learning: whether the episode is one of the search; in the evaluation the guide takes no part.
         """
         if self._guide is None or not learning:
             self._next = self._own
         elif not self._warm:
             self._next = self._guide
         else:
-            self._next = (self._guide, self._own)[self._turns.next()] if self._turns else self._own
+            self._next = (self._guide, self._own)[self._turns.draw()] if self._turns else self._own
         return self._next
 
     @property
     def _warm(self) -> bool:
-        """Whether the guide has done its part; one that goes on anyway has time until it has found enough."""
+        """Whether the guide has done its part; one that takes turns goes on until it has found enough."""
         warm_start = self._spec.learner.warm_start
         spent = self._episodes >= warm_start.episodes and not (self._turns and warm_start.episodes)
         return spent or self._failures >= warm_start.failures
 
-    def tell(self, point: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
-        """Tells what came of the scene that the next one was asked for; see `SceneOptimizer.tell`.
+    def split(self, point: Floats) -> tuple[Scene, Floats]:
+        """Splits a proposed point into its scene and the actor's genes."""
+        size = self._space.dimension
+        return self._space.from_unit(point[:size]), point[size:]
 
-        A method's own sampler hears of its guide's scenes too.
-        """
+    def begin(self, genes: Floats) -> None:
+        """Begins an episode for its actor and for the learner that observes it."""
+        self._next.actor.begin(genes)
         if self._next is not self._own:
-            self._own.optimizer.tell(point[: self.scene_size], mean_return, encounter)
-        return self._next.optimizer.tell(point, mean_return, encounter)
+            self.agent.begin(genes)
+
+    def tell(self, point: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
+        """Scores the scene of the episode; see `SceneOptimizer.tell`. The method's sampler also gets its guide's."""
+        if self._next is not self._own:
+            self._own.sampler.tell(point[: self._space.dimension], mean_return, encounter)
+        return self._next.sampler.tell(point, mean_return, encounter)
 
     def add(self, record: EpisodeRecord) -> None:
-        """Takes note of the episode that the next one has made; from then on it is the turn of another."""
+        """Counts the episode that the searcher chosen last has made."""
         if not record.searching:
             return
         self._episodes += 1
         self._failures += record.outcome is Outcome.FAILURE
         if self._turns:
-            self._turns.tell(int(self._next is self._own), record.steps, record.collision)
+            self._turns.tell(OWN if self._next is self._own else GUIDE, record.steps, record.collision)
 
     def state(self) -> dict[str, Any]:
-        """Everything the next episode depends on but the records so far; see `load`."""
+        """Returns all that the next episode depends on, except the records so far; see `load`."""
         return {
-            "optimizer": self._own.optimizer.state(),
+            "optimizer": self._own.sampler.state(),
             "agent": self.agent.state(),
-            "guide": self._guide.optimizer.state() if self._guide else None,
+            "guide": self._guide.sampler.state() if self._guide else None,
         }
 
     def load(self, state: dict[str, Any], records: list[EpisodeRecord]) -> None:
-        """Goes on from `state()` and the records at that time.
+        """Continues from `state()` and the records at that time.
 
         Raises:
           CheckpointError: the state is of another run.
         """
-        self._own.optimizer.load(state["optimizer"])
+        self._own.sampler.load(state["optimizer"])
         self.agent.load(state["agent"])
         if self._guide:
-            self._guide.optimizer.load(state["guide"])
+            self._guide.sampler.load(state["guide"])
         for record in records:
             self.next(learning=record.searching)
             self.add(record)
 
-    def _searcher(self, actor: Actor, optimizer: Sampler) -> Searcher:
-        return Searcher(optimizer(self.scene_size + actor.genes, self._spec.learner.scenes, self._spec.stream), actor)
+    def _searcher(self, actor: Actor, sampler: Sampler) -> Searcher:
+        dimension = self._space.dimension + actor.genes
+        return Searcher(sampler(dimension, self._spec.learner.scenes, self._spec.stream), actor)
+
+
+class Turns:
+    """Chooses between guide and policy by what each has found lately for its processor time.
+
+    So a policy acts often once the scripts' failures run out, and not before. The same episodes in the same order lead
+    to the same turns.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._random = np.random.default_rng(seed)
+        self._bandit = DiscountedBandit(
+            discount=DISCOUNT, prior_worth=PRIOR_WORTH, prior_cost=PRIOR_STEPS, least=LEAST, unit_costs=STEP_COSTS
+        )
+        self._found, self._preventable = DistinctFailures(), DistinctFailures()
+
+    def draw(self) -> int:
+        """Draws the arm of the next episode."""
+        return int(self._random.random() < self._bandit.probability)
+
+    def tell(self, arm: int, steps: int, collision: Collision | None) -> None:
+        """Counts an episode; what either arm has found is new to neither."""
+        worth = 0.0
+        if collision is not None and collision.valid:
+            worth += NEW * self._found.add(collision)
+            if collision.preventable:
+                worth += NEW_PREVENTABLE * self._preventable.add(collision)
+        self._bandit.tell(arm, worth, steps)

@@ -20,9 +20,9 @@ class ScriptFollower:
     """Each adversary acts by genes of its own, which an episode is begun with; λ and α are 0.
 
     Attributes:
-      hopeless: whether nothing is to be expected of the episode any more: all that act have fallen behind, or have been
-        through with their scripts for a while, or the ego stands and stands. Choice: such an episode is truncated; it
-        counts as safe, with its steps.
+      can_stop_early: whether the rest of the episode is not worth playing: all adversaries that act have fallen
+        behind, or have finished their scripts a while ago, or the ego stands for long. Choice: such an episode is
+        truncated; it counts as safe, with its steps.
     """
 
     device = "cpu"
@@ -46,7 +46,7 @@ class ScriptFollower:
         self._scripts = [Genes(*row) if row[0] >= threshold else None for row in rows]
         self._cued: list[int | None] = [None] * len(rows)
         self._step, self._behind, self._standing = 0, 0, 0
-        self.hopeless = False
+        self.can_stop_early = False
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
         """Acts on what `risk_sac.observation` says of each adversary; nothing is random."""
@@ -80,7 +80,7 @@ class ScriptFollower:
         standing = all(one.ego_mps < STANDING_MPS for _, one, _ in acting)
         self._standing = self._standing + 1 if standing else 0
         over = all(is_over(script, since_s) for script, _, since_s in acting)
-        self.hopeless = over or self._behind >= BEHIND_STEPS or self._standing >= STANDING_STEPS
+        self.can_stop_early = over or self._behind >= BEHIND_STEPS or self._standing >= STANDING_STEPS
 
     def observe(self, transition: Transition, *, own: bool = True) -> None:
         """Forgets it."""

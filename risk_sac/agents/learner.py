@@ -36,7 +36,7 @@ class Learner:
     """
 
     genes = 0
-    hopeless = False
+    can_stop_early = False
 
     def __init__(
         self, observation_size: int, action_size: int, method: Method, config: LearnerConfig, seed: int

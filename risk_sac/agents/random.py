@@ -21,7 +21,7 @@ class RandomAgent:
     dual_variable = 0.0
     temperature = 0.0
     genes = 0
-    hopeless = False
+    can_stop_early = False
 
     def __init__(self, action_size: int, seed: int) -> None:
         self._generator = np.random.default_rng(seed)

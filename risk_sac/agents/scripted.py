@@ -23,7 +23,7 @@ class ScriptedAgent:
     dual_variable = 0.0
     temperature = 0.0
     genes = 0
-    hopeless = False
+    can_stop_early = False
 
     def __init__(self, action_size: int, seed: int) -> None:
         self._adversaries = action_size // 2

@@ -7,9 +7,9 @@ import torch
 from torch import Tensor
 
 from risk_sac.config import SceneOptimizerConfig
+from risk_sac.scene_optimizer.bandit import DiscountedBandit
 from risk_sac.scene_optimizer.base import NOBODY, Encounter, State, check_identity, check_told
 from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
-from risk_sac.scene_optimizer.reach import Reach
 from risk_sac.scene_optimizer.sobol import SobolSequence
 from risk_sac.types import Floats
 
@@ -32,7 +32,7 @@ class BotorchOptimizer:
     share `config.exploration` of scenes is drawn at random. The acquisition is maximised by rounds of ever smaller
     Gaussian steps around its best candidates: they come within a few tenths of a nat of what gradient ascent reaches,
     at a fraction of its price. Near one of the best scenes the model's mean is maximised instead, over small steps from
-    that one alone: see `Reach` for why, and when.
+    that one alone. A bandit chooses.
 
     Every random number of an ask derives from the seed and the number of asks, so the generator has no state to save
     and neither reads nor moves a global one.
@@ -51,7 +51,7 @@ class BotorchOptimizer:
         self._told = 0
         self._fitted_at = 0  # value of _told at the last refit
         self._hyperparameters: Hyperparameters | None = None
-        self._reach = Reach()
+        self._reach = DiscountedBandit(discount=0.95, prior_worth=0.25, prior_cost=5.0, least=0.05)
         self._near: bool | None = None  # how the scene that is out was looked for, if the model proposed it
 
     def ask(self) -> Floats:  # Alg. 1, l. 4
@@ -81,7 +81,7 @@ class BotorchOptimizer:
             self._maximum = update_running_maximum(self._maximum, mean_return, self._config.running_maximum_rate)
             score = objective(mean_return, self._maximum.smoothed)
         if self._near is not None:
-            self._reach.tell(score, near=self._near)
+            self._reach.tell(int(self._near), 0.0 if score is None else max(0.0, 1.0 - score))
             self._near = None
         return score
 
@@ -111,7 +111,7 @@ class BotorchOptimizer:
         model = surrogate.condition(points, targets, self._hyperparameters)
         posterior = surrogate.Posterior(model)
         acquisition = posterior.log_expected_improvement
-        self._near = bool(random.random() < self._reach.near)
+        self._near = bool(random.random() < self._reach.probability)
         if self._near:
             candidates = torch.from_numpy(self._steps_from_one_of_the_best(values, random))
             scores, _ = posterior(candidates)

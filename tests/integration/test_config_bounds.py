@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from risk_sac.config import METHODS, CampaignSpec, Odd, RunSpec
 from risk_sac.errors import OddError
+from risk_sac.guarded_env import GuardedEnv
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, RunMetrics
 from risk_sac.run import RunState
@@ -110,8 +111,9 @@ def play(spec: RunSpec, folder: Path) -> None:
     run = RunState(spec, folder)
     try:
         with CrashGuard(folder) as guard:
+            env = GuardedEnv(run.env, guard)
             while not run.finished:
-                record = episode(run, guard)
+                record = episode(run, env)
                 metrics = run.add(record)
                 assert_told_in_full(record, metrics)
         for contact in run.series.values():

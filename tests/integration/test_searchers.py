@@ -9,10 +9,10 @@ from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, MethodName, RunSpec, WarmStartConfig
 from risk_sac.problem import Problem
-from risk_sac.records import EpisodeRecord, Outcome, RunMetrics, SeriesFile
-from risk_sac.searchers import Searchers
+from risk_sac.records import EpisodeRecord, Grade, Outcome, RunMetrics, SeriesFile
+from risk_sac.searchers import GUIDE, OWN, Searchers, Turns
 from risk_sac.train import train
-from tests.builders import episode_record
+from tests.builders import collision, episode_record, judgement
 
 WARM = 3
 
@@ -81,6 +81,23 @@ def test_a_guide_that_goes_on_anyway_has_time_until_it_has_found_enough() -> Non
     taken = makers(searchers("risk-sac-diverse", few), [Outcome.FAILURE] * 2 + [Outcome.SAFE] * 60)
     assert taken[:2] == [ScriptFollower] * 2
     assert set(taken[2:]) == {ScriptFollower, Learner}
+
+
+def shares(*findings: tuple[int, str, Grade]) -> list[float]:
+    """Share of the policy's turns among 2,000, after each finding."""
+    turns, found = Turns(seed=0), []
+    for arm, signature, grade in findings:
+        turns.tell(arm, 100, collision(judgement=judgement(grade, signature=signature)))
+        found.append(sum(turns.draw() for _ in range(2000)) / 2000)
+    return found
+
+
+def test_turns_go_to_the_searcher_that_finds_what_is_new() -> None:
+    first, repeated, preventable = shares(
+        (GUIDE, "one", Grade.CAREFUL), (OWN, "one", Grade.CAREFUL), (OWN, "another", Grade.CAREFUL)
+    )
+    unpreventable = shares((GUIDE, "one", Grade.CAREFUL), (OWN, "another", Grade.IDEAL))[-1]
+    assert max(first, repeated) < unpreventable < preventable
 
 
 def test_the_frozen_policy_is_on_its_own() -> None:

@@ -48,30 +48,30 @@ def test_it_strikes_at_its_cue_and_begins_anew_with_every_episode():
     assert subject.act(ahead)[0] == pytest.approx(0.0, abs=1e-6)
 
 
-def test_an_episode_is_hopeless_once_all_that_act_have_fallen_behind():
+def test_an_episode_can_stop_once_all_that_act_have_fallen_behind():
     subject = follower(0.9, 0.0, 0.0)
     for _ in range(BEHIND_STEPS):
-        assert not subject.hopeless
+        assert not subject.can_stop_early
         subject.act(observed((-7, 3.3), (12, 3.3), (14, -3.3)))
-    assert subject.hopeless
+    assert subject.can_stop_early
     subject.begin(np.tile(MIDDLE, 3))
-    assert not subject.hopeless
+    assert not subject.can_stop_early
 
 
-def test_an_episode_is_hopeless_once_the_ego_has_stood_for_a_while():
+def test_an_episode_can_stop_once_the_ego_has_stood_for_a_while():
     subject, ahead = follower(0.9, 0.0, 0.0), observed((6, 3.3), (12, 3.3), (14, -3.3))
     standing = ahead.copy()
     standing[-1] = 0.0
     for observation in [standing] * 10 + [ahead] + [standing] * STANDING_STEPS:
-        assert not subject.hopeless
+        assert not subject.can_stop_early
         subject.act(observation)
-    assert subject.hopeless
+    assert subject.can_stop_early
 
 
-def test_an_episode_is_hopeless_a_while_after_the_last_strike():
+def test_an_episode_can_stop_a_while_after_the_last_strike():
     subject, ahead = follower(0.9, 0.0, 0.0), observed((6, 3.3), (12, 3.3), (14, -3.3))
     steps = 0
-    while not subject.hopeless:
+    while not subject.can_stop_early:
         subject.act(ahead)
         steps += 1
     assert steps == 5 + 20 + 30 + 2  # the cue, the strike, and what may come of it

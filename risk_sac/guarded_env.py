@@ -1,0 +1,68 @@
+"""The environment as the loop of Algorithm 1 sees it: whatever ends an episode unplayed is one exception."""
+
+import logging
+from typing import Any
+
+from risk_sac.env import Observation, RiskSacEnv
+from risk_sac.errors import EgoFailed, InfeasibleScene
+from risk_sac.records import Outcome
+from risk_sac.run_folder.crashes import CrashGuard
+from risk_sac.searchers import Actor
+from risk_sac.types import Scene
+
+logger = logging.getLogger(__name__)
+
+SIM_CRASH = "sim_crash"  # reason of a rejection
+
+
+class Unplayable(Exception):
+    """An episode could not be played to its end; its record gets this outcome and reason."""
+
+    def __init__(self, outcome: Outcome, reason: str) -> None:
+        super().__init__(f"{outcome}: {reason}")
+        self.outcome, self.reason = outcome, reason
+
+
+class GuardedEnv:
+    """Environment of a run that leaves out crashing episodes and truncates those of no further use."""
+
+    def __init__(self, env: RiskSacEnv, guard: CrashGuard) -> None:
+        self._env, self._guard = env, guard
+
+    def begin(self, index: int) -> None:
+        """Notes for the crash guard that an episode begins, before its scene is chosen."""
+        self._index, self._playable = index, self._guard.begin(index)
+
+    def reset(self, seed: int, scene: Scene, actor: Actor) -> tuple[Observation, dict[str, Any]]:
+        """Starts the episode; see `RiskSacEnv.reset`.
+
+        Raises:
+          Unplayable: the episode crashed the simulator before, C_hard rejects the scene, or the ego failed.
+        """
+        self._actor, self._steps = actor, 0
+        if not self._playable:
+            raise Unplayable(Outcome.REJECTED, SIM_CRASH)
+        try:
+            return self._env.reset(seed=seed, options={"scene": scene})
+        except InfeasibleScene as infeasible:
+            raise Unplayable(Outcome.REJECTED, infeasible.reason) from infeasible
+        except EgoFailed as failed:
+            raise self._invalid(failed) from failed
+
+    def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Plays one control step; see `RiskSacEnv.step`. Also truncates once the actor can stop early.
+
+        Raises:
+          Unplayable: the ego failed.
+        """
+        self._guard.step(self._steps)
+        self._steps += 1
+        try:
+            observation, reward, terminated, truncated, info = self._env.step(action)
+        except EgoFailed as failed:
+            raise self._invalid(failed) from failed
+        return observation, reward, terminated, truncated or self._actor.can_stop_early, info
+
+    def _invalid(self, failed: EgoFailed) -> Unplayable:
+        logger.warning("episode %d is invalid: %s", self._index, failed)
+        return Unplayable(Outcome.INVALID, failed.reason)
