@@ -1,7 +1,4 @@
-"""What a run is between two episodes: its parts, its episodes so far, and how they are kept on disk.
-
-Source: RISK-SAC, Algorithm 1, l. 1-2.
-"""
+"""Run state between two episodes, and its checkpoint."""
 
 import logging
 import time
@@ -27,40 +24,40 @@ from risk_sac.searchers import Searchers
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
-MOST_REJECTED = 200  # newest records among which a dead ego's episodes are looked for
+LATEST = 200  # records in which the episodes of a dead ego are looked for
 PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
 
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """What a run leaves behind."""
+    """Results of a run."""
 
     metrics: RunMetrics  # of the search, or of the i.i.d. phase that the run is
     evaluation: RunMetrics | None  # of the frozen policy, if the budget has evaluation episodes
     digest: str  # of all records: the same spec gives the same digest
     finished: bool  # False when the observer ended it
     versions: Mapping[str, str]
-    device: str  # where the networks lived
+    device: str
     wall_s: float  # of this process; excludes what was done before a resume
     cpu_s: float  # the same in processor time, which a busy machine does not lengthen
-    episode_cpu_s: tuple[float, ...]  # processor time from the beginning, a resume or none, to the end of each episode
+    episode_cpu_s: tuple[float, ...]  # processor time of the run, resumes included, at the end of each episode
 
 
 class RunState:
-    """The parts that a run's episodes are played with, and the episodes so far.
+    """Parts of a run, and its episodes so far.
 
     Attributes:
       spec: what to run.
       problem: what to falsify.
       env: the closed loop.
-      searchers: who propose the scenes and drive the adversaries.
+      searchers: propose the scenes and drive the adversaries.
       reward: what the agent is trained on, and the scenes are scored by.
-      records: of the episodes so far.
-      series: by episode, where the ego touched something.
+      records: one per episode.
+      series: time series by episode, where the ego touched something.
     """
 
     def __init__(self, spec: RunSpec, folder: Path) -> None:
-        """Begins a run anew; `resume` goes on with what lies in the folder."""
+        """Begins a run; `resume` continues the one in the folder."""
         self._cpu_began_s = time.process_time()
         self.spec = spec
         self.env = RiskSacEnv.of(spec)
@@ -77,13 +74,13 @@ class RunState:
 
     @property
     def finished(self) -> bool:
-        """Whether its budget is spent."""
+        """Whether the budget is spent."""
         budget = self.spec.budget
         return not self.learning and len(self.records) - self._search.episodes >= budget.evaluation_episodes
 
     @property
     def learning(self) -> bool:
-        """Whether the next episode is one of the search; in the evaluation the policy is frozen."""
+        """Whether the next episode belongs to the search; in the evaluation the policy is frozen."""
         budget, played = self.spec.budget, self._search.episodes
         if played < budget.least_episodes or budget.cpu_s is None:
             return played < budget.episodes
@@ -91,18 +88,18 @@ class RunState:
 
     @property
     def phase(self) -> Phase:
-        """That the next episode belongs to."""
+        """Phase of the next episode."""
         if self.spec.iid:
             return "iid"
         return "search" if self.learning else "evaluation"
 
     @property
     def environment_steps(self) -> int:
-        """Of all episodes so far."""
+        """Steps of all episodes so far."""
         return self.records[-1].environment_steps if self.records else 0
 
     def add(self, record: EpisodeRecord) -> RunMetrics:
-        """Takes up the episode that `env` has just played, writes its contact's time series, and counts it.
+        """Adds the episode that `env` has just played, and writes the time series of a contact.
 
         Returns:
           The metrics of its phase.
@@ -116,14 +113,14 @@ class RunState:
         return self._count(record)
 
     def refuse_dead_ego(self) -> None:
-        """Ends a run whose ego has failed in each of the latest episodes that it was to drive.
+        """Ends a run whose ego failed in each of the latest episodes.
 
-        Nothing is kept of these: the same run goes on from its latest checkpoint once the ego works again.
+        These are not kept: the run continues from its latest checkpoint once the ego works again.
 
         Raises:
-          ConfigError: saying how it failed last.
+          ConfigError: with the reason of the latest failure.
         """
-        driven = [record for record in self.records[-MOST_REJECTED:] if record.outcome is not Outcome.REJECTED]
+        driven = [record for record in self.records[-LATEST:] if record.outcome is not Outcome.REJECTED]
         latest = driven[-DEAD_AFTER:]
         if len(latest) == DEAD_AFTER and all(record.outcome is Outcome.INVALID for record in latest):
             raise ConfigError(
@@ -133,7 +130,7 @@ class RunState:
             )
 
     def save(self) -> None:
-        """Writes the checkpoint, if there is something new; only ever called between episodes."""
+        """Writes the checkpoint if there is a new episode; called between episodes only."""
         if self._saved == len(self.records):
             return
         state = {
@@ -146,9 +143,12 @@ class RunState:
         self._saved = len(self.records)
 
     def resume(self) -> list[tuple[EpisodeRecord, RunMetrics]]:
-        """Goes on from the folder's newest good checkpoint, if there is one; its episodes with the metrics after each.
+        """Continues from the folder's newest intact checkpoint; without one the run starts from the beginning.
 
-        Without one the run begins anew; either way it comes to the same results.
+        Either way the results are the same.
+
+        Returns:
+          The episodes of the checkpoint with the metrics after each.
         """
         state = checkpoint.load_newest(self._folder / CHECKPOINT, self.spec.digest)
         if state is None:
@@ -163,7 +163,7 @@ class RunState:
         return [(record, self._count(record)) for record in self.records]
 
     def summary(self, *, wall_s: float, cpu_s: float) -> RunSummary:
-        """What the run has achieved so far, and the time that it took this process."""
+        """Summarises the run so far; the times are of this process."""
         return RunSummary(
             metrics=self._search.metrics(),
             evaluation=self._evaluation.metrics() if self.spec.budget.evaluation_episodes else None,
@@ -185,7 +185,7 @@ class RunState:
 
 
 def _series(folder: Path, records: list[EpisodeRecord], digests: Mapping[int, str]) -> dict[int, SeriesFile]:
-    """The series of the records, with the digests they were written with, whatever became of the files since."""
+    """Time series by episode, with the digests they were written with; a damaged file is logged."""
     found = {}
     for record in records:
         if record.collision is None:

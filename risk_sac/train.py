@@ -8,7 +8,7 @@ import time
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import torch
@@ -22,7 +22,7 @@ from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run import RunState, RunSummary
 from risk_sac.run_folder.crashes import CrashGuard
 from risk_sac.scene_optimizer import Encounter
-from risk_sac.types import Scene
+from risk_sac.types import Floats, Scene
 
 
 class Observer(Protocol):
@@ -113,12 +113,11 @@ def episode(run: RunState, env: GuardedEnv) -> EpisodeRecord:
                 break
     except Unplayable as unplayable:
         run.searchers.tell(point, None)
-        return _record(run, seed, scene, tally, (unplayable.outcome, unplayable.reason))
+        return _record(run, seed, scene, tally, unplayable=unplayable)
     collision = info.get("collision")
     encounter = Encounter(collision=collision, encounters_s=run.env.trace.encounters_s(run.problem.family.adversaries))
     objective = run.searchers.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
-    found = {"objective": objective, "script": tuple(genes.tolist()) or None, "collision": collision}
-    return _record(run, seed, scene, tally, _ending(collision), **found)
+    return _record(run, seed, scene, tally, genes=genes, objective=objective, collision=collision)
 
 
 @dataclass(slots=True)
@@ -139,9 +138,17 @@ class Tally:
 
 
 def _record(
-    run: RunState, seed: int, scene: Scene, tally: Tally, ending: tuple[Outcome, str], **found: Any
+    run: RunState,
+    seed: int,
+    scene: Scene,
+    tally: Tally,
+    *,
+    unplayable: Unplayable | None = None,
+    genes: Floats | None = None,
+    objective: float | None = None,
+    collision: Collision | None = None,
 ) -> EpisodeRecord:
-    outcome, reason = ending
+    outcome, reason = (unplayable.outcome, unplayable.reason) if unplayable else _ending(collision)
     crashed = reason == SIM_CRASH  # then the environment's trace is of the episode before
     return EpisodeRecord(
         index=len(run.records),
@@ -159,7 +166,9 @@ def _record(
         dual_variable=run.searchers.agent.dual_variable,
         temperature=run.searchers.agent.temperature,
         environment_steps=run.environment_steps + tally.steps,
-        **found,
+        objective=objective,
+        script=None if genes is None else tuple(genes.tolist()) or None,
+        collision=collision,
     )
 
 
