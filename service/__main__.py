@@ -10,7 +10,6 @@ from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.executors import executor_named
 from service.api.guards.connections import Server
 from service.app import create_app
-from service.host.allocator import share_arenas
 from service.host.environment import MISUSED, read_settings
 from service.host.logs import set_up_logs
 from service.keys.exposure import check_exposure
@@ -22,7 +21,6 @@ SWITCH_S = 0.001  # for which a busy thread may hold up the event loop, and with
 
 def main() -> None:
     """Serve until told to stop."""
-    share_arenas()
     try:
         settings = read_settings()
         set_up_logs(settings.log_format)

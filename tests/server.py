@@ -31,6 +31,7 @@ class Service:
             self.port = probe.getsockname()[1]
         self.environment = os.environ | {
             "PYTHONPATH": os.pathsep.join([str(ROOT), str(SCRIPTED), os.environ.get("PYTHONPATH", "")]),
+            "MALLOC_ARENA_MAX": "2",  # as `risk-sac serve` sets it
             "RISK_SAC_DATA_DIR": str(data_dir),
             "RISK_SAC_PORT": str(self.port),
             "RISK_SAC_MAX_WORKERS": "2",

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from risk_sac.cli.console import Commands
 
+ARENAS = {"MALLOC_ARENA_MAX": "2"}  # glibc gives each thread an arena otherwise, and the server's memory grows
+
 
 def add_serve(commands: Commands) -> None:
     """Adds the command."""
@@ -21,4 +23,4 @@ def _serve(options: argparse.Namespace) -> int:
     """Replaces this process: the method's code never imports the service."""
     given = {"HOST": options.host, "PORT": options.port, "DATA_DIR": options.data_dir}
     settings = {f"RISK_SAC_{name}": str(value) for name, value in given.items() if value is not None}
-    os.execve(sys.executable, [sys.executable, "-m", "service"], os.environ | settings)
+    os.execve(sys.executable, [sys.executable, "-m", "service"], ARENAS | os.environ | settings)

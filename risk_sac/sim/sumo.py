@@ -21,7 +21,6 @@ from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.drivers import Drivers
 from risk_sac.sim.ego import EVERYTHING, Belief, Perception, Senses
 from risk_sac.sim.lookout import project
-from risk_sac.sim.parser import keep_parser
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import MovedEgo, Pilot
 from risk_sac.sim.placing import hand_over, place
@@ -106,7 +105,6 @@ class SumoSimulation:
         if not self._started:
             libsumo.start(["sumo", *options])
             self._started = True
-            keep_parser()
             return
         libsumo.load(options)
 

@@ -1,7 +1,6 @@
 """What the closed loop costs beside the simulator, and whether it can run for a long time."""
 
 import gc
-import json
 import re
 import statistics
 import subprocess
@@ -147,16 +146,6 @@ def test_a_reset_takes_at_most_fifteen_milliseconds(family: str) -> None:
     worst = sorted(times)[94]
     print(f"\n{family}: reset {statistics.median(times):.1f} ms, 95 % within {worst:.1f} ms")
     assert statistics.median(times) <= RESET_MS
-
-
-@pytest.mark.bench
-def test_a_load_is_faster_with_the_parser_kept() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.benchmarks.sumo_load"], capture_output=True, text=True, check=True
-    )
-    for family, (anew_ms, kept_ms) in json.loads(done.stdout).items():
-        print(f"\n{family}: libsumo's load {anew_ms:.1f} ms, with its parser kept {kept_ms:.1f} ms")
-        assert kept_ms < anew_ms
 
 
 @pytest.mark.bench

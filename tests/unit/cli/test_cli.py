@@ -239,6 +239,7 @@ def test_serve_becomes_the_service_with_its_settings(monkeypatch: pytest.MonkeyP
     assert (program, arguments) == (sys.executable, [sys.executable, "-m", "service"])
     assert (environment["RISK_SAC_HOST"], environment["RISK_SAC_PORT"]) == ("0.0.0.0", "8001")
     assert environment["RISK_SAC_GRACE_S"] == "5"
+    assert environment["MALLOC_ARENA_MAX"] == "2"
     assert "RISK_SAC_DATA_DIR" not in environment
 
 
