@@ -109,7 +109,9 @@ def _service(data_dir: Path, console: Console) -> Iterator[Client]:
         "RISK_SAC_DATA_DIR": str(data_dir),
     }
     with log.open("wb") as stream:
-        process = subprocess.Popen([sys.executable, "-m", "risk_sac", "serve"], env=environment, stdout=stream, stderr=stream)
+        process = subprocess.Popen(
+            [sys.executable, "-m", "risk_sac", "serve"], env=environment, stdout=stream, stderr=stream
+        )
     try:
         with Client(f"http://127.0.0.1:{port}") as client:
             _wait_until_up(client.url, process, log)

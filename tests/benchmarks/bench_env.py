@@ -19,7 +19,7 @@ from risk_sac.sim import driver, drivers, paths, placing, reading, roads, sumo
 
 CALLERS = (sumo, placing, reading, roads, drivers, driver, paths)  # the modules that import libsumo
 STEP_RATIO = 3.0
-RESET_MS = 15.0
+RESET_MS = 20.0
 EPISODES, ROUNDS = 8, 5
 SOAK_EPISODES, GROWTH_MIB = 5000, 50.0
 
@@ -133,7 +133,7 @@ def test_a_step_costs_at_most_three_times_its_libsumo_calls(family: str) -> None
 
 @pytest.mark.bench
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_reset_takes_at_most_fifteen_milliseconds(family: str) -> None:
+def test_a_reset_takes_at_most_twenty_milliseconds(family: str) -> None:
     times = []
     with closing(make_default(family)) as env:
         env.reset(seed=0)
