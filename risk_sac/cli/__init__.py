@@ -9,18 +9,15 @@ from risk_sac import __version__
 from risk_sac.cli.campaigns import add_campaigns
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
 from risk_sac.cli.egos import add_egos
-from risk_sac.cli.evaluate import add_evaluate
 from risk_sac.cli.export import add_export
-from risk_sac.cli.keys import add_keys
 from risk_sac.cli.places import add_places
 from risk_sac.cli.regress import add_regress
-from risk_sac.cli.replay import add_bundle, add_replay
+from risk_sac.cli.replay import add_bundle, add_replay, add_verify
 from risk_sac.cli.report import add_report
-from risk_sac.cli.run import add_run
-from risk_sac.cli.serve import add_serve
+from risk_sac.cli.run import add_evaluate, add_run
+from risk_sac.cli.serve import add_keys, add_serve
 from risk_sac.cli.show import add_show
 from risk_sac.cli.understand import add_clusters, add_minimise, add_region
-from risk_sac.cli.verify import add_verify
 from risk_sac.errors import ConfigError, RiskSacError
 
 COMMANDS = (

@@ -1,13 +1,12 @@
-"""What the commands share: where they print, and what their exit statuses mean."""
+"""What the commands share: consoles, exit statuses, and text made safe for a terminal or an XML file."""
 
 import argparse
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from typing import TypeAlias
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
-
-from risk_sac.cli.text import printable
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs
@@ -65,3 +64,31 @@ class Board:
 def or_dash(value: float | None, format_: str) -> str:
     """A number, or a dash where there is none."""
     return "-" if value is None else format(value, format_)
+
+
+# What XML 1.0 forbids, the other control characters, which a terminal would obey, and unpaired surrogates.
+_UNPRINTABLE = re.compile("[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+# What names an ego.
+EGO = "default, perfect, careful, a registered ego, or a YAML file with the fields of a campaign's ego"
+
+
+def printable(text: str) -> str:
+    """The text without control characters, tabs and line breaks apart."""
+    return _UNPRINTABLE.sub("", text)
+
+
+def on_one_line(text: str) -> str:
+    """The text without control characters, every run of white space a single space."""
+    return " ".join(printable(text).split())
+
+
+def counted(count: int, noun: str) -> str:
+    """A count with its noun: `1 failure`, `2 failures`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def in_words(names: Iterable[str]) -> str:
+    """Names of rules or of what was broken, as words."""
+    return ", ".join(names).replace("_", " ")

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, complain, console, progress_bar
-from risk_sac.cli.evaluate import drawn
+from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_campaign, read_ego
 from risk_sac.egos.registry import SHIPPED, cards

@@ -1,4 +1,4 @@
-"""`risk-sac regress`: old failures against another ego."""
+"""`risk-sac regress`: old failures against another ego, with a JUnit report."""
 
 import argparse
 from collections import Counter
@@ -6,18 +6,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from junitparser import Error, Failure, Skipped
+from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 from pydantic import ValidationError
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.console import FAILED, OK, Commands, console
-from risk_sac.cli.regress_junit import junit
-from risk_sac.cli.text import EGO, counted, printable
+from risk_sac.cli.console import EGO, FAILED, OK, Commands, console, counted, printable
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
-from risk_sac.failures.cases import Regression
+from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names, of_failure
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import RESULTS, read_results
@@ -141,3 +141,32 @@ def read_baseline(file: Path, flag: str = "--baseline") -> Regression:
         raise ConfigError(f"there is no {file}", field=flag) from error
     except ValidationError as error:
         raise ConfigError(f"{file} was not written by `risk-sac regress`", field=flag) from error
+
+
+FAILS = (Verdict.STILL_FAILING, Verdict.NEW_KIND)
+
+
+def junit(regression: Regression) -> bytes:
+    """The report: fixed passes, known is skipped; what is flaky or cannot be compared is an error."""
+    suite = TestSuite("regression")
+    suite.add_property("ego", regression.ego.model_dump_json())
+    suite.add_testcases([_case(case) for case in regression.cases])
+    report = JUnitXml("risk-sac regress")
+    report.add_testsuite(suite)
+    report.update_statistics()
+    text: bytes = report.tostring()
+    return text
+
+
+def _case(case: Case) -> TestCase:
+    found = TestCase(printable(case.id), printable(case.name))
+    if case.grade is not None:
+        found.add_property("grade", case.grade)
+    said = printable(f"{case.verdict.replace('_', ' ')}: {case.reason}")
+    if case.verdict is Verdict.FIXED:
+        found.system_out = said
+    elif case.known:
+        found.append(Skipped(f"known; {said}"))
+    else:
+        found.append((Failure if case.verdict in FAILS else Error)(said, case.verdict))
+    return found

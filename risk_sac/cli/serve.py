@@ -1,4 +1,4 @@
-"""`risk-sac serve`: the service in the foreground."""
+"""`risk-sac serve` and `keys`: the service in the foreground, and its API keys."""
 
 import argparse
 import os
@@ -24,3 +24,17 @@ def _serve(options: argparse.Namespace) -> int:
     given = {"HOST": options.host, "PORT": options.port, "DATA_DIR": options.data_dir}
     settings = {f"RISK_SAC_{name}": str(value) for name, value in given.items() if value is not None}
     os.execve(sys.executable, [sys.executable, "-m", "service"], ARENAS | os.environ | settings)
+
+
+def add_keys(commands: Commands) -> None:
+    """Adds the command; what follows it, flags too, is for the service's own parser."""
+    keys = commands.add_parser(
+        "keys", help="create, list and revoke the service's API keys", add_help=False, prefix_chars="\0"
+    )
+    keys.set_defaults(command=_keys)
+    keys.add_argument("rest", nargs="*")
+
+
+def _keys(options: argparse.Namespace) -> int:
+    """Replaces this process: the method's code never imports the service."""
+    os.execv(sys.executable, [sys.executable, "-m", "service.keys", *options.rest])

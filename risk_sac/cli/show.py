@@ -6,8 +6,7 @@ from pathlib import Path
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from risk_sac.cli.console import OK, Commands, console
-from risk_sac.cli.text import EGO, in_words
+from risk_sac.cli.console import EGO, OK, Commands, console, in_words
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE

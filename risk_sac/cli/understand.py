@@ -10,8 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.console import OK, Commands, console
-from risk_sac.cli.text import counted, printable
+from risk_sac.cli.console import OK, Commands, console, counted, printable
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, note
 from risk_sac.records import EpisodeRecord

@@ -1,4 +1,8 @@
-"""Two methods against each other, runs paired by seed. Pure."""
+"""Two methods against each other, runs paired by seed. Pure.
+
+Source: Arcuri & Briand 2014, A hitchhiker's guide to statistical tests for assessing randomized algorithms in
+software engineering: report an effect size beside every p-value.
+"""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""A finished run as the report reads it from its folder."""
+"""Finished runs as the report reads them, and what a search had found when a budget was spent."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -3,11 +3,8 @@
 import argparse
 
 from risk_sac.cli.campaigns.failures import add_bundle_failure, add_list_failures, add_show_failure
-from risk_sac.cli.campaigns.manage import add_cancel, add_delete, add_list
-from risk_sac.cli.campaigns.regress import add_regress_campaign
-from risk_sac.cli.campaigns.report import add_report_campaign
-from risk_sac.cli.campaigns.submit import add_submit
-from risk_sac.cli.campaigns.watch import add_results, add_watch
+from risk_sac.cli.campaigns.manage import add_cancel, add_delete, add_list, add_regress_campaign, add_report_campaign
+from risk_sac.cli.campaigns.watch import add_results, add_submit, add_watch
 from risk_sac.cli.console import COULD_NOT_RUN, Commands
 
 COMMANDS = (

@@ -11,8 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.campaigns.output import at_least_one, print_answer
-from risk_sac.cli.console import OK, Commands, notes, or_dash
-from risk_sac.cli.text import in_words, printable
+from risk_sac.cli.console import OK, Commands, in_words, notes, or_dash, printable
 from risk_sac.client import Client, Collision, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin

@@ -9,8 +9,7 @@ from typing import Literal, get_args
 
 from pydantic import ValidationError
 
-from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, OK
-from risk_sac.cli.text import counted
+from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, OK, counted
 from risk_sac.client import Results, Total
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval

@@ -1,12 +1,19 @@
-"""`risk-sac campaigns list`, `cancel` and `delete`."""
+"""`risk-sac campaigns` list, cancel, delete, report and regress."""
 
 import argparse
 import itertools
+import time
+from pathlib import Path
 
 from risk_sac.cli.campaigns.output import at_least_one, campaigns_table, line, print_answer
-from risk_sac.cli.campaigns.progress import shown
-from risk_sac.cli.console import OK, Commands
+from risk_sac.cli.campaigns.watch import shown
+from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, Commands, complain, notes
+from risk_sac.cli.regress import cases_table, junit
+from risk_sac.cli.report import format_of
 from risk_sac.client import Client
+from risk_sac.config.spec_file import read_ego
+from risk_sac.failures.cases import Regression
+from risk_sac.run_folder.durable import replace_file
 
 LISTED = 20
 FILTERS = ("state", "family", "method", "label")
@@ -59,3 +66,54 @@ def _delete(options: argparse.Namespace) -> int:
         client.delete(options.id)
     print_answer(options, {"id": options.id, "deleted": True}, f"{options.id} deleted")
     return OK
+
+
+def add_report_campaign(campaigns: Commands) -> None:
+    """Adds the command."""
+    parser = campaigns.add_parser("report", help="one file on what a campaign found, with bounds, coverage and limits")
+    parser.set_defaults(command=_report)
+    parser.add_argument("id", metavar="ID", help="of the campaign")
+    parser.add_argument("--regression", metavar="ID", help="of a regression of it, to be told of in the report")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="report.html, report.md, or its data as report.json"
+    )
+
+
+def _report(options: argparse.Namespace) -> int:
+    format_ = format_of(options.out)
+    with Client.from_environment(options.url) as client:
+        content = client.report(options.id, format_, options.regression)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(options.out, content.encode())
+    notes.print(f"Report: {options.out}", markup=False, soft_wrap=True)
+    return OK
+
+
+POLL_S = 0.5
+
+
+def add_regress_campaign(campaigns: Commands) -> None:
+    """Adds the command."""
+    parser = campaigns.add_parser("regress", help="play a campaign's distinct failures against another ego")
+    parser.set_defaults(command=_regress)
+    parser.add_argument("id", metavar="ID", help="of the campaign, which has ended")
+    parser.add_argument("--ego", required=True, metavar="EGO", help=EGO)
+    parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="report for CI: a case per failure, named")
+
+
+def _regress(options: argparse.Namespace) -> int:
+    ego = read_ego(options.ego)
+    with Client.from_environment(options.url) as client:
+        regression = client.regress(options.id, ego)
+        while regression.state in ("queued", "running"):
+            time.sleep(POLL_S)
+            regression = client.regression(regression.id)
+    if regression.state != "succeeded":
+        complain(f"{regression.id} {regression.state}: {regression.reason}")
+        return COULD_NOT_RUN
+    found = Regression(ego=regression.ego, cases=regression.cases)
+    if options.junit is not None:
+        options.junit.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(options.junit, junit(found))
+    print_answer(options, regression, cases_table(found))
+    return OK if found.passed else ABOVE

@@ -11,8 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons
-from risk_sac.cli.console import console, or_dash
-from risk_sac.cli.text import counted, on_one_line
+from risk_sac.cli.console import console, counted, on_one_line, or_dash
 from risk_sac.client import CampaignSummary, Results
 
 Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]

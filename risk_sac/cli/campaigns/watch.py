@@ -1,16 +1,23 @@
-"""`risk-sac campaigns watch` and `results`: what a campaign found, and whether that is more than it may."""
+"""`risk-sac campaigns` submit, watch and results: what a campaign found, and whether that is more than it may."""
 
 import argparse
 import itertools
 import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, campaign_flags, ego_flag
 from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, rate, verdict
 from risk_sac.cli.campaigns.junit import junit
-from risk_sac.cli.campaigns.output import print_answer, results_table
-from risk_sac.cli.campaigns.progress import shown
-from risk_sac.cli.console import OK, Commands, complain, notes
-from risk_sac.client import Client, Episode, Results
+from risk_sac.cli.campaigns.output import figures, line, print_answer, results_table
+from risk_sac.cli.console import OK, Board, Commands, complain, notes
+from risk_sac.client import Campaign, Client, Episode, Results
+from risk_sac.config.spec_file import read_campaign
+from risk_sac.errors import ConfigError
 from risk_sac.records import Grade
 
 NAMED_FAILURES = 5  # of a run, in a JUnit report
@@ -150,3 +157,75 @@ def _seconds(text: str) -> float:
     if not math.isfinite(seconds) or seconds <= 0:
         raise argparse.ArgumentTypeError(f"got {text}; wanted a time above 0")
     return seconds
+
+
+LINE_S = 10.0  # between two lines, unless the state changes
+AT_WORK = ("running", "cancelling")
+
+
+@contextmanager
+def shown() -> Iterator[Callable[[Campaign], None]]:
+    """What shows a campaign on standard error whenever it is called with it."""
+    if not notes.is_interactive:
+        yield _Lines()
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(15),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[found]}"),
+    )
+    with Progress(*columns, console=notes) as bar:
+        board = Board(bar)
+
+        def draw(campaign: Campaign) -> None:
+            progress = campaign.progress
+            runs = {run.id: (run.episodes_done, run.episodes_total) for run in campaign.runs if run.state in AT_WORK}
+            board.show(progress.episodes_done, progress.episodes_total, figures(campaign), runs)
+
+        yield draw
+
+
+class _Lines:
+    def __init__(self) -> None:
+        self._state = ""
+        self._said = 0.0
+
+    def __call__(self, campaign: Campaign) -> None:
+        now = time.monotonic()
+        if campaign.state != self._state or now - self._said >= LINE_S:
+            self._state, self._said = campaign.state, now
+            notes.print(line(campaign), markup=False, soft_wrap=True)
+
+
+SEEDS = 1  # where none are named
+
+
+def add_submit(campaigns: Commands) -> None:
+    """Adds the command."""
+    parser = campaigns.add_parser("submit", help="queue a campaign")
+    parser.set_defaults(command=_submit)
+    add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
+    add_ego_flag(parser)
+    parser.add_argument("--label", metavar="TEXT", help="to find it by")
+    parser.add_argument(
+        "--idempotency-key", metavar="KEY", help="the same key gives the same campaign, however often it is submitted"
+    )
+    parser.add_argument("--watch", action="store_true", help="go on as `watch` does, with its flags:")
+    add_watch_flags(parser)
+
+
+def _submit(options: argparse.Namespace) -> int:
+    for name in ("max_ecr", "max_pcr", "max_preventable", "no_new_failures", "junit", "timeout"):
+        if getattr(options, name) is not None and not options.watch:
+            raise ConfigError("got it without --watch; wanted both", field=f"--{name.replace('_', '-')}")
+    prepare(options)
+    flags = campaign_flags(options, SEEDS) | ego_flag(options) | {"label": options.label}
+    spec = read_campaign(options.spec, flags, {})
+    with Client.from_environment(options.url) as client:
+        campaign = client.submit(spec, options.idempotency_key)
+        if options.watch:
+            notes.print(client.url_of(campaign.id), markup=False, soft_wrap=True)
+            return watch(client, campaign.id, options)
+    print_answer(options, campaign, line(campaign))
+    return OK

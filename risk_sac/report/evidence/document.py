@@ -1,4 +1,4 @@
-"""What a report is made of, before it is HTML or Markdown. All text is plain: whoever renders it escapes it."""
+"""What a report is made of, and how it is written as HTML and Markdown. All text is plain until then."""
 
 import base64
 import re

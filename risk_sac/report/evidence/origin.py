@@ -1,4 +1,4 @@
-"""Where a report comes from: how its reader has each number again."""
+"""Where a report comes from: commands, folders, and the drawing of a failure."""
 
 import shlex
 import zipfile

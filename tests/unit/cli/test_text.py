@@ -3,7 +3,7 @@ import xml.etree.ElementTree as ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.cli.text import on_one_line, printable
+from risk_sac.cli.console import on_one_line, printable
 
 ANY = st.text(st.characters(exclude_categories=[]))
 

@@ -2,7 +2,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from risk_sac.cli.regress_junit import junit
+from risk_sac.cli.regress import junit
 from risk_sac.config import EgoConfig
 from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.records import Grade
