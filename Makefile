@@ -90,7 +90,7 @@ image: ## build the container image localhost/risk-sac with docker
 		$(if $(TORCH_INDEX_URL),--build-arg TORCH_INDEX_URL=$(TORCH_INDEX_URL)) .
 
 smoke: $(STAMP) ## build the image, run it, and say in one line whether it works
-	docker/smoke
+	$(PYTHON) docker/smoke
 
 screenshots: $(STAMP) ## draw every screen of the page, with a Chromium; the replay is the picture of README.md
 	$(PYTHON) -m tests.web.screenshots

@@ -7,8 +7,6 @@ from pathlib import Path
 import jsonschema_rs
 import pytest
 import yaml
-from smoke_test import chroot_engine
-from smoke_test.workflow import Workflow
 
 from risk_sac.config import CampaignSpec
 from service.host.settings_table import BEGIN, END, with_table
@@ -29,11 +27,6 @@ OTHERS = {
     "RISK_SAC_PUBLISHED_PORT",
     "RISK_SAC_WITHOUT_PAGE",  # of the installation: the page has been built before
 }
-
-
-@pytest.fixture
-def workflow():
-    return Workflow.load(ROOT / "docker" / "workflow.yaml")
 
 
 @pytest.fixture
@@ -96,22 +89,14 @@ def test_example_of_a_campaign_is_one():
     CampaignSpec.model_validate(yaml.safe_load((ROOT / "docker" / "campaign.yaml").read_text(encoding="utf-8")))
 
 
-def test_workflow_cleans_up_whatever_came_of_the_campaign(workflow):
-    assert [step.name for step in workflow.afterwards] == ["Keep what was found", "Stop the service"]
+def test_workflow_cleans_up_whatever_came_of_the_campaign():
+    steps = yaml.safe_load((ROOT / "docker" / "workflow.yaml").read_text())["jobs"]["falsification"]["steps"]
+    always = [step["name"] for step in steps if step.get("if") == "always()" and "run" in step]
+    assert always == ["Keep what was found", "Stop the service"]
 
 
-def test_engine_without_an_engine_understands_each_command_of_the_workflow(workflow):
-    steps = (*workflow.before, workflow.campaign, *workflow.afterwards)
-    lines = [line for step in steps for line in step.script.replace("\\\n", " ").splitlines() if '"$ENGINE"' in line]
-    assert len(lines) > len(steps)
-    for line in lines:
-        words = shlex.split(line.partition(" > ")[0])
-        chroot_engine.parser().parse_args(words[1:])
-
-
-@pytest.mark.parametrize("script", ["docker/smoke", ".ci/run"])
-def test_script_is_executable_bash(script):
-    assert (ROOT / script).stat().st_mode & 0o111 or script == ".ci/run"
+@pytest.mark.parametrize("script", ["tests/container/smoke", ".ci/run"])
+def test_script_is_bash(script):
     subprocess.run(["bash", "-n", ROOT / script], check=True)
 
 
@@ -125,26 +110,6 @@ def test_manifest_for_kuberay_is_what_its_operator_takes(manifest):
     spec = manifest["RayCluster"]["spec"]
     (extra,) = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["ray"]
     assert extra == f"ray=={spec['rayVersion'].rpartition('.')[0]}.*"
-
-
-@pytest.mark.parametrize(
-    ("place", "value"),
-    [
-        (("headGroupSpec", "rayStartParams", "num-cpus"), 0),
-        (("headGroupSpec", "template", "spec", "containers", 0, "env", 0, "value"), 1),
-        (("workerGroupSpecs", 0, "template", "spec", "containers", 0, "resources", "limits", "memory"), "8 GB"),
-        (("workerGroupSpecs", 0, "template", "spec", "container"), []),
-        (("workerGroupSpecs", 0, "maxReplica"), 3),
-    ],
-)
-def test_manifest_with_a_slip_is_not(manifest, place, value):
-    *path, last = place
-    inner = manifest["RayCluster"]["spec"]
-    for each in path:
-        inner = inner[each]
-    inner[last] = value
-    with pytest.raises(jsonschema_rs.ValidationError):
-        jsonschema_rs.validator_for(RAY_CLUSTER).validate(manifest["RayCluster"])
 
 
 def test_all_pods_of_the_manifest_want_a_token_and_are_of_one_image(manifest):

@@ -1,1 +1,0 @@
-"""What `docker/smoke` runs."""
