@@ -1,10 +1,11 @@
 # Everything runs in .venv, which the first target that needs it makes. Needs Python 3.11 or 3.12 and make.
 .DEFAULT_GOAL := help
-.PHONY: help install page demo test serve bench torture load lint openapi settings nets checkers examples image smoke screenshots clean
+.PHONY: help install page demo test serve bench torture load lint openapi settings protos nets checkers examples image smoke screenshots clean
 
 BIN := .venv/bin
 PYTHON := $(BIN)/python
 STAMP := .venv/.installed
+COMMONROAD := risk_sac/failures/export/commonroad.txt
 # One thread per process: runs are parallel, not the small matrices within one.
 export OMP_NUM_THREADS := 1
 # Tried by running it: a pyenv shim may exist without its version.
@@ -16,13 +17,14 @@ help: ## list the targets
 
 install: $(STAMP) ## make .venv with the pinned versions
 
-$(STAMP): pyproject.toml constraints.txt
+$(STAMP): pyproject.toml constraints.txt $(COMMONROAD)
 	@python=$$($(FIND_PYTHON)); \
 	if [ -z "$$python" ]; then echo "make: found neither python3.11 nor python3.12; install one of them" >&2; exit 1; fi; \
 	test -x $(PYTHON) || "$$python" -m venv .venv
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,export,s3]"
-	@# By itself: commonroad-io insists on protobuf 3.20.2, where Ray says that it wants 3.20.3; it works with either.
-	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt --no-deps "ray==2.60.*"
+	@# By itself: commonroad-io insists on protobuf 3.20.2.
+	$(PYTHON) -m venv .venv/commonroad
+	.venv/commonroad/bin/python -m pip install --quiet --disable-pip-version-check -r $(COMMONROAD)
 	@echo "compiling, once: else it would be a part of the first searches' processor time"; set -e; \
 	folder=$$(mktemp -d); trap 'rm -r "$$folder"' EXIT; \
 	for run in "low --method archive --episodes 60" "mixed --method risk-sac --episodes 15"; do \
@@ -45,8 +47,8 @@ $(CHECKERS): tests/exports/checkers.txt | $(STAMP)
 
 checkers: $(CHECKERS) ## make .venv/checkers: ASAM's checkers and CommonRoad's, which the tests put exports before
 
-examples: $(STAMP) ## write the examples of all export formats anew
-	$(PYTHON) -m risk_sac.failures.export.examples
+examples: $(STAMP) ## write tests/exports/examples: one example for each export format
+	$(PYTHON) -m tests.exports.make_examples
 
 # By file: two processes would each make what the tests of a file share. In order: the long ones come first. By three
 # processes, on two cores too: a fifth of the tests' time they wait for servers.
@@ -81,6 +83,9 @@ openapi: $(STAMP) ## write openapi.yaml
 
 settings: $(STAMP) ## write the table of settings into service/README.md
 	$(PYTHON) -m service.host.settings_table
+
+protos: $(STAMP) ## generate risk_sac/egos/remote/*_pb2.py
+	$(PYTHON) -m grpc_tools.protoc -I. --python_out=. risk_sac/egos/remote/*.proto
 
 nets: $(STAMP) ## rebuild sumo_nets/*/*.net.xml
 	PATH="$(CURDIR)/$(BIN):$$PATH" sumo_nets/build.sh

@@ -18,6 +18,7 @@ import numpy as np
 
 from risk_sac.egos.cards import EgoCard
 from risk_sac.egos.registry import make, make_unregistered
+from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.remote.messages import (
     METHODS,
     PROTOCOL,
@@ -27,7 +28,6 @@ from risk_sac.egos.remote.messages import (
     path_of,
     perceived_of,
 )
-from risk_sac.egos.remote.wire import Message, decode, encode
 from risk_sac.egos.seam import Ego, Episode, Vehicle
 from risk_sac.errors import ConfigError
 from risk_sac.types import STEP_S, Floats, Kind, Signal
@@ -60,41 +60,41 @@ class Sessions:
         self._sessions: dict[str, Session] = {}
         self._lock = threading.Lock()
 
-    def start(self, request: Message, context: Any) -> Message:
+    def start(self, request: Any, context: Any) -> Any:
         """Begins an episode."""
-        if request["protocol"] != PROTOCOL:
-            context.abort(grpc.StatusCode.FAILED_PRECONDITION, f"protocol {request['protocol']}; wanted {PROTOCOL}")
+        if request.protocol != PROTOCOL:
+            context.abort(grpc.StatusCode.FAILED_PRECONDITION, f"protocol {request.protocol}; wanted {PROTOCOL}")
         session = Session(self._make())
         session.ego.reset(episode_of(request))
         with self._lock:
             while len(self._sessions) >= MOST_SESSIONS:
                 self._sessions.pop(next(iter(self._sessions))).ego.close()
-            self._sessions[request["session"]] = session
-        return {"version": self._version}
+            self._sessions[request.session] = session
+        return ego_pb2.StartReply(version=self._version)
 
-    def act(self, requests: Iterator[Message], context: Any) -> Iterator[Message]:
+    def act(self, requests: Iterator[Any], context: Any) -> Iterator[Any]:
         """An episode's steps; the session is over with them, also if the client is gone."""
         name = ""
         try:
             for request in requests:
-                name = request["session"]
+                name = request.session
                 yield self._step(request, context)
         finally:
             self._end(name)
 
-    def close(self, request: Message, context: Any) -> Message:
-        """An episode is over."""
-        self._end(request["session"])
-        return {}
+    def close(self, request: Any, context: Any) -> Any:
+        """Ends an episode."""
+        self._end(request.session)
+        return ego_pb2.CloseReply()
 
-    def _step(self, request: Message, context: Any) -> Message:
-        session = self._sessions.get(request["session"])
+    def _step(self, request: Any, context: Any) -> Any:
+        session = self._sessions.get(request.session)
         if session is None:
-            context.abort(grpc.StatusCode.NOT_FOUND, f"there is no session {request['session']!r}")
+            context.abort(grpc.StatusCode.NOT_FOUND, f"there is no session {request.session!r}")
         assert session is not None
-        if "path" in request:
-            session.path = path_of(request["path"])
-        return command_message(session.ego.act(perceived_of(request, session.path)), request["time_s"])
+        if request.HasField("path"):
+            session.path = path_of(request.path)
+        return command_message(session.ego.act(perceived_of(request, session.path)), request.time_s)
 
     def _end(self, name: str) -> None:
         with self._lock:
@@ -108,11 +108,18 @@ def warm_up(ego: Ego) -> None:
     ego.reset(Episode(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=STEP_S))
     along, still = np.array([0.0, 50.0, 100.0]), np.zeros(3)
     path = np.array([along, still, along, still, np.full(3, 13.9), np.cos(still), np.sin(still)])
-    actors = {"id": ["ego", "lead", "walker"], "kind": [Kind.VEHICLE, Kind.VEHICLE, Kind.PEDESTRIAN]}
-    states = {"x_m": [0.0, 30.0, 60.0], "y_m": [0.0, 0.0, 5.0], "heading_rad": still, "vx_mps": [10.0, 10.0, 0.0]}
-    sizes = {"vy_mps": still, "length_m": [4.6, 4.6, 0.5], "width_m": [1.85, 1.85, 0.5]}
-    own = {"time_s": 0.0, "speed_mps": 10.0, "accel_mps2": 0.0, "station_m": 2.3, "offset_m": 0.0}
-    seen = {"actors": actors | states | sizes, "signal": Signal.RED, "stop_line_m": 50.0, **own}
+    actors = ego_pb2.Actors(
+        id=["ego", "lead", "walker"],
+        kind=[Kind.VEHICLE, Kind.VEHICLE, Kind.PEDESTRIAN],
+        x_m=[0.0, 30.0, 60.0],
+        y_m=[0.0, 0.0, 5.0],
+        heading_rad=still,
+        vx_mps=[10.0, 10.0, 0.0],
+        vy_mps=still,
+        length_m=[4.6, 4.6, 0.5],
+        width_m=[1.85, 1.85, 0.5],
+    )
+    seen = ego_pb2.Observation(actors=actors, speed_mps=10.0, station_m=2.3, signal=Signal.RED, stop_line_m=50.0)
     ego.act(perceived_of(seen, path))
     ego.close()
 
@@ -129,7 +136,7 @@ def serve(sessions: Sessions, address: str) -> tuple[grpc.Server, int]:
         "Close": partial(grpc.unary_unary_rpc_method_handler, sessions.close),
     }
     handlers = {
-        name: answers[name](request_deserializer=partial(decode, request), response_serializer=partial(encode, reply))
+        name: answers[name](request_deserializer=request.FromString, response_serializer=reply.SerializeToString)
         for name, (request, reply) in METHODS.items()
     }
     # Without the option a second server would share the port, and every other session.

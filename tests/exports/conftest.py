@@ -2,20 +2,18 @@
 
 import os
 import subprocess
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from risk_sac.failures.bundle import read_bundle
-from risk_sac.failures.export.examples import FOLDER, played_here
 from risk_sac.failures.export.formats import FORMATS, FormatName, of_failure
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.export.written import write
+from tests.exports.make_examples import FOLDER, played_here
 from tests.server import ROOT
 
-FAMILIES = ("low", "mixed", "dense")
 CM = 0.01  # that a round trip may move anything, m
 # The checkers pin versions that are none of ours, so that they have an environment of their own: `make checkers`.
 CHECKERS = Path(os.environ.get("RISK_SAC_CHECKERS", ROOT / ".venv" / "checkers")) / "bin"
@@ -49,16 +47,14 @@ def exported(failure: Callable[[str], Recorded], tmp_path_factory: pytest.TempPa
     return of
 
 
-def example(family: str, name: FormatName, folder: Path) -> Path:
-    """A folder with what the repository has as an example."""
-    with zipfile.ZipFile(FOLDER / f"{family}-{name}.zip") as archive:
-        archive.extractall(folder)
-    return folder
-
-
 def ask_checkers(program: str, *arguments: str | Path) -> str:
     """What a program of this folder prints in the checkers' environment."""
-    command = [CHECKERS / "python", Path(__file__).with_name(program), *arguments]
+    return ask(CHECKERS / "python", program, *arguments)
+
+
+def ask(python: Path, program: str, *arguments: str | Path) -> str:
+    """What a program of this folder prints in another environment."""
+    command = [python, Path(__file__).with_name(program), *arguments]
     clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     done = subprocess.run(command, capture_output=True, text=True, env=clean)
     assert done.returncode == 0, done.stderr[-3000:]

@@ -10,7 +10,7 @@ from PIL import Image, ImageColor
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.export.gif import EGO, HOLD_MS, LAST_S, STRIKER
 from risk_sac.failures.export.recorded import Recorded
-from tests.exports.conftest import FAMILIES
+from tests.exports.make_examples import FAMILIES
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -13,7 +13,8 @@ from mcap.reader import make_reader
 
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.export.recorded import Recorded
-from tests.exports.conftest import CM, FAMILIES
+from tests.exports.conftest import CM
+from tests.exports.make_examples import FAMILIES
 
 
 def read(file: Path) -> tuple[dict[str, list[tuple[int, Any]]], dict[str, bytes]]:
@@ -37,7 +38,7 @@ def decoder(schema: Any) -> Callable[[bytes], Any]:
     pool = descriptor_pool.DescriptorPool()
     for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
         pool.Add(file)
-    kind = message_factory.MessageFactory(pool).GetPrototype(pool.FindMessageTypeByName(schema.name))
+    kind = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
     return cast("Callable[[bytes], Any]", kind.FromString)
 
 

@@ -12,7 +12,8 @@ from lxml import etree
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.export.recorded import Actor, Recorded
 from risk_sac.failures.export.signals import colour
-from tests.exports.conftest import CM, FAMILIES, ask_checkers, checked
+from tests.exports.conftest import CM, ask_checkers, checked
+from tests.exports.make_examples import FAMILIES
 
 FILES = ("failure.xosc", "failure-as-recorded.xosc", "roads.xodr")
 LEFT_OUT = {"check_asam_xodr_junctions_connection_one_link_to_incoming"}  # of OpenDRIVE up to 1.3

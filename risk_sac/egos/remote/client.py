@@ -5,11 +5,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import grpc
+from google.protobuf.message import DecodeError
 
 from risk_sac.egos.guard import CRASH, DEADLINE, MALFORMED
+from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.remote.messages import METHODS, PROTOCOL, SERVICE, command_of, observation, start_request
 from risk_sac.egos.remote.turns import Late, Turns
-from risk_sac.egos.remote.wire import Message, decode, encode
 from risk_sac.egos.seam import Command, Episode, Perceived
 from risk_sac.errors import EgoFailed
 from risk_sac.types import Floats
@@ -51,9 +52,9 @@ class RemoteEgo:
         self._session, self._path = str(uuid.uuid4()), None
         start = start_request(episode, self._session)
         reply = self._asked("Start", start, lambda request: self._call["Start"](request, timeout=self._deadline_s))
-        if reply["version"] != self._version:
+        if reply.version != self._version:
             raise EgoFailed(
-                f"the ego {self._name!r} is of version {reply['version']!r}; registered is {self._version!r}",
+                f"the ego {self._name!r} is of version {reply.version!r}; registered is {self._version!r}",
                 reason=VERSION,
             )
         self._turns = Turns(self._channel.stream_stream(f"/{SERVICE}/Act"), self._deadline_s)
@@ -71,8 +72,8 @@ class RemoteEgo:
         command = command_of(reply)
         if command is None:
             raise EgoFailed("the ego answered neither a control nor a trajectory", reason=MALFORMED)
-        if reply["time_s"] != message["time_s"]:
-            said = f"an observation of {reply['time_s']!r} s; wanted that of {message['time_s']!r} s"
+        if reply.time_s != message.time_s:
+            said = f"an observation of {reply.time_s!r} s; wanted that of {message.time_s!r} s"
             raise EgoFailed(f"the ego {self._name!r} answered {said}", reason=MALFORMED)
         return command
 
@@ -89,14 +90,14 @@ class RemoteEgo:
             self._turns = None
         if self._session:
             session, self._session = self._session, ""
-            request = encode("CloseRequest", {"session": session})
+            request = ego_pb2.CloseRequest(session=session).SerializeToString()
             self._call["Close"].future(request, timeout=self._deadline_s)  # nobody waits
 
-    def _asked(self, name: str, message: Message, ask: Callable[[bytes], bytes]) -> Message:
-        request, reply = METHODS[name]
+    def _asked(self, name: str, message: Any, ask: Callable[[bytes], bytes]) -> Any:
+        _, reply = METHODS[name]
         try:
-            return decode(reply, ask(encode(request, message)))
-        except ValueError as error:
+            return reply.FromString(ask(message.SerializeToString()))
+        except DecodeError as error:
             raise EgoFailed(f"the ego {self._name!r} answered {error}", reason=MALFORMED) from error
         except StopIteration as error:
             raise EgoFailed(f"the ego {self._name!r} ended the session unasked", reason=CRASH) from error

@@ -1,95 +1,97 @@
-"""Between the seam's records and the protocol's messages, in both directions.
-
-The same for both ends, so that an ego that is served (`risk_sac.egos.serve`) drives as it does in our process.
-"""
+"""Converts the seam's records to the protocol's messages and back, for both ends of a connection."""
 
 from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 
-from risk_sac.egos.remote.wire import SCHEMA, Message
+from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.seam import Command, Control, Episode, Perceived, Trajectory, Vehicle
 from risk_sac.types import ACCEL, HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Floats, Signal, X, Y
 
 PROTOCOL = 2
 SERVICE = "risk_sac.egos.v2.Ego"
 METHODS = {  # request and reply
-    "Start": ("StartRequest", "StartReply"),
-    "Act": ("Observation", "Command"),  # a stream of each
-    "Close": ("CloseRequest", "CloseReply"),
+    "Start": (ego_pb2.StartRequest, ego_pb2.StartReply),
+    "Act": (ego_pb2.Observation, ego_pb2.Command),  # a stream of each
+    "Close": (ego_pb2.CloseRequest, ego_pb2.CloseReply),
 }
 ROWS = {"x_m": X, "y_m": Y, "heading_rad": HEADING, "vx_mps": VX, "vy_mps": VY, "length_m": LENGTH, "width_m": WIDTH}
-PATH = tuple(field.name for field in SCHEMA["Path"])  # in the order of the rows
+PATH = tuple(field.name for field in ego_pb2.Path.DESCRIPTOR.fields)  # in the order of the rows
+VEHICLE = tuple(field.name for field in ego_pb2.Vehicle.DESCRIPTOR.fields)
 
 
-def start_request(episode: Episode, session: str) -> Message:
-    """The beginning of an episode."""
-    return {"protocol": PROTOCOL, "session": session, **asdict(episode)}
+def start_request(episode: Episode, session: str) -> Any:
+    """Returns the StartRequest of an episode."""
+    return ego_pb2.StartRequest(protocol=PROTOCOL, session=session, **asdict(episode))
 
 
-def episode_of(request: Message) -> Episode:
-    """What the ego is told."""
+def episode_of(request: Any) -> Episode:
+    """Returns the episode of a StartRequest."""
     return Episode(
-        seed=request["seed"],
-        net=request["net"],
-        route=tuple(request["route"]),
-        vehicle=Vehicle(**request["vehicle"]),
-        step_s=request["step_s"],
+        seed=request.seed,
+        net=request.net,
+        route=tuple(request.route),
+        vehicle=Vehicle(**{name: getattr(request.vehicle, name) for name in VEHICLE}),
+        step_s=request.step_s,
     )
 
 
-def observation(perceived: Perceived, session: str, new_path: bool) -> Message:
-    """What the ego perceives."""
+def observation(perceived: Perceived, session: str, new_path: bool) -> Any:
+    """Returns the Observation of what the ego perceives."""
     p = perceived
-    return {
-        "session": session,
-        "time_s": p.time_s,
-        "actors": {"id": p.ids, "kind": p.kind.tolist()} | {name: p.state[row] for name, row in ROWS.items()},
-        "path": dict(zip(PATH, p.path, strict=False)) if new_path else None,
-        "station_m": p.station_m,
-        "offset_m": p.offset_m,
-        "signal": int(p.signal),
-        "stop_line_m": p.stop_line_m,
-        "speed_mps": p.state[SPEED, 0],
-        "accel_mps2": p.state[ACCEL, 0],
-    }
+    rows = {name: p.state[row].tolist() for name, row in ROWS.items()}
+    return ego_pb2.Observation(
+        session=session,
+        time_s=p.time_s,
+        actors=ego_pb2.Actors(id=p.ids, kind=p.kind.tolist(), **rows),
+        path=ego_pb2.Path(**dict(zip(PATH, p.path.tolist(), strict=False))) if new_path else None,
+        station_m=p.station_m,
+        offset_m=p.offset_m,
+        signal=int(p.signal),
+        stop_line_m=p.stop_line_m,
+        speed_mps=p.state[SPEED, 0],
+        accel_mps2=p.state[ACCEL, 0],
+    )
 
 
-def perceived_of(message: Message, path: Floats) -> Perceived:
-    """What the ego perceives; `path` is the latest that was told."""
-    actors = message["actors"]
-    state = np.full((WIDTH + 1, len(actors["id"])), np.nan)
-    state[[*ROWS.values()], :] = [actors[name] for name in ROWS]
+def perceived_of(message: Any, path: Floats) -> Perceived:
+    """Returns what the ego perceives; `path` is the latest one that was sent."""
+    actors = message.actors
+    state = np.full((WIDTH + 1, len(actors.id)), np.nan)
+    state[[*ROWS.values()], :] = [getattr(actors, name) for name in ROWS]
     state[SPEED] = np.hypot(state[VX], state[VY])
-    state[[SPEED, ACCEL, OFFSET], 0] = message["speed_mps"], message["accel_mps2"], message["offset_m"]
+    state[[SPEED, ACCEL, OFFSET], 0] = message.speed_mps, message.accel_mps2, message.offset_m
     return Perceived(
-        time_s=message["time_s"],
-        ids=tuple(actors["id"]),
-        kind=np.array(actors["kind"], dtype=np.int8),
+        time_s=message.time_s,
+        ids=tuple(actors.id),
+        kind=np.array(actors.kind, dtype=np.int8),
         state=state,
         path=path,
-        station_m=message["station_m"],
-        offset_m=message["offset_m"],
-        signal=Signal(message["signal"]),
-        stop_line_m=message["stop_line_m"],
+        station_m=message.station_m,
+        offset_m=message.offset_m,
+        signal=Signal(message.signal),
+        stop_line_m=message.stop_line_m,
     )
 
 
-def path_of(message: Message) -> Floats:
-    """The rows of `risk_sac.egos.road`, and cosine and sine of the heading below them."""
-    heading = np.array(message["heading_rad"])
-    return np.array([*(message[name] for name in PATH), np.cos(heading), np.sin(heading)])
+def path_of(message: Any) -> Floats:
+    """Returns the rows of `risk_sac.egos.road`, and below them cosine and sine of the heading."""
+    heading = np.array(message.heading_rad)
+    return np.array([*(getattr(message, name) for name in PATH), np.cos(heading), np.sin(heading)])
 
 
-def command_message(command: Command, time_s: float) -> Message:
-    """What the ego answers to the observation of a time."""
-    return {"control" if isinstance(command, Control) else "trajectory": command._asdict(), "time_s": time_s}
+def command_message(command: Command, time_s: float) -> Any:
+    """Returns the Command that answers the observation of a time."""
+    if isinstance(command, Control):
+        return ego_pb2.Command(control=command._asdict(), time_s=time_s)
+    return ego_pb2.Command(trajectory=command._asdict(), time_s=time_s)
 
 
-def command_of(message: Message) -> Command | None:
-    """What the ego answered; None if it is neither control nor trajectory."""
-    if "control" in message:
-        return Control(**message["control"])
-    if "trajectory" in message:
-        return Trajectory(**{name: np.array(row) for name, row in message["trajectory"].items()})
+def command_of(message: Any) -> Command | None:
+    """Returns what the ego commands; None if it is neither control nor trajectory."""
+    if message.HasField("control"):
+        return Control(message.control.accel_mps2, message.control.steering_rad)
+    if message.HasField("trajectory"):
+        return Trajectory(*(np.array(getattr(message.trajectory, name)) for name in Trajectory._fields))
     return None

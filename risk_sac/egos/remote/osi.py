@@ -1,8 +1,7 @@
 """Egos that speak ASAM OSI 3: they are told an `osi3.GroundTruth` and answer an `osi3.MotionRequest`, both as bytes.
 
-Our side needs no OSI package and no protocol buffers, so that the ego can read and write the bytes with whichever
-version its stack has: `osi3.GroundTruth.FromString(told)`, `request.SerializeToString()`. The truth is the ego's: it
-holds whom the ego perceives, and nobody else.
+Our side needs no OSI package: the ego reads and writes the bytes with its own, as `osi3.GroundTruth.FromString(told)`
+and `request.SerializeToString()`. The truth is the ego's: it holds the actors that the ego perceives, and no other.
 
 Source: ASAM OSI 3.8, osi_groundtruth.proto and osi_motionrequest.proto.
 """
@@ -13,13 +12,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from google.protobuf.message import DecodeError
 
-from risk_sac.egos.remote.wire import Message, decode, encode, read_schema
+from risk_sac.egos.remote import osi_pb2
 from risk_sac.egos.road import PATH_X, PATH_Y, STATION, point_at
 from risk_sac.egos.seam import Episode, Perceived, Trajectory
 from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Signal, X, Y
 
-SCHEMA = read_schema("osi.proto")
 VERSION = {"version_major": 3, "version_minor": 8, "version_patch": 0}
 # OSI's numbers.
 TYPE_VEHICLE, TYPE_PEDESTRIAN, TYPE_CAR, TYPE_HEAVY_TRUCK = 2, 3, 4, 7
@@ -85,7 +84,8 @@ def ground_truth(perceived: Perceived, numbers: dict[str, int]) -> bytes:
         "traffic_light": [_light(p)] if p.signal in COLOURS and math.isfinite(p.stop_line_m) else [],
         "reference_line": [{"id": {"value": SIGNAL_ID + 1}, "poly_line": line, "type": 0}],
     }
-    return encode("GroundTruth", truth, SCHEMA)
+    encoded: bytes = osi_pb2.GroundTruth(**truth).SerializeToString()
+    return encoded
 
 
 def trajectory_of(request: bytes, perceived: Perceived, rear_axle_m: float) -> Trajectory:
@@ -99,25 +99,30 @@ def trajectory_of(request: bytes, perceived: Perceived, rear_axle_m: float) -> T
     Raises:
       ValueError: these bytes are no motion request, or it lacks what it has to say.
     """
-    asked = decode("MotionRequest", request, SCHEMA)
-    now = perceived.state[:, 0]
     try:
-        if asked["motion_request_type"] == TRAJECTORY:
-            points = [_point(each, rear_axle_m) for each in asked["desired_trajectory"]["trajectory_point"]]
-            time_s, x_m, y_m = np.array(points).T
-            speed_mps = np.hypot(np.gradient(x_m, time_s), np.gradient(y_m, time_s))
-        else:
-            wanted = asked["desired_state"]
-            then_s, x, y = _point(wanted, rear_axle_m)
-            velocity = wanted["velocity"]
-            time_s, x_m, y_m = np.array(((perceived.time_s, then_s), (now[X], x), (now[Y], y)))
-            speed_mps = np.array((now[SPEED], math.hypot(velocity["x"], velocity["y"])))
-    except (IndexError, KeyError, ValueError) as error:
-        raise ValueError(f"a motion request that lacks {error}") from error
+        asked = osi_pb2.MotionRequest.FromString(request)
+    except DecodeError as error:
+        raise ValueError(f"{len(request)} bytes that are no motion request") from error
+    if missing := asked.FindInitializationErrors():
+        raise ValueError(f"a motion request that lacks {', '.join(missing)}")
+    now = perceived.state[:, 0]
+    if asked.motion_request_type == TRAJECTORY:
+        points = [_point(each, rear_axle_m) for each in asked.desired_trajectory.trajectory_point]
+        if len(points) < 2:
+            raise ValueError(f"a motion request with {len(points)} trajectory points; expected 2 or more")
+        time_s, x_m, y_m = np.array(points).T
+        speed_mps = np.hypot(np.gradient(x_m, time_s), np.gradient(y_m, time_s))
+    elif asked.HasField("desired_state"):
+        then_s, x, y = _point(asked.desired_state, rear_axle_m)
+        velocity = asked.desired_state.velocity
+        time_s, x_m, y_m = np.array(((perceived.time_s, then_s), (now[X], x), (now[Y], y)))
+        speed_mps = np.array((now[SPEED], math.hypot(velocity.x, velocity.y)))
+    else:
+        raise ValueError("a motion request that lacks desired_state")
     return Trajectory(np.maximum(time_s - perceived.time_s, 0.0), x_m, y_m, speed_mps)
 
 
-def _moving(perceived: Perceived, column: int, number: int) -> Message:
+def _moving(perceived: Perceived, column: int, number: int) -> Mapping[str, Any]:
     state = perceived.state[:, column]
     walks, truck = perceived.kind[column] == Kind.PEDESTRIAN, state[LENGTH] > TRUCK_FROM_M
     height_m = WALKER_HEIGHT_M if walks else TRUCK_HEIGHT_M if truck else CAR_HEIGHT_M
@@ -133,7 +138,7 @@ def _moving(perceived: Perceived, column: int, number: int) -> Message:
     return told
 
 
-def _light(perceived: Perceived) -> Message:
+def _light(perceived: Perceived) -> Mapping[str, Any]:
     """The signal ahead, at its stop line."""
     x, y = point_at(perceived.path, perceived.station_m + perceived.stop_line_m)
     return {
@@ -152,8 +157,8 @@ def _timestamp(time_s: float) -> Mapping[str, int]:
     return {"seconds": seconds, "nanos": nanos}
 
 
-def _point(told: Message, rear_axle_m: float) -> tuple[float, float, float]:
-    """Time, and where the middle of the body is to be then."""
-    at, place, yaw = told["timestamp"], told["position"], told["orientation"]["yaw"]
-    time_s = at["seconds"] + at["nanos"] / 1e9
-    return time_s, place["x"] + rear_axle_m * math.cos(yaw), place["y"] + rear_axle_m * math.sin(yaw)
+def _point(told: Any, rear_axle_m: float) -> tuple[float, float, float]:
+    """Returns the time, and where the middle of the body is to be then."""
+    time_s = told.timestamp.seconds + told.timestamp.nanos / 1e9
+    place, yaw = told.position, told.orientation.yaw
+    return time_s, place.x + rear_axle_m * math.cos(yaw), place.y + rear_axle_m * math.sin(yaw)

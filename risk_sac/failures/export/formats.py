@@ -1,5 +1,7 @@
 """The table of formats. Cheap to import: a format's module, and the packages that it needs, load when it is made."""
 
+import os
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from risk_sac.failures.export.recorded import Recorded
 
 EXTRA = "export"  # of pyproject.toml: what has the packages
+COMMONROAD_PYTHON = "RISK_SAC_COMMONROAD_PYTHON"  # environment variable
 ZIP = "application/zip"
 Files = Mapping[str, bytes]
 """What an export is made of: name → content."""
@@ -39,13 +42,28 @@ class Format:
     of: Literal["failure", "episodes"]  # one failure, or all episodes of runs
     module: str  # in this room; has `files`
     packages: tuple[str, ...] = ()  # that it imports, beyond those that are always there
+    python: Callable[[], Path] | None = None  # that has the packages, where it is not ours
     suffix: str = ".zip"  # of what is downloaded: several files, or the one that it is
     media_type: str = ZIP
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Its packages that are not installed."""
+        if self.python is not None:
+            return () if self.python().exists() else self.packages
         return tuple(name for name in self.packages if find_spec(name) is None)
+
+    @property
+    def remedy(self) -> str:
+        """What brings its missing packages, as the end of a sentence."""
+        if self.python is None:
+            return f"pip install 'risk-sac[{EXTRA}]' brings it"
+        return f"{COMMONROAD_PYTHON} has to name a Python that has commonroad-io"
+
+
+def commonroad_python() -> Path:
+    """Returns the Python that has commonroad-io, whose pins suit no other package."""
+    return Path(os.environ.get(COMMONROAD_PYTHON) or Path(sys.prefix) / "commonroad" / "bin" / "python")
 
 
 FORMATS: Mapping[FormatName, Format] = {
@@ -68,6 +86,7 @@ FORMATS: Mapping[FormatName, Format] = {
         of="failure",
         module="commonroad",
         packages=("commonroad",),
+        python=commonroad_python,
     ),
     FormatName.MCAP: Format(
         title="MCAP",
@@ -139,8 +158,7 @@ def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
         raise ConfigError(f"got {name.value!r}, which holds {lacks}; wanted one of: {wanted}", field="format")
     if format_.missing:
         told = ", ".join(format_.missing)
-        message = f"{name} needs {told}, which is not installed: pip install 'risk-sac[{EXTRA}]' brings it"
-        raise ConfigError(message, field="format")
+        raise ConfigError(f"{name} needs {told}, which is not installed: {format_.remedy}", field="format")
 
 
 def _maker(name: FormatName, of: Literal["failure", "episodes"]) -> object:

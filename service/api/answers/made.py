@@ -3,7 +3,7 @@
 from http import HTTPStatus
 from typing import Literal
 
-from risk_sac.failures.export.formats import EXTRA, FORMATS, FormatName
+from risk_sac.failures.export.formats import FORMATS, FormatName
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import STORAGE, Responses, header, problem
 from service.schemas.problems import Reason
@@ -24,11 +24,11 @@ def check_installed(format: FormatName, of: Literal["failure", "episodes"]) -> N
     """Refuses a format whose packages the service lacks: that is no mistake of who asks.
 
     Raises:
-      ProblemError: naming them, and the extra that has them.
+      ProblemError: naming them, and what brings them.
     """
     row = FORMATS[format]
     if row.of == of and row.missing:
-        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: the extra {EXTRA!r} has it"
+        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: {row.remedy}"
         raise ProblemError(HTTPStatus.NOT_IMPLEMENTED, Reason.NOT_INSTALLED, lacks)
 
 

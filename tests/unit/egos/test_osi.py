@@ -8,8 +8,8 @@ import pytest
 
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.egos.registry import SHIPPED
-from risk_sac.egos.remote.osi import SCHEMA, OsiEgo, ground_truth, trajectory_of
-from risk_sac.egos.remote.wire import decode, encode
+from risk_sac.egos.remote.osi import OsiEgo, ground_truth, trajectory_of
+from risk_sac.egos.remote.osi_pb2 import GroundTruth, MotionRequest
 from risk_sac.egos.seam import Perceived
 from risk_sac.env import RiskSacEnv
 from risk_sac.types import HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Kind, Signal, X, Y
@@ -78,9 +78,9 @@ def test_actors_keep_their_numbers() -> None:
     numbers: dict[str, int] = {}
     ground_truth(perceived(), numbers)
     later = perceived()._replace(ids=("ego", "walker", "new"))
-    told = decode("GroundTruth", ground_truth(later, numbers), SCHEMA)
-    assert [each["id"]["value"] for each in told["moving_object"]] == [1, 3, 4]
-    assert told["host_vehicle_id"]["value"] == 1
+    told = GroundTruth.FromString(ground_truth(later, numbers))
+    assert [each.id.value for each in told.moving_object] == [1, 3, 4]
+    assert told.host_vehicle_id.value == 1
 
 
 def test_an_osi_motion_request_is_a_trajectory_of_the_middle_of_the_body() -> None:
@@ -99,10 +99,10 @@ def test_a_desired_state_is_where_to_be_then() -> None:
     np.testing.assert_allclose(found.speed_mps, [8.25, 5.0])
 
 
-@pytest.mark.parametrize("nothing", [b"", bytes.fromhex("0a00"), bytes.fromhex("1801")])
-def test_what_is_no_motion_request_is_refused(nothing: bytes) -> None:
+@pytest.mark.parametrize("nothing", ["", "0a00", "1801", "2200", "18012a020a00", "ff", "22"])
+def test_what_is_no_motion_request_is_refused(nothing: str) -> None:
     with pytest.raises(ValueError, match="motion request"):
-        trajectory_of(nothing, perceived(), 1.5)
+        trajectory_of(bytes.fromhex(nothing), perceived(), 1.5)
 
 
 class ByOsi(OsiEgo):
@@ -112,18 +112,15 @@ class ByOsi(OsiEgo):
     response_time_s = 1.0
 
     def drive(self, told: bytes) -> bytes:
-        truth = decode("GroundTruth", told, SCHEMA)
-        now_s = truth["timestamp"]["seconds"] + truth["timestamp"]["nanos"] / 1e9
-        (own,) = (each for each in truth["moving_object"] if each["id"] == truth["host_vehicle_id"])
-        position = own["base"]["position"]
-        line = [
-            (at["world_position"]["x"], at["world_position"]["y"]) for at in truth["reference_line"][0]["poly_line"]
-        ]
-        x, y = np.array(line).T
+        truth = GroundTruth.FromString(told)
+        now_s = truth.timestamp.seconds + truth.timestamp.nanos / 1e9
+        (own,) = (each for each in truth.moving_object if each.id == truth.host_vehicle_id)
+        position = own.base.position
+        x, y = np.array([(at.world_position.x, at.world_position.y) for at in truth.reference_line[0].poly_line]).T
         along = np.insert(np.cumsum(np.hypot(np.diff(x), np.diff(y))), 0, 0.0)
         stations = np.arange(0.0, along[-1], 0.1)
         xs, ys = np.interp(stations, along, x), np.interp(stations, along, y)
-        here = stations[np.argmin(np.hypot(xs - position["x"], ys - position["y"]))]
+        here = stations[np.argmin(np.hypot(xs - position.x, ys - position.y))]
         points = []
         for k in range(1, round(AHEAD_S / STEP_S) + 1):
             at = here + 8.0 * STEP_S * k - 1.35 + np.array((0.0, 0.1))  # of the rear axle
@@ -131,8 +128,8 @@ class ByOsi(OsiEgo):
             seconds, nanos = divmod(round((now_s + k * STEP_S) * 1e9), 10**9)
             pose = {"position": {"x": x0, "y": y0}, "orientation": {"yaw": math.atan2(y1 - y0, x1 - x0)}}
             points.append(pose | {"timestamp": {"seconds": seconds, "nanos": nanos}})
-        request = {"motion_request_type": 1, "desired_trajectory": {"trajectory_point": points}}
-        return encode("MotionRequest", request, SCHEMA)
+        request = MotionRequest(motion_request_type=1, desired_trajectory={"trajectory_point": points})
+        return request.SerializeToString()
 
 
 def test_it_drives_an_episode(monkeypatch: pytest.MonkeyPatch) -> None:

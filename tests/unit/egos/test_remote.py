@@ -5,26 +5,23 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
-from functools import partial
 
+import grpc
 import numpy as np
 import pytest
 
 from risk_sac.egos import Control, Episode, Perceived
+from risk_sac.egos.remote.client import RemoteEgo
+from risk_sac.egos.remote.ego_pb2 import CloseReply, Command, Observation, StartReply
 from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message
-from risk_sac.egos.remote.wire import Message, decode, encode
 from risk_sac.egos.seam import Vehicle
+from risk_sac.egos.serve import Sessions, serve
 from risk_sac.errors import EgoFailed
 from risk_sac.types import WIDTH, Signal
 
-grpc = pytest.importorskip("grpc")
-
-from risk_sac.egos.remote.client import RemoteEgo  # noqa: E402 - they need gRPC
-from risk_sac.egos.serve import Sessions, serve  # noqa: E402
-
 EPISODE = Episode(seed=0, net="", route=("a",), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1)
 PATIENT_S = 60.0
-Acts = Callable[[Iterator[Message]], Iterator[Message]]
+Acts = Callable[[Iterator[Observation]], Iterator[Command]]
 
 
 def perceived(time_s: float) -> Perceived:
@@ -37,10 +34,14 @@ def talking(acts: Acts, deadline_s: float = PATIENT_S, service: str = SERVICE) -
     """A session with a server that answers observations so."""
     kinds = {"Start": grpc.unary_unary_rpc_method_handler, "Close": grpc.unary_unary_rpc_method_handler}
     kinds["Act"] = grpc.stream_stream_rpc_method_handler
-    answers = {"Start": lambda *_: {"version": "1"}, "Act": lambda requests, _: acts(requests), "Close": lambda *_: {}}
+    answers = {
+        "Start": lambda *_: StartReply(version="1"),
+        "Act": lambda requests, _: acts(requests),
+        "Close": lambda *_: CloseReply(),
+    }
     handlers = {
-        name: kinds[name](answers[name], partial(decode, request), partial(encode, reply))
-        for name, (request, reply) in METHODS.items()
+        name: kinds[name](answers[name], request.FromString, lambda reply: reply.SerializeToString())
+        for name, (request, _) in METHODS.items()
     }
     server = grpc.server(ThreadPoolExecutor(4))
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(service, handlers),))
@@ -54,12 +55,12 @@ def talking(acts: Acts, deadline_s: float = PATIENT_S, service: str = SERVICE) -
         server.stop(0)
 
 
-def keeping(request: Message) -> Message:
-    return command_message(Control(1.0, 0.0), request["time_s"])
+def keeping(request: Observation) -> Command:
+    return command_message(Control(1.0, 0.0), request.time_s)
 
 
 def test_each_answer_has_the_whole_deadline() -> None:
-    def acts(requests: Iterator[Message]) -> Iterator[Message]:
+    def acts(requests: Iterator[Observation]) -> Iterator[Command]:
         for request in requests:
             time.sleep(0.5)
             yield keeping(request)
@@ -73,7 +74,7 @@ def test_each_answer_has_the_whole_deadline() -> None:
 def test_who_does_not_answer_in_time_has_failed(answered: int) -> None:
     asked = threading.Event()
 
-    def acts(requests: Iterator[Message]) -> Iterator[Message]:
+    def acts(requests: Iterator[Observation]) -> Iterator[Command]:
         for step, request in enumerate(requests):
             if step == answered:
                 asked.wait(PATIENT_S)
@@ -90,24 +91,24 @@ def test_who_does_not_answer_in_time_has_failed(answered: int) -> None:
     assert time.monotonic() - began >= 1.9
 
 
-def twice(requests: Iterator[Message]) -> Iterator[Message]:
+def twice(requests: Iterator[Observation]) -> Iterator[Command]:
     for request in requests:
         yield keeping(request)
         yield keeping(request)
 
 
-def once(requests: Iterator[Message]) -> Iterator[Message]:
+def once(requests: Iterator[Observation]) -> Iterator[Command]:
     yield keeping(next(requests))
 
 
-def raising(requests: Iterator[Message]) -> Iterator[Message]:
+def raising(requests: Iterator[Observation]) -> Iterator[Command]:
     yield keeping(next(requests))
     raise ValueError("by me")
 
 
-def silent(requests: Iterator[Message]) -> Iterator[Message]:
+def silent(requests: Iterator[Observation]) -> Iterator[Command]:
     yield keeping(next(requests))
-    yield {"time_s": next(requests)["time_s"]}
+    yield Command(time_s=next(requests).time_s)
 
 
 @pytest.mark.parametrize(
