@@ -20,12 +20,34 @@ class RiskSacError(Exception):
     """Root of the tree; catch this to catch everything this project raises on purpose."""
 
 
-class ConfigError(RiskSacError):
-    """A setting is wrong. `field` is its dotted path, as a user wrote it."""
+class ConfigError(RiskSacError, ValueError):
+    """A setting is wrong.
 
-    def __init__(self, message: str, *, field: str = "") -> None:
-        super().__init__(message)
+    A `ValueError`, so that pydantic validators may raise it; `risk_sac.config.invalid` completes its path.
+    """
+
+    def __init__(self, field: str, got: str, expected: str = "", remedy: str = "") -> None:
+        """A wrong setting.
+
+        Args:
+          field: its dotted path, flag or variable, as a user wrote it; "": the whole input.
+          got: what it holds, as text; or, without `expected`, what is wrong with it.
+          expected: what it should hold.
+          remedy: what to do about it.
+        """
+        super().__init__(field, got, expected, remedy)
         self.field = field
+        self.got = got
+        self.expected = expected
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        return self._text(self.field)
+
+    def _text(self, where: str) -> str:
+        got = f"got {self.got}; wanted {self.expected}" if self.expected else self.got
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{where}: {got}{remedy}".removeprefix(": ")
 
 
 class OddError(ConfigError):
@@ -38,9 +60,16 @@ class FormulaError(ConfigError):
     `position` is the 0-based column of the offending text, or None where it has none.
     """
 
-    def __init__(self, message: str, *, field: str = "", position: int | None = None) -> None:
-        super().__init__(message, field=field)
+    def __init__(
+        self, got: str, expected: str = "", remedy: str = "", *, field: str = "", position: int | None = None
+    ) -> None:
+        super().__init__(field, got, expected, remedy)
+        self.args = got, expected, remedy  # what pickle calls this with
         self.position = position
+
+    def __str__(self) -> str:
+        column = "" if self.position is None else f"column {self.position}"
+        return self._text(": ".join(filter(None, (self.field, column))))
 
 
 class MapError(ConfigError):

@@ -51,9 +51,9 @@ class Problem:
         odd = intersect(family.odd, spec.odd)
         if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
             raise OddError(
-                f"odd.dynamic.actor_kinds is {list(odd.dynamic.actor_kinds or ())}; wanted {sorted(missing)} too, "
-                f"which every scene of the {family.name!r} family has",
-                field="odd.dynamic.actor_kinds",
+                "odd.dynamic.actor_kinds",
+                f"{list(odd.dynamic.actor_kinds or ())}",
+                f"{sorted(missing)} too, which every scene of the {family.name!r} family has",
             )
         shipped = requirements_from_odd(odd, ego.response_s)
         check_requirements(spec.requirements, STEP_S, family.horizon_steps)
@@ -61,9 +61,9 @@ class Problem:
         for index, requirement in enumerate(spec.requirements):
             if requirement.name in taken:
                 raise ConfigError(
-                    f"requirement name {requirement.name!r} is taken by a shipped one; wanted a name not in "
-                    f"{sorted(taken)}",
-                    field=f"requirements[{index}].name",
+                    f"requirements[{index}].name",
+                    f"{requirement.name!r}, which a shipped requirement has",
+                    f"a name not in {sorted(taken)}",
                 )
         problem = cls(
             family=family,
@@ -149,4 +149,4 @@ def check_installed(method: MethodName) -> None:
     """
     needed = METHODS[method].needs
     if needed and find_spec(needed) is None:
-        raise ConfigError(f"method {method!r} needs {needed}; pip install 'risk-sac[dev]'", field="methods")
+        raise ConfigError("methods", f"{method!r}, which needs {needed}", remedy="pip install 'risk-sac[dev]'")

@@ -124,9 +124,10 @@ class RunState:
         latest = driven[-DEAD_AFTER:]
         if len(latest) == DEAD_AFTER and all(record.outcome is Outcome.INVALID for record in latest):
             raise ConfigError(
-                f"the ego {self.spec.ego.driver!r} failed in {DEAD_AFTER} episodes in a row, the last time with "
-                f"{latest[-1].reason}; wanted one that drives",
-                field="ego.driver",
+                "ego.driver",
+                f"{self.spec.ego.driver!r}, which failed in {DEAD_AFTER} episodes in a row, the last time with "
+                f"{latest[-1].reason}",
+                "one that drives",
             )
 
     def save(self) -> None:

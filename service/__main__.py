@@ -30,8 +30,7 @@ def main() -> None:
         check_exposure(settings)
         executor = executor_named(settings.executor)(program(settings))  # tries a cluster, which takes seconds
     except ConfigError as error:
-        said = str(error)
-        print(said if error.field in said else f"{error.field}: {said}", file=sys.stderr)  # noqa: T201 - no log yet
+        print(error, file=sys.stderr)  # noqa: T201 - no log yet
         sys.exit(MISUSED)
     except RiskSacError as error:
         sys.exit(str(error))

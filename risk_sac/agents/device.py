@@ -29,9 +29,7 @@ def choose_device(wanted: str, make: Callable[[str], Agent], batch: Batch) -> st
     """
     if not torch.cuda.is_available():
         if wanted == "cuda":
-            raise ConfigError(
-                "got 'cuda'; torch sees no CUDA device here. Take 'auto' or 'cpu'", field="learner.agent.device"
-            )
+            raise ConfigError("learner.agent.device", "'cuda', and torch sees no CUDA device here", "'auto' or 'cpu'")
         return "cpu"
     if wanted != "auto":
         return wanted

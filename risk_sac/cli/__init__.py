@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         status: int = options.command(options)
     except ConfigError as error:
-        complain(f"{error.field}: {error}" if error.field else str(error))
+        complain(str(error))
         return MISUSED
     except (RiskSacError, OSError) as error:
         complain(str(error))

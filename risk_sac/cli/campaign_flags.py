@@ -84,7 +84,7 @@ def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:
 def _iid(options: argparse.Namespace) -> dict[str, int] | None:
     if options.iid is None:
         if options.iid_seed is not None:
-            raise ConfigError("got it without --iid; wanted both", field="--iid-seed")
+            raise ConfigError("--iid-seed", "it without --iid", "both")
         return None
     return {"episodes": options.iid, "seed": options.iid_seed or 0}
 
@@ -94,7 +94,7 @@ def _seeds(options: argparse.Namespace, default: int) -> list[int] | None:
         return None
     count = default if options.seeds is None else options.seeds
     if not 1 <= count <= 100:
-        raise ConfigError(f"got {count}; wanted 1 to 100 seeds", field="seeds")
+        raise ConfigError("seeds", f"{count}", "1 to 100 seeds")
     first = options.first_seed or 0
     return list(range(first, first + count))
 
@@ -127,12 +127,12 @@ def families_on_map(options: argparse.Namespace) -> list[str] | None:
     if flags.get("network") is None:
         given = [name for name in ("pattern", "place", "places") if flags.get(name) is not None]
         if given:
-            raise ConfigError("it says where on a map; wanted --network too", field=given[0])
+            raise ConfigError(given[0], "a place without a map", "--network too")
         return None
     if flags.get("pattern") is None:
-        raise ConfigError(f"wanted one of {', '.join(FINDERS)}", field="pattern")
+        raise ConfigError("pattern", "nothing", f"one of {', '.join(FINDERS)}")
     if (flags.get("place") is None) == (flags.get("places") is None):
-        raise ConfigError("wanted the id of one; `risk-sac places MAP` lists them", field="place")
+        raise ConfigError("place", "nothing, or places too", "the id of one", "`risk-sac places MAP` lists them")
     with TemporaryDirectory() as folder:
         chosen = Map(present_net(options.network, Path(folder)).file)
         return [chosen.keep(fit) for fit in chosen.fits(options.pattern, options.place)]

@@ -34,7 +34,7 @@ def _export(options: argparse.Namespace) -> int:
         files = of_episodes(name, list(_runs(options.source)))
     else:
         if len(options.source) > 1:
-            raise ConfigError(f"got {len(options.source)} bundles; {name} holds one failure", field="BUNDLE")
+            raise ConfigError("BUNDLE", f"{len(options.source)} bundles", f"one, since {name} holds one failure")
         files = _failure(name, options.source[0])
     from risk_sac.failures.export.written import write
 
@@ -48,8 +48,8 @@ def _failure(name: FormatName, bundle: Path) -> Files:
     from risk_sac.failures.export.recorded import Recorded
 
     if bundle.is_dir():
-        message = f"{bundle} is a folder; {name} holds one failure, whose bundle `risk-sac bundle RUN FAILURE` makes"
-        raise ConfigError(message, field="BUNDLE")
+        expected = f"the bundle of a failure, since {name} holds one"
+        raise ConfigError("BUNDLE", f"{bundle}, which is a folder", expected, "`risk-sac bundle RUN FAILURE` makes it")
     return of_failure(name, Recorded.of(read_bundle(bundle)))
 
 
@@ -62,7 +62,5 @@ def _runs(folders: list[Path]) -> Iterator[Path]:
     for folder in folders:
         found = [folder] if (folder / RESULTS).exists() else sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
         if not found:
-            raise ConfigError(
-                f"{folder} holds no run; wanted the folder of a run, or one with such in it", field="BUNDLE"
-            )
+            raise ConfigError("BUNDLE", f"{folder}, which holds no run", "the folder of a run, or one with such in it")
         yield from found

@@ -123,7 +123,7 @@ def _cases(paths: list[Path], ego: EgoConfig) -> Iterator["Regressed"]:
             files += sorted(path.glob("*.npz")) if path.is_dir() else [path]
     bundles = [read_bundle(file) for file in files]
     if not bundles and not any(distinct_failures(read_results(run)) for run in runs):
-        raise ConfigError(f"there is no failure in {', '.join(map(str, paths))}", field="--failures")
+        raise ConfigError("--failures", f"there is no failure in {', '.join(map(str, paths))}")
     yield from (regress(bundle, ego) for bundle in bundles)
     for run in runs:
         yield from regress_run(run, ego)
@@ -138,9 +138,9 @@ def read_baseline(file: Path, flag: str = "--baseline") -> Regression:
     try:
         return Regression.model_validate_json(file.read_bytes())
     except FileNotFoundError as error:
-        raise ConfigError(f"there is no {file}", field=flag) from error
+        raise ConfigError(flag, f"there is no {file}") from error
     except ValidationError as error:
-        raise ConfigError(f"{file} was not written by `risk-sac regress`", field=flag) from error
+        raise ConfigError(flag, f"{file} was not written by `risk-sac regress`") from error
 
 
 FAILS = (Verdict.STILL_FAILING, Verdict.NEW_KIND)

@@ -66,7 +66,7 @@ def format_of(file: Path) -> Format:
       ConfigError: by none of the names there are.
     """
     if file.suffix not in FORMATS:
-        raise ConfigError(f"got {file.name!r}; wanted a name that ends in {', '.join(FORMATS)}", field="--out")
+        raise ConfigError("--out", f"{file.name!r}", f"a name that ends in {', '.join(FORMATS)}")
     return FORMATS[file.suffix]
 
 

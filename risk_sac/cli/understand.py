@@ -75,11 +75,11 @@ def _asked(options: argparse.Namespace) -> _Asked:
     path: Path = options.path
     if options.failure is None:
         if path.is_dir():
-            raise ConfigError(f"{path} is a folder; wanted a bundle, or a failure of its run too", field="FAILURE")
+            raise ConfigError("FAILURE", f"{path}, which is a folder", "a bundle, or a failure of its run too")
         return _Asked(read_bundle(path), None)
     results, folder = read_results(path), path if path.is_dir() else path.parent
     if results.digest is None:
-        raise ConfigError(f"the run in {folder} is not finished", field="PATH")
+        raise ConfigError("PATH", f"the run in {folder} is not finished")
     (bundle,) = bundles(folder, results, [results.contact(options.failure).episode])
     return _Asked(bundle, folder, results.digest)
 
@@ -90,7 +90,7 @@ def _minimise(options: argparse.Namespace) -> int:
 
     asked = _asked(options)
     if asked.folder is None and options.out is None:
-        raise ConfigError("wanted a file for the core of a bundle", field="--out")
+        raise ConfigError("--out", "nothing", "a file for the core of a bundle")
     minimal = minimise(asked.bundle)
     core = minimal.manifest.core
     assert core is not None  # that is what `minimise` makes

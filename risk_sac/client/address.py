@@ -21,10 +21,9 @@ def checked_url(url: str) -> str:
     try:
         parsed = _URL.validate_python(url)
     except ValidationError as error:
-        message = f"got {url!r}; wanted http(s)://host[:port]: {error.errors()[0]['msg']}"
-        raise ConfigError(message, field="url") from error
+        raise ConfigError("url", repr(url), f"http(s)://host[:port]: {error.errors()[0]['msg']}") from error
     if parsed.username or parsed.password:
-        raise ConfigError("the URL holds a user or a password; wanted the key in RISK_SAC_API_KEY", field="url")
+        raise ConfigError("url", "a URL that holds a user or a password", "the key in RISK_SAC_API_KEY")
     return str(parsed).rstrip("/")
 
 
@@ -41,7 +40,7 @@ def api_key(environment: Mapping[str, str]) -> str | None:
         return Path(file).read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is no text"
-        raise ConfigError(f"{file} cannot be read: {reason}", field="RISK_SAC_API_KEY_FILE") from error
+        raise ConfigError("RISK_SAC_API_KEY_FILE", f"{file} cannot be read: {reason}") from error
 
 
 def checked_key(key: str) -> str:
@@ -51,6 +50,6 @@ def checked_key(key: str) -> str:
       ConfigError: it cannot; the message does not show it.
     """
     if not key or not all("!" <= character <= "~" for character in key):
-        message = "the key is empty or holds a space, a control character or a letter outside of ASCII"
-        raise ConfigError(f"{message}; wanted it as `risk-sac keys` printed it", field="API key")
+        got = "an empty one, or one with a space, a control character or a letter outside of ASCII"
+        raise ConfigError("API key", got, "it as `risk-sac keys` printed it")
     return key

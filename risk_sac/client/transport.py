@@ -67,7 +67,7 @@ class Transport:
         try:
             request = self._http.build_request(method, path, params=given, headers=headers, content=body)
         except UnicodeEncodeError as error:
-            raise ConfigError(f"got {error.object!r}; wanted text in {error.encoding}") from error
+            raise ConfigError("", f"{error.object!r}", f"text in {error.encoding}") from error
         return self._answer(request, patience_s, repeatable=repeatable)
 
     def listen(
@@ -118,7 +118,7 @@ class Transport:
             if not response.is_success:
                 response.read()
         except httpx.LocalProtocolError as error:
-            raise ConfigError(f"HTTP cannot send this: {error}") from error
+            raise ConfigError("", f"HTTP cannot send this: {error}") from error
         except httpx.RequestError as error:
             raise Unreachable(self.url, error, passing=repeatable or isinstance(error, NEVER_SENT)) from error
         if response.is_success or response.status_code == httpx.codes.NOT_MODIFIED:

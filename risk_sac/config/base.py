@@ -4,6 +4,8 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from risk_sac.errors import ConfigError
+
 
 class Settings(BaseModel):
     """Frozen, closed to unknown fields, and finite.
@@ -24,7 +26,7 @@ class Interval(Settings):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.low > self.high:
-            raise ValueError(f"low is {self.low:g} and high is {self.high:g}; wanted low <= high")
+            raise ConfigError("low", f"{self.low:g} with high {self.high:g}", "low <= high")
         return self
 
     def __contains__(self, value: float) -> bool:

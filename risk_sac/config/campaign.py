@@ -15,6 +15,7 @@ from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import IID_METHODS, MethodName, RunMethod
 from risk_sac.config.odd import Odd
+from risk_sac.errors import ConfigError
 
 SHIPPED = ("low", "mixed", "dense")
 PLACED = r"(car_following|crossing|junction)_[0-9a-f]{12}"
@@ -70,7 +71,7 @@ class Budget(Settings):
     @model_validator(mode="after")
     def _least_is_affordable(self) -> Self:
         if self.least_episodes > self.episodes:
-            raise ValueError(f"least_episodes is {self.least_episodes}; wanted at most episodes, {self.episodes}")
+            raise ConfigError("least_episodes", f"{self.least_episodes}", f"at most episodes, {self.episodes}")
         return self
 
     @property
@@ -148,10 +149,9 @@ class CampaignSpec(Settings):
         runs = len(self.families) * len(self.methods) * len(self.seeds)
         drawn = len(self.families) * len(IID_METHODS) * self.iid.episodes if self.iid else 0
         if runs * self.budget.total_episodes + drawn > MOST_EPISODES:
-            raise ValueError(
-                f"budget is {self.budget.total_episodes} episodes for each of {runs} runs"
-                f"{f', and {drawn} of the i.i.d. phase' if drawn else ''}; wanted at most {MOST_EPISODES} in all"
-            )
+            more = f", and {drawn} of the i.i.d. phase" if drawn else ""
+            got = f"{self.budget.total_episodes} episodes for each of {runs} runs{more}"
+            raise ConfigError("budget", got, f"at most {MOST_EPISODES} in all")
         return self
 
     @model_validator(mode="after")
@@ -159,10 +159,10 @@ class CampaignSpec(Settings):
         for name in ("families", "methods", "seeds"):
             values = getattr(self, name)
             if len(set(values)) < len(values):
-                raise ValueError(f"{name} is {list(values)}; wanted each value once")
+                raise ConfigError(name, f"{list(values)}", "each value once")
         names = [requirement.name for requirement in self.requirements]
         if len(set(names)) < len(names):
-            raise ValueError(f"requirements are named {names}; wanted each name once")
+            raise ConfigError("requirements", f"the names {names}", "each name once")
         return self
 
     @property

@@ -30,9 +30,10 @@ def check_demand(spec: RunSpec, observation_size: int, action_size: int, horizon
     if (total := sum(demand.values())) > MOST_BYTES:
         field, most = max(demand.items(), key=lambda item: item[1])
         raise ConfigError(
-            f"{field} is {_value(spec, field)}, for which a run takes {most / 2**30:.1f} GiB of memory, and "
-            f"{total / 2**30:.1f} GiB in all; wanted at most {MOST_BYTES / 2**30:g} GiB in all",
-            field=field,
+            field,
+            f"{_value(spec, field)}, for which a run takes {most / 2**30:.1f} GiB of memory, and "
+            f"{total / 2**30:.1f} GiB in all",
+            f"at most {MOST_BYTES / 2**30:g} GiB in all",
         )
 
 

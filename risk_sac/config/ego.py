@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from risk_sac.config.base import Settings
+from risk_sac.errors import ConfigError
 
 CarFollowing = Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"]
 EgoName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_-]{0,39}$")]
@@ -67,18 +68,15 @@ class EgoConfig(Settings):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if abs(self.reaction_time_s * 10 - round(self.reaction_time_s * 10)) > 1e-9:
-            raise ValueError(
-                f"reaction_time_s is {self.reaction_time_s:g}; wanted a multiple of the 0.1 s simulation step"
-            )
+            expected = "a multiple of the 0.1 s simulation step"
+            raise ConfigError("reaction_time_s", f"{self.reaction_time_s:g}", expected)
         if self.profile == "perfect" and (self.reaction_time_s > 0.1 or self.sensor is not None):
-            raise ValueError(
-                "profile 'perfect' has no delay and no sensor; leave reaction_time_s and sensor out, or use 'default'"
-            )
+            remedy = "leave reaction_time_s and sensor out"
+            raise ConfigError("profile", "'perfect', which has no delay and no sensor", "'default'", remedy)
         if self.driver is None and self.version is not None:
-            raise ValueError("version is of a registered ego; name it with driver, or leave version out")
+            raise ConfigError("version", "a version without a driver", "that of a registered ego, which driver names")
         models = (self.profile, self.car_following, self.reaction_time_s)
         if self.driver is not None and models != ("default", "Krauss", 0.5):
-            raise ValueError(
-                "profile, car_following and reaction_time_s are SUMO's drivers'; leave them out beside driver"
-            )
+            got = "a driver beside profile, car_following or reaction_time_s, which SUMO's drivers have"
+            raise ConfigError("driver", got, "either", "leave the others out")
         return self

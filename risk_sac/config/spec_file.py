@@ -10,6 +10,7 @@ import yaml
 from pydantic import ValidationError
 
 from risk_sac.config import IID_METHODS, Budget, CampaignSpec, EgoConfig, RunSpec
+from risk_sac.config.invalid import causes, field_error
 from risk_sac.errors import ConfigError
 
 T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)
@@ -81,11 +82,11 @@ def _read_yaml(file: Path) -> dict[str, Any]:
     try:
         data = yaml.safe_load(file.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ConfigError(f"{file} cannot be read: {error.strerror}", field="spec") from error
+        raise ConfigError("spec", f"{file} cannot be read: {error.strerror}") from error
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{file} is no YAML: {error}", field="spec") from error
+        raise ConfigError("spec", f"{file} is no YAML: {error}") from error
     if not isinstance(data, dict):
-        raise ConfigError(f"{file} holds a {type(data).__name__}; wanted the fields of a run or campaign", field="spec")
+        raise ConfigError("spec", f"{file}, which holds a {type(data).__name__}", "the fields of a run or campaign")
     return data
 
 
@@ -98,8 +99,7 @@ def _only_run(data: dict[str, Any], picked: Mapping[str, Any]) -> RunSpec:
         runs = list(_validate(CampaignSpec, data | {CAMPAIGN_ONLY[k]: [v] for k, v in picked.items()}).searches())
     if len(runs) != 1:
         raise ConfigError(
-            f"the campaign has {len(runs) or 'no such'} runs; wanted one: pick it with --family, --method and --seed",
-            field="spec",
+            "spec", f"a campaign of {len(runs) or 'no such'} runs", "one", "pick it with --family, --method and --seed"
         )
     return runs[0]
 
@@ -109,12 +109,4 @@ def _validate(model: type[T], data: dict[str, Any]) -> T:
     try:
         return model.model_validate_json(json.dumps(data, default=str), strict=True)
     except ValidationError as error:
-        first = error.errors()[0]
-        got = "" if first["type"] == "missing" else f" (got {first['input']!r})"
-        raise ConfigError(f"{first['msg']}{got}", field=_path(first["loc"])) from error
-
-
-def _path(location: tuple[int | str, ...]) -> str:
-    """("requirements", 0, "scale") -> "requirements[0].scale"."""
-    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
-    return "".join(parts).removeprefix(".")
+        raise field_error(causes(error.errors())[0], model) from error

@@ -14,6 +14,7 @@ from pydantic import Field, ValidationError
 
 from risk_sac.config import Settings
 from risk_sac.config.ego import EgoName
+from risk_sac.config.invalid import field_error
 from risk_sac.errors import ConfigError
 
 HASH_DIGITS = 12
@@ -51,8 +52,7 @@ def python_card(point: EntryPoint) -> EgoCard:
     except (OSError, SyntaxError, UnicodeDecodeError) as error:
         raise _wrong(point, f"{file.name} cannot be read: {error}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        raise _wrong(point, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        raise _wrong(point, str(field_error(error.errors()[0]))) from error
 
 
 def _source(point: EntryPoint) -> Path:
@@ -88,4 +88,4 @@ def _hash(file: Path, in_package: bool) -> str:
 
 
 def _wrong(point: EntryPoint, why: str) -> ConfigError:
-    return ConfigError(f"the registered ego {point.name!r} ({point.value}) cannot be used: {why}", field="ego.driver")
+    return ConfigError("ego.driver", f"the registered ego {point.name!r} ({point.value}) cannot be used: {why}")

@@ -20,6 +20,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationError
 
 from risk_sac.config import EgoConfig
+from risk_sac.config.invalid import field_error
 from risk_sac.egos.cards import EgoCard, python_card
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.seam import Ego
@@ -51,7 +52,7 @@ def cards() -> tuple[EgoCard, ...]:
     """
     points, remotes = _points(), _remotes()
     if twice := points.keys() & remotes.keys():
-        raise ConfigError(f"the names {sorted(twice)} are those of entry points too; wanted others", field=FILE)
+        raise ConfigError(FILE, f"the names {sorted(twice)}, which entry points have too", "others")
     found = (*map(python_card, points.values()), *remotes.values())
     return tuple(sorted(found, key=lambda card: card.name))
 
@@ -83,8 +84,9 @@ def card_of(name: str) -> EgoCard:
     if name in remotes:
         return remotes[name]
     raise ConfigError(
-        f"ego.driver is {name!r}; wanted one of {', '.join(sorted((*points, *remotes)))}, which are registered",
-        field="ego.driver",
+        "ego.driver",
+        f"{name!r}",
+        f"one of {', '.join(sorted((*points, *remotes)))}, which are registered",
     )
 
 
@@ -99,9 +101,10 @@ def pinned(ego: EgoConfig) -> EgoConfig:
     card = card_of(ego.driver)
     if ego.version not in (None, card.version):
         raise ConfigError(
-            f"ego.version is {ego.version!r}; the registered {card.name!r} is of version {card.version!r}. Register "
-            "the one that is wanted, or leave version out",
-            field="ego.version",
+            "ego.version",
+            f"{ego.version!r}",
+            f"{card.version!r}, of which the registered {card.name!r} is",
+            "register the one that is wanted, or leave version out",
         )
     response_s = card.response_time_s if ego.response_time_s is None else ego.response_time_s
     return ego.model_copy(update={"version": card.version, "response_time_s": response_s})
@@ -131,7 +134,7 @@ def make(name: str) -> tuple[Callable[[], Ego], EgoCard]:
     """
     card, points = card_of(name), _points()
     if name not in points:
-        raise ConfigError(f"the ego {name!r} is no Python ego, but {card.kind}", field="ego.driver")
+        raise ConfigError("ego.driver", f"the ego {name!r} is no Python ego, but {card.kind}")
     return _loaded(points[name]), card
 
 
@@ -154,8 +157,7 @@ def _loaded(point: EntryPoint) -> Callable[[], Ego]:
         made: Callable[[], Ego] = point.load()
     except Exception as error:
         raise ConfigError(
-            f"the ego {point.name!r} ({point.value}) cannot be loaded: {type(error).__name__}: {error}",
-            field="ego.driver",
+            "ego.driver", f"the ego {point.name!r} ({point.value}) cannot be loaded: {type(error).__name__}: {error}"
         ) from error
     return made
 
@@ -164,7 +166,7 @@ def _points() -> Mapping[str, EntryPoint]:
     found = {name: EntryPoint(name=name, value=value, group=GROUP) for name, value in SHIPPED.items()}
     for point in entry_points(group=GROUP):
         if found.setdefault(point.name, point).value != point.value:
-            raise ConfigError(f"two egos are registered as {point.name!r}; wanted names of their own", field=GROUP)
+            raise ConfigError(GROUP, f"two egos as {point.name!r}", "names of their own")
     return found
 
 
@@ -176,9 +178,8 @@ def _remotes() -> Mapping[str, RemoteCard]:
         tables = tomllib.loads(Path(name).read_text(encoding="utf-8"))
         return {key: RemoteCard.model_validate({"name": key, **table}) for key, table in tables.items()}
     except OSError as error:
-        raise ConfigError(f"{name} cannot be read: {error.strerror}", field=FILE) from error
+        raise ConfigError(FILE, f"{name} cannot be read: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, TypeError) as error:
-        raise ConfigError(f"{name} is no TOML of one table for each ego: {error}", field=FILE) from error
+        raise ConfigError(FILE, f"{name} is no TOML of one table for each ego: {error}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        raise ConfigError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}", field=FILE) from error
+        raise ConfigError(FILE, str(field_error(error.errors()[0]))) from error

@@ -64,9 +64,9 @@ def evaluate(
       OSError: the folder cannot be written.
     """
     if jobs < 1:
-        raise ConfigError(f"got {jobs}; wanted at least one process", field="jobs")
+        raise ConfigError("jobs", f"{jobs}", "at least one process")
     if times < 0:
-        raise ConfigError(f"got {times}; wanted 0 or more", field="verify")
+        raise ConfigError("verify", f"{times}", "0 or more")
     spec = checked_campaign(spec)  # before the folder is claimed
     make_executor = executor_named(executor)
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
@@ -97,8 +97,8 @@ def _claimed(spec: CampaignSpec, folder: Path) -> Iterator[int]:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise ConfigError(
+                "out",
                 f"{folder} is in use by another evaluation, or by runs that one left behind; wait for them to end",
-                field="out",
             ) from error
         file = folder / SPEC
         if file.exists():
@@ -114,9 +114,9 @@ def _check_same(wanted: CampaignSpec, found: CampaignSpec, folder: Path) -> None
     if found.digest != wanted.digest:
         names = [name for name in CampaignSpec.model_fields if getattr(found, name) != getattr(wanted, name)]
         raise ConfigError(
-            f"{folder} holds a comparison with another {', '.join(names)}; wanted an empty folder, or the settings in "
-            f"{folder / SPEC} to go on with that one",
-            field="out",
+            "out",
+            f"{folder}, which holds a comparison with another {', '.join(names)}",
+            f"an empty folder, or the settings in {folder / SPEC} to go on with that one",
         )
 
 

@@ -29,4 +29,4 @@ def executor_named(name: str) -> MakeExecutor:
     for known, make in EXECUTORS.items():
         if known == name:
             return make
-    raise ConfigError(f"got {name!r}; wanted one of {', '.join(EXECUTORS)}", field="RISK_SAC_EXECUTOR")
+    raise ConfigError("RISK_SAC_EXECUTOR", f"{name!r}", f"one of {', '.join(EXECUTORS)}")

@@ -95,13 +95,13 @@ def _results_so_far(spec: RunSpec, folder: Path) -> Results:
         if results.spec_digest != spec.digest:
             differing = [name for name in RunSpec.model_fields if getattr(results.spec, name) != getattr(spec, name)]
             raise ConfigError(
-                f"{folder} holds a run with another {', '.join(differing)}; wanted an empty folder, or the same "
-                "settings to go on with that run",
-                field="out",
+                "out",
+                f"{folder}, which holds a run with another {', '.join(differing)}",
+                "an empty folder, or the same settings to go on with that run",
             )
         return replace(results, finished=False, digest=None)
     if checkpoint.exists(folder / CHECKPOINT):
-        raise ConfigError(f"{folder} holds a checkpoint but no {RESULTS}; wanted an empty folder", field="out")
+        raise ConfigError("out", f"{folder}, which holds a checkpoint but no {RESULTS}", "an empty folder")
     return _claim(spec, folder)
 
 

@@ -38,7 +38,7 @@ def verify(
       OSError: a folder cannot be written.
     """
     if times < 1:
-        raise ConfigError(f"got {times}; wanted at least 1", field="times")
+        raise ConfigError("times", f"{times}", "at least 1")
     code, found = code_digest(), dict[Path, Verified]()
     missing: dict[Path, Verified] = {}  # with nothing replayed yet
     for folder in folders:

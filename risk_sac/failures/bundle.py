@@ -122,7 +122,7 @@ def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
             content = (Path(str(files(WORLD))) / name).read_bytes()
         except FileNotFoundError as error:
             message = f"{name}, which {episode.id_in(spec.id)} was found on, is gone"
-            raise ConfigError(message, field="BUNDLE") from error
+            raise ConfigError("BUNDLE", message) from error
         found[_portable(name, spec)] = hashlib.sha256(content).hexdigest()
     return found
 
@@ -155,7 +155,7 @@ def check_world(manifest: Manifest) -> None:
     """
     for name, digest in world_of(manifest.spec, manifest.episode).items():
         if manifest.world.get(name) != digest:
-            raise ConfigError(f"{manifest.id} was found on another {name}, so it cannot be replayed", field="BUNDLE")
+            raise ConfigError("BUNDLE", f"{manifest.id} was found on another {name}, so it cannot be replayed")
 
 
 def write_bundle(file: Path, bundle: Bundle) -> None:
@@ -266,4 +266,4 @@ def _check_playable(problem: Problem, manifest: Manifest, series: Series) -> Non
 
 
 def _refused(file: Path, why: str) -> ConfigError:
-    return ConfigError(f"{file} {why}", field="BUNDLE")
+    return ConfigError("BUNDLE", f"{file} {why}")

@@ -68,7 +68,7 @@ def check_release(spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> No
     """
     if "released_s" not in recorded:
         message = f"the series of {episode.id_in(spec.id)} is older than the release of adversaries"
-        raise ConfigError(message, field="FAILURE")
+        raise ConfigError("FAILURE", message)
 
 
 def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> Played:

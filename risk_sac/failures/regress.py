@@ -99,8 +99,8 @@ def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Regressed]:
     results = read_results(folder)
     policy = policy_of(folder, results)
     if policy is None and method_of(results.spec.method).learns:
-        message = f"{folder} has not finished, or has no checkpoint, so that its policy cannot act on; make bundles"
-        raise ConfigError(message, field="--failures")
+        got = f"{folder} has not finished, or has no checkpoint, so that its policy cannot act on"
+        raise ConfigError("--failures", got, remedy="make bundles")
     for episode in distinct_failures(results):
         yield regress(recorded_bundle(folder, results, episode, policy), ego)
 

@@ -40,7 +40,7 @@ def draw(family: FamilyName, recording: Recording, file: Path, twin: Recording |
       OSError: the picture cannot be written.
     """
     if file.suffix not in (".png", ".pdf", ".svg"):
-        raise ConfigError(f"got {str(file)!r}; wanted a name that ends in .png, .pdf or .svg", field="out")
+        raise ConfigError("out", f"{str(file)!r}", "a name that ends in .png, .pdf or .svg")
     content = recording_bytes(family, recording, file.suffix.removeprefix("."), twin)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_bytes(content)

@@ -53,7 +53,7 @@ class Stage:
         """
         episode = bundle.manifest.episode
         if episode.collision is None or not episode.collision.valid or episode.collision.judgement is None:
-            raise ConfigError(f"{bundle.manifest.id} is no valid failure", field="BUNDLE")
+            raise ConfigError("BUNDLE", f"{bundle.manifest.id} is no valid failure")
         check_world(bundle.manifest)
         self.env = RiskSacEnv.of(bundle.manifest.spec)
         self.space = self.env.problem.space

@@ -160,7 +160,7 @@ def figure_files(comparison: Comparison, name: str, formats: Sequence[Format] = 
 
     figures = _figures(comparison)
     if name not in figures:
-        raise ConfigError(f"got {name!r}; wanted one of {', '.join(figures) or 'none: no run has finished'}")
+        raise ConfigError("", f"{name!r}", f"one of {', '.join(figures) or 'none: no run has finished'}")
     return draw(comparison, figures[name], formats)
 
 

@@ -82,12 +82,14 @@ def read_run(folder: Path) -> FinishedRun:
     """
     results = read_results(folder)
     if not results.finished or results.digest is None:
-        raise ConfigError(f"the run in {folder} is not finished; finish it with the command that began it")
+        raise ConfigError("", f"the run in {folder} is not finished", remedy="finish it with the command that began it")
     records = read_records(folder / EPISODES)
     if results_digest(records) != results.digest:
         raise ConfigError(
+            "",
             f"{folder / EPISODES} does not hold the {len(results.contacts)} contacts and the other episodes that "
-            f"digest {results.digest[:12]} was formed over; delete the folder and run it again"
+            f"digest {results.digest[:12]} was formed over",
+            remedy="delete the folder and run it again",
         )
     verified = read_verified(folder, results.digest)
     return FinishedRun(
@@ -114,7 +116,7 @@ def read_records(file: Path) -> tuple[EpisodeRecord, ...]:
     try:
         return tuple(records_from_lines(content))
     except ValidationError as error:
-        raise ConfigError(f"{file} was not written by a run: {error.errors()[0]['msg']}") from error
+        raise ConfigError("", f"{file} was not written by a run: {error.errors()[0]['msg']}") from error
 
 
 NOTHING = Found(0, 0, 0)

@@ -117,21 +117,23 @@ def parse(formula: str, step_s: float, horizon_steps: int) -> Node:
     try:
         node: Node = _parser(step_s).parse(formula)  # type: ignore[assignment] # what the transformer makes
     except UnexpectedCharacters as error:
-        raise _error(f"unknown character {error.char!r}", error.pos_in_stream) from error
+        raise FormulaError(f"unknown character {error.char!r}", position=error.pos_in_stream) from error
     except UnexpectedToken as error:
         raise _unexpected(error, formula) from error
     _require_truth(node)
     back = memory(node)
     if back > horizon_steps:
         raise FormulaError(
-            f"the windows reach {back * step_s:g} s back; an episode lasts {horizon_steps * step_s:g} s. Shorten them.",
+            f"windows that reach {back * step_s:g} s back",
+            f"at most the {horizon_steps * step_s:g} s of an episode",
             position=node.position,
         )
     work = comparisons(node)
     if work > MAX_COMPARISONS:
         raise FormulaError(
-            f"the windows need {work} comparisons per step; wanted at most {MAX_COMPARISONS}. "
-            "Shorten them: a timed since costs the square of its window.",
+            f"windows that need {work} comparisons per step",
+            f"at most {MAX_COMPARISONS}",
+            "shorten them: a timed since costs the square of its window",
             position=node.position,
         )
     return node
@@ -174,25 +176,24 @@ def _parser(step_s: float) -> Lark:
 def _supported(token: Token) -> Token:
     """Refuses future operators and those without a faithful robustness, with the rewrite."""
     if token in _PAST_OF:
-        raise _error(
-            f"{token.value!r} looks into the future, which an online monitor does not know; "
-            f"use the past-time operator {_PAST_OF[token]!r}",
-            token.start_pos,
+        raise FormulaError(
+            f"{token.value!r}, which looks into the future, unknown to an online monitor",
+            f"the past-time operator {_PAST_OF[token]!r}",
+            position=token.start_pos,
         )
     if token in _REWRITES:
-        raise _error(f"{token.value!r} is not supported; use {_REWRITES[token]}", token.start_pos)
+        got, remedy = f"{token.value!r} is not supported", f"use {_REWRITES[token]}"
+        raise FormulaError(got, remedy=remedy, position=token.start_pos)
     return token
-
-
-def _error(reason: str, position: int | None) -> FormulaError:
-    return FormulaError(f"column {position}: {reason}", position=position)
 
 
 def _unexpected(error: UnexpectedToken, formula: str) -> FormulaError:
     """Says what was found and what was expected."""
     accepts = error.accepts
     if error.token.type == "COMPARISON" and "AND" in accepts:
-        return _error("comparisons cannot be chained; write a <= x and x <= b", error.token.start_pos)
+        return FormulaError(
+            "comparisons cannot be chained", remedy="write a <= x and x <= b", position=error.token.start_pos
+        )
     at_end = error.token.type == "$END"
     got, position = ("the end", len(formula)) if at_end else (error.token.value, error.token.start_pos)
     if accepts == {"NUMBER"}:
@@ -200,7 +201,7 @@ def _unexpected(error: UnexpectedToken, formula: str) -> FormulaError:
     else:
         words = [word for terminal, word in _EXPECTED.items() if terminal in accepts] or ["the end"]
         wanted = " or ".join(filter(None, (", ".join(words[:-1]), words[-1])))
-    return _error(f"got {got!r}, wanted {wanted}", position)
+    return FormulaError(repr(got), wanted, position=position)
 
 
 @v_args(inline=True)
@@ -218,7 +219,9 @@ class _Nodes(Transformer[Token, Node]):
     def signal(self, token: Token) -> Node:
         info = SIGNALS.get(token)
         if info is None:
-            raise _error(f"unknown signal {token.value!r}; the published ones are {', '.join(SIGNALS)}", _at(token))
+            raise FormulaError(
+                f"the unknown signal {token.value!r}", f"one of {', '.join(SIGNALS)}", position=_at(token)
+            )
         return Node("signal", _at(token), text=str(token), magnitude=max(abs(info.low), abs(info.high)))
 
     def negation(self, token: Token, operand: Node) -> Node:
@@ -227,18 +230,20 @@ class _Nodes(Transformer[Token, Node]):
 
     def bound(self, token: Token, unit: str = "s") -> int:
         if not _BOUND.fullmatch(token):
-            raise _error(f"got {token.value!r}, wanted a window bound in seconds such as 0.5", _at(token))
+            raise FormulaError(repr(token.value), "a window bound in seconds such as 0.5", position=_at(token))
         seconds = Fraction(token) * (Fraction(1, 1000) if unit == "ms" else 1)
         steps = seconds / self._step_s
         if steps.denominator != 1:
             step = float(self._step_s)
-            raise _error(f"the bound {float(seconds):g} s is no multiple of the {step:g} s step", _at(token))
+            raise FormulaError(
+                f"the bound {float(seconds):g} s is no multiple of the {step:g} s step", position=_at(token)
+            )
         return int(steps)
 
     def window(self, bracket: Token, first: int, last: int) -> tuple[int, int]:
         if first > last:
             start_s, end_s = float(first * self._step_s), float(last * self._step_s)
-            raise _error(f"the window [{start_s:g}, {end_s:g}] s ends before it begins", _at(bracket))
+            raise FormulaError(f"the window [{start_s:g}, {end_s:g}] s ends before it begins", position=_at(bracket))
         return first, last
 
     def operation(self, *parts: Token | tuple[int, int] | Node) -> Node:
@@ -251,10 +256,10 @@ class _Nodes(Transformer[Token, Node]):
             if op not in (*ARITHMETIC, *COMPARISONS):
                 _require_truth(operand)
             elif operand.magnitude is None:
-                raise _error(f"{op!r} wants numbers; got a formula", operand.position)
+                raise FormulaError("a formula", f"numbers around {op!r}", position=operand.position)
         depth = 1 + max(operand.depth for operand in operands)
         if depth > MAX_DEPTH:
-            raise _error(f"more than {MAX_DEPTH} nested operators", _at(token))
+            raise FormulaError(f"more than {MAX_DEPTH} nested operators", position=_at(token))
         position = _at(token) if len(operands) == 1 else operands[0].position
         magnitude = _magnitude(token, operands) if op in ARITHMETIC else None
         return Node(op, position, operands, window=window, magnitude=magnitude, depth=depth)
@@ -266,7 +271,7 @@ def _at(token: Token) -> int:
 
 def _require_truth(node: Node) -> None:
     if node.magnitude is not None:
-        raise _error("got a number, wanted a comparison such as ttc_s >= 1.5", node.position)
+        raise FormulaError("a number", "a comparison such as ttc_s >= 1.5", position=node.position)
 
 
 def _magnitude(token: Token, operands: tuple[Node, ...]) -> float:
@@ -274,12 +279,16 @@ def _magnitude(token: Token, operands: tuple[Node, ...]) -> float:
     if token == "/":
         divisor = operands[1]
         if divisor.op != "number" or float(divisor.text) == 0:
-            raise _error("only a number other than 0 can divide; multiply the inequality out instead", divisor.position)
+            raise FormulaError(
+                "only a number other than 0 can divide",
+                remedy="multiply the inequality out instead",
+                position=divisor.position,
+            )
         return _bounded(token, values[0] / float(divisor.text))
     return _bounded(token, math.prod(values) if token == "*" else sum(values))
 
 
 def _bounded(token: Token, value: float) -> float:
     if value > MAX_MAGNITUDE:
-        raise _error(f"the number may reach {value:g}; wanted at most {MAX_MAGNITUDE:g}", _at(token))
+        raise FormulaError(f"a number that may reach {value:g}", f"at most {MAX_MAGNITUDE:g}", position=_at(token))
     return value

@@ -125,8 +125,5 @@ def _parse(index: int, requirement: Requirement, step_s: float, horizon_steps: i
     try:
         return parse(requirement.formula, step_s, horizon_steps)
     except FormulaError as error:
-        raise FormulaError(
-            f"requirement {requirement.name!r}: {error}",
-            field=f"requirements[{index}].formula",
-            position=error.position,
-        ) from error
+        error.field = f"requirements[{index}].formula"
+        raise

@@ -76,7 +76,7 @@ class Results:
             if id_ in known or (id_.isdecimal() and int(id_) == episode.index):
                 return contact
         every = ", ".join(contact.id for contact in self.contacts) or "none: the ego touched nothing"
-        raise ConfigError(f"got {id_!r}; wanted one of the contacts ({every})", field="FAILURE")
+        raise ConfigError("FAILURE", f"{id_!r}", f"one of the contacts ({every})")
 
 
 _RESULTS = TypeAdapter(Results)
@@ -101,10 +101,10 @@ def read_results(path: Path) -> Results:
     try:
         return _RESULTS.validate_json(unseal(file.read_bytes()))
     except FileNotFoundError as error:
-        raise ConfigError(f"there is no {file}; wanted the folder of a run", field="RESULTS") from error
+        raise ConfigError("RESULTS", f"{file}, which does not exist", "the folder of a run") from error
     except DamagedError as error:
-        raise ConfigError(f"{file} is damaged: {error}", field="RESULTS") from error
+        raise ConfigError("RESULTS", f"{file} is damaged: {error}") from error
     except ValidationError as error:
         raise ConfigError(
-            f"{file} is damaged, or was not written by a run: {error.errors()[0]['msg']}", field="RESULTS"
+            "RESULTS", f"{file} is damaged, or was not written by a run: {error.errors()[0]['msg']}"
         ) from error

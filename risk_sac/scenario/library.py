@@ -58,7 +58,7 @@ def put(name: str, text: bytes, net: bytes) -> None:
       OSError: the folder cannot be written.
     """
     if not name.endswith(f"_{_digest(text, net)}"):
-        raise ConfigError(f"the place {name!r} is not what its name says", field="family")
+        raise ConfigError("family", f"the place {name!r} is not what its name says")
     folder = library() / name
     if folder.is_dir():
         os.utime(folder)  # it is wanted again: see `prune`
@@ -88,10 +88,10 @@ def files_of(name: str) -> tuple[bytes, bytes]:
             raise FileNotFoundError
         text, net = (folder / PLACE).read_bytes(), (folder / NET).read_bytes()
     except OSError:
-        wanted = f"wanted low, mixed, dense, or one that lies in {library()} ({VARIABLE} names another folder)"
-        raise ConfigError(f"there is no place {name!r}; {wanted}", field="family") from None
+        wanted = f"low, mixed, dense, or one that lies in {library()} ({VARIABLE} names another folder)"
+        raise ConfigError("family", f"{name!r}", wanted) from None
     if not name.endswith(f"_{_digest(text, net)}"):
-        raise ConfigError(f"the place {name!r} in {library()} is damaged; find it on its map anew", field="family")
+        raise ConfigError("family", f"the place {name!r} in {library()} is damaged", remedy="find it on its map anew")
     return text, net
 
 

@@ -238,7 +238,7 @@ def _common(ours: Any, theirs: Any) -> Any:
 
 
 def _error(path: str, got: Any, wanted: str) -> OddError:
-    return OddError(f"odd.{path} is {_text(got)}; wanted {wanted}", field=f"odd.{path}")
+    return OddError(f"odd.{path}", _text(got), wanted)
 
 
 def _text(value: Any) -> str:

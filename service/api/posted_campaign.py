@@ -8,6 +8,7 @@ from fastapi.concurrency import run_in_threadpool
 from pydantic import Field, model_validator
 
 from risk_sac.config import CampaignSpec, Settings
+from risk_sac.errors import ConfigError
 from risk_sac.scenario.maps.found import Pattern
 from service.api.access import Caller, CurrentCaller
 from service.api.answers.busy import busy
@@ -35,7 +36,7 @@ class Ground(Settings):
     @model_validator(mode="after")
     def _one_or_all(self) -> Self:
         if (self.place is None) == (self.places is None):
-            raise ValueError('wanted either place, one of the network\'s, or places: "all"')
+            raise ConfigError("place", "both or neither", 'either place, one of the network\'s, or places: "all"')
         return self
 
 

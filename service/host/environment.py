@@ -26,16 +26,16 @@ def read_settings() -> ServiceSettings:
     except ValidationError as error:
         # A default that depends on other settings is not wrong because they are.
         wrong = [each for each in error.errors() if each["type"] != "default_factory_not_called"]
-        raise ConfigError("\n".join(dict.fromkeys(map(_line, wrong)))) from error
+        raise ConfigError("", "\n".join(dict.fromkeys(map(_line, wrong)))) from error
     except OSError as error:
-        raise ConfigError(f"secret {error.filename!r} cannot be read ({error.strerror})") from error
+        raise ConfigError("", f"secret {error.filename!r} cannot be read ({error.strerror})") from error
 
 
 def _check_secrets() -> None:
     if SECRETS and not Path(SECRETS).is_dir():
         what = "no folder" if os.path.lexists(SECRETS) else "missing"
         name = _variable("secrets_dir")
-        raise ConfigError(f"{name} is {SECRETS!r}, which is {what}; wanted a folder that has settings as files")
+        raise ConfigError(name, f"{SECRETS!r}, which is {what}", "a folder that has settings as files")
 
 
 def _line(error: ErrorDetails) -> str:
@@ -44,8 +44,7 @@ def _line(error: ErrorDetails) -> str:
     field = ServiceSettings.model_json_schema()["properties"][name]
     text = repr(error["input"])
     shown = text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}…"
-    verb, wanted = ("holds", takes(field["items"])) if item else ("is", takes(field))
-    return f"{_variable(str(name))} {verb} {shown}; wanted {wanted}"
+    return str(ConfigError(_variable(str(name)), shown, takes(field["items"] if item else field)))
 
 
 def _variable(name: str) -> str:

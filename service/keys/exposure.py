@@ -25,7 +25,5 @@ def check_exposure(settings: ServiceSettings) -> None:
     keys = KeyFile(settings.keys_file).read()
     if is_loopback(settings.host) or any(key.revoked_at is None for key in keys):
         return
-    message = (
-        f"host is {settings.host!r}; wanted a loopback address, or API keys: create one with `risk-sac keys create`"
-    )
-    raise ConfigError(message, field="host")
+    remedy = "create one with `risk-sac keys create`"
+    raise ConfigError("host", repr(settings.host), "a loopback address, or API keys", remedy)

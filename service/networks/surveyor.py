@@ -29,9 +29,10 @@ def main() -> None:
     try:
         report = _survey() if action == "survey" else _keep(*arguments)
     except ConfigError as error:
-        report = {"refused": str(error), "field": error.field}
+        report = {"refused": error.args}
     except MemoryError:
-        report = {"refused": f"the search needs more than {SURVEY_MEMORY_BYTES >> 20} MiB; wanted a smaller network"}
+        got = f"a network whose search needs more than {SURVEY_MEMORY_BYTES >> 20} MiB"
+        report = {"refused": ("network", got, "a smaller network")}
     Path(file).write_text(json.dumps(report))
 
 
@@ -51,11 +52,9 @@ def _keep(name: str, place: str | None = None) -> dict[str, object]:
     chosen = Map(NET)
     fits = chosen.fits(pattern, place)
     if len(fits) > MAX_PLACES:
-        raise ConfigError(
-            f"{pattern} fits at {len(fits)} places; wanted at most {MAX_PLACES}: name one", field="places"
-        )
+        raise ConfigError("places", f"{len(fits)} places where {pattern} fits", f"at most {MAX_PLACES}", "name one")
     if not fits:
-        raise ConfigError(f"{pattern} fits nowhere on this network; its places say why", field="places")
+        raise ConfigError("places", f"{pattern} fits nowhere on this network; its places say why")
     return {"families": [chosen.keep(fit) for fit in fits]}
 
 

@@ -114,7 +114,7 @@ class Surveys:
                 raise StorageError(f"places cannot be looked for ({error.strerror})") from error
         if result.timed_out:
             raise ConfigError(
-                f"looking for places takes more than {SURVEY_S} s; wanted a smaller network", field="network"
+                "network", f"one on which looking for places takes more than {SURVEY_S} s", "a smaller network"
             )
         try:
             report: dict[str, Any] = json.loads(result.answer)
@@ -122,7 +122,7 @@ class Surveys:
             said = result.log.splitlines()[-1:]
             raise StorageError(f"places cannot be looked for (status {result.status}: {said})") from error
         if "refused" in report:
-            raise ConfigError(report["refused"], field=report.get("field", "network"))
+            raise ConfigError(*report["refused"])
         return report
 
     @contextmanager

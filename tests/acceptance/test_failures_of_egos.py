@@ -177,4 +177,4 @@ def test_where_the_ego_is_of_another_version_it_is_refused_by_both(
     monkeypatch.setenv("RISK_SAC_EGOS", "")
     status, _, err = tell("replay", failure.bundle)
     assert status == 2
-    assert "ego.driver is 'far'" in err
+    assert "ego.driver: got 'far'" in err

@@ -43,8 +43,10 @@ def test_a_missing_package_names_the_extra_before_anything_is_read(
     monkeypatch.setattr(formats, "find_spec", lambda name: None)
     monkeypatch.setenv(COMMONROAD_PYTHON, str(tmp_path / "python"))
     asked = (tmp_path / "none.npz", "--out", tmp_path / "x", "--format")
-    assert "needs foxglove, which is not installed: pip install 'risk-sac[export]'" in refused(capsys, *asked, "mcap")
-    assert f"needs commonroad, which is not installed: {COMMONROAD_PYTHON}" in refused(capsys, *asked, "commonroad")
+    assert "needs foxglove, and that is not installed; pip install 'risk-sac[export]'" in refused(
+        capsys, *asked, "mcap"
+    )
+    assert f"needs commonroad, and that is not installed; {COMMONROAD_PYTHON}" in refused(capsys, *asked, "commonroad")
     assert [name for name, row in FORMATS.items() if not row.missing] == [FormatName.SUMO, FormatName.GIF]
 
 
@@ -101,7 +103,7 @@ def test_a_disk_that_fills_leaves_nothing(name: str, out: str, tmp_path: Path) -
 def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "kept").write_text("mine")
     said = refused(capsys, BUNDLE, "--format", "openscenario", "--out", tmp_path)
-    assert "is there already" in said
+    assert "which exists" in said
     assert [file.name for file in tmp_path.iterdir()] == ["kept"]
 
 

@@ -547,8 +547,8 @@ def test_server_refuses_to_start_where_it_could_not_keep_anybody_out(tmp_path):
         [sys.executable, "-m", "service"], env=environment, capture_output=True, text=True, timeout=LONG_S
     )
     assert started.returncode == 2
-    wanted = "wanted a loopback address, or API keys: create one with `risk-sac keys create`"
-    assert started.stderr == f"host is '0.0.0.0'; {wanted}\n"
+    wanted = "wanted a loopback address, or API keys; create one with `risk-sac keys create`"
+    assert started.stderr == f"host: got '0.0.0.0'; {wanted}\n"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -122,6 +122,6 @@ def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monke
     campaign = CampaignSpec(families=("low",), methods=("random", "sb3-sac"))
     checked_campaign(campaign)
     monkeypatch.setattr("risk_sac.problem.find_spec", lambda name: None)
-    with pytest.raises(ConfigError, match=r"'sb3-sac' needs stable_baselines3; pip install") as refusal:
+    with pytest.raises(ConfigError, match=r"'sb3-sac', which needs stable_baselines3; pip install") as refusal:
         checked_campaign(campaign)
     assert refusal.value.field == "methods"

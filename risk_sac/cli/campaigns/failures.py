@@ -92,7 +92,7 @@ def _bundle(options: argparse.Namespace) -> int:
 def _show(options: argparse.Namespace) -> int:
     picture = options.out or Path(f"{options.failure}.png")
     if picture.suffix != ".png":
-        raise ConfigError(f"got {str(picture)!r}; wanted a name that ends in .png", field="--out")
+        raise ConfigError("--out", f"{str(picture)!r}", "a name that ends in .png")
     picture.parent.mkdir(parents=True, exist_ok=True)
     with Client.from_environment(options.url) as client:
         failure = client.failure(options.id, options.failure)

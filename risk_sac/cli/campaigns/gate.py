@@ -53,8 +53,8 @@ class Bounds:
         )
         for name, bound in bounds.rates():
             if bound == 0 and bounds.judged_by == "interval":
-                message = "got 0, and the interval of no rate ends there; wanted more, or --judge-by rate as well"
-                raise ConfigError(message, field=f"--max-{name.lower()}")
+                got, expected = "0, where the interval of no rate ends", "more, or --judge-by rate as well"
+                raise ConfigError(f"--max-{name.lower()}", got, expected)
         return bounds
 
     def __bool__(self) -> bool:
@@ -159,10 +159,10 @@ def _read_known(file: Path) -> Mapping[str, frozenset[str]]:
     try:
         earlier = Results.model_validate_json(file.read_bytes())
     except OSError as error:
-        raise ConfigError(f"{file} cannot be read: {error.strerror}", field="--no-new-failures") from error
+        raise ConfigError("--no-new-failures", f"{file} cannot be read: {error.strerror}") from error
     except ValidationError as error:
-        message = f"{file} is none; wanted what `risk-sac campaigns results ID --json` printed of an earlier campaign"
-        raise ConfigError(message, field="--no-new-failures") from error
+        expected = "what `risk-sac campaigns results ID --json` printed of an earlier campaign"
+        raise ConfigError("--no-new-failures", str(file), expected) from error
     known: dict[str, frozenset[str]] = {}
     for total in earlier.totals:
         known[total.family] = known.get(total.family, frozenset()) | total.signatures.keys()

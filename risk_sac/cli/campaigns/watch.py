@@ -218,7 +218,7 @@ def add_submit(campaigns: Commands) -> None:
 def _submit(options: argparse.Namespace) -> int:
     for name in ("max_ecr", "max_pcr", "max_preventable", "no_new_failures", "junit", "timeout"):
         if getattr(options, name) is not None and not options.watch:
-            raise ConfigError("got it without --watch; wanted both", field=f"--{name.replace('_', '-')}")
+            raise ConfigError(f"--{name.replace('_', '-')}", "it without --watch", "both")
     prepare(options)
     flags = campaign_flags(options, SEEDS) | ego_flag(options) | {"label": options.label}
     spec = read_campaign(options.spec, flags, {})

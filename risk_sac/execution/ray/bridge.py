@@ -111,7 +111,7 @@ def main() -> None:
             bridge.tell("ready")
             _carry(bridge, settings.ray_lease_s)
     except ConfigError as error:
-        words.write(line("refused", message=str(error), field=error.field))
+        words.write(line("refused", error=error.args))
         words.flush()
         return
     os._exit(0)

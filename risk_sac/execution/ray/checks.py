@@ -41,9 +41,9 @@ def check(settings: RaySettings, within: Path | None) -> None:
     able = [node for node in nodes(ray.nodes(), settings) if node.alive and node.slots]
     if not able:
         raise ConfigError(
-            f"got {settings.ray_cpus_per_run:g} processors and {settings.ray_memory_bytes_per_run} bytes for a run; "
-            "no node of the cluster has as much",
-            field=variable("ray_cpus_per_run"),
+            variable("ray_cpus_per_run"),
+            f"{settings.ray_cpus_per_run:g} processors and {settings.ray_memory_bytes_per_run} bytes for a run",
+            "what some node of the cluster has",
         )
     with _probed_storage(settings, within) as probe:
         asked = [(node.address, on_node(_tried, node.id).remote(probe, settings.ray_scratch_dir)) for node in able]
@@ -51,7 +51,7 @@ def check(settings: RaySettings, within: Path | None) -> None:
         tried = [_check_node(address, reference, expected, probe, settings) for address, reference in asked]
     if not any(tried):
         addresses = ", ".join(node.address for node in able)
-        raise ConfigError(f"all nodes were lost while they were tried: {addresses}", field=ADDRESS)
+        raise ConfigError(ADDRESS, f"all nodes were lost while they were tried: {addresses}")
 
 
 def nodes(found: Iterable[dict[str, Any]], settings: RaySettings) -> list[Node]:
@@ -78,9 +78,9 @@ class _Probe:
 
     def refused(self, who: str, why: object) -> ConfigError:
         return ConfigError(
-            f"{self.given}, which {who} cannot use ({without_folders(_first(why))}); wanted a folder or bucket that "
-            "the server and all nodes read and write",
-            field=STORAGE,
+            STORAGE,
+            f"{self.given}, which {who} cannot use ({without_folders(_first(why))})",
+            "a folder or bucket that the server and all nodes read and write",
         )
 
 
@@ -145,23 +145,24 @@ def _check_node(address: str, reference: Any, expected: Versions, probe: _Probe 
     try:
         found: _Found = ray.get(reference, timeout=PROBE_S)
     except GetTimeoutError as error:
-        raise ConfigError(f"node {address} does not answer within {PROBE_S:g} s", field=ADDRESS) from error
+        raise ConfigError(ADDRESS, f"node {address} does not answer within {PROBE_S:g} s") from error
     except RayTaskError as error:
-        wanted = f"wanted risk-sac {expected['risk-sac']} and all that belongs to it, as on the server's machine"
+        wanted = f"risk-sac {expected['risk-sac']} and all that belongs to it, as on the server's machine"
         raise ConfigError(
-            f"node {address} cannot run what is here ({_first(error.cause)}); {wanted}", field=ADDRESS
+            ADDRESS, f"node {address}, which cannot run what is here ({_first(error.cause)})", wanted
         ) from error
     except RayError as error:
         logger.warning("node %s was lost: %s", address, _first(error))
         return False
     other = differing(found.versions, expected)
     if other:
-        raise ConfigError(f"on node {address}: {other}", field=ADDRESS)
+        raise ConfigError(ADDRESS, f"on node {address}: {other}")
     if found.scratch is not None:
         raise ConfigError(
-            f"got {str(settings.ray_scratch_dir)!r}, which node {address} cannot write to "
-            f"({without_folders(_first(found.scratch))}); wanted a folder that every node makes for itself",
-            field=variable("ray_scratch_dir"),
+            variable("ray_scratch_dir"),
+            f"{str(settings.ray_scratch_dir)!r}, which node {address} cannot write to "
+            f"({without_folders(_first(found.scratch))})",
+            "a folder that every node makes for itself",
         )
     if found.storage is not None:
         assert probe is not None

@@ -50,8 +50,7 @@ class RayExecutor(Generic[Word]):
         """
         if find_spec("ray") is None:
             raise ConfigError(
-                "got 'ray', which is not installed; wanted `local`, or `pip install risk-sac[ray]`",
-                field="RISK_SAC_EXECUTOR",
+                "RISK_SAC_EXECUTOR", "'ray', which is not installed", "`local`, or `pip install risk-sac[ray]`"
             )
         self._program = program
         self._settings = read_settings()

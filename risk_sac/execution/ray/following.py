@@ -158,7 +158,7 @@ def _blamed(error: BaseException) -> str:
     """What an attempt failed for, with the setting to look at where there is one."""
     why = without_folders(str(error))
     if isinstance(error, ConfigError):
-        return f"{error.field}: {why}"
+        return why
     if isinstance(error, OSError | DamagedError):
         return f"{variable('ray_storage')}: {why}"
     return f"{type(error).__name__}: {why}"

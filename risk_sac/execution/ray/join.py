@@ -33,7 +33,7 @@ def joined(settings: RaySettings) -> Iterator[str | None]:
         yield None
         return
     if settings.ray_address == "auto":
-        raise ConfigError("got 'auto', which is no cluster to join; wanted HOST:PORT", field=variable("ray_address"))
+        raise ConfigError(variable("ray_address"), "'auto', which is no cluster to join", "HOST:PORT")
     node = subprocess.Popen(
         [sys.executable, "-m", "ray.scripts.scripts", "start", f"--address={settings.ray_address}", "--num-cpus=0",
          f"--object-store-memory={STORE_BYTES}", "--disable-usage-stats", "--block"],
@@ -69,6 +69,6 @@ def _address(node: "subprocess.Popen[str]", settings: RaySettings) -> str | None
             threading.Thread(target=deque, args=(node.stdout, 0), daemon=True).start()  # what else it says is not kept
             return address
     raise ConfigError(
+        variable("ray_address"),
         f"got {settings.ray_address!r}, which this machine cannot join: {' '.join(filter(None, said))}",
-        field=variable("ray_address"),
     )

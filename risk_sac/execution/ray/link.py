@@ -111,7 +111,7 @@ class Link:
             try:
                 bridge = Bridge(self._within)
             except ConfigError as error:
-                logger.warning("the cluster cannot be reached: %s: %s", error.field, error)
+                logger.warning("the cluster cannot be reached: %s", error)
                 wait_s = min(2 * wait_s, LONGEST_WAIT_S)
                 continue
             with self._lock:
@@ -146,8 +146,8 @@ class Bridge:
         if first is None or first["kind"] != "ready":
             self.close()
             if first is None:
-                raise ConfigError("Ray ended while it was reaching the cluster", field=variable("ray_address"))
-            raise ConfigError(first["message"], field=first["field"])
+                raise ConfigError(variable("ray_address"), "Ray ended while it was reaching the cluster")
+            raise ConfigError(*first["error"])
 
     @property
     def _output(self) -> IO[bytes]:

@@ -27,14 +27,13 @@ def check_head(settings: RaySettings) -> None:
     if address == "auto":
         return
     if not re.fullmatch(r"(\[[0-9A-Fa-f:]+\]|[^:/\s]+):\d{1,5}", address):
-        raise ConfigError(f"got {address!r}; wanted `auto` or HOST:PORT of the head", field=ADDRESS)
+        raise ConfigError(ADDRESS, f"{address!r}", "`auto` or HOST:PORT of the head")
     host, _, port = address.rpartition(":")
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=HEAD_S).close()
     except (OSError, OverflowError) as error:
         raise ConfigError(
-            f"got {address!r}, where nothing answers ({error}); wanted HOST:PORT of the head of a Ray cluster",
-            field=ADDRESS,
+            ADDRESS, f"{address!r}, where nothing answers ({error})", "HOST:PORT of the head of a Ray cluster"
         ) from error
     check_token(host)
 
@@ -61,9 +60,9 @@ def connect(settings: RaySettings, node: str | None) -> None:
     except (ConnectionError, RuntimeError, ValueError, RayError) as error:
         why = " ".join(str(error).split())
         raise ConfigError(
-            f"got {settings.ray_address!r}: {why}; wanted the head of a cluster of Ray {ray.__version__}, "
-            f"with its token where {TOKEN_MODE} is set",
-            field=ADDRESS,
+            ADDRESS,
+            f"{settings.ray_address!r}: {why}",
+            f"the head of a cluster of Ray {ray.__version__}, with its token where {TOKEN_MODE} is set",
         ) from error
     check_token(ray.get_runtime_context().gcs_address.rpartition(":")[0])
 
@@ -76,9 +75,9 @@ def check_token(host: str) -> None:
     """
     if os.environ.get(TOKEN_MODE) != "token" and not is_this_machine_alone(host):
         raise ConfigError(
-            f"{TOKEN_MODE} is {os.environ.get(TOKEN_MODE, '')!r} and {ADDRESS} is on {host}, which other machines may "
-            f"reach; wanted {TOKEN_MODE}=token on all nodes, with a token in RAY_AUTH_TOKEN or RAY_AUTH_TOKEN_PATH",
-            field=TOKEN_MODE,
+            TOKEN_MODE,
+            f"{os.environ.get(TOKEN_MODE, '')!r} with {ADDRESS} on {host}, which other machines may reach",
+            f"{TOKEN_MODE}=token on all nodes, with a token in RAY_AUTH_TOKEN or RAY_AUTH_TOKEN_PATH",
         )
 
 

@@ -31,8 +31,9 @@ def scratch(folder: Path) -> Iterator[Path]:
     own.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     if own.parent.stat().st_uid != os.getuid():
         raise ConfigError(
-            f"got {str(own.parent)!r}, which belongs to somebody else on this node; wanted a folder of its own",
-            field=variable("ray_scratch_dir"),
+            variable("ray_scratch_dir"),
+            f"{str(own.parent)!r}, which belongs to somebody else on this node",
+            "a folder of its own",
         )
     sweep(own.parent)
     own.mkdir()

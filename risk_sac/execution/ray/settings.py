@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from risk_sac.config.invalid import field_error
 from risk_sac.errors import ConfigError
 
 
@@ -46,8 +47,8 @@ def read_settings() -> RaySettings:
     try:
         return RaySettings()
     except ValidationError as error:
-        first = error.errors()[0]
-        raise ConfigError(f"got {first['input']!r}; {first['msg']}", field=variable(str(first["loc"][0]))) from error
+        first = field_error(error.errors()[0])
+        raise ConfigError(variable(first.field), first.got, first.expected) from error
 
 
 def variable(name: str) -> str:

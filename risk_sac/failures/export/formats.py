@@ -155,10 +155,10 @@ def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
     if format_.of != of:
         lacks = "no single failure" if of == "failure" else "no episodes of runs"
         wanted = ", ".join(names(of))
-        raise ConfigError(f"got {name.value!r}, which holds {lacks}; wanted one of: {wanted}", field="format")
+        raise ConfigError("format", f"{name.value!r}, which holds {lacks}", f"one of: {wanted}")
     if format_.missing:
-        told = ", ".join(format_.missing)
-        raise ConfigError(f"{name} needs {told}, which is not installed: {format_.remedy}", field="format")
+        got = f"{name}, which needs {', '.join(format_.missing)}, and that is not installed"
+        raise ConfigError("format", got, remedy=format_.remedy)
 
 
 def _maker(name: FormatName, of: Literal["failure", "episodes"]) -> object:

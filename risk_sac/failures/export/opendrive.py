@@ -47,7 +47,7 @@ def _netconvert(*options: str) -> None:
     done = subprocess.run(command, capture_output=True, text=True, timeout=WALL_S)
     if done.returncode:
         why = (done.stderr.strip().splitlines() or ["it ended without a word"])[0]
-        raise ConfigError(f"netconvert cannot write this net as OpenDRIVE: {why}", field="format")
+        raise ConfigError("format", f"netconvert cannot write this net as OpenDRIVE: {why}")
 
 
 def _as_of_1_7(root: ET.Element, name: str) -> ET.Element:

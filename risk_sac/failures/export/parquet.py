@@ -55,7 +55,7 @@ def _rows(folder: Path, results: Results) -> list[dict[str, Any]]:
     try:
         records = tuple(records_from_lines((folder / EPISODES).read_bytes()))
     except ValueError as error:
-        raise ConfigError(f"{folder / EPISODES} was not written by a run: {error}", field="RESULTS") from error
+        raise ConfigError("RESULTS", f"{folder / EPISODES} was not written by a run: {error}") from error
     spec = results.spec
     verified = read_verified(folder, results.digest or "")
     run = {

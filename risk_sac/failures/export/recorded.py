@@ -89,7 +89,7 @@ class Recorded:
         """That it ends in."""
         collision = self.manifest.episode.collision
         if collision is None:
-            raise ConfigError(f"{self.name} ends without a contact, so that there is no failure in it", field="BUNDLE")
+            raise ConfigError("BUNDLE", f"{self.name} ends without a contact, so that there is no failure in it")
         return collision
 
     @cached_property
@@ -175,9 +175,7 @@ def _check(manifest: Manifest, series: Series) -> None:
     wanted = dict.fromkeys(PER_FRAME, (frames, actors)) | dict.fromkeys(PER_ACTOR, (actors,))
     for name, shape in wanted.items():
         if name not in series or series[name].shape != shape or series[name].dtype.kind not in "fi":
-            raise ConfigError(
-                f"{manifest.id} has no sound array {name}, so that nothing can be told of it", field="BUNDLE"
-            )
+            raise ConfigError("BUNDLE", f"{manifest.id} has no sound array {name}, so that nothing can be told of it")
     there = np.isfinite(series["x_m"])
     if not actors or not there[0].all() or (there[1:] > there[:-1]).any():
-        raise ConfigError(f"{manifest.id} does not begin with everybody in place", field="BUNDLE")
+        raise ConfigError("BUNDLE", f"{manifest.id} does not begin with everybody in place")

@@ -36,9 +36,7 @@ def write(format_: Format, files: Files, out: Path) -> None:
         replace_file(out, packed(format_, files))
         return
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise ConfigError(
-            f"{out} is there already; wanted a new folder, an empty one, or a name that ends in .zip", field="--out"
-        )
+        raise ConfigError("--out", f"{out}, which exists", "a new folder, an empty one, or a name that ends in .zip")
     draft = out.with_name(f".{out.name}.tmp")
     shutil.rmtree(draft, ignore_errors=True)  # of one that was killed
     try:

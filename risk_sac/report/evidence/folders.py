@@ -44,7 +44,7 @@ def read_folders(paths: Sequence[Path]) -> Found:
     else:  # which of its runs a damaged results.json was of, nobody can tell; it is missing
         specs = dict(_readable(sorted((whole / RUNS).glob("*/"))))
     if not specs:
-        raise ConfigError(f"there is no run in {paths[0]}", field="RUNS")
+        raise ConfigError("RUNS", f"there is no run in {paths[0]}")
     runs: list[FinishedRun] = []
     reasons: dict[str, str] = {}
     for path, spec in specs.items():
@@ -70,13 +70,13 @@ def _campaign(runs: Sequence[RunSpec]) -> CampaignSpec:
     """The campaign that runs with these specs may be of."""
     searches, drawn = [run for run in runs if not run.iid], [run for run in runs if run.iid]
     if not searches:
-        raise ConfigError("there are only runs of an i.i.d. phase; wanted one of a search, too", field="RUNS")
+        raise ConfigError("RUNS", "only runs of an i.i.d. phase", "one of a search, too")
     for alike, names in ((runs, SHARED), (searches, ("budget",)), (drawn, ("budget", "seed"))):
         for name in names:
             other = next((run for run in alike if getattr(run, name) != getattr(alike[0], name)), None)
             if other is not None:
                 raise ConfigError(
-                    f"{alike[0].id} and {other.id} differ in their {name}; wanted runs of one campaign", field="RUNS"
+                    "RUNS", f"{alike[0].id} and {other.id}, which differ in their {name}", "runs of one campaign"
                 )
     first = searches[0]
     return CampaignSpec(

@@ -101,7 +101,8 @@ def drawn(run: FinishedRun) -> Drawn:
       ConfigError: an episode of the run belongs to another phase.
     """
     if other := {record.phase for record in run.records} - {RECORDED["iid"]}:
-        raise ConfigError(f"{run.spec.id} has episodes of the phase {min(other)!r}; wanted those of its own alone")
+        got = f"{run.spec.id} with episodes of the phase {min(other)!r}"
+        raise ConfigError("", got, "those of its own alone")
     played = [record for record in run.records if record.outcome not in NOT_PLAYED]
     unended = sum(record.outcome is Outcome.INVALID or record.reason == CRASHED for record in run.records)
 

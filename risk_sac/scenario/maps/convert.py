@@ -98,7 +98,9 @@ def netconvert() -> tuple[str, dict[str, str]]:
             return program, _environment(home)
     if program := shutil.which("netconvert"):
         return program, _environment(os.environ.get("SUMO_HOME", "/usr/share/sumo"))
-    raise MapError("this map has to be converted, and netconvert is not installed; pip install eclipse-sumo")
+    raise MapError(
+        "network", "a map that netconvert converts, and that is not installed", remedy="pip install eclipse-sumo"
+    )
 
 
 def _environment(home: str) -> dict[str, str]:
@@ -115,7 +117,7 @@ def _unpacked(file: Path, folder: Path) -> Path:
         with gzip.open(file) as source, plain.open("wb") as target:
             shutil.copyfileobj(source, target)
     except (EOFError, gzip.BadGzipFile) as error:
-        raise MapError(f"{file.name} is no whole gzip file: {error}") from error
+        raise MapError("network", f"{file.name} is no whole gzip file: {error}") from error
     return plain
 
 
@@ -131,7 +133,7 @@ def _told(file: Path) -> tuple[Format, tuple[int, ...]]:
     root = re.search(r"<([A-Za-z_][\w.-]*)([^>]*)", re.sub(r"<!--.*?-->", "", head, flags=re.DOTALL))
     if root is None or root[1] not in ROOTS:
         got = "no XML" if root is None else f"XML with the root <{root[1][:40]}>"
-        raise MapError(f"{file.name} is {got}; wanted <net> (SUMO), <osm> or <OpenDRIVE>")
+        raise MapError("network", f"{file.name}, which is {got}", "<net> (SUMO), <osm> or <OpenDRIVE>")
     version = re.search(r'version="(\d+)\.(\d+)', root[2])
     return ROOTS[root[1]], (0,) if version is None else (int(version[1]), int(version[2]))
 
@@ -143,9 +145,9 @@ def _run(format_: Format, plain: Path, out: Path, name: str) -> str:
     try:
         done = subprocess.run(command, capture_output=True, timeout=WALL_S, env=environment, check=False)
     except subprocess.TimeoutExpired:
-        raise MapError(f"converting {name} takes more than {WALL_S} s; wanted a smaller map") from None
+        raise MapError("network", f"{name}, which takes more than {WALL_S} s to convert", "a smaller map") from None
     said = done.stderr.decode("utf-8", "replace")
     if done.returncode != 0:
         why = "; ".join(remarks(said, "Error")[:5]) or f"status {done.returncode}"
-        raise MapError(f"netconvert cannot convert {name}: {why}")
+        raise MapError("network", f"netconvert cannot convert {name}: {why}")
     return said

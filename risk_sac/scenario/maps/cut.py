@@ -28,7 +28,7 @@ def read_tree(path: Path) -> ET.Element:
     try:
         return ET.parse(path).getroot()
     except ET.ParseError as error:
-        raise MapError(f"{path.name} is no XML: {error}") from error
+        raise MapError("network", f"{path.name} is no XML: {error}") from error
 
 
 def cut(net: Net, root: ET.Element, fit: Fit) -> bytes:

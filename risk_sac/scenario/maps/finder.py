@@ -36,11 +36,11 @@ def place_at(net: Net, pattern: Pattern, id_: str) -> Fit:
     """
     spot = next((spot for spot in _spots(net, (pattern,)) if spot.id == id_), None)
     if spot is None:
-        raise MapError(_nowhere(net, pattern, id_), field="place")
+        raise MapError("place", _nowhere(net, pattern, id_))
     try:
         return with_ground(net, Fit(spot, FINDERS[pattern].place(net, spot)))
     except NoFit as error:
-        raise MapError(f"{pattern} does not fit at {id_!r}: {error}", field="place") from error
+        raise MapError("place", f"{pattern} does not fit at {id_!r}: {error}") from error
 
 
 def with_ground(net: Net, fit: Fit) -> Fit:

@@ -160,20 +160,24 @@ def read_net(path: Path) -> Net:
     try:
         root = ET.parse(path).getroot()  # a net that we, the sandbox or netconvert have written
     except ET.ParseError as error:
-        raise MapError(f"{path.name} is no XML: {error}") from error
+        raise MapError("network", f"{path.name} is no XML: {error}") from error
     if root.tag != "net":
-        raise MapError(f"the root of {path.name} is <{root.tag}>; wanted <net>: convert it first")
+        raise MapError("network", f"{path.name} with the root <{root.tag}>", "<net>", "convert it first")
     if root.get("lefthand", "false").lower() in ("true", "1"):
-        raise MapError('the net has left-hand traffic (lefthand="true"); wanted right-hand traffic')
+        raise MapError("network", 'left-hand traffic (lefthand="true")', "right-hand traffic")
     try:
         net = _net(root)
     except (KeyError, ValueError, IndexError, TypeError) as error:
-        raise MapError(f"{path.name} is no net of the present format ({error!r}); run netconvert over it") from error
+        raise MapError(
+            "network", f"{path.name} is no net of the present format ({error!r})", remedy="run netconvert over it"
+        ) from error
     if not any(edge.drivable for edge in net.edges.values()):
-        raise MapError(f"none of the {len(net.edges)} edges has a lane for passenger cars")
+        raise MapError("network", f"none of the {len(net.edges)} edges has a lane for passenger cars")
     starts = {edge.start for edge in net.edges.values() if edge.drivable}
     if not net.onward and any(edge.end in starts for edge in net.edges.values()):
-        raise MapError("roads meet, but no lane leads on to another: the net lacks its <connection> elements")
+        raise MapError(
+            "network", "roads meet, but no lane leads on to another: the net lacks its <connection> elements"
+        )
     return net
 
 

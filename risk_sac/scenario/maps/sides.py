@@ -36,7 +36,7 @@ def side_remarks(file: Path) -> list[str]:
     right = [where for where, side in said if side == RIGHT]
     if left and len(left) >= len(right):
         more = f" (and {len(left) - 1} more like it)" if len(left) > 1 else ""
-        raise MapError(f"the map has left-hand traffic: {left[0]}{more}; wanted right-hand traffic")
+        raise MapError("network", f"left-hand traffic: {left[0]}{more}", "right-hand traffic")
     return [] if right else [UNKNOWN]
 
 
@@ -108,9 +108,11 @@ def _parse(file: Path, start: Callable[[str, dict[str, str]], None], end: Callab
     try:
         with file.open("rb") as stream:
             parser.ParseFile(stream)
+    except MapError:
+        raise
     except (ExpatError, KeyError, ValueError) as error:
-        raise MapError(f"{file.name} is no map: {error!r}") from error
+        raise MapError("network", f"{file.name} is no map: {error!r}") from error
 
 
 def _refuse_doctype(*_: object) -> None:
-    raise MapError("the map has a DOCTYPE; wanted a document without")
+    raise MapError("network", "a DOCTYPE", "a document without")

@@ -14,7 +14,7 @@ from typing import Annotated
 
 from fastapi import Query
 
-from service.api.answers.fields import shown
+from risk_sac.config.invalid import shown
 from service.api.answers.problems import ProblemError, invalid
 from service.schemas.problems import FieldProblem
 

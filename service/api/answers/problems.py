@@ -2,18 +2,20 @@
 
 import logging
 import math
+from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import compile_path
 
+from risk_sac.config.invalid import LONGEST_VALUE, causes, field_error, shown
 from risk_sac.errors import ConfigError
-from service.api.answers.fields import field_problems, parse, shown
 from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
 from service.schemas.problems import FieldProblem, Problem, Reason
 
@@ -102,8 +104,7 @@ def _problem(request: Request, error: Exception) -> ProblemError:
         case HTTPException():
             return _http_error(request, error)
         case ConfigError():
-            _, got, wanted = parse(said)
-            return invalid(said, FieldProblem(field=error.field, message=said, got=got, wanted=wanted))
+            return invalid(said, _field_problem(error, said))
         case NotFoundError():
             item = FieldProblem(field=error.field, message=said, got=shown(error.got), wanted="an existing id")
             return ProblemError(HTTPStatus.NOT_FOUND, Reason.UNKNOWN_ID, said, item)
@@ -124,8 +125,22 @@ def _invalid_request(error: RequestValidationError) -> ProblemError:
     if any(item["type"] == "json_invalid" for item in found):
         detail = f"the body is no JSON: {found[0]['ctx']['error']}"
         return ProblemError(HTTPStatus.BAD_REQUEST, Reason.MALFORMED_JSON, detail)
-    errors = field_problems(found, error.body)
+    errors = [_of_validation(item, error.body) for item in causes(found)]
     return invalid("; ".join(f"{item.field}: {item.message}".removeprefix(": ") for item in errors), *errors)
+
+
+def _of_validation(item: Mapping[str, Any], model: type[BaseModel] | None) -> FieldProblem:
+    """One error of a validation; `model`: what the body was to be, None where no body was validated."""
+    part, *location = item["loc"]
+    inside = location if part in ("body", "query", "path", "header") else item["loc"]
+    message = str(item["msg"]).removeprefix("Value error, ")
+    return _field_problem(field_error({**item, "loc": tuple(inside)}, model), message)
+
+
+def _field_problem(error: ConfigError, message: str) -> FieldProblem:
+    field = error.field.encode("ascii", "backslashreplace").decode()[:LONGEST_VALUE]
+    wanted = error.expected or error.remedy or message
+    return FieldProblem(field=field, message=message, got=error.got, wanted=wanted)
 
 
 def _http_error(request: Request, error: HTTPException) -> ProblemError:

@@ -74,7 +74,7 @@ def converted(data: bytes, root: str) -> tuple[bytes, list[str]]:
         sides = side_remarks(Path(MAP))
         program, environment = netconvert()
     except MapError as error:
-        raise UploadError(str(error)) from error
+        raise UploadError(str(error).removeprefix(f"{error.field}: ")) from error
     command = [program, *conversion(FORMATS[root], MAP, CONVERTED), "--xml-validation", "never"]
     done = subprocess.run(command, env=environment, capture_output=True, timeout=WALL_S, check=False)
     said = done.stderr.decode("utf-8", "replace")

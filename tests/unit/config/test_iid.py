@@ -54,7 +54,7 @@ def test_a_command_line_picks_one_of_its_runs_from_a_campaigns_file(tmp_path):
     picked = {"family": "dense", "method": "iid-random", "seed": 7}
     assert read_spec(file, picked) == spec.drawn()[3]
     assert read_spec(file, picked | {"method": "archive"}) == spec.searches()[7]
-    with pytest.raises(ConfigError, match="has no such runs"):
+    with pytest.raises(ConfigError, match="a campaign of no such runs"):
         read_spec(file, picked | {"seed": 8})
     assert read_spec(None, {"family": "low", "method": "iid-random", "episodes": 3}) == RunSpec.model_validate(
         {"family": "low", "method": "iid-random", "seed": 0, "budget": {"episodes": 3}}

@@ -72,12 +72,12 @@ def test_intersection_is_the_set_of_common_values(bounds: list[float]) -> None:
         (
             Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(25, 30))),
             "odd.dynamic.vehicle_speed_mps",
-            r"odd.dynamic.vehicle_speed_mps is \[25, 30\]; wanted an overlap with \[0, 20\]",
+            r"odd.dynamic.vehicle_speed_mps: got \[25, 30\]; wanted an overlap with \[0, 20\]",
         ),
         (
             Odd(scenery=Scenery(crossing_types=("signalised",))),
             "odd.scenery.crossing_types",
-            r"is \{signalised\}; wanted an overlap with \{none, zebra\}",
+            r"got \{signalised\}; wanted an overlap with \{none, zebra\}",
         ),
         (Odd(scenery=Scenery(signal_types=())), "odd.scenery.signal_types", "wanted at least one kind"),
         (Odd(dynamic=DynamicElements(actor_kinds=())), "odd.dynamic.actor_kinds", "wanted at least one kind"),
@@ -137,7 +137,7 @@ def test_a_set_in_the_odd_narrows_a_category(allowed: tuple[str, ...], low: floa
 
 def test_a_set_that_leaves_no_category_names_the_parameter() -> None:
     odd = Odd(scenery=Scenery(crossing_types=("none",)))
-    with pytest.raises(OddError, match=r"is \{none\}; wanted an overlap with \{zebra, signalised\}.*'crossing'"):
+    with pytest.raises(OddError, match=r"got \{none\}; wanted an overlap with \{zebra, signalised\}.*'crossing'"):
         narrow(SceneSpace("mixed", (CROSSING,)), odd)
 
 

@@ -82,7 +82,7 @@ def test_roundabouts_are_read_whatever_comes_first(extract: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ('<!DOCTYPE osm [<!ENTITY a "b">]><osm/>', "has a DOCTYPE"),
+        ('<!DOCTYPE osm [<!ENTITY a "b">]><osm/>', "got a DOCTYPE"),
         ("<osm><node", "is no map"),
         (f"<osm>{osm_roundabout(clockwise=True).replace('lat=', 'height=')}</osm>", "is no map: KeyError"),
     ],

@@ -183,7 +183,7 @@ def test_folders_without_runs_and_runs_of_different_campaigns_are_refused(tmp_pa
     for run in runs:
         (tmp_path / run.id).mkdir()
         write_results(tmp_path / run.id, Results(spec=run, spec_digest=run.digest, finished=False))
-    with pytest.raises(ConfigError, match="low-random-0 and low-random-1 differ in their ego"):
+    with pytest.raises(ConfigError, match="low-random-0 and low-random-1, which differ in their ego"):
         read_folders([tmp_path / run.id for run in runs])
 
 

@@ -33,11 +33,11 @@ def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program: str, t
     ended = start(program, tmp_path, **wrong)
     assert (ended.returncode, ended.stdout) == (2, "")
     assert ended.stderr.splitlines() == [
-        "RISK_SAC_PORT is 'http'; wanted integer ≥ 1, ≤ 65535",
-        "RISK_SAC_LOG_FORMAT is 'xml'; wanted `text` or `json`",
-        "RISK_SAC_GRACE_S is 'nan'; wanted number > 0, ≤ 600",
-        "RISK_SAC_ALLOWED_HOSTS holds 1; wanted text",
-        "RISK_SAC_CORS_ORIGINS is '*'; wanted JSON list",
+        "RISK_SAC_PORT: got 'http'; wanted integer ≥ 1, ≤ 65535",
+        "RISK_SAC_LOG_FORMAT: got 'xml'; wanted `text` or `json`",
+        "RISK_SAC_GRACE_S: got 'nan'; wanted number > 0, ≤ 600",
+        "RISK_SAC_ALLOWED_HOSTS: got 1; wanted text",
+        "RISK_SAC_CORS_ORIGINS: got '*'; wanted JSON list",
     ]
     assert list(tmp_path.iterdir()) == []
 
@@ -47,7 +47,7 @@ def test_a_missing_folder_of_secrets_ends_the_start_in_one_line(program: str, tm
     ended = start(program, tmp_path, secrets_dir="/run/no-such-secrets")
     assert (ended.returncode, ended.stdout) == (2, "")
     wanted = "which is missing; wanted a folder that has settings as files"
-    assert ended.stderr == f"RISK_SAC_SECRETS_DIR is '/run/no-such-secrets', {wanted}\n"
+    assert ended.stderr == f"RISK_SAC_SECRETS_DIR: got '/run/no-such-secrets', {wanted}\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -61,7 +61,7 @@ def test_a_file_in_place_of_the_folder_of_secrets_is_refused(tmp_path: Path) -> 
 def test_secrets_are_read_and_wrong_ones_named(tmp_path: Path) -> None:
     (tmp_path / "risk_sac_port").write_text("70000\n")
     ended = start("keys", tmp_path, secrets_dir=str(tmp_path))
-    assert (ended.returncode, ended.stderr) == (2, "RISK_SAC_PORT is '70000'; wanted integer ≥ 1, ≤ 65535\n")
+    assert (ended.returncode, ended.stderr) == (2, "RISK_SAC_PORT: got '70000'; wanted integer ≥ 1, ≤ 65535\n")
 
 
 def test_lists_are_json(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,11 +72,11 @@ def test_lists_are_json(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("value", ["a.example", "{}", '"a"', "", "7"])
 def test_what_is_no_list_is_named(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
     monkeypatch.setenv("RISK_SAC_ALLOWED_HOSTS", value)
-    with pytest.raises(ConfigError, match=r"^RISK_SAC_ALLOWED_HOSTS is .*; wanted JSON list$"):
+    with pytest.raises(ConfigError, match=r"^RISK_SAC_ALLOWED_HOSTS: got .*; wanted JSON list$"):
         read_settings()
 
 
 def test_a_long_value_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RISK_SAC_MAX_WORKERS", "9" * 5000)
-    with pytest.raises(ConfigError, match=r"^RISK_SAC_MAX_WORKERS is '9{79}…; wanted integer"):
+    with pytest.raises(ConfigError, match=r"^RISK_SAC_MAX_WORKERS: got '9{79}…; wanted integer"):
         read_settings()

@@ -1,0 +1,96 @@
+"""What a validation found, as the errors of fields."""
+
+import json
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from pydantic import BaseModel
+
+from risk_sac.errors import ConfigError
+
+LONGEST_VALUE = 200
+_EXPECTED = {
+    "greater_than": "> {gt}",
+    "greater_than_equal": ">= {ge}",
+    "less_than": "< {lt}",
+    "less_than_equal": "<= {le}",
+    "literal_error": "{expected}",
+    "enum": "{expected}",
+    "string_pattern_mismatch": "a string matching {pattern}",
+    "string_too_short": "at least {min_length} characters",
+    "string_too_long": "at most {max_length} characters",
+    "too_short": "at least {min_length} entries",
+    "too_long": "at most {max_length} entries",
+    "missing": "a value",
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "int_type": "an integer",
+    "model_type": "a JSON object",
+    "tuple_type": "a JSON array",
+}
+
+Location = tuple[int | str, ...]
+
+
+def causes(found: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Drops errors that repeat one inside them: a list is "too short" once its bad entries are dropped."""
+    locations = [item["loc"] for item in found]
+
+    def repeats(location: Location) -> bool:
+        return any(len(other) > len(location) and other[: len(location)] == location for other in locations)
+
+    return [item for item in found if not repeats(item["loc"])]
+
+
+def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -> ConfigError:
+    """Translates one of `ValidationError.errors()`.
+
+    Args:
+      item: the error.
+      model: what was validated; its fields are listed where a field is unknown.
+    """
+    location: Location = item["loc"]
+    field = dotted(location)
+    cause = item.get("ctx", {}).get("error")
+    if isinstance(cause, ConfigError):
+        return ConfigError(f"{field}.{cause.field}".strip("."), cause.got, cause.expected, cause.remedy)
+    got = "nothing" if item["type"] == "missing" else shown(item.get("input"))
+    if item["type"] == "extra_forbidden" and model is not None:
+        return ConfigError(field, got, f"one of {', '.join(_fields_at(location[:-1], model))}")
+    template = _EXPECTED.get(item["type"])
+    if template:
+        return ConfigError(field, got, template.format(**item.get("ctx", {})))
+    return ConfigError(field, got, str(item["msg"]).removeprefix("Input should be ").partition(",")[0])
+
+
+def dotted(location: Location) -> str:
+    """A location as a path: `requirements[0].name`."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).removeprefix(".")
+
+
+def shown(value: object) -> str:
+    """A value as JSON, shortened."""
+    text = json.dumps(value, default=str)  # ASCII, so that lone surrogates survive
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}…"
+
+
+def _fields_at(location: Location, model: type[BaseModel]) -> list[str]:
+    """Names of the fields at a location of a model's JSON schema."""
+    schema = _schema(model)
+    node = schema
+    for part in location:
+        node = _resolve(schema, node)
+        node = node["properties"][part] if isinstance(part, str) else node["items"]
+    return sorted(_resolve(schema, node)["properties"])
+
+
+@cache
+def _schema(model: type[BaseModel]) -> dict[str, Any]:
+    return model.model_json_schema()
+
+
+def _resolve(schema: dict[str, Any], node: dict[str, Any]) -> dict[str, Any]:
+    node = next((option for option in node.get("anyOf", []) if option.get("type") != "null"), node)
+    reference: str | None = node.get("$ref")
+    return node if reference is None else schema["$defs"][reference.rpartition("/")[2]]
