@@ -101,7 +101,7 @@ def read_results(path: Path) -> Results:
     try:
         return _RESULTS.validate_json(unseal(file.read_bytes()))
     except FileNotFoundError as error:
-        raise ConfigError("RESULTS", f"{file}, which does not exist", "the folder of a run") from error
+        raise ConfigError("RESULTS", f"there is no {file}", remedy="name the folder of a run") from error
     except DamagedError as error:
         raise ConfigError("RESULTS", f"{file} is damaged: {error}") from error
     except ValidationError as error:

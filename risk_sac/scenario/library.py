@@ -88,8 +88,8 @@ def files_of(name: str) -> tuple[bytes, bytes]:
             raise FileNotFoundError
         text, net = (folder / PLACE).read_bytes(), (folder / NET).read_bytes()
     except OSError:
-        wanted = f"low, mixed, dense, or one that lies in {library()} ({VARIABLE} names another folder)"
-        raise ConfigError("family", f"{name!r}", wanted) from None
+        remedy = f"name low, mixed, dense, or one that lies in {library()} ({VARIABLE} names another folder)"
+        raise ConfigError("family", f"there is no place {name!r}", remedy=remedy) from None
     if not name.endswith(f"_{_digest(text, net)}"):
         raise ConfigError("family", f"the place {name!r} in {library()} is damaged", remedy="find it on its map anew")
     return text, net

@@ -310,7 +310,7 @@ def test_a_bundle_that_lost_its_place_or_carries_another_is_refused(
 ) -> None:
     monkeypatch.setenv(library.VARIABLE, str(tmp_path / "places"))
     told = replayed_elsewhere(changed(placed, tmp_path / "a.npz", lambda arrays: arrays.pop(carried.NET)), tmp_path)
-    assert (told.returncode, "family: got 'junction_" in told.stderr.replace("\n", " ")) == (2, True), told.stderr
+    assert (told.returncode, "there is no place 'junction_" in told.stderr.replace("\n", " ")) == (2, True), told.stderr
     doctype = np.frombuffer(b"<!DOCTYPE net [<!ENTITY a 'b'>]><net/>", dtype=np.uint8)
     with pytest.raises(ConfigError, match="DOCTYPE"):
         read_bundle(changed(placed, tmp_path / "b.npz", lambda arrays: arrays.update({carried.NET: doctype})))

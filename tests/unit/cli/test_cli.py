@@ -136,10 +136,7 @@ def test_show_names_the_known_contacts(folder: Path, unknown: str, capsys: pytes
 
 def test_show_refuses_a_folder_without_results(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["show", str(tmp_path)]) == 2
-    assert (
-        capsys.readouterr().err
-        == f"RESULTS: got {tmp_path / 'results.json'}, which does not exist; wanted the folder of a run\n"
-    )
+    assert capsys.readouterr().err.startswith("RESULTS: there is no ")
 
 
 def test_show_refuses_what_run_did_not_write(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

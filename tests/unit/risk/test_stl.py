@@ -310,7 +310,7 @@ def test_no_requirements_give_no_robustness() -> None:
 
 GAP, TTC = "vehicle_gap_m >= 1", "ttc_s >= 1"
 BAD: list[tuple[str, int | None, str]] = [  # formula, position, reason
-    ("always(ttc_s >= 1)", 0, "'always' looks into the future.*use the past-time operator 'historically'"),
+    ("always(ttc_s >= 1)", 0, "'always', which looks into the future.*wanted the past-time operator 'historically'"),
     ("G[0,1](ttc_s >= 1)", 0, "'G'.*'historically'"),
     ("not eventually[0,1](ttc_s >= 1)", 4, "'eventually'.*'once'"),
     ("F(ttc_s >= 1)", 0, "'F'.*'once'"),

@@ -125,7 +125,7 @@ def test_a_kept_place_that_was_changed_is_refused(town: Map, tmp_path: Path, mon
     net.write_bytes(net.read_bytes() + b" ")
     with pytest.raises(ConfigError, match="damaged"):
         library.kept(name)
-    with pytest.raises(ConfigError, match="got 'junction_000000000000'"):
+    with pytest.raises(ConfigError, match="there is no place 'junction_000000000000'"):
         family_named("junction_000000000000")
 
 
