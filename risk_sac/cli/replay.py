@@ -54,7 +54,7 @@ def _replay(options: argparse.Namespace) -> int:
     from risk_sac.env import RiskSacEnv
     from risk_sac.failures.bundle import check_world, code_digest, read_bundle, versions
     from risk_sac.failures.play import play
-    from risk_sac.failures.trajectory import actions_of, trajectory_digest
+    from risk_sac.failures.recording import actions_of, trajectory_digest
 
     bundle = read_bundle(options.bundle)
     manifest = bundle.manifest

@@ -113,7 +113,7 @@ def _minimise(options: argparse.Namespace) -> int:
 
 
 def _region(options: argparse.Namespace) -> int:
-    from risk_sac.failures.region import region
+    from risk_sac.failures.variants import region
 
     asked = _asked(options)
     if options.out is not None:

@@ -23,8 +23,8 @@ from pydantic import ValidationError
 from risk_sac.config import SHIPPED, RunSpec
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.failures.carried import carried, unpack
-from risk_sac.failures.core import Core
-from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
+from risk_sac.failures.recording import Series, actions_of, trajectory_digest
+from risk_sac.failures.studied import Core
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, Record
@@ -56,7 +56,7 @@ class Manifest(Record):
     world: Mapping[str, str]
     """File of the road network or of the vehicle types → its SHA-256."""
     digest: str
-    """Of the series, see `risk_sac.failures.trajectory.trajectory_digest`."""
+    """Of the series, see `risk_sac.failures.recording.trajectory_digest`."""
     core: Core | None = None
     """Of what was minimised."""
 

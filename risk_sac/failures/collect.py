@@ -14,7 +14,7 @@ from risk_sac.env import RiskSacEnv
 from risk_sac.errors import CheckpointError
 from risk_sac.failures.bundle import Bundle, make_bundle
 from risk_sac.failures.play import check_release, repeated
-from risk_sac.failures.trajectory import Series
+from risk_sac.failures.recording import Series
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.records import EpisodeRecord
 from risk_sac.run import RunState

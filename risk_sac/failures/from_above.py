@@ -9,8 +9,17 @@ from matplotlib.patches import Polygon
 from risk_sac.config import FamilyName
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.roads import roads_of
-from risk_sac.failures.style import BYSTANDER_COLOUR, CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, legend
 from risk_sac.types import Kind, Role
+
+EGO_COLOUR, OTHER_COLOUR, BYSTANDER_COLOUR = "tab:blue", "tab:red", "tab:gray"
+SEEN_COLOUR, CONFLICT_COLOUR, RELEASE_COLOUR = "tab:green", "tab:orange", "tab:purple"  # of instants
+HIDDEN_COLOUR = "0.9"
+
+
+def legend(axis: Axes, title: str | None = None) -> None:
+    """Beside the axes, so that it covers nothing."""
+    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, frameon=False, title=title, title_fontsize=7)
+
 
 SURFACE_COLOURS = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
 GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the contact, where the two bodies are drawn as well

@@ -12,9 +12,9 @@ from typing import TypeVar
 import numpy as np
 
 from risk_sac.failures.bundle import Bundle, make_bundle
-from risk_sac.failures.core import Core, Extent
 from risk_sac.failures.play import play
 from risk_sac.failures.sentence import sentence
+from risk_sac.failures.studied import Core, Extent
 from risk_sac.failures.variants import Stage, Variant, alike
 from risk_sac.records import Collision, Grade
 from risk_sac.types import STEP_S, Bools, Floats

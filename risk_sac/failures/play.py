@@ -1,17 +1,20 @@
 """An episode played with given actions: as it was recorded, or as it might have been."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.config import RunSpec
+from risk_sac.config import EgoConfig, RunSpec, method_of
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, SimulationError
-from risk_sac.failures.trajectory import Series, actions_of, trajectory_digest
+from risk_sac.failures.question import TwinPlay
+from risk_sac.failures.recording import Recording, Series, actions_of, trajectory_digest
+from risk_sac.problem import Problem
 from risk_sac.records import Collision, EpisodeRecord
-from risk_sac.types import Floats, Scene, Vector
+from risk_sac.types import STEP_S, Floats, Scene, Vector
 
 Policy = Callable[[Vector], Vector]
 """From an observation to an action."""
@@ -83,3 +86,43 @@ def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: S
     if trajectory_digest(played.series) != trajectory_digest(recorded):
         raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here")
     return played
+
+
+AFTER_S = 3.0  # how long a twin goes on after the contact that it is compared with
+
+
+def twin_recording(spec: RunSpec, recording: Recording, changed: EgoConfig | None, name: str = "") -> Recording:
+    """The twin of a recorded failure, to be drawn beside it; see `twin`.
+
+    Args:
+      spec: of the run that found it.
+      recording: of the failure.
+      changed: the other ego, or None.
+      name: of the other ego; its profile if not given.
+    """
+    played = twin(spec, recording.contact.episode, actions_of(recording.series), changed)
+    return replace(recording, series=played.series, twin=TwinPlay.of(changed, played.collision, name).title)
+
+
+def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoConfig | None) -> Played:
+    """Plays a failure's episode once more with another ego, or with nobody who attacks.
+
+    Args:
+      spec: of the run that found it.
+      episode: of the failure.
+      actions: since the release, `T x a`.
+      changed: the other ego; None to leave the adversaries to SUMO and to let pedestrians stand.
+
+    Raises:
+      ConfigError: the other ego poses no problem that can be run.
+      InfeasibleScene: with the other ego, traffic is in danger already when the adversaries are released.
+    """
+    if changed is not None:
+        spec = spec.model_copy(update={"ego": changed})
+    problem = Problem.from_spec(spec)
+    steps = min(len(actions) + round(AFTER_S / STEP_S), problem.family.horizon_steps)
+    longer = np.zeros((steps, actions.shape[1]), dtype=actions.dtype)
+    longer[: len(actions)] = actions[:steps]
+    attacked = changed is not None and method_of(spec.method).agent != "none"
+    with closing(RiskSacEnv(problem, spec.learner.reward, controlled=attacked)) as env:
+        return play(env, Scene(spec.family, episode.scene), episode.seed, longer)

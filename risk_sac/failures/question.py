@@ -1,11 +1,16 @@
 """What can be asked of a failure by whoever must not load the simulator; see `risk_sac.failures.study`."""
 
+import io
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.records import EpisodeRecord, Record
+from risk_sac.records import Collision, EpisodeRecord, Record
 
 IDLE = "idle"
 Twin = Literal["idle", "default", "perfect", "careful"]
@@ -26,3 +31,51 @@ class Question(Record):
     """The other ego of a twin; null: nobody attacks."""
     format: FormatName | None = None
     """Of an export, which."""
+
+
+TOLD = "twin"  # in the file, beside the arrays of the time series
+
+
+class TwinPlay(Record):
+    """What was changed in a scene, and what came of it."""
+
+    changed: str
+    """Such as "nobody attacks"."""
+    outcome: str
+    """Such as "touches nobody"."""
+    collision: Collision | None
+    """The ego's first contact, if it touched somebody."""
+
+    @classmethod
+    def of(cls, ego: EgoConfig | None, collision: Collision | None, name: str = "") -> Self:
+        """A twin in words.
+
+        Args:
+          ego: the other ego, or None: nobody attacked.
+          collision: that it ended in, if it did.
+          name: of the other ego; its driver's or its profile's if not given.
+        """
+        changed = "nobody attacks" if ego is None else f"ego: {name or ego.driver or ego.profile}"
+        touches = (
+            f"touches {collision.other_id} at {collision.ego_speed_mps:.1f} m/s" if collision else "touches nobody"
+        )
+        return cls(changed=changed, outcome=touches, collision=collision)
+
+    @property
+    def title(self) -> str:
+        """Of its picture."""
+        return f"{self.changed}: {self.outcome}"
+
+
+def twin_bytes(play: TwinPlay, series: Mapping[str, NDArray[Any]]) -> bytes:
+    """A twin with its time series as an .npz."""
+    file = io.BytesIO()
+    np.savez_compressed(file, allow_pickle=False, **series, **{TOLD: np.array(play.model_dump_json())})
+    return file.getvalue()
+
+
+def read_twin(content: bytes) -> tuple[TwinPlay, dict[str, NDArray[Any]]]:
+    """A twin and its time series from what `twin_bytes` wrote."""
+    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    return TwinPlay.model_validate_json(str(arrays.pop(TOLD))), arrays

@@ -23,7 +23,7 @@ from risk_sac.failures.bundle import Bundle, check_world, code_digest, make_bund
 from risk_sac.failures.cases import Case, Verdict
 from risk_sac.failures.collect import policy_of, recorded_bundle
 from risk_sac.failures.play import Played, Policy, play
-from risk_sac.failures.trajectory import actions_of, trajectory_digest
+from risk_sac.failures.recording import actions_of, trajectory_digest
 from risk_sac.failures.variants import alike
 from risk_sac.records import Collision, Outcome
 from risk_sac.run_folder.results import read_results

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from risk_sac.failures.trajectory import Series
+from risk_sac.failures.recording import Series
 from risk_sac.records import Collision
 from risk_sac.types import STEP_S, Floats, Kind
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS

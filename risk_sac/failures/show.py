@@ -3,20 +3,157 @@
 Where the contact was judged, the moment at which the conflict began is marked as well.
 """
 
+import textwrap
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from risk_sac.canvas import canvas, picture
 from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
-from risk_sac.failures.caption import caption
-from risk_sac.failures.from_above import draw_from_above
-from risk_sac.failures.panels import PANELS, mark_instants, name_instants
+from risk_sac.failures.from_above import (
+    CONFLICT_COLOUR,
+    EGO_COLOUR,
+    HIDDEN_COLOUR,
+    OTHER_COLOUR,
+    RELEASE_COLOUR,
+    SEEN_COLOUR,
+    draw_from_above,
+    legend,
+)
 from risk_sac.failures.recording import Recording
+from risk_sac.records import Collision, Grade
+from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.types import Floats
+
+WIDTH = 120  # characters that the page holds
+PREVENTED = {
+    Grade.CAREFUL: "a careful driver would have prevented it",
+    Grade.IDEAL: "only full braking at once would have prevented it",
+    Grade.UNAVOIDABLE: "not even full braking at once would have prevented it",
+}
+
+
+def caption(family: FamilyName, recording: Recording) -> str:
+    """Which contact of which run, what touched what, and what its judgement says; no line is too long for the page."""
+    episode, collision = recording.contact.episode, recording.collision
+    failed = f" · failed rules: {_words(episode.reason)}" if episode.reason else ""
+    lines = [
+        f"{family} · episode {recording.contact.id} · {episode.outcome}{failed}",
+        f"the ego's {collision.ego_zone}, at {collision.ego_speed_mps:.1f} m/s, touched the {collision.other_zone} of "
+        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {_seen(collision)}",
+        *_judged(collision),
+    ]
+    return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
+
+
+def _seen(collision: Collision) -> str:
+    seen_s = collision.visible_for_s
+    return f"which it had seen for {seen_s:.1f} s" if seen_s > 0 else "which it had not seen"
+
+
+def _judged(collision: Collision) -> list[str]:
+    """Lines with its kind, how it began, who would have prevented it, and whether the striker was in the wrong."""
+    judgement = collision.judgement
+    if judgement is None:
+        return []
+    before_s = collision.time_s - judgement.conflict_s
+    grade = "" if judgement.grade is None else f" · grade {judgement.grade}: {PREVENTED[judgement.grade]}"
+    return [
+        judgement.signature,
+        f"the conflict began {before_s:.1f} s before the contact{grade}",
+        f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'}",
+    ]
+
+
+def _words(names: str) -> str:
+    return names.replace("_", " ")
+
+
+def _speeds(axis: Axes, recording: Recording) -> None:
+    _both(axis, recording, "speed_mps")
+    axis.set_ylabel("speed\nm/s")
+    if any(True for _ in recording.hidden()):
+        axis.add_patch(Rectangle((0, 0), 0, 0, color=HIDDEN_COLOUR, label="hidden from the ego"))
+    legend(axis)
+
+
+def _accelerations(axis: Axes, recording: Recording) -> None:
+    _both(axis, recording, "accel_mps2")
+    axis.set_ylabel("acceleration\nm/s²")
+
+
+def _both(axis: Axes, recording: Recording, name: str) -> None:
+    for actor, colour in ((0, EGO_COLOUR), (recording.other, OTHER_COLOUR)):
+        label = str(recording.series["ids"][actor])
+        axis.plot(recording.time_s, recording[name][:, actor], color=colour, linewidth=1.2, label=label)
+
+
+def _distance(axis: Axes, recording: Recording) -> None:
+    axis.plot(recording.time_s, recording["distance_m"][:, recording.other], color="black", linewidth=1.2)
+    axis.set_ylabel("distance\nm")
+    axis.set_ylim(bottom=0)
+
+
+def _ttc(axis: Axes, recording: Recording) -> None:
+    axis.plot(recording.time_s, recording["ttc_s"][:, recording.other], color="black", linewidth=1.2)
+    axis.set(ylabel=f"time to\ncollision, s\n({TTC_CAP_S:g}: none)", ylim=(0, TTC_CAP_S * 1.05))
+
+
+def _robustness(axis: Axes, recording: Recording) -> None:
+    for name, values in zip(recording.series["requirements"], recording["robustness"].T, strict=True):
+        axis.plot(recording.time_s, values, linewidth=0.9, label=str(name))
+    axis.plot(
+        recording.time_s, recording["soft_min"], color="black", linestyle="--", linewidth=1.4, label="soft minimum"
+    )
+    axis.axhline(0, color="0.6", linewidth=0.6)
+    axis.set_ylabel("requirements\nbroken below 0")
+    legend(axis)
+
+
+PANELS: tuple[Callable[[Axes, Recording], None], ...] = (_speeds, _accelerations, _distance, _ttc, _robustness)
+
+
+def mark_instants(axis: Axes, recording: Recording) -> None:
+    """Upright lines at the instants, and grey ground where the ego did not see the other."""
+    axis.grid(visible=True, linewidth=0.3)
+    for start, end in recording.hidden():
+        axis.axvspan(start, end, color=HIDDEN_COLOUR, zorder=0)
+    for time_s, _, colour in _instants(recording):
+        axis.axvline(time_s, color=colour, linewidth=1.0, linestyle="--" if time_s == 0 else ":")
+
+
+def name_instants(axis: Axes, recording: Recording) -> None:
+    """Names above the first panel, each in a row of its own so that they do not cover each other."""
+    for row, (time_s, name, colour) in enumerate(_instants(recording)):
+        axis.annotate(
+            name,
+            (time_s, 1),
+            (0, 3 + 9 * row),
+            xycoords=axis.get_xaxis_transform(),
+            textcoords="offset points",
+            va="bottom",
+            ha="right" if time_s == 0 else "left",
+            fontsize=7,
+            color=colour,
+            annotation_clip=True,
+        )
+
+
+def _instants(recording: Recording) -> Iterator[tuple[float, str, str]]:
+    """What there is to mark: when, its name, and its colour."""
+    yield 0.0, "contact of the failure" if recording.twin else "contact", "black"
+    if recording.collision.visible_for_s > 0 and not recording.twin:
+        yield recording.time_s[-1] - recording.collision.visible_for_s, "in the ego's view from here", SEEN_COLOUR
+    yield recording.released_s, "adversaries released", RELEASE_COLOUR
+    if recording.conflict_s is not None:
+        yield recording.conflict_s, "conflict begins", CONFLICT_COLOUR
+
 
 VIEW_S, PANELS_S = 3.0, 8.0  # before the contact: what the view from above holds, and the panels
 MARGIN_M = 5.0

@@ -4,12 +4,77 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from pydantic import ValidationError
+from pydantic import ValidationError, computed_field
 
-from risk_sac.failures.core import Core
-from risk_sac.failures.surroundings import Region
+from risk_sac.metrics import wilson_interval
 from risk_sac.records import Record
 from risk_sac.run_folder.durable import replace_file
+
+
+class Extent(Record):
+    """How much the adversaries do."""
+
+    adversaries: int
+    """That do anything but drive on as SUMO's drivers would, or walk on."""
+    segments: int
+    """Segments of 0.5 s of an adversary in which it does."""
+    channels: int
+    """Of these, drive and steering counted apart."""
+    strongest: float
+    """Greatest action, of 1."""
+
+
+class Core(Record):
+    """What was left of a failure, and how surely it fails."""
+
+    before: Extent
+    after: Extent
+    plain_parameters: int
+    """Of the scene, in the middle of their ranges."""
+    parameters: int
+    """Without those that stand for one of two categories."""
+    episodes: int
+    """That were played to find it."""
+    held: int
+    """Copies, perturbed by up to 1 %, that still fail; other ones than those that the reductions were chosen by."""
+    copies: int
+    sentence: str
+    """What happens, in words."""
+
+
+NEEDLE = 0.5
+
+
+class Share(Record):
+    """Of the copies that differ from a failure in one way, those that fail as it does."""
+
+    what: str
+    """In which way they differ."""
+    failed: int
+    played: int
+    low: float
+    """Wilson's 95 % interval of the share."""
+    high: float
+
+    @classmethod
+    def of(cls, what: str, failed: int, played: int) -> "Share":
+        """With its interval."""
+        low, high = wilson_interval(failed, played)
+        return cls(what=what, failed=failed, played=played, low=low, high=high)
+
+
+class Region(Record):
+    """What surrounds a failure; the shares in the order of `region`."""
+
+    shares: tuple[Share, ...]
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def needle(self) -> bool:
+        """Whether fewer than half of the nearest scenes fail: a failure that one would hardly meet again."""
+        nearest = self.shares[0]
+        return nearest.failed < NEEDLE * nearest.played
+
 
 STUDIES = "studies"
 _NAME = re.compile(r"([0-9]{1,9})-(?:core|region)\.json", re.ASCII)

@@ -14,12 +14,10 @@ from risk_sac.failures.export.formats import FORMATS, of_failure
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.export.written import packed
 from risk_sac.failures.minimise import minimise
-from risk_sac.failures.play import repeated
-from risk_sac.failures.question import REFUSED, Question
-from risk_sac.failures.region import region
-from risk_sac.failures.trajectory import actions_of
-from risk_sac.failures.twin import twin
-from risk_sac.failures.twin_play import TwinPlay, twin_bytes
+from risk_sac.failures.play import repeated, twin
+from risk_sac.failures.question import REFUSED, Question, TwinPlay, twin_bytes
+from risk_sac.failures.recording import actions_of
+from risk_sac.failures.variants import region
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.run_folder.results import FAILURES, read_results
 from risk_sac.run_folder.series import read_series

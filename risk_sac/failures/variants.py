@@ -1,6 +1,7 @@
 """A failure's episode as it might have been: in another scene, with other actions, in other traffic."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import closing
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +9,8 @@ import numpy as np
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, EgoFailed, InfeasibleScene, SimulationError
 from risk_sac.failures.bundle import Bundle, check_world
-from risk_sac.failures.trajectory import actions_of
+from risk_sac.failures.recording import actions_of
+from risk_sac.failures.studied import Region, Share
 from risk_sac.records import Collision
 from risk_sac.scenario.space import SceneSpace
 from risk_sac.sim.sumo import OFF_ROAD
@@ -115,3 +117,35 @@ def alike(found: Collision | None, wanted: Collision) -> bool:
 def _with_tail(actions: Floats, horizon_steps: int) -> Floats:
     steps = min(round(TAIL_S / STEP_S), horizon_steps - len(actions))
     return np.vstack((actions, np.zeros((steps, actions.shape[1]), dtype=actions.dtype)))
+
+
+SCENES, COPIES = (0.01, 0.02, 0.05), 40  # shares of the ranges of a scene's parameters, and copies at each
+SEEDS = 10  # of the traffic
+ACTIONS = 0.05
+
+
+def region(bundle: Bundle) -> Region:
+    """Plays a failure in scenes near its own, in other traffic, and with other actions: 170 episodes.
+
+    An episode fails as it did if it ends in a valid contact with the same striker, in the same type of conflict.
+
+    Raises:
+      ConfigError: the bundle holds no valid failure that can be played here.
+      SimulationError: it does not happen here.
+    """
+    stage = Stage(bundle)
+    with closing(stage.env):
+        return Region(shares=tuple(_share(stage, what, variants) for what, variants in _neighbours(stage)))
+
+
+def _neighbours(stage: Stage) -> Iterator[tuple[str, list[Variant]]]:
+    original, space, random = stage.original, stage.space, np.random.default_rng(0)
+    for share in SCENES:
+        yield f"scene by {share:.0%}", [original.perturbed(space, share, 0.0, random) for _ in range(COPIES)]
+    yield "other traffic", [replace(original, seed=original.seed + 1 + i) for i in range(SEEDS)]
+    yield f"actions by {ACTIONS:.0%}", [original.perturbed(space, 0.0, ACTIONS, random) for _ in range(COPIES)]
+
+
+def _share(stage: Stage, what: str, variants: Iterable[Variant]) -> Share:
+    failed = [stage.fails(variant) for variant in variants]
+    return Share.of(what, sum(failed), len(failed))

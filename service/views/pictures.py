@@ -4,9 +4,8 @@ import hashlib
 from dataclasses import dataclass, field, replace
 
 from risk_sac import __version__
-from risk_sac.failures.question import Twin
+from risk_sac.failures.question import Twin, read_twin
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.twin_play import read_twin
 from risk_sac.run_folder.results import Contact
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign, StoredEpisode, StoredRun

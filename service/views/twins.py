@@ -1,7 +1,6 @@
 """A contact's twin as a body."""
 
-from risk_sac.failures.question import Twin
-from risk_sac.failures.twin_play import read_twin
+from risk_sac.failures.question import Twin, read_twin
 from service.schemas.episodes import Collision
 from service.schemas.failures import TwinPlay
 from service.views.series import series_body

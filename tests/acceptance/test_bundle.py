@@ -22,7 +22,7 @@ from risk_sac.cli import main
 from risk_sac.errors import ConfigError
 from risk_sac.failures import carried
 from risk_sac.failures.bundle import MANIFEST, MOST_ARRAYS, MOST_FILE_BYTES, read_bundle
-from risk_sac.failures.trajectory import trajectory_digest
+from risk_sac.failures.recording import trajectory_digest
 from risk_sac.run_folder.results import read_results
 from risk_sac.scenario import library
 

@@ -21,8 +21,8 @@ from risk_sac.failures.cases import Regression, Verdict
 from risk_sac.failures.collect import bundles, policy_of
 from risk_sac.failures.minimise import COPIES, MOST, SHARE
 from risk_sac.failures.play import play
+from risk_sac.failures.recording import actions_of
 from risk_sac.failures.regress import regress, regress_run
-from risk_sac.failures.trajectory import actions_of
 from risk_sac.failures.variants import Stage
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.report import read_run

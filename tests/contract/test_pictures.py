@@ -15,7 +15,7 @@ import pytest
 from risk_sac import cli
 from risk_sac.client import Client, Refused, Series
 from risk_sac.failures import show
-from risk_sac.failures.twin_play import TwinPlay, twin_bytes
+from risk_sac.failures.question import TwinPlay, twin_bytes
 from risk_sac.run_folder.results import FAILURES, series_name
 from service.settings import ServiceSettings
 from service.store.database import READERS

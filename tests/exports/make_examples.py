@@ -16,7 +16,7 @@ from risk_sac.failures.export.formats import FORMATS, FormatName, names, of_epis
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.export.written import write
 from risk_sac.failures.play import play
-from risk_sac.failures.trajectory import actions_of
+from risk_sac.failures.recording import actions_of
 from risk_sac.types import Scene
 
 FOLDER = Path(__file__).with_name("examples")

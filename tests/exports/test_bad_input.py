@@ -68,7 +68,7 @@ def test_a_net_that_is_gone_or_another_one_is_named(
 def test_a_bundle_that_lacks_an_array_or_a_contact_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from risk_sac.failures.trajectory import trajectory_digest
+    from risk_sac.failures.recording import trajectory_digest
 
     with np.load(BUNDLE) as archive:
         arrays = {name: archive[name] for name in archive.files}

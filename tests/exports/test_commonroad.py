@@ -11,8 +11,7 @@ import pytest
 
 from risk_sac.failures.export.commonroad import ACTORS, LANELETS
 from risk_sac.failures.export.formats import FORMATS, FormatName, commonroad_python
-from risk_sac.failures.export.recorded import Recorded
-from risk_sac.failures.export.signals import colour
+from risk_sac.failures.export.recorded import Recorded, colour
 from tests.exports.conftest import CHECKERS, CM, ask, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
 

@@ -10,8 +10,7 @@ import shapely
 from lxml import etree
 
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.failures.export.recorded import Actor, Recorded
-from risk_sac.failures.export.signals import colour
+from risk_sac.failures.export.recorded import Actor, Recorded, colour
 from tests.exports.conftest import CM, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
 

@@ -10,8 +10,7 @@ import numpy as np
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from risk_sac.failures.export.formats import Files
-from risk_sac.failures.export.recorded import Actor, Recorded
-from risk_sac.failures.export.signals import colour
+from risk_sac.failures.export.recorded import Actor, Recorded, colour
 from risk_sac.failures.roads import Surface, read_surfaces
 from risk_sac.failures.sentence import sentence
 from risk_sac.types import STEP_S, Floats

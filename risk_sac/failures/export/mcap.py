@@ -38,11 +38,10 @@ from foxglove.messages import (
     Vector3,
 )
 
-from risk_sac.failures.export.beside import BESIDE, beside
 from risk_sac.failures.export.formats import Files
 from risk_sac.failures.export.net import Lane, boundaries
-from risk_sac.failures.export.recorded import Actor, Recorded
-from risk_sac.failures.export.signals import colour
+from risk_sac.failures.export.recorded import Actor, Recorded, colour
+from risk_sac.failures.export.written import BESIDE, beside
 from risk_sac.failures.sentence import sentence
 from risk_sac.types import Floats
 

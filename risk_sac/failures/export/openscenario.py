@@ -11,13 +11,10 @@ from datetime import datetime
 import numpy as np
 from scenariogeneration import xosc
 
-from risk_sac.failures.export.beside import BESIDE, beside
 from risk_sac.failures.export.formats import Files
-from risk_sac.failures.export.markup import document
 from risk_sac.failures.export.opendrive import opendrive
-from risk_sac.failures.export.recorded import Actor, Recorded
-from risk_sac.failures.export.route import goal
-from risk_sac.failures.export.signals import colour, cycle
+from risk_sac.failures.export.recorded import Actor, Recorded, colour, cycle, goal
+from risk_sac.failures.export.written import BESIDE, beside, document
 from risk_sac.types import STEP_S
 
 VERSION = 2  # of OpenSCENARIO 1

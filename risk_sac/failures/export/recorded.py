@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import WORLD, Bundle, Manifest, check_world
-from risk_sac.failures.export.net import Net, read_net
-from risk_sac.failures.trajectory import Series
+from risk_sac.failures.export.net import Lane, Net, read_net
+from risk_sac.failures.recording import Series
 from risk_sac.problem import Problem
 from risk_sac.records import Collision
 from risk_sac.scenario.layout import Layout
@@ -179,3 +179,70 @@ def _check(manifest: Manifest, series: Series) -> None:
     there = np.isfinite(series["x_m"])
     if not actors or not there[0].all() or (there[1:] > there[:-1]).any():
         raise ConfigError("BUNDLE", f"{manifest.id} does not begin with everybody in place")
+
+
+BEYOND_M = 60.0  # into the last road, where a free ego has been through what the failure is about
+
+
+def goal(failure: Recorded) -> tuple[Lane, Floats]:
+    """The lane on the ego's last road that its own lane leads to, and a place on it: x, y and heading.
+
+    On the only road of its route, its own lane, and that lane's end.
+    """
+    start = failure.layout.ego
+    lanes, last = failure.net.lanes, start.route[-1]
+    reached, ahead = None, [lanes[f"{start.route[0]}_{start.lane}"]]
+    known = {ahead[0].id}
+    while ahead and reached is None:
+        lane = ahead.pop(0)
+        if lane.edge == last:
+            reached = lane
+        for name in lane.next:
+            if name in lanes and name not in known and (lanes[name].edge in start.route or lanes[name].use == "inside"):
+                known.add(name)
+                ahead.append(lanes[name])
+    if reached is None:  # its route asks for another lane than the one that it starts in
+        reached = next(lane for lane in lanes.values() if lane.edge == last and lane.use == "road")
+    return reached, _place(reached.centre, np.inf if len(start.route) == 1 else BEYOND_M)
+
+
+def _place(line: Floats, along_m: float) -> Floats:
+    """x, y and heading so far along a line, or at its end."""
+    sides = np.diff(line, axis=0)
+    lengths = np.linalg.norm(sides, axis=1)
+    station = np.concatenate(([0.0], np.cumsum(lengths)))
+    side = min(int(np.searchsorted(station[1:], along_m)), len(sides) - 1)
+    part = min((along_m - station[side]) / lengths[side], 1.0)
+    x, y = line[side] + sides[side] * part
+    return np.array([x, y, np.arctan2(sides[side, 1], sides[side, 0])])
+
+
+COLOURS = {"r": "red", "u": "red_yellow", "y": "yellow", "g": "green", "o": "off", "s": "green"}
+"""SUMO's letter, in lower case → colour; o and O are a signal that is off."""
+
+
+def cycle(failure: Recorded, signal: str) -> list[tuple[int, str]]:
+    """Steps and letters of a signal's phases from the first frame on.
+
+    Its program, which begins where it was then; where something else was recorded, that, which then ends the list.
+    """
+    shown = [bytes(row).decode() for row in failure.heads[signal]]
+    program = failure.net.signals[signal]
+    steps = round(program.cycle_s / STEP_S)
+    turning = [program.letters(failure.offset_s(signal, frame)) for frame in range(max(steps, len(shown)))]
+    return _runs(turning[:steps] if turning[: len(shown)] == shown else shown)
+
+
+def _runs(letters: list[str]) -> list[tuple[int, str]]:
+    runs: list[tuple[int, str]] = []
+    for each in letters:
+        if runs and runs[-1][1] == each:
+            runs[-1] = (runs[-1][0] + 1, each)
+        else:
+            runs.append((1, each))
+    return runs
+
+
+def colour(letter: str) -> str:
+    """Of one of SUMO's letters."""
+    return COLOURS.get(letter.lower(), "off")

@@ -9,7 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names
 from risk_sac.failures.question import Twin
-from risk_sac.failures.surroundings import Region
+from risk_sac.failures.studied import Region
 from service.api.access import CurrentCaller
 from service.api.answers.made import CROWDED, LACKING, check_installed, crowded
 from service.api.answers.problems import ProblemError

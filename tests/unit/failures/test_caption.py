@@ -1,7 +1,7 @@
 from dataclasses import replace
 
-from risk_sac.failures.caption import WIDTH, caption
 from risk_sac.failures.recording import Recording
+from risk_sac.failures.show import WIDTH, caption
 from risk_sac.records import Grade, Outcome
 from tests.unit.failures.staged import JUDGED, synthetic_contact, with_release
 

@@ -4,9 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.failures.core import Core, Extent
-from risk_sac.failures.studied import STUDIES, Studied, edition, note, read_studies
-from risk_sac.failures.surroundings import Region, Share
+from risk_sac.failures.studied import STUDIES, Core, Extent, Region, Share, Studied, edition, note, read_studies
 
 CORE = Core(
     before=Extent(adversaries=2, segments=9, channels=12, strongest=1.0),

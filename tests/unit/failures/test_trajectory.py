@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from risk_sac.failures.trajectory import actions_of, trajectory_digest
+from risk_sac.failures.recording import actions_of, trajectory_digest
 
 
 def series() -> dict[str, np.ndarray]:

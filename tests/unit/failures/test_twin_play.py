@@ -3,7 +3,7 @@ import math
 import numpy as np
 
 from risk_sac.config import EgoConfig
-from risk_sac.failures.twin_play import TwinPlay, read_twin, twin_bytes
+from risk_sac.failures.question import TwinPlay, read_twin, twin_bytes
 from tests.builders import collision
 from tests.unit.failures.staged import synthetic_series
 

@@ -9,9 +9,7 @@ import pytest
 
 from risk_sac.config import METHODS
 from risk_sac.errors import ConfigError
-from risk_sac.failures.core import Core, Extent
-from risk_sac.failures.studied import Studied
-from risk_sac.failures.surroundings import Region, Share
+from risk_sac.failures.studied import Core, Extent, Region, Share, Studied
 from risk_sac.metrics import results_digest
 from risk_sac.report import (
     compare,

@@ -1,7 +1,7 @@
 import json
 import math
 
-from risk_sac.failures.twin_play import TwinPlay, twin_bytes
+from risk_sac.failures.question import TwinPlay, twin_bytes
 from service.views.twins import twin_body
 from tests.builders import collision, judgement
 from tests.unit.service.views.test_series import arrays
