@@ -11,23 +11,22 @@ from tests.server import ROOT
 POLLERS, STREAMS, SECONDS = 20, 5, 5
 
 
-def generate(service, campaigns, seconds, go_on):
+def generate(service, campaigns, seconds):
     """What a generator in a process of its own saw."""
     options = {"port": service.port, "pollers": POLLERS, "streams": STREAMS, "seconds": seconds, "stays": 1}
     flags = [f"--{name}={value}" for name, value in options.items()]
-    command = [sys.executable, "-m", "tests.load.generator", *flags, f"--go-on={go_on}", *campaigns]
+    command = [sys.executable, "-m", "tests.load.generator", *flags, *campaigns]
     return json.loads(subprocess.run(command, cwd=ROOT, check=False, stdout=subprocess.PIPE).stdout)
 
 
-def test_pollers_and_streams_see_all_without_an_error_and_leave_nothing_open(serve, tmp_path):
+def test_pollers_and_streams_see_all_without_an_error_and_leave_nothing_open(serve):
     service = serve()
     campaigns = [service.post(label=label, budget={"episodes": 10_000}) for label in ("one", "two")]
     service.wait_until(lambda: all(service.get(each)["progress"]["episodes_done"] for each in campaigns))
     server = psutil.Process(service.process.pid)
-    streams = tmp_path / "streams.json"
-    generate(service, campaigns, 2, streams)  # from now on, all connections to the database are open
+    generate(service, campaigns, 2)  # from now on, all connections to the database are open
     before = server.num_fds()
-    seen = generate(service, campaigns, SECONDS, streams)
+    seen = generate(service, campaigns, SECONDS)
     assert seen["errors"] == {}
     assert (seen["repeated"], seen["missing"]) == (0, 0)
     assert seen["episodes"] > 0

@@ -1,149 +1,143 @@
-"""Two campaigns at work, with and without clients that look on.
+"""Two campaigns at work, with and without clients.
 
 Quiet and loaded phases follow each other as A B B A B A A B, so that what changes slowly, like the length of episodes
-while a policy learns, changes both alike, be it at a falling rate.
+while a policy learns, changes both alike. Where there are as many workers as cores, the generator's processor time is
+taken from the workers, which clients elsewhere would not do. So the workers are given it back, at the pace they had,
+before the loss of throughput is judged.
 """
 
 import itertools
 import json
 import math
+import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.load.resources import Holding, Watch, processor_s
+import psutil
+
+from tests.load.promises import Promise, at_most, percentile
 from tests.server import ROOT, Service, servers
 
 SPEC: dict[str, Any] = {"families": ["low"], "methods": ["risk-sac"], "budget": {"episodes": 100_000}}
 CAMPAIGNS = 2
 SETTLE_S = 3.0  # at the beginning of each phase, while clients connect
+LATENCY_MS, LOSS, GROWTH_MIB, GROWTH_FILES = 100.0, 0.10, 10.0, 5.0
+ORDER = (False, True, True, False, True, False, False, True)  # whether a phase is loaded
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Trial:
-    """How much load, and for how long."""
-
-    seconds: float = 600.0  # with load, all phases together
-    phase_s: float = 30.0
-    warm_up_s: float = 120.0
-    pollers: int = 200
-    streams: int = 50
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
-    """Clocks and counters at one moment."""
-
-    at: float
-    steps: int
-    episodes: int
-    server_s: float
-    workers_s: float
-    generator_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Phase:
-    """What happened between two readings."""
+    """What happened in a while; processor time in s."""
 
     loaded: bool
     wall_s: float
     steps: int
-    episodes: int
     server_s: float
     workers_s: float
     generator_s: float
-    holding: Holding
+    memory_mib: float  # of the server, like the next one a median
+    files: float
     seen: dict[str, Any] = field(default_factory=dict)  # by the generator
 
 
-def measure(trial: Trial, tell: Callable[[str], None]) -> list[Phase]:
-    """Run the phases on a service of their own, and tell of each."""
+def measure(seconds: float, phase_s: float, warm_up_s: float, pollers: int, streams: int) -> list[Phase]:
+    """Run the phases on a service of their own, `seconds` of them loaded."""
     with tempfile.TemporaryDirectory() as folder, servers(Path(folder)) as serve:
         service = serve("service.worker", lease_s=60)
-        ids = tuple(service.post(label=f"campaign {seed}", seeds=[seed], **SPEC) for seed in range(CAMPAIGNS))
+        ids = [service.post(label=f"campaign {seed}", seeds=[seed], **SPEC) for seed in range(CAMPAIGNS)]
         service.wait_until(lambda: all(service.get(each)["progress"]["episodes_done"] for each in ids))
-        time.sleep(trial.warm_up_s)
+        time.sleep(warm_up_s)
         workers = service.workers()
-        streams = Path(folder) / "streams.json"
-        phases = []
-        for loaded in itertools.islice(_order(), _count(trial)):
-            phases.append(_phase(service, ids, workers, trial, streams, loaded))
-            tell(_line(phases[-1]))
+        count = 2 * max(2, math.ceil(seconds / phase_s))
+        phases = [
+            _phase(service, ids, workers, phase_s, (pollers, streams) if loaded else None)
+            for loaded in itertools.islice(itertools.cycle(ORDER), count)
+        ]
         if sorted(service.workers()) != sorted(workers):
             raise RuntimeError(f"workers were replaced, so throughput means nothing; see {service.log}")
         return phases
 
 
-def _line(phase: Phase) -> str:
-    """What there is to see of a phase while others follow."""
-    cores = {name: getattr(phase, f"{name}_s") / phase.wall_s for name in ("workers", "server", "generator")}
-    busy = ", ".join(f"{name} {share:.2f}" for name, share in cores.items())
-    return f"{'loaded' if phase.loaded else 'quiet'}: {phase.steps / phase.wall_s:.0f} steps per second; cores: {busy}"
-
-
-def _count(trial: Trial) -> int:
-    return 2 * max(2, math.ceil(trial.seconds / trial.phase_s))
-
-
-def _order() -> Iterator[bool]:
-    return itertools.cycle((False, True, True, False, True, False, False, True))
-
-
 def _phase(
-    service: Service, ids: tuple[str, ...], workers: Sequence[int], trial: Trial, streams: Path, loaded: bool
+    service: Service, ids: Sequence[str], workers: Sequence[int], phase_s: float, load: tuple[int, int] | None
 ) -> Phase:
-    generator = _generator(service, ids, trial, streams) if loaded else None
+    generator = None
+    if load:
+        flags = [f"--port={service.port}", f"--pollers={load[0]}", f"--streams={load[1]}"]
+        command = [sys.executable, "-m", "tests.load.generator", *flags, f"--seconds={phase_s + SETTLE_S + 1}", *ids]
+        generator = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE)
     time.sleep(SETTLE_S)
-    before = _reading(service, ids, workers, generator)
-    with Watch(service.process.pid) as watch:
-        time.sleep(trial.phase_s)
-    after = _reading(service, ids, workers, generator)
-    if generator is None:
-        seen = {}
-    else:
-        said, _ = generator.communicate(timeout=60)
-        seen = json.loads(said)
-    return Phase(
-        loaded=loaded,
-        wall_s=after.at - before.at,
-        steps=after.steps - before.steps,
-        episodes=after.episodes - before.episodes,
-        server_s=after.server_s - before.server_s,
-        workers_s=after.workers_s - before.workers_s,
-        generator_s=after.generator_s - before.generator_s,
-        holding=watch.holding,
-        seen=seen,
+    server, samples = psutil.Process(service.process.pid), []
+    pids = {"server_s": [server.pid], "workers_s": workers, "generator_s": [generator.pid] if generator else []}
+
+    def reading() -> dict[str, float]:
+        runs = [run for each in ids for run in service.get(each)["runs"]]
+        used = {name: sum(_processor_s(pid) for pid in of) for name, of in pids.items()}
+        return {"wall_s": time.monotonic(), "steps": sum(run["metrics"]["environment_steps"] for run in runs)} | used
+
+    over = threading.Event()
+
+    def watch() -> None:
+        while not over.wait(1.0):
+            samples.append((server.memory_info().rss / (1 << 20), server.num_fds()))
+
+    watching = threading.Thread(target=watch, daemon=True)
+    watching.start()
+    before = reading()
+    time.sleep(phase_s)
+    after = reading()
+    over.set()
+    watching.join()
+    memory_mib, files = (statistics.median(each) for each in zip(*samples, strict=True))
+    seen = json.loads(generator.communicate(timeout=60)[0]) if generator else {}
+    spent = {name: after[name] - before[name] for name in before}
+    return Phase(loaded=load is not None, memory_mib=memory_mib, files=files, seen=seen, **spent)
+
+
+def _processor_s(pid: int) -> float:
+    times = psutil.Process(pid).cpu_times()
+    return times.user + times.system
+
+
+def judge(phases: Sequence[Phase]) -> Iterator[Promise]:
+    """All promises, from equally many quiet and loaded phases."""
+    quiet, loaded = ([phase for phase in phases if phase.loaded is which] for which in (False, True))
+    for kind in loaded[0].seen["latencies_ms"]:
+        times = [each for phase in loaded for each in phase.seen["latencies_ms"][kind]]
+        note = f"; p50 {percentile(times, 50):.1f}, p95 {percentile(times, 95):.1f}, max {max(times):.0f}"
+        yield at_most(f"polls of {kind}: p99", LATENCY_MS, percentile(times, 99), "ms", note)
+    errors = sum((Counter(phase.seen["errors"]) for phase in loaded), Counter())
+    yield Promise("errors", "none", str(dict(errors.most_common(5))), not errors)
+    told, repeated, missing = (
+        sum(phase.seen[name] for phase in loaded) for name in ("episodes", "repeated", "missing")
     )
+    streams = f"{told:,} episodes, {repeated} repeated, {missing} missing"
+    yield Promise("streams tell every episode", "exactly once", streams, not (repeated or missing))
+    losses = [_loss([a], [b]) for a, b in zip(quiet, loaded, strict=True)]
+    note = f" (± {100 * statistics.stdev(losses) / len(losses) ** 0.5:.1f})"
+    yield at_most("campaigns slowed down by the service", 100 * LOSS, 100 * _loss(quiet, loaded), "%", note)
+    for name in ("workers_s", "server_s", "generator_s"):
+        cores = f"{_rate(quiet, name):.3f} quiet, {_rate(loaded, name):.3f} loaded"
+        yield Promise(f"cores of {name.removesuffix('_s')}", "", cores)
+    first, last = loaded[1], loaded[-1]  # in the very first, pools fill up
+    yield at_most("server's memory grows by", GROWTH_MIB, last.memory_mib - first.memory_mib, "MiB")
+    yield at_most("open files grow by", GROWTH_FILES, last.files - first.files, "")
 
 
-def _generator(service: Service, ids: tuple[str, ...], trial: Trial, streams: Path) -> subprocess.Popen[bytes]:
-    options = {
-        "--port": service.port,
-        "--pollers": trial.pollers,
-        "--streams": trial.streams,
-        "--seconds": trial.phase_s + SETTLE_S + 1,
-        "--go-on": streams,
-    }
-    flags = [str(part) for option in options.items() for part in option]
-    command = [sys.executable, "-m", "tests.load.generator", *flags, *ids]
-    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE)
+def _rate(phases: Sequence[Phase], name: str) -> float:
+    return sum(getattr(phase, name) for phase in phases) / sum(phase.wall_s for phase in phases)
 
 
-def _reading(
-    service: Service, ids: tuple[str, ...], workers: Sequence[int], generator: subprocess.Popen[bytes] | None
-) -> Reading:
-    runs = [run for each in ids for run in service.get(each)["runs"]]
-    return Reading(
-        at=time.monotonic(),
-        steps=sum(run["metrics"]["environment_steps"] for run in runs),
-        episodes=sum(run["episodes_done"] for run in runs),
-        server_s=processor_s(service.process.pid),
-        workers_s=processor_s(*workers),
-        generator_s=processor_s(generator.pid) if generator else 0.0,
-    )
+def _loss(quiet: Sequence[Phase], loaded: Sequence[Phase]) -> float:
+    """Share of the quiet throughput that is lost, with the generator's processor time given back."""
+    had, has = _rate(quiet, "workers_s"), _rate(loaded, "workers_s")
+    given_back = max(has, min(had, has + _rate(loaded, "generator_s"))) / has
+    return 1 - _rate(loaded, "steps") * given_back / _rate(quiet, "steps")

@@ -1,212 +1,215 @@
 """What a service answers that has run for years: 10,000 campaigns with 1,000,000 episodes in its database.
 
-One client asks at a time, so that a latency is what one answer costs. Each question is asked anew each time: with
-another cursor, or about another campaign, so that nothing is answered from memory.
+The rows are copies of those of one real campaign, made by SQL whatever columns the tables have. One client asks at a
+time, so that a latency is what one answer costs.
 """
 
-import asyncio
+import itertools
 import json
+import sqlite3
 import tempfile
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 from typing import Any
 
-from risk_sac.config import METHODS
+from risk_sac.config import METHODS, RunSpec
 from risk_sac.scenario.families import FAMILIES
-from service.api.answers.pages import Cursors
-from service.api.routes.campaigns import LISTED
-from service.settings import ServiceSettings
-from service.store.database import connect
-from service.store.server import cursor_secret
-from service.store.states import FINAL
-from tests.load.population import LABELS, RARE_LABEL, Plan, populate
-from tests.load.resources import processor_s
-from tests.load.verdicts import Verdict, at_most, percentile
-from tests.load.wire import HOST, Polling, Streaming, WireError, get
+from tests.load.promises import Promise, at_most, percentile
 from tests.server import Service, servers
 
 LATENCY_MS, START_S = 50.0, 20.0
-FIRST = {"families": ["low"], "methods": ["bo-only"], "budget": {"episodes": 40}}  # the pattern of all others
 WARM_UP, ASKED = 20, 200  # times each
-NEWER = 1 << 40  # than any campaign
-PATIENCE_S = 30.0
+LABELS, RARE_LABEL = ("", "nightly", "release", "cut-ins"), "seldom"
+STATES = ("succeeded",) * 17 + ("failed", "failed", "cancelled")
+LARGE_SHARE = 0.06  # of the episodes, in one campaign with many runs
 
+Values = Mapping[str, Any]
 Question = Callable[[Random], str]  # a path
 
 
-@dataclass(frozen=True, slots=True)
-class Answers:
-    """How long one question took, again and again."""
-
-    latencies_ms: list[float]
-    processor_ms: float  # of the server for one answer, in the mean
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Measured:
     """What the large database was asked."""
 
     size_bytes: int
     fill_s: float
     start_s: float
-    answers: dict[str, Answers]
+    latencies_ms: dict[str, list[float]]
 
 
 def measure(campaigns: int, episodes: int) -> Measured:
     """Fill a database, start a service on it, and ask."""
+    first = {"families": ["low"], "methods": ["bo-only"], "budget": {"episodes": max(1, episodes // campaigns)}}
     with tempfile.TemporaryDirectory() as folder, servers(Path(folder)) as serve:
         service = serve("service.worker", lease_s=60, rate_limit=1_000_000)
-        service.wait(service.post(**FIRST))
+        service.wait(service.post(**first))
         service.stop()
         began = time.monotonic()
-        plans = populate(service.data_dir, campaigns, episodes)
+        ids, large = populate(service.data_dir / "risk-sac.db", campaigns, round(LARGE_SHARE * campaigns))
         filled = time.monotonic()
         service.start()
         started = time.monotonic()
-        answers = asyncio.run(Asking(service, plans).all())
+        chance = Random(0)
+        latencies = {name: _time(service, path, chance) for name, path in _questions(service, ids, large).items()}
+        latencies["first event"] = [_first_event(service, chance.choice(ids)) for _ in range(ASKED)]
         size = sum(path.stat().st_size for path in service.data_dir.glob("risk-sac.db*"))
-        return Measured(size, filled - began, started - filled, answers)
+        return Measured(size, filled - began, started - filled, latencies)
 
 
-def judge(measured: Measured) -> list[Verdict]:
-    """All verdicts."""
+def judge(measured: Measured) -> Iterator[Promise]:
+    """All promises."""
     gib = f"; {measured.size_bytes / (1 << 30):.1f} GiB, filled in {measured.fill_s:.0f} s"
-    verdicts = [at_most("the service starts within", START_S, measured.start_s, "s", gib)]
-    for name, answers in measured.answers.items():
-        times = answers.latencies_ms
-        note = f"; p50 {percentile(times, 50):.1f}, max {max(times):.0f}, processor {answers.processor_ms:.1f}"
-        verdicts.append(at_most(f"{name}: p99", LATENCY_MS, percentile(times, 99), "ms", note))
-    return verdicts
+    yield at_most("the service starts within", START_S, measured.start_s, "s", gib)
+    for name, times in measured.latencies_ms.items():
+        note = f"; p50 {percentile(times, 50):.1f}, max {max(times):.0f}"
+        yield at_most(f"{name}: p99", LATENCY_MS, percentile(times, 99), "ms", note)
 
 
-class Asking:
-    """One client."""
+def populate(file: Path, campaigns: int, runs: int) -> tuple[list[str], str]:
+    """Copy the only campaign of a database, once with many runs; returns the ids, and that of the large one."""
+    with sqlite3.connect(file) as database:
+        database.row_factory = sqlite3.Row
+        (campaign,) = database.execute("SELECT * FROM campaigns").fetchall()
+        (run,) = database.execute("SELECT * FROM runs").fetchall()
+        searches = list(itertools.product(FAMILIES, METHODS))
+        ids, now = [], time.time()
+        for place in range(campaigns):
+            label = RARE_LABEL if place == campaigns // 10 else LABELS[place % len(LABELS)]
+            state, at = STATES[place * 3 % len(STATES)], now - 60.0 * (campaigns - place)
+            large = place == campaigns // 2
+            wanted = range(runs) if large else [place * 7]
+            own = [(*searches[each % len(searches)], each // len(searches) if large else 0) for each in wanted]
+            number = place + 2
+            ids.append(f"c{number:016x}")
+            columns = {"number": number, "id": ids[-1], "label": label, "state": state, "created_at": at}
+            spec = json.loads(campaign["spec"]) | {
+                "label": label,
+                "families": list(dict.fromkeys(each[0] for each in own)),
+                "methods": list(dict.fromkeys(each[1] for each in own)),
+                "seeds": sorted({each[2] for each in own}),
+            }
+            events = campaign["events"] * len(own)
+            _insert(database, "campaigns", dict(campaign) | columns | {"spec": json.dumps(spec), "events": events})
+            for nth, (family, method, seed) in enumerate(own):
+                _copy_run(
+                    database,
+                    run,
+                    number,
+                    RunSpec(family=family, method=method, seed=seed),
+                    state,
+                    nth * campaign["events"],
+                )
+        return ids, ids[campaigns // 2]
 
-    def __init__(self, service: Service, plans: Sequence[Plan]) -> None:
-        self._port = service.port
-        self._cursors = Cursors(cursor_secret(connect(ServiceSettings(data_dir=service.data_dir).url)))
-        self._server = service.process.pid
-        self._plans = plans
-        self._large = max(plans, key=lambda plan: len(plan.spec.runs()))
-        self._chance = Random(0)
 
-    async def all(self) -> dict[str, Answers]:
-        """All questions, one after another."""
-        connection = await Polling.open(self._port)
-        contacts = await self._contacts(connection)
-        questions = _lists(self._plans, self._cursors)
-        questions |= _campaigns(self._plans, self._large, contacts, self._cursors)
-        answers = {
-            name: await self._time(lambda path=path: self._ask(connection, path(self._chance)))
-            for name, path in questions.items()
-        }
-        connection.close()
-        return answers | {"first event": await self._time(self._first_event)}
-
-    async def _time(self, ask: Callable[[], Awaitable[float]]) -> Answers:
-        for _ in range(WARM_UP):
-            await ask()
-        began_s = processor_s(self._server)
-        latencies = [await ask() for _ in range(ASKED)]
-        return Answers(latencies, 1e3 * (processor_s(self._server) - began_s) / ASKED)
-
-    async def _ask(self, connection: Polling, path: str) -> float:
-        request = get(self._port, path)
-        began = time.perf_counter()
-        async with asyncio.timeout(PATIENCE_S):
-            answer = await connection.ask(request)
-        took_ms = 1e3 * (time.perf_counter() - began)
-        if answer.status != 200:
-            raise WireError(f"{request!r} was answered with {answer.status}: {answer.body[:500]!r}")
-        return took_ms
-
-    async def _contacts(self, connection: Polling) -> list[str]:
-        """Ids of failures of the largest campaign."""
-        path = f"/v1/campaigns/{self._large.id}/failures?tier=raw&limit=500"
-        answer = await connection.ask(get(self._port, path))
-        page: dict[str, Any] = json.loads(answer.body)
-        return [item["id"] for item in page["items"]]
-
-    async def _first_event(self) -> float:
-        """Time until a new stream of any campaign tells of something, ms."""
-        told = asyncio.Event()
-
-        def hear(block: bytes) -> None:
-            if b"data: " in block:
-                told.set()
-
-        request = get(self._port, f"/v1/campaigns/{self._chance.choice(self._plans).id}/events")
-        began = time.perf_counter()
-        _, stream = await asyncio.get_running_loop().create_connection(
-            lambda: Streaming(request, hear), HOST, self._port
+def _copy_run(
+    database: sqlite3.Connection, run: sqlite3.Row, campaign: int, spec: RunSpec, state: str, offset: int
+) -> None:
+    """Copy a run with its episodes and events; `offset` is added to their places among the campaign's events."""
+    names = {"family": spec.family, "method": spec.method, "seed": spec.seed, "spec_digest": spec.digest}
+    number = _insert(
+        database,
+        "runs",
+        {name: run[name] for name in run.keys() if name != "number"}  # noqa: SIM118
+        | names
+        | {"campaign_number": campaign, "id": spec.id, "state": state},
+    )
+    for table, replaced in (
+        ("episodes", {"campaign_number": campaign, "run_number": number}),
+        ("changes", {"campaign_number": campaign}),
+    ):
+        columns = [row[1] for row in database.execute(f"PRAGMA table_info({table})") if row[1] != "number"]
+        chosen = [
+            str(replaced[name]) if name in replaced else f'"sequence" + {offset}' if name == "sequence" else f'"{name}"'
+            for name in columns
+        ]
+        if table == "changes":
+            chosen = [
+                "CASE WHEN run_id IS NULL THEN NULL ELSE :id END" if each == '"run_id"' else each for each in chosen
+            ]
+        listed = ", ".join(f'"{name}"' for name in columns)
+        where = f"run_number = {run['number']}" if table == "episodes" else "campaign_number = 1"
+        database.execute(
+            f"INSERT INTO {table} ({listed}) SELECT {', '.join(chosen)} FROM {table} WHERE {where}", {"id": spec.id}
         )
-        async with asyncio.timeout(PATIENCE_S):
-            await told.wait()
-        took_ms = 1e3 * (time.perf_counter() - began)
-        stream.close()
-        return took_ms
 
 
-def _lists(plans: Sequence[Plan], cursors: Cursors) -> dict[str, Question]:
-    """Pages of campaigns; the newest ones by a cursor that no request before had."""
-    families, methods, states = list(FAMILIES), list(METHODS), sorted(FINAL)
-
-    def older(number: int) -> str:
-        return f"/v1/campaigns?cursor={cursors.encode(number, LISTED, None)}"
-
-    def newest(chance: Random) -> str:
-        return older(NEWER + chance.getrandbits(30))
-
-    def deep(chance: Random) -> str:
-        return older(chance.choice(plans).number)
-
-    def narrow(chance: Random) -> str:
-        search = f"&family={chance.choice(families)}&method={chance.choice(methods)}"
-        return f"{deep(chance)}{search}&state={chance.choice(states)}&label={chance.choice(LABELS)}"
-
-    return {
-        "list": newest,
-        "list, somewhere": deep,
-        "list by state": lambda chance: f"{newest(chance)}&state={chance.choice(states)}",
-        "list by a state that none has": lambda chance: f"{newest(chance)}&state=paused",
-        "list by family": lambda chance: f"{newest(chance)}&family={chance.choice(families)}",
-        "list by method": lambda chance: f"{newest(chance)}&method={chance.choice(methods)}",
-        "list by label": lambda chance: f"{newest(chance)}&label={chance.choice(LABELS)}",
-        "list by a label that one has": lambda chance: f"{newest(chance)}&label={RARE_LABEL}",
-        "list by all of them": narrow,
-    }
+def _insert(database: sqlite3.Connection, table: str, row: Values) -> int:
+    names = ", ".join(f'"{name}"' for name in row)
+    cursor = database.execute(f"INSERT INTO {table} ({names}) VALUES ({', '.join('?' * len(row))})", list(row.values()))
+    return int(cursor.lastrowid or 0)
 
 
-def _campaigns(plans: Sequence[Plan], large: Plan, contacts: Sequence[str], cursors: Cursors) -> dict[str, Question]:
-    """What is asked about one campaign: any of them, and the largest, which has many runs."""
-    runs = [run.id for run in large.spec.runs()]
-    episodes = f"/v1/campaigns/{large.id}/episodes"
-    failures = f"/v1/campaigns/{large.id}/failures"
+def _time(service: Service, path: Question, chance: Random) -> list[float]:
+    times = []
+    for _ in range(WARM_UP + ASKED):
+        asked = path(chance)
+        began = time.perf_counter()
+        answer = service.client.get(asked)
+        times.append(1e3 * (time.perf_counter() - began))
+        assert answer.status_code == 200, f"{asked}: {answer.text[:500]}"
+    return times[WARM_UP:]
+
+
+def _first_event(service: Service, campaign: str) -> float:
+    """Time until a new stream tells something, ms."""
+    began = time.perf_counter()
+    with service.client.stream("GET", f"/v1/campaigns/{campaign}/events") as stream:
+        next(line for line in stream.iter_lines() if line.startswith("data: "))
+        return 1e3 * (time.perf_counter() - began)
+
+
+def _cursors(service: Service, path: str) -> list[str]:
+    """The cursors of all pages of a list."""
+    found: list[str] = []
+    while len(found) < 200:
+        after = {"cursor": found[-1]} if found else {}
+        cursor = service.client.get(path, params={"limit": 100} | after).json()["next"]
+        if cursor is None:
+            break
+        found.append(cursor)
+    return found
+
+
+def _questions(service: Service, ids: list[str], large: str) -> dict[str, Question]:
+    """What is asked; a random limit keeps answers from being remembered."""
+    families, methods = list(FAMILIES), list(METHODS)
+    runs = [run["id"] for run in service.get(large)["runs"]]
+    contacts = [each["id"] for each in service.get(large, "/failures", tier="raw", limit=500)["items"]]
+    pages = {path: _cursors(service, path) for path in ("/v1/campaigns", f"/v1/campaigns/{large}/episodes")}
+
+    def listed(path: str, **filters: list[str]) -> Question:
+        def ask(chance: Random) -> str:
+            chosen = "".join(f"&{name}={chance.choice(values)}" for name, values in filters.items())
+            return f"{path}?limit={chance.randint(20, 50)}{chosen}"
+
+        return ask
 
     def about(part: str) -> Question:
-        return lambda chance: f"/v1/campaigns/{chance.choice(plans).id}{part}"
+        return lambda chance: f"/v1/campaigns/{chance.choice(ids)}{part}"
 
-    def somewhere(path: str) -> Question:
-        # Numbers of episodes lie between those of the campaigns and a few hundred times as much.
-        return lambda chance: f"{path}cursor={cursors.encode(chance.randrange(1, len(plans) * 100), large.id, None)}"
-
+    assert contacts, "the copied campaign has no contact; wanted one to ask for"
+    campaigns, of_large = "/v1/campaigns", f"/v1/campaigns/{large}"
+    narrow = {"family": families, "method": methods, "state": sorted(set(STATES)), "label": list(LABELS[1:])}
     return {
+        "list": listed(campaigns),
+        "list, somewhere": listed(campaigns, cursor=pages[campaigns]),
+        "list by a state that none has": listed(campaigns, state=["paused"]),
+        **{f"list by {name}": listed(campaigns, **{name: values}) for name, values in narrow.items()},
+        "list by a label that one has": listed(campaigns, label=[RARE_LABEL]),
+        "list by all of them": listed(campaigns, **narrow),
+        **{part: about(f"/{part}") for part in ("results", "episodes", "failures", "spec")},
         "status": about(""),
-        "results": about("/results"),
-        "episodes": about("/episodes"),
-        "failures": about("/failures"),
-        "spec": about("/spec"),
-        f"status, {len(runs)} runs": lambda _: f"/v1/campaigns/{large.id}",
-        f"results, {len(runs)} runs": lambda _: f"/v1/campaigns/{large.id}/results",
-        "its episodes, somewhere": somewhere(f"{episodes}?"),
-        "its episodes of one run": lambda chance: f"{episodes}?run={chance.choice(runs)}",
-        "its episodes by outcome": lambda chance: f"{episodes}?outcome={chance.choice(['safe', 'failure'])}",
-        "its contacts, somewhere": somewhere(f"{failures}?tier=raw&"),
-        "its failures of one run": lambda chance: f"{failures}?run={chance.choice(runs)}",
-        "one of its failures": lambda chance: f"{failures}/{chance.choice(contacts)}",
+        f"status, {len(runs)} runs": lambda _: of_large,
+        f"results, {len(runs)} runs": lambda _: f"{of_large}/results",
+        "its episodes, somewhere": listed(f"{of_large}/episodes", cursor=pages[f"{of_large}/episodes"]),
+        "its episodes of one run": listed(f"{of_large}/episodes", run=runs),
+        "its episodes by outcome": listed(f"{of_large}/episodes", outcome=["safe", "failure"]),
+        "its failures of one run": listed(f"{of_large}/failures", run=runs),
+        "one of its failures": lambda chance: f"{of_large}/failures/{chance.choice(contacts)}",
         "metrics": lambda _: "/metrics",
         "readiness": lambda _: "/readyz",
     }

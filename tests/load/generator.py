@@ -1,6 +1,7 @@
-"""`python -m tests.load.generator --port PORT CAMPAIGN...`: pollers and event streams, from a process of their own.
+"""`python -m tests.load.generator --port PORT CAMPAIGN...`: pollers and event streams, in a process of their own.
 
-It talks to this machine alone, and ends by itself. What it saw goes to standard output as JSON.
+It speaks just enough HTTP/1.1 itself: a client library costs several times what the service spends on an answer.
+It prints what it saw as JSON.
 """
 
 import argparse
@@ -8,163 +9,167 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import sys
-import time
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections import Counter, defaultdict
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field
 from random import Random
-from typing import Any
 
-from tests.load.followers import Follower, follow
-from tests.load.pollers import PERIOD_S, Poller, Polls, poll
-from tests.load.wire import Polling, get
-
-MOST_POLLERS, MOST_STREAMS, LONGEST_S = 1000, 500, 3600.0
-# What clients ask for, and how many of ten do.
-KINDS = {"status": 6, "results": 2, "list": 2}
-CONDITIONAL = 0.8  # of them say what they have already
-MOMENTS = 50  # of a second at which clients ask, several at once, so that this process wakes only so often
-CATCH_UP_S = 10.0  # for streams, at the end, to tell what had happened by then
+HOST, PERIOD_S, PATIENCE_S = "127.0.0.1", 1.0, 10.0
+KINDS = ["status"] * 6 + ["results"] * 2 + ["list"] * 2  # of ten pollers
+CONDITIONAL = 0.8  # of the pollers send the ETag that they have
+MOMENTS = 50  # of a second at which pollers ask, so that this process wakes seldom
+_EPISODE = re.compile(rb'"id":"([^"]+)-(\d+)"')  # run and phase; index
 
 
-@dataclass(frozen=True, kw_only=True)
-class Load:
-    """How much of it."""
+@dataclass
+class Seen:
+    """What all clients saw."""
 
-    port: int
-    campaigns: tuple[str, ...]
-    pollers: int = 200
-    streams: int = 50
-    seconds: float = 20.0
-    stays_s: float = 60.0  # mean time for which a stream keeps its connection
-    seed: int = 0
-
-
-async def generate(load: Load, followers: list[Follower]) -> Polls:
-    """Poll and follow for a while; the followers know afterwards what they were told."""
-    chance = Random(load.seed)
-    polls = Polls()
-    async with asyncio.TaskGroup() as group:
-        following = [
-            group.create_task(follow(follower, load.port, load.stays_s, Random(chance.random())))
-            for follower in followers
-        ]
-        begin = asyncio.get_running_loop().time() + 0.1
-        end = begin + load.seconds
-        polling = [group.create_task(poll(each, load.port, begin, end, polls)) for each in pollers(load, chance)]
-        await asyncio.wait(polling) if polling else await asyncio.sleep(load.seconds)
-        await _catch_up(load, followers)
-        for task in following:
-            task.cancel()
-    return polls
+    latencies_ms: defaultdict[str, list[float]] = field(default_factory=lambda: defaultdict(list))  # by kind
+    errors: Counter[str] = field(default_factory=Counter)
+    episodes: int = 0
+    repeated: int = 0
+    missing: int = 0
+    connections: int = 0  # of streams
 
 
-def pollers(load: Load, chance: Random) -> list[Poller]:
-    """All of them, spread over the moments of a second, in no order."""
-    kinds = [kind for kind, share in KINDS.items() for _ in range(share)]
-    offsets = [PERIOD_S * (MOMENTS * number // load.pollers) / MOMENTS for number in range(load.pollers)]
-    chance.shuffle(offsets)
-    return [
-        Poller(
-            kind=kinds[number % len(kinds)],
-            path=_path(kinds[number % len(kinds)], load.campaigns[number // len(kinds) % len(load.campaigns)]),
-            offset_s=offset,
-            conditional=chance.random() < CONDITIONAL,
-        )
-        for number, offset in enumerate(offsets)
-    ]
+def request(port: int, path: str, **headers: str) -> bytes:
+    """A GET request as it is sent."""
+    lines = [f"GET {path} HTTP/1.1", f"Host: {HOST}:{port}"]
+    lines += [f"{name.replace('_', '-')}: {value}" for name, value in headers.items()]
+    return "\r\n".join([*lines, "", ""]).encode()
 
 
-def _path(kind: str, campaign: str) -> str:
-    return {
-        "status": f"/v1/campaigns/{campaign}",
-        "results": f"/v1/campaigns/{campaign}/results",
-        "list": "/v1/campaigns",
-    }[kind]
+async def head(reader: asyncio.StreamReader) -> tuple[int, dict[str, str]]:
+    """Status and headers of an answer."""
+    status, *lines = (await reader.readuntil(b"\r\n\r\n")).decode().rstrip().split("\r\n")
+    pairs = (line.split(": ", 1) for line in lines)
+    return int(status.split()[1]), {name.lower(): value for name, value in pairs}
 
 
-async def _catch_up(load: Load, followers: Sequence[Follower]) -> None:
-    """Wait until all streams have told what is stored now."""
-    stored = {campaign: await _episodes_done(load.port, campaign) for campaign in load.campaigns}
-    with contextlib.suppress(TimeoutError):
-        async with asyncio.timeout(CATCH_UP_S):
-            while any(each.episodes < stored[each.campaign] for each in followers):
-                await asyncio.sleep(0.05)
-    for each in followers:
-        lacking = stored[each.campaign] - each.episodes
-        if lacking > 0:
-            each.errors[f"{lacking} episodes not told after {CATCH_UP_S:g} s"] += 1
-
-
-async def _episodes_done(port: int, campaign: str) -> int:
-    connection = await Polling.open(port)
-    try:
-        answer = await connection.ask(get(port, f"/v1/campaigns/{campaign}"))
-    finally:
-        connection.close()
-    return int(json.loads(answer.body)["progress"]["episodes_done"])
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Generate load; returns the exit status: 1 after an error or a broken stream."""
-    options = _parser().parse_args(arguments)
-    load = Load(
-        port=options.port,
-        campaigns=tuple(options.campaigns),
-        pollers=min(options.pollers, MOST_POLLERS),
-        streams=min(options.streams, MOST_STREAMS),
-        seconds=min(options.seconds, LONGEST_S),
-        stays_s=options.stays,
-        seed=options.seed,
+async def poll(port: int, kind: str, campaign: str, due: float, end: float, conditional: bool, seen: Seen) -> None:
+    """Ask every second. A latency counts from the moment at which the request was due."""
+    loop = asyncio.get_running_loop()
+    path = (
+        "/v1/campaigns" if kind == "list" else f"/v1/campaigns/{campaign}" + ("/results" if kind == "results" else "")
     )
-    # Clients elsewhere would push no worker off its core whenever they wake, nor empty its caches.
-    os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
-    followers = _followers(load, options.go_on)
-    polls = asyncio.run(generate(load, followers))
-    if options.go_on is not None:
-        options.go_on.write_text(json.dumps([each.state() for each in followers]))
-    seen = report(load, polls, followers)
-    json.dump(seen, sys.stdout)
-    return 1 if seen["errors"] or seen["repeated"] or seen["missing"] else 0
+    connection, tag = None, {}
+    while due < end:
+        await asyncio.sleep(due - loop.time())
+        try:
+            async with asyncio.timeout(PATIENCE_S):
+                connection = connection or await asyncio.open_connection(HOST, port)
+                connection[1].write(request(port, path, **tag))
+                status, headers = await head(connection[0])
+                await connection[0].readexactly(int(headers.get("content-length", 0)))
+        except (OSError, EOFError) as error:  # a timeout is an OSError
+            seen.errors[f"{kind}: {type(error).__name__} {error}".strip()] += 1
+            if connection is not None:
+                connection[1].close()
+            connection = None
+        else:
+            seen.latencies_ms[kind].append(1e3 * (loop.time() - due))
+            if status not in (200, 304):
+                seen.errors[f"{kind}: status {status}"] += 1
+            if conditional and "etag" in headers:
+                tag = {"If_None_Match": headers["etag"]}
+        due += PERIOD_S
+    if connection is not None:
+        connection[1].close()
 
 
-def report(load: Load, polls: Polls, followers: Sequence[Follower]) -> dict[str, Any]:
-    """What was seen, as JSON."""
-    errors = Counter(polls.errors)
-    for each in followers:
-        errors.update({f"stream: {what}": count for what, count in each.errors.items()})
-    return {
-        "seconds": load.seconds,
-        "latencies_ms": {kind: [round(each, 3) for each in seen] for kind, seen in polls.latencies_ms.items()},
-        "answers": polls.answers,
-        "errors": errors,
-        "episodes": sum(each.episodes for each in followers),
-        "repeated": sum(each.repeated for each in followers),
-        "missing": sum(each.missing for each in followers),
-        "connections": sum(each.connections for each in followers),
-        "processor_s": time.process_time(),
-    }
+async def follow(port: int, campaign: str, stays_s: float, chance: Random, seen: Seen) -> None:
+    """Follow a campaign's events until cancelled; break off now and then, and go on after the last id."""
+    last: dict[str, str] = {}
+    expected: dict[bytes, int] = {}  # index by run and phase
+    await asyncio.sleep(chance.uniform(0, 2.0))
+    while True:
+        try:
+            async with asyncio.timeout(stays_s * chance.uniform(0.5, 1.5)):
+                async for block in _blocks(port, f"/v1/campaigns/{campaign}/events?newest=100", last, seen):
+                    fields = dict(line.split(b": ", 1) for line in block.split(b"\n") if b": " in line[1:])
+                    if b"id" not in fields:
+                        continue
+                    last = {"Last_Event_ID": fields[b"id"].decode()}
+                    if fields[b"event"] != b"state" and (found := _EPISODE.search(fields[b"data"])):
+                        run, index = found[1], int(found[2])
+                        seen.episodes += 1
+                        seen.repeated += index < expected.get(run, 0)
+                        seen.missing += max(0, index - expected.get(run, index))
+                        expected[run] = max(expected.get(run, 0), index + 1)
+        except TimeoutError:
+            continue
+        except (OSError, EOFError) as error:
+            seen.errors[f"stream: {type(error).__name__} {error}".strip()] += 1
+        await asyncio.sleep(0.2)
 
 
-def _followers(load: Load, go_on: Path | None) -> list[Follower]:
-    if go_on is not None and go_on.exists():
-        return [Follower.restored(state) for state in json.loads(go_on.read_text())]
-    return [Follower(load.campaigns[number % len(load.campaigns)]) for number in range(load.streams)]
+async def _blocks(port: int, path: str, last: dict[str, str], seen: Seen) -> AsyncIterator[bytes]:
+    """The blocks of an event stream, which blank lines end."""
+    reader, writer = await asyncio.open_connection(HOST, port)
+    try:
+        writer.write(request(port, path, Accept="text/event-stream", **last))
+        status, headers = await head(reader)
+        seen.connections += 1
+        if status not in (200, 204):
+            seen.errors[f"stream: status {status}"] += 1
+        text = b""
+        while "chunked" in headers.get("transfer-encoding", "") and (size := int(await reader.readline(), 16)):
+            *blocks, text = (text + (await reader.readexactly(size + 2))[:-2]).split(b"\n\n")
+            for block in blocks:
+                yield block
+    finally:
+        writer.close()
 
 
-def _parser() -> argparse.ArgumentParser:
+async def generate(options: argparse.Namespace) -> Seen:
+    """Poll and follow for a while."""
+    seen, chance = Seen(), Random(0)
+    begin = asyncio.get_running_loop().time() + 0.1
+    offsets = [PERIOD_S * (MOMENTS * number // options.pollers) / MOMENTS for number in range(options.pollers)]
+    chance.shuffle(offsets)
+    campaigns = options.campaigns
+    streams = [
+        asyncio.create_task(follow(options.port, campaigns[n % len(campaigns)], options.stays, Random(n), seen))
+        for n in range(options.streams)
+    ]
+    polls = [
+        poll(
+            options.port,
+            KINDS[n % len(KINDS)],
+            campaigns[n // len(KINDS) % len(campaigns)],
+            begin + offset,
+            begin + options.seconds,
+            chance.random() < CONDITIONAL,
+            seen,
+        )
+        for n, offset in enumerate(offsets)
+    ]
+    await asyncio.gather(*polls)
+    for stream in streams:
+        stream.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await asyncio.gather(*streams)
+    return seen
+
+
+def main() -> int:
+    """Generate load; returns 1 after an error or a broken stream."""
     parser = argparse.ArgumentParser(prog="python -m tests.load.generator", description=__doc__)
     parser.add_argument("campaigns", nargs="+", metavar="CAMPAIGN", help="ids of campaigns to look at")
     parser.add_argument("--port", type=int, required=True, help="of the service, on 127.0.0.1")
-    parser.add_argument("--pollers", type=int, default=Load.pollers, help="clients that ask every second")
-    parser.add_argument("--streams", type=int, default=Load.streams, help="clients that follow events")
-    parser.add_argument("--seconds", type=float, default=Load.seconds, help="how long")
-    parser.add_argument("--stays", type=float, default=Load.stays_s, help="how long a stream keeps its connection, s")
-    parser.add_argument("--seed", type=int, default=Load.seed, help="of who asks when, and breaks off when")
-    parser.add_argument("--go-on", type=Path, help="file that tells streams of the next call where these ended")
-    return parser
+    parser.add_argument("--pollers", type=int, default=200, help="clients that ask every second")
+    parser.add_argument("--streams", type=int, default=50, help="clients that follow events")
+    parser.add_argument("--seconds", type=float, default=20.0, help="how long")
+    parser.add_argument("--stays", type=float, default=60.0, help="how long a stream keeps its connection, s")
+    options = parser.parse_args()
+    # Clients elsewhere would push no worker off its core whenever they wake.
+    os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+    seen = asyncio.run(generate(options))
+    json.dump(vars(seen) | {"seconds": options.seconds}, sys.stdout)
+    return 1 if seen.errors or seen.repeated or seen.missing else 0
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Promises, what was measured of them, and whether they were kept."""
 
 import statistics
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from rich.box import SIMPLE_HEAD
@@ -9,8 +9,8 @@ from rich.console import Console
 from rich.table import Table
 
 
-@dataclass(frozen=True, slots=True)
-class Verdict:
+@dataclass(frozen=True)
+class Promise:
     """One line of the table; `kept` is None where nothing is promised."""
 
     what: str
@@ -20,22 +20,20 @@ class Verdict:
     value: float | None = None
 
 
-def at_most(what: str, limit: float, measured: float, unit: str, note: str = "") -> Verdict:
+def at_most(what: str, limit: float, measured: float, unit: str, note: str = "") -> Promise:
     """A figure that has a limit."""
-    return Verdict(what, f"≤ {limit:g} {unit}", f"{measured:,.1f} {unit}{note}", measured <= limit, measured)
+    return Promise(what, f"≤ {limit:g} {unit}", f"{measured:,.1f} {unit}{note}", measured <= limit, measured)
 
 
 def percentile(values: Sequence[float], percent: int) -> float:
-    """What so many percent of the values do not exceed, interpolated."""
+    """The value that so many percent do not exceed, interpolated."""
     return statistics.quantiles(values, n=100, method="inclusive")[percent - 1]
 
 
-def show(title: str, verdicts: Sequence[Verdict], console: Console) -> None:
-    """The table."""
-    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
-    for name in ("what", "promise", "measured", ""):
-        table.add_column(name, overflow="fold")
-    for each in verdicts:
+def show(title: str, promises: Iterable[Promise], console: Console) -> None:
+    """Print the table."""
+    table = Table("what", "promise", "measured", "", title=title, box=SIMPLE_HEAD, title_justify="left")
+    for each in promises:
         mark = {True: "[green]ok[/]", False: "[bold red]BROKEN[/]", None: ""}[each.kept]
         table.add_row(each.what, each.promised, each.measured, mark)
     console.print(table)
