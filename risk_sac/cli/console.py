@@ -1,6 +1,7 @@
 """What the commands share: consoles, exit statuses, and text made safe for a terminal or an XML file."""
 
 import argparse
+import math
 import re
 from collections.abc import Iterable, Mapping
 from typing import TypeAlias
@@ -63,7 +64,7 @@ class Board:
 
 def or_dash(value: float | None, format_: str) -> str:
     """A number, or a dash where there is none."""
-    return "-" if value is None else format(value, format_)
+    return format(value, format_) if value is not None and math.isfinite(value) else "-"
 
 
 # What XML 1.0 forbids, the other control characters, which a terminal would obey, and unpaired surrogates.

@@ -12,23 +12,7 @@ with Client("http://127.0.0.1:8000") as client:
         Path(f"{found.id}.png").write_bytes(client.picture(campaign.id, found.id))
 """
 
-from risk_sac.client.answers import (
-    Campaign,
-    CampaignSummary,
-    Collision,
-    Episode,
-    Event,
-    Failure,
-    Judgement,
-    Metrics,
-    Progress,
-    Results,
-    Run,
-    RunResult,
-    Series,
-    Total,
-)
-from risk_sac.client.client import Client
+from risk_sac.client.client import Client, Event
 from risk_sac.client.errors import (
     ClientError,
     FieldProblem,
@@ -38,6 +22,21 @@ from risk_sac.client.errors import (
     UnexpectedAnswer,
     Unreachable,
 )
+from risk_sac.records import (
+    Campaign,
+    CampaignSummary,
+    Collision,
+    Episode,
+    Failure,
+    Judgement,
+    Progress,
+    Results,
+    Run,
+    RunMetrics,
+    RunResult,
+    Total,
+)
+from risk_sac.series import Series
 
 __all__ = [
     "Campaign",
@@ -50,12 +49,12 @@ __all__ = [
     "Failure",
     "FieldProblem",
     "Judgement",
-    "Metrics",
     "Overdue",
     "Progress",
     "Refused",
     "Results",
     "Run",
+    "RunMetrics",
     "RunResult",
     "Series",
     "StreamLost",

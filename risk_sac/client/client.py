@@ -4,28 +4,31 @@ import json
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Literal, Self, TypeVar
 from urllib.parse import quote
 from uuid import uuid4
 
 from risk_sac.client.address import DEFAULT_URL, api_key, checked_key, checked_url
-from risk_sac.client.answers import (
-    Campaign,
-    CampaignSummary,
-    Episode,
-    Event,
-    Failure,
-    Page,
-    Record,
-    Regression,
-    Results,
-)
 from risk_sac.client.errors import StreamLost, UnexpectedAnswer
 from risk_sac.client.follow import AWAY_S, SILENCE_S, Follower
-from risk_sac.client.transport import Transport
+from risk_sac.client.transport import Transport, read
 from risk_sac.config import CampaignSpec, EgoConfig
-from risk_sac.records import Grade
+from risk_sac.failures.cases import CampaignRegression
+from risk_sac.records import (
+    FINAL,
+    Campaign,
+    CampaignPage,
+    CampaignSummary,
+    Episode,
+    EpisodePage,
+    Failure,
+    Grade,
+    Page,
+    Record,
+    Results,
+)
 
 TIMEOUT_S = 30.0  # of silence within one answer
 PATIENCE_S = 10.0  # with a service that does not answer
@@ -36,6 +39,20 @@ RECONNECT_S = 1.0  # between two streams of events
 
 Query = dict[str, str | int | None]
 R = TypeVar("R", bound=Record)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something that happened to a campaign."""
+
+    id: str  # opaque; the stream goes on after it
+    name: str  # episode | failure (instead of it) | state
+    data: dict[str, Any]
+
+    @property
+    def last(self) -> bool:
+        """Whether the campaign has ended with it."""
+        return self.name == "state" and self.data.get("run_id") is None and self.data.get("state") in FINAL
 
 
 class Client:
@@ -108,7 +125,7 @@ class Client:
         key = uuid4().hex if idempotency_key is None else idempotency_key
         headers = {"Content-Type": "application/json", "Idempotency-Key": key}
         answer = self._transport.ask("POST", "v1/campaigns", patience_s=self._patience_s, headers=headers, body=body)
-        return Campaign.of(answer)
+        return read(Campaign, answer)
 
     def campaigns(
         self,
@@ -121,7 +138,7 @@ class Client:
     ) -> Iterator[CampaignSummary]:
         """Campaigns, newest first; read page by page as far as they are asked for."""
         query: Query = {"state": state, "family": family, "method": method, "label": label, "limit": page}
-        return self._items(Page[CampaignSummary], "v1/campaigns", query)
+        return self._items(CampaignPage, "v1/campaigns", query)
 
     def campaign(self, campaign_id: str) -> Campaign:
         """State, progress and runs of a campaign."""
@@ -144,7 +161,7 @@ class Client:
     ) -> Iterator[Episode]:
         """Collisions of the ego in the order of their arrival; read page by page as far as they are asked for."""
         query: Query = {"run": run, "tier": tier, "grade": grade, "broke": broke, "signature": signature, "limit": page}
-        return self._items(Page[Episode], f"{_path(campaign_id)}/failures", query)
+        return self._items(EpisodePage, f"{_path(campaign_id)}/failures", query)
 
     def failure(self, campaign_id: str, failure_id: str) -> Failure:
         """One collision with its full time series."""
@@ -164,16 +181,16 @@ class Client:
         """One collision in a file that stands alone, or its core, which takes some ten seconds."""
         return self._made(campaign_id, failure_id, "core.npz" if core else "bundle.npz", BUNDLE)
 
-    def regress(self, campaign_id: str, ego: EgoConfig) -> Regression:
+    def regress(self, campaign_id: str, ego: EgoConfig) -> CampaignRegression:
         """Has the distinct failures of a campaign played against another ego; the same again gives the one there is."""
         body = json.dumps({"campaign_id": campaign_id, "ego": ego.model_dump(mode="json", exclude_unset=True)})
         headers = {"Content-Type": "application/json"}
         answer = self._transport.ask("POST", "v1/regressions", patience_s=self._patience_s, headers=headers, body=body)
-        return Regression.of(answer)
+        return read(CampaignRegression, answer)
 
-    def regression(self, regression_id: str) -> Regression:
+    def regression(self, regression_id: str) -> CampaignRegression:
         """What became of the failures, as far as it is known."""
-        return self._get(Regression, f"v1/regressions/{_part(regression_id)}")
+        return self._get(CampaignRegression, f"v1/regressions/{_part(regression_id)}")
 
     def _made(self, campaign_id: str, failure_id: str, what: str, wanted: str) -> bytes:
         path = f"{_path(campaign_id)}/failures/{_part(failure_id)}/{what}"
@@ -204,7 +221,7 @@ class Client:
     def cancel(self, campaign_id: str) -> Campaign:
         """Stops a campaign, which takes a while, and keeps what it found; changes nothing once it has ended."""
         path = f"{_path(campaign_id)}/cancel"
-        return Campaign.of(self._transport.ask("POST", path, patience_s=self._patience_s))
+        return read(Campaign, self._transport.ask("POST", path, patience_s=self._patience_s))
 
     def delete(self, campaign_id: str) -> None:
         """Deletes a campaign that has ended, with all its files."""
@@ -265,11 +282,11 @@ class Client:
         return campaign
 
     def _get(self, record: type[R], path: str, patience_s: float | None = None) -> R:
-        return record.of(self._transport.ask("GET", path, patience_s=patience_s or self._patience_s))
+        return read(record, self._transport.ask("GET", path, patience_s=patience_s or self._patience_s))
 
     def _items(self, page: type[Page[R]], path: str, query: Query) -> Iterator[R]:
         while True:
-            found = page.of(self._transport.ask("GET", path, patience_s=self._patience_s, query=query))
+            found = read(page, self._transport.ask("GET", path, patience_s=self._patience_s, query=query))
             yield from found.items
             if found.next is None:
                 return

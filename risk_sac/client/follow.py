@@ -9,9 +9,9 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 
-from risk_sac.client.answers import Campaign
 from risk_sac.client.errors import Overdue, Refused, StreamLost, UnexpectedAnswer, Unreachable, retry_after_s
-from risk_sac.client.transport import Transport
+from risk_sac.client.transport import Transport, read
+from risk_sac.records import Campaign
 
 AWAY_S = 120.0  # how long a service that was there may be away, as when it is restarted
 SILENCE_S = 45.0  # three times what the service leaves between two signs of life
@@ -96,7 +96,7 @@ class Follower:
         if known is not None and response.status_code == 304:
             return known
         self._tag = response.headers.get("etag")
-        return Campaign.of(response)
+        return read(Campaign, response)
 
     def _bounded_patience_s(self) -> float:
         return min(self._patience_s, self._left_s())

@@ -3,16 +3,21 @@
 import logging
 from collections.abc import Generator, Mapping
 from contextlib import closing
+from typing import TypeVar
 
 import httpx
 from httpx_sse import EventSource, ServerSentEvent, SSEError
+from pydantic import ValidationError
 from tenacity import RetryCallState, Retrying, retry_if_exception, stop_before_delay, wait_exponential_jitter
 
 from risk_sac import __version__
 from risk_sac.client.errors import ClientError, Refused, StreamLost, UnexpectedAnswer, Unreachable
 from risk_sac.errors import ConfigError
+from risk_sac.records import Record
 
 logger = logging.getLogger(__name__)
+
+R = TypeVar("R", bound=Record)
 
 LONGEST_PAUSE_S = 2.0  # between two attempts, unless the service asks for more
 NOT_BEGUN = frozenset({429, 503})  # the service has done nothing, whatever was asked
@@ -20,6 +25,18 @@ PASSING = NOT_BEGUN | {502, 504}
 NEVER_SENT = (httpx.ConnectError, httpx.ConnectTimeout)
 
 _backoff = wait_exponential_jitter(multiplier=0.1, max=LONGEST_PAUSE_S, jitter=0.1)
+
+
+def read(type_: type[R], response: httpx.Response) -> R:
+    """The record in an answer; fields that this version does not know are no error.
+
+    Raises:
+      UnexpectedAnswer: there is none.
+    """
+    try:
+        return type_.model_validate_json(response.content, extra="allow")
+    except ValidationError as error:
+        raise UnexpectedAnswer(response, f"a {type_.__name__}") from error
 
 
 class Transport:

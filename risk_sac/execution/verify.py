@@ -10,8 +10,9 @@ from pathlib import Path
 from risk_sac.errors import ConfigError
 from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.failures.bundle import code_digest, versions
+from risk_sac.records import Repetition
 from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.verified import TIMES, Repetition, Verified, distinct_failures, read_verified, write_verified
+from risk_sac.run_folder.verified import TIMES, Verified, distinct_failures, read_verified, write_verified
 
 logger = logging.getLogger(__name__)
 

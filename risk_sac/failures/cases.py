@@ -1,9 +1,13 @@
 """What became of old failures with another ego; see `risk_sac.failures.regress`."""
 
+from datetime import datetime
 from enum import StrEnum
+from typing import Literal
+
+from pydantic import computed_field
 
 from risk_sac.config import EgoConfig
-from risk_sac.records import Grade, Record
+from risk_sac.records import Grade, Record, State
 
 
 class Verdict(StrEnum):
@@ -57,3 +61,24 @@ class Regression(Record):
             case.model_copy(update={"known": (case.digest, case.verdict, case.found) in known}) for case in self.cases
         )
         return self.model_copy(update={"cases": tuple(cases)})
+
+
+class CampaignRegression(Record):
+    """The distinct failures of a campaign against another ego, as the service plays them."""
+
+    id: str
+    campaign_id: str
+    ego: EgoConfig
+    state: Literal[State.QUEUED, State.RUNNING, State.SUCCEEDED, State.FAILED] = State.QUEUED
+    reason: str | None = None
+    """Why it failed."""
+    created_at: datetime
+    finished_at: datetime | None = None
+    cases: tuple[Case, ...] = ()
+    """One for each distinct failure of each run."""
+
+    @computed_field  # type: ignore[prop-decorator]
+    @property
+    def passed(self) -> bool | None:
+        """Whether all failures are fixed; null until it has succeeded."""
+        return all(case.passed for case in self.cases) if self.state is State.SUCCEEDED else None

@@ -6,7 +6,7 @@ Source: RISK-SAC, Sec. IV (evaluation metrics); what the paper leaves open is ma
 """
 
 from risk_sac.metrics.accumulator import MetricsAccumulator
-from risk_sac.metrics.counts import COUNTS, Counts, Funnel, pooled_counts
+from risk_sac.metrics.counts import COUNTS, Counts, pooled_counts
 from risk_sac.metrics.digest import results_digest
 from risk_sac.metrics.features import FEATURES, outcome_features
 from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, clopper_pearson, wilson_interval
@@ -24,7 +24,6 @@ __all__ = [
     "WINDOW",
     "Counts",
     "Estimate",
-    "Funnel",
     "Kept",
     "Metric",
     "MetricName",

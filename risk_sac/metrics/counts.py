@@ -1,9 +1,9 @@
-"""What is counted of a run, and the funnel of it. Pure."""
+"""Counts of a run, and their sums over runs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
-from risk_sac.records import Record, RunMetrics
+from risk_sac.records import RunMetrics
 
 
 @dataclass(kw_only=True)
@@ -35,23 +35,3 @@ COUNTS = tuple(each.name for each in fields(Counts))
 def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
     """Each count summed over the runs; what two runs found alike counts twice."""
     return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in COUNTS})
-
-
-class Funnel(Record):
-    """From what the ego touched to what is worth a person's time; each count is part of the one before."""
-
-    contacts: int
-    valid: int
-    distinct: int
-    preventable: int
-    """Distinct failures that the careful driver would have prevented."""
-
-    @classmethod
-    def of(cls, metrics: RunMetrics) -> "Funnel":
-        """The funnel of a run."""
-        return cls(
-            contacts=metrics.raw_collisions,
-            valid=metrics.failures,
-            distinct=metrics.distinct_failures,
-            preventable=metrics.distinct_preventable,
-        )

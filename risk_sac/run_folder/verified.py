@@ -9,7 +9,7 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
-from risk_sac.records import EpisodeRecord, Outcome, Record
+from risk_sac.records import EpisodeRecord, Outcome, Repetition
 from risk_sac.rules import REPEATS
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import Results
@@ -18,19 +18,6 @@ from risk_sac.verdicts.distinct import DistinctFailures, niche_of
 
 VERIFIED = "verified.json"
 TIMES = 3  # that a failure is replayed, if nobody says otherwise
-
-
-class Repetition(Record):
-    """How often an episode was played again, in a fresh process each time, and what came of it."""
-
-    times: int
-    same: int
-    """Of these, with every array of its series as it was, to the bit."""
-
-    @property
-    def verified(self) -> bool:
-        """Whether it was the same each time; if not, it is flaky."""
-        return self.same == self.times > 0
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,12 +6,11 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
+from risk_sac.records import StateChange
 from service.api.guards.description import describe_guards
 from service.api.posted import input_schemas
 from service.api.posted_campaign import campaign_schemas
-from service.schemas.changes import StateChange
-from service.schemas.regressions import PostedRegression
-from service.schemas.triage import PostedTriage
+from service.schemas.posted import PostedRegression, PostedTriage
 
 DESCRIPTION = """Finds scenarios in which an automated driving system fails.
 

@@ -13,12 +13,9 @@ from async_lru import alru_cache
 from sse_starlette import ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.records import RECORDED, Outcome
+from risk_sac.records import RECORDED, Episode, Outcome, StateChange, wire
 from service.errors import NotFoundError, StorageError
-from service.schemas.changes import StateChange
 from service.store.reading import Store
-from service.store.stored import StoredChange, StoredEpisode
-from service.views.bodies import episode_body
 
 logger = logging.getLogger(__name__)
 
@@ -91,10 +88,10 @@ class Streams:
 
     def _render(self, campaign_id: str, position: int) -> Chunk:
         page = self._store.events(campaign_id, after=position, limit=BATCH)
-        data = b"".join(_event(campaign_id, event) for event in page.items)
+        data = b"".join(_event(campaign_id, at, event) for at, event in enumerate(page.items, position + 1))
         last = page.items[-1] if page.items else None
-        ended = isinstance(last, StoredChange) and last.ends_campaign
-        return Chunk(data, position if last is None else last.sequence, page.last is not None, ended)
+        ended = isinstance(last, StateChange) and last.ends_campaign
+        return Chunk(data, position + len(page.items), page.last is not None, ended)
 
 
 def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None:
@@ -115,12 +112,10 @@ def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None
     return position if store.events(campaign_id, after=position - 1, limit=1).items else None
 
 
-def _event(campaign_id: str, event: StoredEpisode | StoredChange) -> bytes:
-    if isinstance(event, StoredEpisode):
-        found = event.record.outcome is Outcome.FAILURE and event.record.phase != RECORDED["iid"]
+def _event(campaign_id: str, position: int, event: Episode | StateChange) -> bytes:
+    name = "state"
+    if isinstance(event, Episode):
+        found = event.outcome is Outcome.FAILURE and event.phase != RECORDED["iid"]
         name = "failure" if found else "episode"
-        data = episode_body(event).model_dump_json()
-    else:
-        name, data = "state", StateChange.model_validate(event).model_dump_json()
-    event_id = base64.urlsafe_b64encode(f"{campaign_id}-{event.sequence}".encode()).decode()  # opaque to clients
-    return ServerSentEvent(data, event=name, id=event_id, sep="\n").encode()
+    id_ = base64.urlsafe_b64encode(f"{campaign_id}-{position}".encode()).decode()  # opaque to clients
+    return ServerSentEvent(wire(event).decode(), event=name, id=id_, sep="\n").encode()

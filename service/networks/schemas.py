@@ -4,12 +4,12 @@ from datetime import datetime
 
 from pydantic import BaseModel, ConfigDict
 
+from risk_sac.records import Page, Record
 from risk_sac.scenario.maps.found import Pattern
 from service.networks.report import NetworkFile
-from service.schemas.base import Body
 
 
-class BoundingBox(Body):
+class BoundingBox(Record):
     """What all lanes lie in, m in the net's own coordinates."""
 
     west: float
@@ -18,7 +18,7 @@ class BoundingBox(Body):
     north: float
 
 
-class Network(Body):
+class Network(Record):
     """A road network that was checked, loaded by the simulator once, and kept."""
 
     id: str
@@ -41,15 +41,11 @@ class Network(Body):
     """What the simulator remarked when it loaded the network; at most 20."""
 
 
-class NetworkPage(Body):
+class NetworkPage(Page[Network]):
     """Networks, newest first."""
 
-    items: list[Network]
-    next: str | None
-    """Pass as `cursor` to continue; null at the end."""
 
-
-class Spot(Body):
+class Spot(Record):
     """Somewhere on a network, m in its own coordinates."""
 
     pattern: Pattern
@@ -71,14 +67,14 @@ class Elsewhere(Spot):
     why: str
 
 
-class Places(Body):
+class Places(Record):
     """Where the patterns fit on a network; in the order of the net."""
 
     items: list[FoundPlace]
     elsewhere: list[Elsewhere]
 
 
-class Record(BaseModel):
+class StoredNetwork(BaseModel):
     """A network as it is stored; closed, so that a damaged seal is not taken for one more field."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -29,8 +29,8 @@ from service.networks.incoming import Incoming
 from service.networks.packaging import Packaging
 from service.networks.report import CheckReport
 from service.networks.sandbox import inspect
-from service.networks.schemas import BoundingBox, Network, Record
-from service.store.stored import Page
+from service.networks.schemas import BoundingBox, Network, StoredNetwork
+from service.store.stored import StoredPage
 
 logger = logging.getLogger(__name__)
 
@@ -117,7 +117,9 @@ class Shelf:
             report = inspect(incoming.folder, packaging)
             network = _network(report, label, sha256, incoming.bytes)
             incoming.strip()
-            (incoming.folder / RECORD).write_bytes(seal(Record(network=network).model_dump_json(indent=2).encode()))
+            (incoming.folder / RECORD).write_bytes(
+                seal(StoredNetwork(network=network).model_dump_json(indent=2).encode())
+            )
             _sync(incoming.folder)
             with self._adding:
                 self._check_room(project)
@@ -129,7 +131,7 @@ class Shelf:
         logger.info("network %s of project %s: %d edges", network.id, project, network.edges)
         return network
 
-    def list(self, limit: int, before: int | None, project: str | None) -> Page[Network]:
+    def list(self, limit: int, before: int | None, project: str | None) -> StoredPage[Network]:
         """Networks, newest first; a damaged one is left out and logged.
 
         Args:
@@ -145,7 +147,7 @@ class Shelf:
             older = [(number, path) for number, path in reversed(found) if before is None or number < before]
             page = older[:limit]
             items = [network for _, path in page if (network := _readable(path)) is not None]
-        return Page(items=tuple(items), last=page[-1][0] if len(older) > limit else None)
+        return StoredPage(items=tuple(items), last=page[-1][0] if len(older) > limit else None)
 
     def get(self, network_id: str, project: str | None) -> Network:
         """One network.
@@ -214,7 +216,7 @@ def _number(path: Path) -> int:
 
 def _read(folder: Path) -> Network:
     try:
-        return Record.model_validate_json(unseal((folder / RECORD).read_bytes())).network
+        return StoredNetwork.model_validate_json(unseal((folder / RECORD).read_bytes())).network
     except (DamagedError, ValidationError) as error:
         raise StorageError(f"network {folder.name} is damaged: {error}") from error
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.executor import Cause, Cluster, Executor, Exited
 from risk_sac.problem import checked_campaign
+from risk_sac.records import State, Triage, TriageState
 from service.errors import ConflictError, OutdatedError, StorageError
 from service.runs.active import Active
 from service.runs.disposal import dispose, settle
@@ -18,8 +19,7 @@ from service.runs.storage_pause import StoragePause, refused
 from service.runs.unused_places import UnusedPlaces
 from service.settings import ServiceSettings
 from service.store.reading import Store
-from service.store.states import State, TriageState
-from service.store.stored import StoredCampaign, StoredTriage
+from service.store.stored import StoredCampaign
 from service.store.writing import Ledger
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
 
@@ -140,7 +140,7 @@ class Manager:
 
     def triage(
         self, campaign_id: str, failure_id: str, state: TriageState, comment: str, project: str | None = None
-    ) -> StoredTriage:
+    ) -> Triage:
         """Note what people make of a failure; raises what `Ledger.triage` does."""
         with self._lock:
             return self._ledger.triage(campaign_id, failure_id, state, comment, project)

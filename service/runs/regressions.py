@@ -9,7 +9,7 @@ import logging
 import queue
 import re
 import threading
-import time
+from datetime import UTC, datetime
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -19,13 +19,12 @@ from risk_sac.egos.registry import pinned
 from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.failures.bundle import code_digest
-from risk_sac.failures.cases import Case
+from risk_sac.failures.cases import CampaignRegression
 from risk_sac.failures.cases import Regression as Cases
-from risk_sac.records import Record
+from risk_sac.records import State
 from risk_sac.run_folder.durable import replace_file
 from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
 from service.settings import ServiceSettings
-from service.store.states import State
 from service.store.stored import StoredCampaign
 
 logger = logging.getLogger(__name__)
@@ -36,23 +35,10 @@ WALL_S = 24 * 3600.0
 _ID = re.compile(r"([A-Za-z0-9]{1,100})-([0-9a-f]{16})", re.ASCII)
 
 
-class StoredRegression(Record):
-    """One regression. Times are seconds since the epoch."""
+class StoredRegression(CampaignRegression):
+    """A regression with the runs whose failures are played."""
 
-    id: str
-    campaign_id: str
     runs: tuple[str, ...]
-    ego: EgoConfig
-    state: State = State.QUEUED
-    reason: str | None = None
-    created_at: float
-    finished_at: float | None = None
-    cases: tuple[Case, ...] = ()
-
-    @property
-    def passed(self) -> bool | None:
-        """Whether all failures are fixed; None until that is known."""
-        return Cases(ego=self.ego, cases=self.cases).passed if self.state is State.SUCCEEDED else None
 
 
 def campaign_of(regression_id: str) -> str:
@@ -124,7 +110,8 @@ class Regressions:
                 return known
             if self._queue.qsize() >= MOST_WAITING:
                 raise QuotaError(f"{MOST_WAITING} regressions wait; wanted fewer", RETRY_S)
-            posted = StoredRegression(id=id_, campaign_id=campaign.id, runs=runs, ego=ego, created_at=time.time())
+            now = datetime.now(UTC)
+            posted = StoredRegression(id=id_, campaign_id=campaign.id, runs=runs, ego=ego, created_at=now)
             _write(file, posted)
             self._queue.put(file)
         return posted
@@ -170,7 +157,7 @@ class Regressions:
         else:
             said = without_folders(result.log[-500:])
             ended = {"state": State.FAILED, "reason": said or f"its process ended with status {result.status}"}
-        done = asked.model_copy(update={"finished_at": time.time()} | ended)
+        done = asked.model_copy(update={"finished_at": datetime.now(UTC)} | ended)
         _write(file, done)
 
 

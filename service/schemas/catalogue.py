@@ -4,10 +4,10 @@ from typing import Literal
 
 from risk_sac.config import FamilyName, Method, MethodName, Odd, Requirement
 from risk_sac.failures.export.formats import FormatName
-from service.schemas.base import Body
+from risk_sac.records import Record
 
 
-class SceneParameter(Body):
+class SceneParameter(Record):
     """One dimension of a family's scene space."""
 
     name: str
@@ -19,7 +19,7 @@ class SceneParameter(Body):
     """The field of the ODD that narrows it, such as `dynamic.ego_speed_mps`."""
 
 
-class Family(Body):
+class Family(Record):
     """A scenario family: what is searched, and where."""
 
     name: FamilyName
@@ -37,7 +37,7 @@ class Family(Body):
     campaign's own requirements come on top, under other names."""
 
 
-class Signal(Body):
+class Signal(Record):
     """What the formula of a requirement may speak of, with a value in every step."""
 
     name: str
@@ -47,7 +47,7 @@ class Signal(Body):
     meaning: str
 
 
-class ExportFormat(Body):
+class ExportFormat(Record):
     """A format of other tools."""
 
     name: FormatName
@@ -62,13 +62,13 @@ class ExportFormat(Body):
     """Packages that are not installed here, without which it cannot be made."""
 
 
-class ExportFormats(Body):
+class ExportFormats(Record):
     """All of them."""
 
     items: list[ExportFormat]
 
 
-class Families(Body):
+class Families(Record):
     """All scenario families, and what requirements may speak of in each."""
 
     items: list[Family]
@@ -81,7 +81,7 @@ class NamedMethod(Method):
     name: MethodName
 
 
-class Ego(Body):
+class Ego(Record):
     """Who can drive the ego."""
 
     name: str
@@ -97,13 +97,13 @@ class Ego(Body):
     summary: str
 
 
-class Egos(Body):
+class Egos(Record):
     """All egos; the operator registers them."""
 
     items: list[Ego]
 
 
-class Methods(Body):
+class Methods(Record):
     """All search methods."""
 
     items: list[NamedMethod]

@@ -1,12 +1,10 @@
 """How the runs of a campaign have gone, episode by episode."""
 
 from risk_sac.config import FamilyName, MethodName
-from risk_sac.records import Real
-from service.schemas.base import Body
-from service.store.states import State
+from risk_sac.records import Real, Record, State
 
 
-class RunCurves(Body):
+class RunCurves(Record):
     """The search of one run: each list has an entry per point. Failures that were refused since do not count."""
 
     run_id: str
@@ -32,7 +30,7 @@ class RunCurves(Body):
     """Realism cost per step of the episodes since the point before; null where none of them was simulated."""
 
 
-class Curves(Body):
+class Curves(Record):
     """Curves of all runs of a campaign, in the order they are queued."""
 
     runs: list[RunCurves]

@@ -4,14 +4,12 @@ from collections.abc import Mapping
 from typing import Literal
 
 from risk_sac.config import FamilyName, MethodName
-from risk_sac.records import ConflictType, Grade, Real
-from service.schemas.base import Body
-from service.store.states import TriageState
+from risk_sac.records import ConflictType, Grade, Real, Record, TriageState
 
 Repeats = Literal["verified", "flaky"]
 
 
-class FailureKind(Body):
+class FailureKind(Record):
     """The failures of one signature."""
 
     signature: str | None
@@ -26,7 +24,7 @@ class FailureKind(Body):
     """Valid ones that the careful driver would have prevented."""
 
 
-class FamilyScenes(Body):
+class FamilyScenes(Record):
     """The scenes of one family's failures."""
 
     names: list[str]
@@ -37,7 +35,7 @@ class FamilyScenes(Body):
     """Which entries of the table the rows belong to, from 0."""
 
 
-class FailureTable(Body):
+class FailureTable(Record):
     """Failures by columns: each list has an entry per failure, in the order of their arrival.
 
     Numbers are rounded to four decimals; the failure itself has all of them. Times count from the adversaries' release.

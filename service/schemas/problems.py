@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 
-from service.schemas.base import Body
+from risk_sac.records import Record
 
 
 class Reason(StrEnum):
@@ -39,7 +39,7 @@ class Reason(StrEnum):
     MANAGER_STOPPED = "manager_stopped"
 
 
-class FieldProblem(Body):
+class FieldProblem(Record):
     """What is wrong with one field."""
 
     field: str
@@ -50,7 +50,7 @@ class FieldProblem(Body):
     wanted: str
 
 
-class Problem(Body):
+class Problem(Record):
     """Problem details (RFC 9457)."""
 
     type: str

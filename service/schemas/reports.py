@@ -8,14 +8,12 @@ from pydantic import Field
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.failures.clusters import Overview
 from risk_sac.failures.studied import Studied
-from risk_sac.records import Phase
+from risk_sac.records import Phase, Record, RunMetrics
 from risk_sac.report import PairedTest
 from risk_sac.report.cells import Cell
-from service.schemas.base import Body
-from service.schemas.campaigns import Metrics
 
 
-class Clusters(Body):
+class Clusters(Record):
     """The failures of the finished runs, sorted into kinds; flaky ones are left out."""
 
     complete: bool
@@ -24,7 +22,7 @@ class Clusters(Body):
     """Those with a finished run."""
 
 
-class MissingRun(Body):
+class MissingRun(Record):
     """A run that the tables lack."""
 
     family: FamilyName
@@ -34,7 +32,7 @@ class MissingRun(Body):
     """Its state, and why it failed."""
 
 
-class ReportedRun(Body):
+class ReportedRun(Record):
     """One finished run."""
 
     family: FamilyName
@@ -43,13 +41,13 @@ class ReportedRun(Body):
     digest: str
     """SHA-256 of the results: the same whenever the run is repeated."""
     spec_digest: str
-    metrics: Mapping[Phase, Metrics]
+    metrics: Mapping[Phase, RunMetrics]
     wall_s: float
     cpu_s: float
     versions: Mapping[str, str]
 
 
-class Table(Body):
+class Table(Record):
     """The comparison of a campaign's methods over seeds; `table.json` of `risk-sac evaluate`."""
 
     format_version: int
@@ -87,7 +85,7 @@ class Table(Body):
     runs: list[ReportedRun]
 
 
-class FigureFile(Body):
+class FigureFile(Record):
     """A figure in one format."""
 
     format: Literal["png", "svg"]
@@ -96,7 +94,7 @@ class FigureFile(Body):
     """Where it is."""
 
 
-class Figure(Body):
+class Figure(Record):
     """A figure of the report."""
 
     name: Annotated[str, Field(examples=["ecr_low", "bars_rho_c_evaluation"])]
@@ -106,7 +104,7 @@ class Figure(Body):
     files: list[FigureFile]
 
 
-class Figures(Body):
+class Figures(Record):
     """The figures that the finished runs allow."""
 
     complete: bool

@@ -2,11 +2,10 @@
 
 import time
 
-from pydantic_core import from_json, to_json
+from pydantic_core import from_json
 from sqlalchemy.orm import Session
 
-from risk_sac.metrics import Funnel
-from risk_sac.records import EpisodeRecord, Outcome
+from risk_sac.records import EpisodeRecord, Funnel, Outcome, stored
 from service.store.tables import EpisodeRow, RunRow, UsageRow
 from service.workers.messages import EpisodeDone
 
@@ -44,7 +43,7 @@ def fill(row: EpisodeRow, event: EpisodeDone) -> None:
     row.series = event.series
     row.series_sha256 = event.series_sha256
     row.wall_s = event.wall_s
-    row.funnel = to_text(Funnel.of(event.metrics))
+    row.funnel = stored(Funnel.of(event.metrics))
 
 
 def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
@@ -52,13 +51,8 @@ def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
     row.phase = record.phase
     row.index = record.index
     row.outcome = record.outcome
-    row.record = to_text(record)
+    row.record = stored(record)
     judgement = record.collision.judgement if record.collision is not None else None
     row.grade = judgement.grade if judgement is not None and record.outcome is Outcome.FAILURE else None
     row.signature = judgement.signature if judgement is not None else None
     row.broke = f",{','.join(judgement.broke)}," if judgement is not None else None
-
-
-def to_text(value: object) -> str:
-    """JSON as columns hold it."""
-    return to_json(value, inf_nan_mode="strings").decode()

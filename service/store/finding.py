@@ -9,9 +9,9 @@ from operator import attrgetter
 from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import Session
 
-from risk_sac.records import RECORDED, Grade, Outcome
+from risk_sac.records import RECORDED, Episode, Grade, Outcome
 from service.errors import NotFoundError
-from service.store.stored import Page, StoredEpisode
+from service.store.stored import StoredPage, read_episode
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow
 
 
@@ -69,7 +69,7 @@ def find_run(session: Session, campaign: CampaignRow, run_id: str) -> int:
 
 def episode_page(
     session: Session, query: Select[EpisodeRow], outcomes: Collection[Outcome], limit: int, after: int
-) -> Page[StoredEpisode]:
+) -> StoredPage[Episode]:
     """The page of a query's episodes just after number `after`; no outcomes means all."""
     # A query for each outcome: the index has the order of a page only within one.
     query = query.where(EpisodeRow.number > after).order_by(EpisodeRow.number).limit(limit + 1)
@@ -77,7 +77,7 @@ def episode_page(
     found = merge(*(session.scalars(each) for each in queries), key=attrgetter("number"))
     rows = list(islice(found, limit + 1))
     last = rows[limit - 1].number if len(rows) > limit else None
-    return Page(items=tuple(StoredEpisode.from_row(row) for row in rows[:limit]), last=last)
+    return StoredPage(items=tuple(map(read_episode, rows[:limit])), last=last)
 
 
 def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> EpisodeRow:

@@ -9,23 +9,14 @@ from pydantic_core import from_json
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, selectinload
 
-from risk_sac.records import Outcome
+from risk_sac.records import FINAL, Episode, Outcome, State, StateChange, Triage, TriageState
 from service.errors import StorageError
 from service.store.counting import HOUR_S
 from service.store.database import open_database, storage_errors
 from service.store.finding import Judged, episode_page, find_campaign, find_failure, find_run, find_triage
 from service.store.revisions import Revisions
 from service.store.sequence import event_page
-from service.store.states import FINAL, State, TriageState
-from service.store.stored import (
-    Page,
-    PlainEpisode,
-    StoredCampaign,
-    StoredChange,
-    StoredEpisode,
-    StoredTriage,
-    Usage,
-)
+from service.store.stored import PlainEpisode, StoredCampaign, StoredContact, StoredPage, Usage, read_episode
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
 
 DAY_HOURS = 24
@@ -79,7 +70,7 @@ class Store:
         family: str | None = None,
         method: str | None = None,
         label: str | None = None,
-    ) -> Page[StoredCampaign]:
+    ) -> StoredPage[StoredCampaign]:
         """Newest first, from the campaign just older than number `before`; family and method are those of one run."""
         query = select(CampaignRow).options(selectinload(CampaignRow.runs)).order_by(CampaignRow.number.desc())
         wanted = {"project": project, "state": state, "label": label}
@@ -92,7 +83,7 @@ class Store:
         with self._reading() as session:
             rows = list(session.scalars(query.limit(limit + 1)))
             last = rows[limit - 1].number if len(rows) > limit else None
-            return Page(items=tuple(self._campaign(row) for row in rows[:limit]), last=last)
+            return StoredPage(items=tuple(self._campaign(row) for row in rows[:limit]), last=last)
 
     def revision(self, campaign_id: str, project: str | None = None) -> str:
         """A name for what a campaign, its runs and its episodes look like now; another one once they do not.
@@ -118,7 +109,7 @@ class Store:
         """A name for what all campaigns look like now; another one once any of them does not. Holds until a restart."""
         return self._shown_revision(self.revisions.all)
 
-    def events(self, campaign_id: str, *, limit: int, after: int = 0) -> Page[StoredEpisode | StoredChange]:
+    def events(self, campaign_id: str, *, limit: int, after: int = 0) -> StoredPage[Episode | StateChange]:
         """Episodes of a campaign and changes of its state and its runs', in their one order, just after `after`.
 
         Raises:
@@ -146,7 +137,7 @@ class Store:
         outcomes: Collection[Outcome] = (),
         judged: Judged | None = None,
         project: str | None = None,
-    ) -> Page[StoredEpisode]:
+    ) -> StoredPage[Episode]:
         """In order of arrival, from the episode just after number `after`; no outcomes means all.
 
         Raises:
@@ -176,7 +167,7 @@ class Store:
             for found in session.execute(query.execution_options(yield_per=BATCH)):
                 yield PlainEpisode(*found[:-1], from_json(found.record))
 
-    def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredEpisode:
+    def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredContact:
         """The episode with this id in which the ego touched something.
 
         Raises:
@@ -184,9 +175,10 @@ class Store:
         """
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
-            return StoredEpisode.from_row(find_failure(session, campaign, failure_id))
+            row = find_failure(session, campaign, failure_id)
+            return StoredContact(read_episode(row), row.series, row.series_sha256)
 
-    def triage(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredTriage | None:
+    def triage(self, campaign_id: str, failure_id: str, project: str | None = None) -> Triage | None:
         """What people made of the contact with this id; None if nobody has.
 
         Raises:
@@ -195,7 +187,7 @@ class Store:
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             row = find_triage(session, find_failure(session, campaign, failure_id))
-            return None if row is None else StoredTriage.from_row(row)
+            return None if row is None else Triage.model_validate(row, from_attributes=True)
 
     def triages(self, number: int) -> dict[int, TriageState]:
         """What people made of the contacts of the campaign with this number, by the numbers of the episodes."""

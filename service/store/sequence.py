@@ -4,13 +4,14 @@ Both take the next number of their campaign in the transaction that writes them,
 ends. So numbers become visible in their order and leave no gap: whoever has read up to one has read all before it.
 """
 
-from operator import attrgetter
+from operator import itemgetter
 
 from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
+from risk_sac.records import Episode, StateChange
 from service.errors import StorageError
-from service.store.stored import Page, StoredChange, StoredEpisode
+from service.store.stored import StoredPage, read_episode
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 
 
@@ -30,8 +31,8 @@ def next_sequence(campaign: CampaignRow) -> int:
     return campaign.events
 
 
-def event_page(session: Session, campaign: CampaignRow, limit: int, after: int) -> Page[StoredEpisode | StoredChange]:
-    """Events just after number `after`.
+def event_page(session: Session, campaign: CampaignRow, limit: int, after: int) -> StoredPage[Episode | StateChange]:
+    """Events number `after + 1` and on, without a gap.
 
     Raises:
       StorageError: one is missing.
@@ -40,14 +41,15 @@ def event_page(session: Session, campaign: CampaignRow, limit: int, after: int) 
     # would show in the second one without what came before it.
     last = min(after + limit, campaign.events)
     if last <= after:
-        return Page(items=(), last=None)
+        return StoredPage(items=(), last=None)
     episodes = select(EpisodeRow).where(EpisodeRow.sequence.between(after + 1, last))
     changes = select(ChangeRow).where(ChangeRow.sequence.between(after + 1, last))
-    found: list[StoredEpisode | StoredChange] = [
-        *map(StoredEpisode.from_row, session.scalars(episodes.filter_by(campaign_number=campaign.number))),
-        *map(StoredChange.from_row, session.scalars(changes.filter_by(campaign_number=campaign.number))),
-    ]
+    found: list[tuple[int, Episode | StateChange]] = []
+    for episode in session.scalars(episodes.filter_by(campaign_number=campaign.number)):
+        found.append((episode.sequence, read_episode(episode)))
+    for change in session.scalars(changes.filter_by(campaign_number=campaign.number)):
+        found.append((change.sequence, StateChange.model_validate(change, from_attributes=True)))
     if len(found) != last - after:
         raise StorageError(f"events {after + 1} to {last} of campaign {campaign.id} are {len(found)}; restore a copy")
-    items = tuple(sorted(found, key=attrgetter("sequence")))
-    return Page(items=items, last=last if last < campaign.events else None)
+    items = tuple(event for _, event in sorted(found, key=itemgetter(0)))
+    return StoredPage(items=items, last=last if last < campaign.events else None)

@@ -8,36 +8,9 @@ queued ──> running ──> succeeded | failed
 """
 
 from collections.abc import Collection
-from enum import StrEnum
 
+from risk_sac.records import State
 from service.errors import TransitionError
-
-
-class TriageState(StrEnum):
-    """What people make of a failure; any may follow any."""
-
-    NEW = "new"
-    CONFIRMED = "confirmed"
-    DISMISSED = "dismissed"
-    FIXED = "fixed"
-
-
-class State(StrEnum):
-    """Where a campaign or a run stands."""
-
-    QUEUED = "queued"
-    RUNNING = "running"
-    PAUSED = "paused"
-    CANCELLING = "cancelling"
-    CANCELLED = "cancelled"
-    SUCCEEDED = "succeeded"
-    FAILED = "failed"
-
-    @property
-    def final(self) -> bool:
-        """Nothing follows this state."""
-        return not TRANSITIONS[self]
-
 
 TRANSITIONS: dict[State, frozenset[State]] = {
     State.QUEUED: frozenset({State.RUNNING, State.PAUSED, State.CANCELLED, State.FAILED}),
@@ -50,7 +23,6 @@ TRANSITIONS: dict[State, frozenset[State]] = {
 }
 # What a run comes back as when the server that had it in hand is gone, or the disk that refused it has room again.
 RESUMED = {State.RUNNING: State.QUEUED, State.PAUSED: State.QUEUED, State.CANCELLING: State.CANCELLED}
-FINAL = frozenset(state for state in State if not TRANSITIONS[state])
 
 
 def advance(current: State, new: State) -> State:

@@ -6,8 +6,8 @@ from typing import Any
 
 from sqlalchemy import Engine, Row, func, select
 
+from risk_sac.records import State
 from service.store.database import storage_errors
-from service.store.states import State
 from service.store.tables import TALLIED, CampaignRow, RunRow
 
 

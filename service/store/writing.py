@@ -9,16 +9,16 @@ from sqlalchemy import delete, select, tuple_
 from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import EpisodeRecord, Outcome
+from risk_sac.records import EpisodeRecord, Outcome, State, Triage, TriageState, stored
 from risk_sac.rules import REPEATS
 from service.errors import ConflictError
-from service.store.counting import add_usage, count, fill, fill_record, tally, to_text
+from service.store.counting import add_usage, count, fill, fill_record, tally
 from service.store.database import WRITING, storage_errors
 from service.store.finding import find_campaign, find_failure, find_triage
 from service.store.reading import Store
 from service.store.sequence import hold_campaigns, next_sequence
-from service.store.states import RESUMED, State, TriageState, advance, campaign_state
-from service.store.stored import StoredCampaign, StoredTriage
+from service.store.states import RESUMED, advance, campaign_state
+from service.store.stored import StoredCampaign
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow, TriageRow
 from service.workers.messages import EpisodeDone, Finished
 
@@ -91,7 +91,7 @@ class Ledger:
                 run, row = runs[number], known.get(_place(number, event))
                 campaign = campaigns[run.campaign_number]
                 self._repeated_s[number] = self._repeated_s.get(number, 0.0) + event.wall_s
-                if row is not None and row.record == to_text(event.record) and row.series_sha256 == event.series_sha256:
+                if row is not None and row.record == stored(event.record) and row.series_sha256 == event.series_sha256:
                     continue
                 if row is None:
                     grown.add(number)
@@ -104,9 +104,9 @@ class Ledger:
                 fill(row, event)
                 count(run, event.record.outcome, +1)
                 if event.record.evaluating:
-                    run.evaluation = to_text(event.metrics)
+                    run.evaluation = stored(event.metrics)
                 else:
-                    run.metrics = to_text(event.metrics)
+                    run.metrics = stored(event.metrics)
                 changed.add(number)
             for number in changed:
                 run = runs[number]
@@ -125,13 +125,13 @@ class Ledger:
             _move(session, row, state, reason)
             row.finished_at = time.time()
             if result is not None:
-                row.metrics = to_text(result.metrics)
-                row.evaluation = None if result.evaluation is None else to_text(result.evaluation)
+                row.metrics = stored(result.metrics)
+                row.evaluation = None if result.evaluation is None else stored(result.evaluation)
                 tally(row)
                 row.digest = result.digest
-                row.versions = to_text(dict(result.versions))
+                row.versions = stored(dict(result.versions))
                 _refuse(session, row, result.flaky)
-                row.repetitions = to_text(dict(result.repetitions)) if result.repetitions else None
+                row.repetitions = stored(dict(result.repetitions)) if result.repetitions else None
 
     def requeue_run(self, number: int, reason: str | None = None) -> None:
         """A run lost its worker; it will resume from its checkpoint."""
@@ -185,7 +185,7 @@ class Ledger:
 
     def triage(
         self, campaign_id: str, failure_id: str, state: TriageState, comment: str, project: str | None = None
-    ) -> StoredTriage:
+    ) -> Triage:
         """Note what people make of a contact; noting the same again changes nothing.
 
         Raises:
@@ -200,10 +200,10 @@ class Ledger:
                 row = TriageRow(campaign_number=campaign.number, episode_number=episode.number)
                 session.add(row)
             elif (row.state, row.comment) == (state, comment):
-                return StoredTriage.from_row(row)
+                return Triage.model_validate(row, from_attributes=True)
             row.state, row.comment, row.changed_at = state, comment, time.time()
             campaign.revision += 1
-            return StoredTriage.from_row(row)
+            return Triage.model_validate(row, from_attributes=True)
 
     def delete(self, campaign_id: str) -> None:
         """Remove a campaign with all that belongs to it.

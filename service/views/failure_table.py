@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from risk_sac.records import Grade, Outcome
+from risk_sac.records import Grade, Outcome, TriageState
 from service.schemas.failure_table import FailureKind, FailureTable, FamilyScenes
-from service.store.states import TriageState
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
 from service.views.plain import Kinds, Plain, signature_of
 

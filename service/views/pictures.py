@@ -6,9 +6,10 @@ from dataclasses import dataclass, field, replace
 from risk_sac import __version__
 from risk_sac.failures.question import Twin, read_twin
 from risk_sac.failures.recording import Recording
+from risk_sac.records import Episode
 from risk_sac.run_folder.results import Contact
 from service.settings import ServiceSettings
-from service.store.stored import StoredCampaign, StoredEpisode, StoredRun
+from service.store.stored import StoredCampaign, StoredContact, StoredRun
 from service.views.bodies import series_file
 from service.views.products import Products
 from service.views.series import load_arrays
@@ -21,17 +22,23 @@ class ContactOfARun:
     edition: str  # changes whenever what is told of it would
     campaign: StoredCampaign = field(compare=False)
     run: StoredRun = field(compare=False)
-    episode: StoredEpisode = field(compare=False)
+    stored: StoredContact = field(compare=False)
+
+    @property
+    def episode(self) -> Episode:
+        """The episode that ended in it."""
+        return self.stored.episode
 
     @classmethod
-    def of(cls, campaign: StoredCampaign, episode: StoredEpisode) -> "ContactOfARun":
+    def of(cls, campaign: StoredCampaign, stored: StoredContact) -> "ContactOfARun":
         """A contact of a campaign."""
+        episode = stored.episode
         run = next(run for run in campaign.runs if run.id == episode.run_id)
         # The run's digest: what is made of a run that has ended holds its policy too.
-        told = (str(run.digest), str(episode.series_sha256), episode.record.model_dump_json())
+        told = (str(run.digest), str(stored.series_sha256), episode.model_dump_json())
         parts = (__version__, campaign.id, episode.id, *told)
         edition = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
-        return cls(edition, campaign, run, episode)
+        return cls(edition, campaign, run, stored)
 
 
 def recording_of(contact: ContactOfARun, settings: ServiceSettings) -> Recording:
@@ -41,9 +48,9 @@ def recording_of(contact: ContactOfARun, settings: ServiceSettings) -> Recording
       StorageError: the time series is lost.
     """
     episode = contact.episode
-    path, sha256 = series_file(contact.campaign.id, episode, settings)
+    path, sha256 = series_file(contact.campaign.id, contact.stored, settings)
     arrays = load_arrays(path, sha256)
-    return Recording(Contact(id=episode.id, series=path.name, episode=episode.record), arrays)
+    return Recording(Contact(id=episode.id, series=path.name, episode=episode), arrays)
 
 
 @dataclass(frozen=True, slots=True)

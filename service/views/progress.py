@@ -4,9 +4,7 @@ import math
 from collections.abc import Sequence
 
 from risk_sac.config import METHODS
-from risk_sac.records import RunMetrics
-from service.schemas.campaigns import Progress
-from service.store.states import State
+from risk_sac.records import Progress, RunMetrics, State
 from service.store.stored import StoredCampaign, StoredRun
 from service.store.tables import TALLIED
 

@@ -8,12 +8,12 @@ from pathlib import Path
 from risk_sac import __version__
 from risk_sac.errors import ConfigError
 from risk_sac.failures import studied
+from risk_sac.records import State
 from risk_sac.report import Comparison, FinishedRun, compare, figure_bytes, figure_names, read_run
 from risk_sac.report.figures import Format
 from risk_sac.scenario.families import family_named
 from service.errors import NotFoundError
 from service.settings import ServiceSettings
-from service.store.states import State
 from service.store.stored import StoredCampaign, StoredRun
 
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.series import Series
 from risk_sac.types import Kind, Role, Signal
 from service.errors import StorageError
-from service.schemas.failures import Series
 
 _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 

@@ -11,7 +11,7 @@ MM = 3  # decimals of a metre
 
 def roads_body(contact: ContactOfARun) -> Roads:
     """The surfaces of a contact's scene."""
-    surfaces = roads_of(contact.run.family, contact.episode.record.scene)
+    surfaces = roads_of(contact.run.family, contact.episode.scene)
     return Roads(
         surfaces=[Surface(use=surface.use, outline=surface.outline.round(MM).tolist()) for surface in surfaces]
     )
@@ -23,5 +23,5 @@ def thumbnail_of(contact: ContactOfARun, settings: ServiceSettings) -> str:
     Raises:
       StorageError: its time series is lost.
     """
-    roads = roads_of(contact.run.family, contact.episode.record.scene)
+    roads = roads_of(contact.run.family, contact.episode.scene)
     return thumbnail(recording_of(contact, settings), roads)

@@ -50,7 +50,7 @@ class Studies(Products[Study]):
 
     def _answer(self, study: Study) -> bytes:
         contact = study.contact
-        path, sha256 = series_file(contact.campaign.id, contact.episode, self._settings)
+        path, sha256 = series_file(contact.campaign.id, contact.stored, self._settings)
         load_arrays(path, sha256)  # else it is lost or damaged, and that is to be said
         try:
             spec = contact.campaign.run_spec(contact.run)
@@ -59,7 +59,7 @@ class Studies(Products[Study]):
         question = Question(
             subject=study.subject,
             spec=spec,
-            episode=contact.episode.record,
+            episode=contact.episode,
             series=path,
             format=study.format,
             twin=None if study.twin in (None, IDLE) else EgoConfig.model_validate({"profile": study.twin}),

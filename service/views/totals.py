@@ -17,8 +17,7 @@ from risk_sac.metrics import (
     pooled_counts,
     pooled_signatures,
 )
-from risk_sac.records import RunMetrics
-from service.schemas.campaign_results import Results, RunResult, Total
+from risk_sac.records import Results, RunMetrics, Total
 from service.store.stored import StoredCampaign, StoredRun
 
 
@@ -28,7 +27,7 @@ def results(campaign: StoredCampaign) -> Results:
         campaign_id=campaign.id,
         state=campaign.state,
         complete=campaign.state.final,
-        runs=[RunResult.model_validate(run) for run in campaign.runs],
+        runs=campaign.runs,
         totals=totals(campaign.searches),
     )
 

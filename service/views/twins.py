@@ -1,7 +1,6 @@
 """A contact's twin as a body."""
 
 from risk_sac.failures.question import Twin, read_twin
-from service.schemas.episodes import Collision
 from service.schemas.failures import TwinPlay
 from service.views.series import series_body
 
@@ -14,5 +13,4 @@ def twin_body(twin: Twin, played: bytes) -> TwinPlay:
       played: as a study told it.
     """
     told, arrays = read_twin(played)
-    collision = None if told.collision is None else Collision.model_validate(told.collision.model_dump())
-    return TwinPlay(twin=twin, outcome=told.outcome, collision=collision, series=series_body(arrays))
+    return TwinPlay(twin=twin, outcome=told.outcome, collision=told.collision, series=series_body(arrays))

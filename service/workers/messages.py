@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
-from risk_sac.records import EpisodeRecord, Record, RunMetrics
-from risk_sac.run_folder.verified import Repetition
+from risk_sac.records import EpisodeRecord, Record, Repetition, RunMetrics
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}$")]

@@ -13,9 +13,10 @@ import pytest
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunSpec, SceneOptimizerConfig, WarmStartConfig
 from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.local import LocalExecutor
+from risk_sac.records import Repetition
 from risk_sac.run_folder.results import FAILURES, read_results, series_name
 from risk_sac.run_folder.series import read_series, write_series
-from risk_sac.run_folder.verified import Repetition, distinct_failures
+from risk_sac.run_folder.verified import distinct_failures
 from service.settings import ServiceSettings
 from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
 from service.workers.program import program

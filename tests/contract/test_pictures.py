@@ -16,6 +16,7 @@ from risk_sac import cli
 from risk_sac.client import Client, Refused, Series
 from risk_sac.failures import show
 from risk_sac.failures.question import TwinPlay, twin_bytes
+from risk_sac.records import wire
 from risk_sac.run_folder.results import FAILURES, series_name
 from service.settings import ServiceSettings
 from service.store.database import READERS
@@ -205,7 +206,7 @@ def test_the_client_has_the_picture_and_the_series_as_arrays_with_units(client):
         assert failure.series.x_m == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
         assert failure.series.visible == [[None, True], [None, None], [None, False]]
         assert failure.series.released_s is None
-        assert failure.model_dump(mode="json") == client.get(f"{FOLDER}/{RUN}-train-1").json()
+        assert json.loads(wire(failure)) == client.get(f"{FOLDER}/{RUN}-train-1").json()
         assert remote.picture(ENDED_ID, failure.id) == client.get(f"{FOLDER}/{RUN}-train-1/picture.png").content
         with pytest.raises(Refused) as refused:
             remote.picture(ENDED_ID, f"{RUN}-train-0")

@@ -1,5 +1,6 @@
 """The client against a real server."""
 
+import json
 import signal
 import threading
 import time
@@ -9,6 +10,7 @@ import pytest
 
 from risk_sac.client import Campaign, Client, Refused
 from risk_sac.config import Budget, CampaignSpec
+from risk_sac.records import wire
 from tests.server import LONG_S, Service
 
 SPEC = CampaignSpec(label="a", families=("low",), methods=("random",), seeds=(0, 1), budget=Budget(episodes=6))
@@ -35,9 +37,9 @@ def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Clie
     assert campaign.state == "succeeded"
     assert [each.progress.episodes_done for each in seen] == sorted(each.progress.episodes_done for each in seen)
     assert campaign.progress.episodes_done == 12
-    assert campaign.model_dump(mode="json") == shared.get(campaign.id)
+    assert json.loads(wire(campaign)) == shared.get(campaign.id)
     results = client.results(campaign.id)
-    assert results.model_dump(mode="json") == shared.get(campaign.id, "/results")
+    assert json.loads(wire(results)) == shared.get(campaign.id, "/results")
     assert [(total.method, total.failures) for total in results.totals] == [("random", 6)]
     assert client.table(campaign.id).startswith("# Comparison of methods")
 

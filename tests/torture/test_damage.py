@@ -16,11 +16,11 @@ import pytest
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
+from risk_sac.records import State
 from risk_sac.run_folder.results import FAILURES, RESULTS
 from service.errors import StorageError
 from service.settings import ServiceSettings
 from service.store.reading import Store
-from service.store.states import State
 from service.views.bodies import failure_body
 from service.views.reports import Reports
 from tests.server import servers

@@ -12,7 +12,7 @@ from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 from risk_sac.cli.campaigns.failures import look_command
 from risk_sac.cli.campaigns.gate import Bounds, comparisons, excesses
 from risk_sac.cli.console import counted, printable
-from risk_sac.client import Episode, Metrics, Results, RunResult, Total
+from risk_sac.client import Episode, Results, RunMetrics, RunResult, Total
 
 
 def junit(
@@ -106,7 +106,7 @@ def _named(run: RunResult, service_url: str, url: str, campaign_id: str, failure
     return printable("\n".join(lines))
 
 
-def _funnel(metrics: Metrics) -> str:
+def _funnel(metrics: RunMetrics) -> str:
     return (
         f"{counted(metrics.raw_collisions, 'contact')}, {metrics.failures} valid, "
         f"{metrics.distinct_failures} distinct, "

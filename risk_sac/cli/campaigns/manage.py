@@ -13,6 +13,7 @@ from risk_sac.cli.report import format_of
 from risk_sac.client import Client
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.cases import Regression
+from risk_sac.records import State
 from risk_sac.run_folder.durable import replace_file
 
 LISTED = 20
@@ -105,10 +106,10 @@ def _regress(options: argparse.Namespace) -> int:
     ego = read_ego(options.ego)
     with Client.from_environment(options.url) as client:
         regression = client.regress(options.id, ego)
-        while regression.state in ("queued", "running"):
+        while not regression.state.final:
             time.sleep(POLL_S)
             regression = client.regression(regression.id)
-    if regression.state != "succeeded":
+    if regression.state is not State.SUCCEEDED:
         complain(f"{regression.id} {regression.state}: {regression.reason}")
         return COULD_NOT_RUN
     found = Regression(ego=regression.ego, cases=regression.cases)

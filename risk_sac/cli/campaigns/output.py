@@ -13,6 +13,7 @@ from rich.text import Text
 from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons
 from risk_sac.cli.console import console, counted, on_one_line, or_dash
 from risk_sac.client import CampaignSummary, Results
+from risk_sac.records import wire
 
 Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]
 
@@ -101,5 +102,5 @@ def _rate(rate: float | None, low: float | None, high: float | None, broken: Com
 
 def _plain(answer: Answer) -> Any:
     if isinstance(answer, BaseModel):
-        return answer.model_dump(mode="json")
+        return json.loads(wire(answer))
     return answer if isinstance(answer, Mapping) else [_plain(each) for each in answer]

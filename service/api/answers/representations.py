@@ -5,6 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from fastapi import HTTPException, Request, Response
+from pydantic import BaseModel
+
+from risk_sac.records import wire
 
 _QUALITY = re.compile(r"\s*q\s*=\s*([01](?:\.\d{0,3})?)\s*", re.IGNORECASE)
 
@@ -71,6 +74,11 @@ def caching(tag: str | None, vary: str = "") -> dict[str, str]:
     """
     headers = {"Cache-Control": "no-cache", "ETag": tag or "", "Vary": vary}
     return {name: value for name, value in headers.items() if value}
+
+
+def as_json(record: BaseModel) -> Response:
+    """A record as it is answered; FastAPI's own way would write numbers that are not finite as strings."""
+    return Response(wire(record), media_type="application/json")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Header, Query, Request, Response
 
 from risk_sac import __version__, problem
 from risk_sac.config import FamilyName, MethodName
+from risk_sac.records import Campaign, CampaignPage, Record, Results, State, wire
 from service.api.access import Caller, CurrentCaller
 from service.api.answer_cache import keep
 from service.api.answers.pages import Cursor, Limit
@@ -27,12 +28,8 @@ from service.api.answers.responses import (
 from service.api.answers.tiers import TIERS, Tier
 from service.api.context import Context, Service
 from service.api.posted_campaign import PostedCampaign, documented_campaign
-from service.schemas.base import Body
-from service.schemas.campaign_results import Results
-from service.schemas.campaigns import Campaign, CampaignPage
 from service.schemas.curves import Curves
 from service.schemas.failure_table import FailureTable
-from service.store.states import State
 from service.store.stored import StoredCampaign
 from service.views.bodies import campaign_body, summary_body
 from service.views.curves import curves
@@ -101,7 +98,7 @@ def list_campaigns(
     )
     items = [summary_body(campaign, service.manager.workers) for campaign in page.items]
     cursor = service.cursors.encode(page.last, LISTED, caller.sees)
-    body = CampaignPage(items=items, next=cursor).model_dump_json().encode()
+    body = wire(CampaignPage(items=items, next=cursor))
     tag = entity_tag(blake2b(body, digest_size=8).hexdigest())
     representation = Representation(body, tag, caching(tag))
     keep(request, representation, revision)
@@ -166,7 +163,7 @@ def get_curves(
 
 
 def _kept(
-    campaign_id: str, request: Request, service: Context, caller: Caller, body: Callable[[StoredCampaign], Body]
+    campaign_id: str, request: Request, service: Context, caller: Caller, body: Callable[[StoredCampaign], Record]
 ) -> Response:
     """An answer about one campaign, which the cache keeps."""
     revision = service.store.revision(campaign_id, caller.sees)
@@ -176,14 +173,14 @@ def _kept(
     headers = caching(tag) | _retry_after(campaign, service)
     if has(request, tag):  # before the body is made, which of many episodes takes seconds
         return Response(status_code=304, headers=headers)
-    representation = Representation(body(campaign).model_dump_json().encode(), tag, headers)
+    representation = Representation(wire(body(campaign)), tag, headers)
     keep(request, representation, revision, campaign_id)
     return representation.response(request)
 
 
 def _accepted(campaign: StoredCampaign, service: Context) -> Response:
     headers = {"Location": f"/v1/campaigns/{campaign.id}"} | _retry_after(campaign, service)
-    body = campaign_body(campaign, service.manager.workers).model_dump_json()
+    body = wire(campaign_body(campaign, service.manager.workers))
     return Response(body, status_code=202, headers=headers, media_type="application/json")
 
 

@@ -39,7 +39,9 @@ def list_families() -> Families:
             name=family.name,
             summary=family.summary,
             horizon_steps=family.horizon_steps,
-            parameters=[SceneParameter.model_validate(parameter) for parameter in family.space.parameters],
+            parameters=[
+                SceneParameter.model_validate(parameter, from_attributes=True) for parameter in family.space.parameters
+            ],
             adversaries=list(family.adversaries),
             odd=family.odd,
             odd_limits=widest(family.odd),

@@ -10,7 +10,7 @@ from fastapi.responses import FileResponse, HTMLResponse, RedirectResponse
 
 from risk_sac import __version__
 from service.api.answers.representations import accepted
-from service.schemas.entrance import Entrance
+from service.schemas.operations import Entrance
 
 ASSETS = Path(str(files("fastapi_offline"))) / "static"
 SCRIPT, STYLE, ICON = "swagger-ui-bundle.js", "swagger-ui.css", "favicon.png"

@@ -2,21 +2,20 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request
+from fastapi import APIRouter, Depends, Query, Request, Response
 
-from risk_sac.records import Grade, Outcome
+from risk_sac.records import Episode, EpisodePage, Failure, Grade, Outcome, Triage
 from service.api.access import CurrentCaller
 from service.api.answers.pages import Cursor, Limit
+from service.api.answers.representations import as_json
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN
 from service.api.answers.tiers import TIERS, Tier
 from service.api.context import Service
 from service.api.posted import documented, read_posted
-from service.schemas.episodes import EpisodePage
-from service.schemas.failures import Failure
-from service.schemas.triage import PostedTriage, Triage
+from service.schemas.posted import PostedTriage
 from service.store.finding import Judged
-from service.store.stored import Page, StoredEpisode
-from service.views.bodies import episode_body, failure_body
+from service.store.stored import StoredPage
+from service.views.bodies import failure_body
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
 
@@ -25,7 +24,7 @@ async def _posted_triage(request: Request) -> PostedTriage:
     return await read_posted(request, PostedTriage)
 
 
-@router.get("/episodes")
+@router.get("/episodes", response_model=EpisodePage)
 def list_episodes(
     campaign_id: str,
     service: Service,
@@ -34,7 +33,7 @@ def list_episodes(
     outcome: Annotated[Outcome | None, Query(description="Only episodes that ended so.")] = None,
     limit: Limit = 50,
     cursor: Cursor = None,
-) -> EpisodePage:
+) -> Response:
     """Episodes of a campaign in the order of their arrival."""
     page = service.store.episodes(
         campaign_id,
@@ -44,10 +43,10 @@ def list_episodes(
         outcomes=() if outcome is None else (outcome,),
         project=caller.sees,
     )
-    return _episode_page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
+    return _page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
 
 
-@router.get("/failures")
+@router.get("/failures", response_model=EpisodePage)
 def list_failures(
     campaign_id: str,
     service: Service,
@@ -65,7 +64,7 @@ def list_failures(
     ] = None,
     limit: Limit = 50,
     cursor: Cursor = None,
-) -> EpisodePage:
+) -> Response:
     """Collisions of the ego in the order of their arrival."""
     page = service.store.episodes(
         campaign_id,
@@ -76,15 +75,15 @@ def list_failures(
         judged=Judged(grade=grade, broke=broke, signature=signature, iid=run is not None),
         project=caller.sees,
     )
-    return _episode_page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
+    return _page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
 
 
-@router.get("/failures/{failure_id}")
-def get_failure(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> Failure:
+@router.get("/failures/{failure_id}", response_model=Failure)
+def get_failure(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> Response:
     """One collision, valid or not, with its full time series."""
-    episode = service.store.failure(campaign_id, failure_id, caller.sees)
+    contact = service.store.failure(campaign_id, failure_id, caller.sees)
     triage = service.store.triage(campaign_id, failure_id, caller.sees)
-    return failure_body(campaign_id, episode, triage, service.settings)
+    return as_json(failure_body(campaign_id, contact, triage, service.settings))
 
 
 @router.put("/failures/{failure_id}/triage", responses=MALFORMED | NOT_JSON, openapi_extra=documented(PostedTriage))
@@ -96,9 +95,8 @@ def put_triage(
     caller: CurrentCaller,
 ) -> Triage:
     """Note what you make of a collision, in place of what was noted before; it goes with the campaign."""
-    triage = service.manager.triage(campaign_id, failure_id, posted.state, posted.comment, caller.sees)
-    return Triage.model_validate(triage)
+    return service.manager.triage(campaign_id, failure_id, posted.state, posted.comment, caller.sees)
 
 
-def _episode_page(page: Page[StoredEpisode], cursor: str | None) -> EpisodePage:
-    return EpisodePage(items=[episode_body(episode) for episode in page.items], next=cursor)
+def _page(page: StoredPage[Episode], cursor: str | None) -> Response:
+    return as_json(EpisodePage(items=list(page.items), next=cursor))

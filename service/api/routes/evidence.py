@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 
 from risk_sac.failures.cases import Regression
+from risk_sac.records import State
 from risk_sac.report import FinishedRun
 from risk_sac.report.evidence import POLICY, Evidence, Origin, gathered, html, markdown, report
 from service.api.access import CurrentCaller
@@ -19,7 +20,6 @@ from service.api.context import Context, Service
 from service.api.routes.reports import CACHED, UNCHANGED, commands
 from service.errors import ConflictError, NotFoundError
 from service.runs.regressions import StoredRegression, campaign_of
-from service.store.states import State
 from service.store.stored import StoredCampaign
 from service.views.reports import CampaignReport
 

@@ -9,7 +9,7 @@ from service.api.access import require_admin
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import STOPPED, UNREADY, Responses
 from service.api.context import Service
-from service.schemas.health import Health, Ready
+from service.schemas.operations import Health, Ready
 from service.schemas.problems import Reason
 from service.store.statistics import check_readable
 

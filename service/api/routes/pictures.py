@@ -10,6 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names
 from risk_sac.failures.question import Twin
 from risk_sac.failures.studied import Region
+from risk_sac.records import wire
 from service.api.access import CurrentCaller
 from service.api.answers.made import CROWDED, LACKING, check_installed, crowded
 from service.api.answers.problems import ProblemError
@@ -47,8 +48,8 @@ router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], res
 
 async def _contact(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> ContactOfARun:
     campaign = await run_in_threadpool(service.store.campaign, campaign_id, caller.sees)
-    episode = await run_in_threadpool(service.store.failure, campaign_id, failure_id, caller.sees)
-    return ContactOfARun.of(campaign, episode)
+    stored = await run_in_threadpool(service.store.failure, campaign_id, failure_id, caller.sees)
+    return ContactOfARun.of(campaign, stored)
 
 
 Asked = Annotated[ContactOfARun, Depends(_contact)]
@@ -107,7 +108,7 @@ async def get_twin_play(contact: Asked, twin: Twin, request: Request, service: S
 
     async def tell() -> bytes:
         played = await _played(contact, twin, service)
-        return await run_in_threadpool(lambda: twin_body(twin, played).model_dump_json().encode())
+        return await run_in_threadpool(lambda: wire(twin_body(twin, played)))
 
     return await _answer(contact, request, JSON, tell)
 

@@ -5,12 +5,13 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from risk_sac.failures.cases import CampaignRegression
 from service.api.access import CurrentCaller
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses, header, problem
 from service.api.context import Service
 from service.api.posted import documented, read_posted
 from service.runs.regressions import campaign_of
-from service.schemas.regressions import PostedRegression, Regression
+from service.schemas.posted import PostedRegression
 
 POSTING: Responses = (
     {202: {"headers": {"Location": header("Where to follow it.")}}}
@@ -30,16 +31,16 @@ async def _posted(request: Request) -> PostedRegression:
 @router.post("", status_code=202, responses=POSTING, openapi_extra=documented(PostedRegression))
 async def post_regression(
     posted: Annotated[PostedRegression, Depends(_posted)], response: Response, service: Service, caller: CurrentCaller
-) -> Regression:
+) -> CampaignRegression:
     """Play the distinct failures of a campaign against another ego; posting the same again gives the one there is."""
     campaign = await run_in_threadpool(service.store.campaign, posted.campaign_id, caller.sees)
     regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego)
     response.headers["Location"] = f"/v1/regressions/{regression.id}"
-    return Regression.model_validate(regression)
+    return regression
 
 
 @router.get("/{regression_id}", responses=UNKNOWN)
-def get_regression(regression_id: str, service: Service, caller: CurrentCaller) -> Regression:
+def get_regression(regression_id: str, service: Service, caller: CurrentCaller) -> CampaignRegression:
     """What became of each failure: fixed, still failing, a new kind, flaky, or not comparable, and why."""
     service.store.campaign(campaign_of(regression_id), caller.sees)  # which another project's caller does not see
-    return Regression.model_validate(service.regressions.get(regression_id))
+    return service.regressions.get(regression_id)

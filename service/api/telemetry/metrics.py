@@ -13,10 +13,10 @@ from prometheus_client.registry import Collector
 from pydantic_core import from_json
 
 from risk_sac.execution.executor import Cluster, Node
+from risk_sac.records import State
 from service.errors import StorageError
 from service.runs.manager import Manager
 from service.store.reading import Store
-from service.store.states import State
 from service.store.statistics import Statistics, read_statistics
 
 BUCKETS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)

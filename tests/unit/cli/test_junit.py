@@ -6,23 +6,13 @@ from typing import Any
 from risk_sac.cli.campaigns.gate import Bounds
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.client import Episode, Results
+from risk_sac.records import Outcome
+from tests.builders import collision, episode_record, judgement, run_metrics
 from tests.unit.cli.test_gate import TOTAL
 
-METRICS = {
-    "episodes": 40,
-    "failures": 10,
-    "ecr": 0.25,
-    "ecr_low": 0.1,
-    "ecr_high": 0.4,
-    "distinct_failures": 4,
-    "raw_collisions": 12,
-    "preventable": 6,
-    "distinct_preventable": 2,
-    "pcr": 0.15,
-    "pcr_low": 0.05,
-    "pcr_high": 0.3,
-    "unresponsive": 0,
-}
+METRICS = run_metrics(
+    40, failures=10, ecr=0.25, ecr_low=0.1, ecr_high=0.4, distinct_failures=4, raw_collisions=12, preventable=6
+).model_copy(update={"distinct_preventable": 2, "pcr": 0.15, "pcr_low": 0.05, "pcr_high": 0.3})
 RUN = {
     "id": "low-sac-0",
     "family": "low",
@@ -42,36 +32,24 @@ SERVICE = "http://host"
 URL = "http://host/v1/campaigns/c1"
 FAILURES = {
     "low-sac-0": [
-        Episode.model_validate(
-            {
-                "id": f"low-sac-0-train-{index}",
-                "run_id": "low-sac-0",
-                "index": index,
-                "phase": "train",
-                "outcome": "failure",
-                "reason": "",
-                "steps": 50,
-                "collision": {
-                    "time_s": 2.0,
-                    "other_id": "left",
-                    "other_kind": "vehicle",
-                    "other_role": "adversary",
-                    "ego_zone": "front",
-                    "other_zone": "rear",
-                    "ego_speed_mps": 8.0,
-                    "other_speed_mps": 1.0,
-                    "verdicts": {},
-                    "judgement": {
-                        "conflict_type": "cut_in",
-                        "conflict_s": 0.5,
-                        "hidden": False,
-                        "broke": [],
-                        "grade": "careful",
-                        "signature": "cut-in, ahead, in a lane; ego goes straight, brakes",
-                    },
-                },
-                "funnel": None,
-            }
+        Episode(
+            **dict(
+                episode_record(
+                    index,
+                    Outcome.FAILURE,
+                    steps=50,
+                    collision=collision(
+                        time_s=2.0,
+                        other_id="left",
+                        ego_speed_mps=8.0,
+                        other_speed_mps=1.0,
+                        judgement=judgement(broke=(), signature="cut-in, ahead, in a lane; ego goes straight, brakes"),
+                    ),
+                )
+            ),
+            id=f"low-sac-0-train-{index}",
+            run_id="low-sac-0",
+            wall_s=1.0,
         )
         for index in (3, 9)
     ]

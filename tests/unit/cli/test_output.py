@@ -5,8 +5,10 @@ from risk_sac.cli.campaigns.gate import Bounds
 from risk_sac.cli.campaigns.output import line, results_table
 from risk_sac.client import CampaignSummary, Results
 from risk_sac.config import METHODS
+from tests.unit.cli.test_gate import TOTAL as ORDINARY
+from tests.unit.client.scripted_server import PROGRESS, campaign
 
-TOTAL = {
+TOTAL = ORDINARY | {
     "family": "dense",
     "runs": 100,
     "episodes": 100_000,
@@ -15,20 +17,12 @@ TOTAL = {
     "ecr": 0.999,
     "ecr_low": 0.99,
     "ecr_high": 1.0,
-    "efficiency": 0.0,
-    "cost_rate": 0.0,
-    "dispersion": None,
     "distinct_failures": 9_999,
-    "steps_per_distinct_failure": None,
     "preventable": 9_999,
     "distinct_preventable": 9_999,
     "pcr": 0.999,
     "pcr_low": 0.99,
     "pcr_high": 1.0,
-    "unresponsive": 0,
-    "signatures": {},
-    "conflicts_by_second": [],
-    "contacts_by_second": [],
 }
 
 
@@ -53,18 +47,6 @@ def test_a_rate_that_may_be_above_says_up_to_where(capsys: pytest.CaptureFixture
 
 @pytest.mark.parametrize(("count", "said"), [(0, "0 failures"), (1, "1 failure"), (2, "2 failures")])
 def test_one_failure_is_no_failures(count: int, said: str) -> None:
-    progress = {
-        "episodes_done": 1,
-        "episodes_total": 1,
-        "failures": count,
-        "raw_collisions": 2,
-        "distinct_failures": 1,
-        "preventable": 1,
-        "distinct_preventable": 1,
-        "window_ecr": 1.0,
-        "window_pcr": 1.0,
-        "dual_variable": None,
-        "eta_s": None,
-    }
-    campaign = {"id": "c1", "label": "", "state": "running", "reason": None, "created_at": 0, "progress": progress}
-    assert line(CampaignSummary.model_validate(campaign)).startswith(f"c1 running: 1/1 episode, {said}, 1 distinct")
+    progress = PROGRESS | {"episodes_done": 1, "episodes_total": 1, "failures": count, "distinct_preventable": 1}
+    found = CampaignSummary.model_validate(campaign(progress=progress))
+    assert line(found).startswith(f"c1 running: 1/1 episode, {said}, 1 distinct")

@@ -13,12 +13,14 @@ PROGRESS = {
     "episodes_total": 4,
     "failures": 0,
     "raw_collisions": 0,
+    "rejected": 0,
     "distinct_failures": 0,
     "preventable": 0,
     "distinct_preventable": 0,
     "window_ecr": None,
     "window_pcr": None,
     "dual_variable": None,
+    "temperature": None,
     "eta_s": None,
 }
 
@@ -29,10 +31,15 @@ def campaign(state: str = "running", done: int = 0, **fields: Any) -> dict[str, 
         "label": "",
         "state": state,
         "reason": None,
+        "families": ["low"],
+        "methods": ["risk-sac"],
+        "ego": {"profile": "default", "car_following": "Krauss"},
         "created_at": "2026-01-02T03:04:05Z",
+        "started_at": None,
+        "finished_at": None,
         "progress": PROGRESS | {"episodes_done": done},
         "runs": [],
-        "spec": {},
+        "spec": {"families": ["low"]},
     } | fields
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 
 from risk_sac.errors import NotFinite
-from risk_sac.metrics import WINDOW, Funnel, MetricsAccumulator, wilson_interval
+from risk_sac.metrics import WINDOW, MetricsAccumulator, wilson_interval
 from risk_sac.metrics.rows import (
     cost_rate,
     effective_collision_rate,
@@ -13,7 +13,7 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.records import Grade, Outcome, RunMetrics
+from risk_sac.records import Funnel, Grade, Outcome, RunMetrics
 from risk_sac.verdicts.distinct import distinct_failures
 from risk_sac.verdicts.taxonomy import kind_of
 from tests.builders import judgement

@@ -1,8 +1,8 @@
 """Which failures are refused because one of them does not repeat."""
 
-from risk_sac.records import EpisodeRecord, Grade, Outcome
+from risk_sac.records import EpisodeRecord, Grade, Outcome, Repetition
 from risk_sac.rules import REPEATS
-from risk_sac.run_folder.verified import Repetition, Verified
+from risk_sac.run_folder.verified import Verified
 from tests.builders import collision, episode_record, judgement
 
 

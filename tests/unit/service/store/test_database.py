@@ -6,12 +6,11 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Grade, Outcome
+from risk_sac.records import Grade, Outcome, State
 from service.errors import StorageError
 from service.store import database
 from service.store.finding import Judged
 from service.store.reading import Store
-from service.store.states import State
 from service.store.tables import Base
 from service.store.writing import Ledger
 from tests.begun import start
@@ -53,9 +52,9 @@ def test_a_database_from_before_contacts_were_judged_is_brought_up_to_date(tmp_p
     assert (waiting.distinct_failures, waiting.metrics) == (0, None)
     assert (found.metrics.distinct_failures, found.metrics.preventable, found.metrics.signatures) == (1, 0, {})
     episodes = store.episodes(campaign.id, limit=9).items
-    assert [each.record.collision is not None for each in episodes] == [False, True, True, False, True]
+    assert [each.collision is not None for each in episodes] == [False, True, True, False, True]
     assert {each.funnel for each in episodes} == {None}
-    assert episodes[1].record.collision.judgement is None
+    assert episodes[1].collision.judgement is None
     assert store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.CAREFUL)).items == ()
     store.close()
 

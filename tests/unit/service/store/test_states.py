@@ -2,8 +2,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from risk_sac.records import State
 from service.errors import TransitionError
-from service.store.states import TRANSITIONS, State, advance, campaign_state
+from service.store.states import TRANSITIONS, advance, campaign_state
 
 Q, R, P, X, C, S, F = State
 states = st.sampled_from(State)

@@ -10,14 +10,13 @@ from alembic.config import Config
 from sqlalchemy import create_engine, inspect
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Outcome
+from risk_sac.records import Outcome, TriageState
 from service.errors import StorageError
 from service.host.data_folder import hold_data_folder
 from service.settings import ServiceSettings
 from service.store.__main__ import main
 from service.store.database import held
 from service.store.reading import Store
-from service.store.states import TriageState
 from service.store.steps import newest_step, present_step, step_back
 from service.store.stored import StoredCampaign
 from service.store.writing import Ledger

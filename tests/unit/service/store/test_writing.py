@@ -1,11 +1,9 @@
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Outcome
+from risk_sac.records import Episode, Outcome, State, TriageState
 from service.errors import ConflictError, NotFoundError, TransitionError
 from service.store.finding import Judged
-from service.store.states import State, TriageState
-from service.store.stored import StoredEpisode
 from service.views.curves import curves
 from service.views.progress import progress
 from service.views.totals import results
@@ -46,8 +44,8 @@ def test_episodes_told_together_are_each_stored_and_one_change(store, ledger, ep
     found = store.campaign(campaign.id)
     assert int(found.revision) == before + 1
     assert [(run.episodes_done, run.failures) for run in found.runs[:2]] == [(2, 1), (1, 0)]
-    stored = [event for event in store.events(campaign.id, limit=9).items if isinstance(event, StoredEpisode)]
-    assert [(event.run_id, event.record.index) for event in stored] == [
+    stored = [event for event in store.events(campaign.id, limit=9).items if isinstance(event, Episode)]
+    assert [(event.run_id, event.index) for event in stored] == [
         (found.runs[1].id, 0),
         (found.runs[0].id, 0),
         (found.runs[0].id, 1),
@@ -61,7 +59,7 @@ def test_an_episode_reported_twice_is_stored_and_counted_once(store, ledger, epi
     assert [bool(ledger.add_episodes([(number, report)])) for report in reports] == [True, True, False, False, True]
     run = store.campaign(campaign.id).runs[0]
     assert (run.episodes_done, run.failures, run.raw_collisions, run.rejected) == (3, 1, 1, 0)
-    assert [item.record.index for item in store.episodes(campaign.id, limit=10).items] == [0, 1, 2]
+    assert [item.index for item in store.episodes(campaign.id, limit=10).items] == [0, 1, 2]
     assert run.busy_s == 2.5  # the time was spent twice
     assert store.usage("default").cpu_s == 2.5
 
@@ -72,7 +70,7 @@ def test_an_episode_that_comes_out_otherwise_replaces_the_first(store, ledger, e
     assert ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
     assert not ledger.add_episodes([(number, episode(0))])
     (stored,) = store.episodes(campaign.id, limit=10).items
-    assert stored.record.outcome is Outcome.SAFE
+    assert stored.outcome is Outcome.SAFE
     assert (store.campaign(campaign.id).runs[0].failures, store.campaign(campaign.id).runs[0].episodes_done) == (0, 1)
 
 
@@ -110,7 +108,7 @@ def test_failures_that_did_not_repeat_are_refused_with_the_end_of_their_run(stor
     runs = store.campaign(campaign.id).runs
     assert [(run.episodes_done, run.raw_collisions, run.failures) for run in runs[:2]] == [(3, 3, 1), (3, 3, 3)]
     found = store.episodes(campaign.id, run_id="low-risk-sac-3", limit=9).items
-    assert [(each.record.outcome, each.record.reason) for each in found] == [
+    assert [(each.outcome, each.reason) for each in found] == [
         (Outcome.DEGENERATE, "repeats"),
         (Outcome.FAILURE, ""),
         (Outcome.DEGENERATE, "repeats"),
@@ -141,7 +139,7 @@ def test_what_an_i_i_d_phase_counts_is_added_to_nothing_that_searches_found(stor
 
     assert ids(judged=Judged(iid=False)) == ["low-random-0-train-1"]
     assert ids(run_id="low-iid-random-0", judged=Judged()) == ["low-iid-random-0-iid-1"]
-    assert store.failure(found.id, "low-iid-random-0-iid-1").record.phase == "iid"
+    assert store.failure(found.id, "low-iid-random-0-iid-1").episode.phase == "iid"
     assert {each.phase for each in store.plain_episodes(found.number)} == {"train"}
     assert [curve.run_id for curve in curves(found, store.plain_episodes(found.number), 9).runs] == ["low-random-0"]
 

@@ -9,8 +9,7 @@ from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec
 from risk_sac.metrics import MetricsAccumulator
-from risk_sac.records import Grade, Outcome
-from service.store.counting import to_text
+from risk_sac.records import Grade, Outcome, stored, wire
 from service.store.stored import PlainEpisode
 from service.views.curves import curves, spread
 from tests.builders import collision, episode_record, judgement
@@ -19,7 +18,7 @@ SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
 
 
 def plain(run, record):
-    return PlainEpisode(1, run.number, record.phase, record.index, record.outcome, from_json(to_text(record)))
+    return PlainEpisode(1, run.number, record.phase, record.index, record.outcome, from_json(stored(record)))
 
 
 def drawn(count):
@@ -61,7 +60,7 @@ def test_mean_cost_is_that_of_the_steps_since_the_point_before(ledger):
         episode_record(index, Outcome.SAFE if steps else Outcome.REJECTED, mean_cost=cost, steps=steps)
         for index, (cost, steps) in enumerate(costs)
     ]
-    body = curves(campaign, [plain(campaign.runs[1], each) for each in records], 3).model_dump_json()
+    body = wire(curves(campaign, [plain(campaign.runs[1], each) for each in records], 3))
     assert json.loads(body)["runs"][1]["mean_cost"] == [pytest.approx((50 + 75) / 400), None, pytest.approx(0.125)]
 
 
@@ -74,7 +73,7 @@ def test_an_evaluation_is_no_part_of_the_search(ledger):
 
 def test_lambda_that_is_not_finite_is_null(ledger):
     campaign = ledger.create(SPEC)
-    body = curves(campaign, [plain(campaign.runs[0], episode_record(0, dual_variable=math.inf))], 9).model_dump_json()
+    body = wire(curves(campaign, [plain(campaign.runs[0], episode_record(0, dual_variable=math.inf))], 9))
     assert json.loads(body)["runs"][0]["dual_variable"] == [None]
 
 

@@ -5,11 +5,8 @@ from dataclasses import replace
 from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Grade, Outcome
-from risk_sac.run_folder.verified import Repetition
+from risk_sac.records import Grade, Outcome, Repetition, TriageState, stored, wire
 from risk_sac.verdicts.distinct import DistinctFailures
-from service.store.counting import to_text
-from service.store.states import TriageState
 from service.store.stored import PlainEpisode
 from service.views.failure_table import failure_table
 from tests.builders import collision, episode_record, judgement
@@ -20,11 +17,11 @@ FAILURE, REFUSED = Outcome.FAILURE, Outcome.DEGENERATE
 
 def plain(run, index, hit, outcome=FAILURE, phase="train", **changes):
     record = episode_record(index, outcome, phase=phase, collision=hit, **changes)
-    return PlainEpisode(1, run.number, phase, index, outcome, from_json(to_text(record)))
+    return PlainEpisode(1, run.number, phase, index, outcome, from_json(stored(record)))
 
 
 def told(table):
-    return json.loads(table.model_dump_json())
+    return json.loads(wire(table))
 
 
 def test_a_column_has_what_the_record_has(ledger):
@@ -114,7 +111,8 @@ def test_a_failure_says_whether_it_repeats(ledger):
     campaign = ledger.create(SPEC)
     run = campaign.runs[0]
     repetitions = {0: Repetition(times=3, same=3), 1: Repetition(times=3, same=2)}
-    campaign = replace(campaign, runs=(replace(run, repetitions=repetitions), campaign.runs[1]))
+    run = run.model_copy(update={"repetitions": repetitions})
+    campaign = campaign.model_copy(update={"runs": (run, campaign.runs[1])})
     table = failure_table(campaign, [plain(run, index, collision()) for index in range(3)], {})
     assert table.repeats == ["verified", "flaky", None]
 

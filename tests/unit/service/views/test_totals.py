@@ -1,20 +1,22 @@
-from dataclasses import replace
-
 import pytest
 
 from risk_sac.config import CampaignSpec
-from service.store.states import State
+from risk_sac.records import State
 from service.views.totals import results
+
+
+def changed(record, **fields):
+    return record.model_copy(update=fields)
 
 
 def test_totals_are_per_family_and_method_over_the_seeds(ledger, metrics):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random"), seeds=(0, 1)))
     sac = [metrics.model_copy(update=each) for each in ({"ecr": 0.25}, {"ecr": 0.75, "failures": 3, "dispersion": 0.5})]
     runs = tuple(
-        replace(run, metrics=sac[run.seed] if run.method == "sac" else None, state=State.RUNNING)
+        changed(run, metrics=sac[run.seed] if run.method == "sac" else None, state=State.RUNNING)
         for run in campaign.runs
     )
-    found = results(replace(campaign, runs=runs))
+    found = results(changed(campaign, runs=runs))
     assert not found.complete
     assert [run.metrics is not None for run in found.runs] == [True, False, True, False]
     (total,) = found.totals
@@ -38,8 +40,8 @@ def test_totals_have_the_funnel_and_its_histograms(ledger, metrics):
         "contacts_by_second": (0, 0, 1, 2),
     }
     second = metrics.model_copy(update=found)
-    runs = tuple(replace(run, metrics=(metrics, second)[run.seed]) for run in campaign.runs)
-    (total,) = results(replace(campaign, runs=runs)).totals
+    runs = tuple(changed(run, metrics=(metrics, second)[run.seed]) for run in campaign.runs)
+    (total,) = results(changed(campaign, runs=runs)).totals
     assert (total.raw_collisions, total.failures, total.distinct_failures) == (7, 4, 3)
     assert (total.preventable, total.distinct_preventable, total.artefacts) == (3, 2, 2)
     assert (total.pcr, total.pcr_low, total.pcr_high) == (0.375, 0.25, 0.5)
@@ -50,6 +52,6 @@ def test_totals_have_the_funnel_and_its_histograms(ledger, metrics):
 
 def test_one_run_keeps_its_wilson_interval(ledger, metrics):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0,)))
-    (total,) = results(replace(campaign, runs=(replace(campaign.runs[0], metrics=metrics),))).totals
+    (total,) = results(changed(campaign, runs=(changed(campaign.runs[0], metrics=metrics),))).totals
     assert (total.ecr_low, total.ecr_high) == pytest.approx((0.0456, 0.6994), abs=1e-4)  # of 1 in 4
     assert (total.pcr_low, total.pcr_high) == (total.ecr_low, total.ecr_high)  # the same one

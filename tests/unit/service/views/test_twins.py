@@ -2,6 +2,7 @@ import json
 import math
 
 from risk_sac.failures.question import TwinPlay, twin_bytes
+from risk_sac.records import wire
 from service.views.twins import twin_body
 from tests.builders import collision, judgement
 from tests.unit.service.views.test_series import arrays
@@ -9,7 +10,7 @@ from tests.unit.service.views.test_series import arrays
 
 def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_is_not_finite():
     hit = collision(other_id="lead", ego_speed_mps=5.44, min_ttc_s=math.inf, judgement=judgement())
-    body = json.loads(twin_body("idle", twin_bytes(TwinPlay.of(None, hit), arrays())).model_dump_json())
+    body = json.loads(wire(twin_body("idle", twin_bytes(TwinPlay.of(None, hit), arrays()))))
     assert (body["twin"], body["outcome"]) == ("idle", "touches lead at 5.4 m/s")
     assert body["collision"]["early_min_ttc_s"] is None
     assert body["collision"]["judgement"]["signature"] == hit.judgement.signature

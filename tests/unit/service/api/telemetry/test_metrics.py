@@ -4,11 +4,10 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.local import LocalExecutor
-from risk_sac.records import Outcome
+from risk_sac.records import Outcome, State
 from service.api.telemetry.metrics import registry, request_latencies
 from service.runs.manager import Manager
 from service.settings import ServiceSettings
-from service.store.states import State
 from service.workers.program import program
 
 SPEC = CampaignSpec(families=("low",), methods=("random", "sac"), seeds=(0, 1))

@@ -1,14 +1,17 @@
-"""What is stored and told of episodes and runs, all frozen. The public bodies derive from these records."""
+"""One episode: how it ended, how its contact came about, and what people made of it."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from enum import StrEnum
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import AliasChoices, Field
 
+from risk_sac.records.base import Least, Page, Real, Record
+from risk_sac.records.run import Funnel
 from risk_sac.rules import ARTEFACT_RULES
+from risk_sac.series import Series
 
 
 class Outcome(StrEnum):
@@ -36,27 +39,6 @@ class Grade(StrEnum):
     CAREFUL = "careful"  # the careful driver would not have touched: preventable
     IDEAL = "ideal"  # full braking at once alone would not have
     UNAVOIDABLE = "unavoidable"
-
-
-class Record(BaseModel):
-    """What the records share that are stored and told. A field is declared here and nowhere else.
-
-    As JSON, in the folder of a run and between processes, a number that is not finite is the string "Infinity",
-    "-Infinity" or "NaN", so that it reads back. Only the public bodies, which derive from these records, say null.
-    """
-
-    model_config = ConfigDict(
-        frozen=True, ser_json_inf_nan="strings", serialize_by_alias=True, use_attribute_docstrings=True
-    )
-
-
-def _nothing_was_least(value: Any) -> Any:
-    return math.inf if value is None else value
-
-
-Real = Annotated[float, WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "null"}]})]
-Least = Annotated[Real, BeforeValidator(_nothing_was_least)]
-"""The least of some values, infinite without any; folders from before infinities were strings have null for it."""
 
 
 def _early(name: str) -> Any:
@@ -251,64 +233,57 @@ class SeriesFile:
     sha256: str  # as it was written, whatever became of it since
 
 
-class RunMetrics(Record):
-    """What a run has achieved so far; rates come with their 95 % interval.
+class Repetition(Record):
+    """How often an episode was played again, in a fresh process each time, and what came of it."""
 
-    Fields with a default can be read from what was stored before they were counted.
-    """
+    times: int
+    same: int
+    """Of these, with every array of its series as it was, to the bit."""
 
-    episodes: int
-    """Finished, rejected scenes included."""
-    rejected: int
-    """Scenes that were physically infeasible and not simulated."""
-    raw_collisions: int
-    """Episodes in which the ego touched something."""
-    failures: int
-    """Valid collisions."""
-    invalid: int = 0
-    """Episodes in which the ego failed to drive; the rates leave them out."""
-    environment_steps: int
-    ecr: Real
-    """Effective collision rate: valid collisions / episodes."""
-    ecr_low: Real
-    ecr_high: Real
-    window_ecr: Real
-    """ECR over the newest 100 episodes."""
-    pcr: Real = 0.0
-    """Preventable collision rate: valid collisions that the careful driver would have prevented / episodes."""
-    pcr_low: Real = 0.0
-    pcr_high: Real = 1.0
-    window_pcr: Real = 0.0
-    """PCR over the newest 100 episodes."""
-    efficiency: Real
-    """Exploration efficiency ES in [0, 1]; 1 means a failure at once."""
-    cost_rate: Real
-    """Mean realism cost per step, in [0, 1]."""
-    dispersion: float | None
-    """Outcome feature dispersion of the failures, in [0, 1]; null with fewer than two."""
-    dual_variable: Real
-    """λ."""
-    temperature: Real
-    """α."""
-    distinct_failures: int = 0
-    """Valid collisions that resemble no earlier one: another signature, or other outcome features."""
-    steps_per_distinct_failure: float | None = None
-    """Environment steps per distinct failure; null without one."""
-    preventable: int = 0
-    """Valid collisions that the careful driver would have prevented, repetitions included."""
-    avoidable: int = 0
-    """These, and those that only full braking at once would have prevented."""
-    distinct_preventable: int = 0
-    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
-    covered: int = 0
-    """Kinds of failures found: cells of the fixed taxonomy that a valid collision lies in."""
-    artefacts: int = 0
-    """Contacts that the simulator or the control made."""
-    unresponsive: int = 0
-    """Valid collisions with a visible collision course of 1.5 s or more during which the ego never braked."""
-    signatures: Mapping[str, int] = {}
-    """Signature → valid collisions, in the order in which they were first met."""
-    conflicts_by_second: tuple[int, ...] = ()
-    """Valid collisions by the second after the adversaries' release in which the conflict began."""
-    contacts_by_second: tuple[int, ...] = ()
-    """The same by the second of the contact."""
+    @property
+    def verified(self) -> bool:
+        """Whether it was the same each time; if not, it is flaky."""
+        return self.same == self.times > 0
+
+
+class Episode(EpisodeRecord):
+    """One episode of a campaign."""
+
+    id: str
+    run_id: str
+    wall_s: float
+    funnel: Funnel | None = None
+    """What the run's phase had found up to and including this episode, as it was told then; null in what is older."""
+    repetition: Repetition | None = None
+    """Of the first failure of its kind, once the run has ended; a failure that was not the same each time is flaky."""
+
+
+class EpisodePage(Page[Episode]):
+    """Episodes in the order of their arrival."""
+
+
+class TriageState(StrEnum):
+    """What people make of a failure; any may follow any."""
+
+    NEW = "new"
+    CONFIRMED = "confirmed"
+    DISMISSED = "dismissed"
+    FIXED = "fixed"
+
+
+class Triage(Record):
+    """What people made of a failure."""
+
+    state: TriageState
+    comment: str
+    changed_at: datetime
+
+
+class Failure(Episode):
+    """A contact of the ego with its full time series."""
+
+    series: Series | None
+    """Null when the record is lost; `series_problem` says why."""
+    series_problem: str | None
+    triage: Triage | None = None
+    """What people made of it; null if nobody has."""

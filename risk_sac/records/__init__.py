@@ -1,0 +1,75 @@
+"""What a run produces and what the service stores of it: one model per thing, frozen.
+
+A record is stored as JSON, answered by the service and read by the client; a field is declared once, here.
+"""
+
+from risk_sac.records.base import Least, Page, Real, Record, stored, wire
+from risk_sac.records.campaign import (
+    Campaign,
+    CampaignHead,
+    CampaignPage,
+    CampaignSummary,
+    Progress,
+    Results,
+    StateChange,
+    Total,
+)
+from risk_sac.records.episode import (
+    RECORDED,
+    Collision,
+    ConflictType,
+    Episode,
+    EpisodePage,
+    EpisodeRecord,
+    Failure,
+    Grade,
+    Judgement,
+    Outcome,
+    Phase,
+    ReferenceOutcome,
+    Repetition,
+    SeriesFile,
+    Triage,
+    TriageState,
+)
+from risk_sac.records.run import FINAL, Funnel, Run, RunMetrics, RunResult, RunSummary, State
+
+__all__ = [
+    "FINAL",
+    "RECORDED",
+    "Campaign",
+    "CampaignHead",
+    "CampaignPage",
+    "CampaignSummary",
+    "Collision",
+    "ConflictType",
+    "Episode",
+    "EpisodePage",
+    "EpisodeRecord",
+    "Failure",
+    "Funnel",
+    "Grade",
+    "Judgement",
+    "Least",
+    "Outcome",
+    "Page",
+    "Phase",
+    "Progress",
+    "Real",
+    "Record",
+    "ReferenceOutcome",
+    "Repetition",
+    "Results",
+    "Run",
+    "RunMetrics",
+    "RunResult",
+    "RunSummary",
+    "SeriesFile",
+    "State",
+    "StateChange",
+    "Total",
+    "Triage",
+    "TriageState",
+    "stored",
+    "wire",
+]

@@ -1,0 +1,65 @@
+"""What all records share: how a number that is not finite is written and read."""
+
+import math
+from typing import Annotated, Any, Generic, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
+from pydantic_core import to_json
+
+
+def _without_defaults(schema: dict[str, Any]) -> None:
+    """Drops defaults from a schema: they are for what was stored before there was the field."""
+    for each in schema.get("properties", {}).values():
+        each.pop("default", None)
+
+
+class Record(BaseModel):
+    """A frozen model that is stored as JSON, answered by the service and read by its client.
+
+    Stored JSON, in the folder of a run and in the database, has a number that is not finite as the string "Infinity",
+    "-Infinity" or "NaN", so that it reads back; `wire` writes null instead.
+    """
+
+    model_config = ConfigDict(
+        frozen=True,
+        ser_json_inf_nan="strings",
+        serialize_by_alias=True,
+        use_attribute_docstrings=True,
+        json_schema_extra=_without_defaults,
+        json_schema_serialization_defaults_required=True,
+    )
+
+
+def stored(value: object) -> str:
+    """JSON as it is stored; it reads back as it was."""
+    return to_json(value, inf_nan_mode="strings").decode()
+
+
+def wire(record: BaseModel) -> bytes:
+    """JSON as the service answers it: a number that is not finite is null."""
+    return to_json(record.model_dump(), inf_nan_mode="null")
+
+
+def _null_is_nan(value: Any) -> Any:
+    return math.nan if value is None else value
+
+
+def _null_is_infinite(value: Any) -> Any:
+    return math.inf if value is None else value
+
+
+_NULLABLE = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "null"}]})
+Real = Annotated[float, BeforeValidator(_null_is_nan), _NULLABLE]
+"""A number; null on the wire where it is not finite."""
+Least = Annotated[float, BeforeValidator(_null_is_infinite), _NULLABLE]
+"""The least of some values, infinite without any; null on the wire and in old run folders."""
+
+T = TypeVar("T")
+
+
+class Page(Record, Generic[T]):
+    """A part of a list."""
+
+    items: list[T]
+    next: str | None
+    """Pass as `cursor` to continue; null at the end."""

@@ -1,0 +1,162 @@
+"""One campaign: how far it is and what it found."""
+
+from collections.abc import Mapping
+from datetime import datetime
+
+from risk_sac.config import CampaignSpec
+from risk_sac.records.base import Page, Record
+from risk_sac.records.run import Family, Run, RunResult, SearchMethod, State
+from risk_sac.series import Real
+
+
+class Progress(Record):
+    """How far a campaign is, and what its searches have found."""
+
+    episodes_done: int
+    """Of the i.i.d. phase too, if there is one; what follows the totals is of the searches alone."""
+    episodes_total: int
+    failures: int
+    """Valid collisions."""
+    raw_collisions: int
+    """All contacts of the ego."""
+    rejected: int
+    distinct_failures: int
+    """Sum over the runs; what two runs found alike counts twice."""
+    preventable: int
+    """Valid collisions that the careful driver would have prevented, repetitions included."""
+    distinct_preventable: int
+    """The distinct ones among them; sum over the runs."""
+    window_ecr: Real
+    """ECR over each run's newest 100 episodes: mean over the runs at work, or over all once none is. Controls, which do
+    not learn, are left out of it, unless the campaign has nothing else; its results have each method by itself."""
+    window_pcr: Real
+    """PCR, averaged the same way."""
+    dual_variable: Real
+    """λ, averaged the same way."""
+    temperature: Real
+    """α, averaged the same way."""
+    eta_s: Real
+    """Seconds until the campaign ends at its present pace; null before there is one, 0 at the end."""
+
+
+class Driver(Record):
+    """Who drives the ego. These are no enums: what an earlier version knew can still be listed."""
+
+    profile: str
+    car_following: str
+    driver: str | None = None
+    """Name of a registered ego; null: SUMO's models drive, as `profile` and `car_following` say."""
+
+
+class CampaignHead(Record):
+    """What is known of a campaign without its runs."""
+
+    id: str
+    label: str
+    state: State
+    reason: str | None
+    """Why it failed, is paused, or waits."""
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing will change any more."""
+        return self.state.final
+
+
+class CampaignSummary(CampaignHead):
+    """A campaign as it appears in a list."""
+
+    families: list[str]
+    methods: list[str]
+    ego: Driver
+    """The rest of its settings is in the campaign's `spec`."""
+    progress: Progress
+
+
+class CampaignPage(Page[CampaignSummary]):
+    """Campaigns, newest first."""
+
+
+class Campaign(CampaignSummary):
+    """A campaign with its runs, in the order they are queued, and what was posted."""
+
+    runs: list[Run]
+    spec: CampaignSpec
+
+
+class StateChange(Record):
+    """A campaign, or one of its runs, came into another state."""
+
+    run_id: str | None
+    """Null: the campaign itself."""
+    state: State
+    reason: str | None
+    """Why, where it did not go as planned."""
+    at: datetime
+
+    @property
+    def ends_campaign(self) -> bool:
+        """Whether this is the end of the campaign, which nothing follows."""
+        return self.run_id is None and self.state.final
+
+
+class Total(Record):
+    """All runs of one family and method that have begun."""
+
+    family: Family
+    method: SearchMethod
+    runs: int
+    episodes: int
+    rejected: int
+    invalid: int
+    """Episodes in which the ego failed to drive; the rates leave them out."""
+    raw_collisions: int
+    failures: int
+    environment_steps: int
+    ecr: Real
+    """Mean over the runs."""
+    ecr_low: Real
+    """95 % interval: Wilson for one run, bootstrap over the seeds for more."""
+    ecr_high: Real
+    pcr: Real
+    """Mean over the runs."""
+    pcr_low: Real
+    """95 % interval, as that of the ECR."""
+    pcr_high: Real
+    efficiency: Real
+    """Mean over the runs."""
+    cost_rate: Real
+    """Mean over the runs."""
+    dispersion: Real
+    """Mean over the runs that have one."""
+    distinct_failures: int
+    """Sum over the runs; what two runs found alike counts twice."""
+    steps_per_distinct_failure: Real
+    preventable: int
+    """Sum over the runs, repetitions included."""
+    distinct_preventable: int
+    """Sum over the runs: the last step of the funnel contacts → valid → distinct → preventable."""
+    artefacts: int
+    unresponsive: int
+    unresponsive_share: Real
+    """Of the valid failures; null without one."""
+    signatures: Mapping[str, int]
+    """Signature → valid failures, summed over the runs."""
+    conflicts_by_second: list[int]
+    """Valid failures by the second after the adversaries' release in which the conflict began."""
+    contacts_by_second: list[int]
+    """The same by the second of the contact."""
+
+
+class Results(Record):
+    """What a campaign found so far."""
+
+    campaign_id: str
+    state: State
+    complete: bool
+    """Whether these are the final results."""
+    runs: list[RunResult]
+    totals: list[Total]

@@ -1,0 +1,170 @@
+"""One run: its state, what it has counted, and what it found."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from enum import StrEnum
+from typing import Annotated
+
+from pydantic import TypeAdapter, WithJsonSchema
+
+from risk_sac.config import FamilyName, MethodName, RunMethod
+from risk_sac.records.base import Real, Record
+
+
+class RunMetrics(Record):
+    """What a run has achieved so far; rates come with their 95 % interval.
+
+    Fields with a default can be read from what was stored before they were counted.
+    """
+
+    episodes: int
+    """Finished, rejected scenes included."""
+    rejected: int
+    """Scenes that were physically infeasible and not simulated."""
+    raw_collisions: int
+    """Episodes in which the ego touched something."""
+    failures: int
+    """Valid collisions."""
+    invalid: int = 0
+    """Episodes in which the ego failed to drive; the rates leave them out."""
+    environment_steps: int
+    ecr: Real
+    """Effective collision rate: valid collisions / episodes."""
+    ecr_low: Real
+    ecr_high: Real
+    window_ecr: Real
+    """ECR over the newest 100 episodes."""
+    pcr: Real = 0.0
+    """Preventable collision rate: valid collisions that the careful driver would have prevented / episodes."""
+    pcr_low: Real = 0.0
+    pcr_high: Real = 1.0
+    window_pcr: Real = 0.0
+    """PCR over the newest 100 episodes."""
+    efficiency: Real
+    """Exploration efficiency ES in [0, 1]; 1 means a failure at once."""
+    cost_rate: Real
+    """Mean realism cost per step, in [0, 1]."""
+    dispersion: float | None
+    """Outcome feature dispersion of the failures, in [0, 1]; null with fewer than two."""
+    dual_variable: Real
+    """λ."""
+    temperature: Real
+    """α."""
+    distinct_failures: int = 0
+    """Valid collisions that resemble no earlier one: another signature, or other outcome features."""
+    steps_per_distinct_failure: float | None = None
+    """Environment steps per distinct failure; null without one."""
+    preventable: int = 0
+    """Valid collisions that the careful driver would have prevented, repetitions included."""
+    avoidable: int = 0
+    """These, and those that only full braking at once would have prevented."""
+    distinct_preventable: int = 0
+    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
+    covered: int = 0
+    """Kinds of failures found: cells of the fixed taxonomy that a valid collision lies in."""
+    artefacts: int = 0
+    """Contacts that the simulator or the control made."""
+    unresponsive: int = 0
+    """Valid collisions with a visible collision course of 1.5 s or more during which the ego never braked."""
+    signatures: Mapping[str, int] = {}
+    """Signature → valid collisions, in the order in which they were first met."""
+    conflicts_by_second: tuple[int, ...] = ()
+    """Valid collisions by the second after the adversaries' release in which the conflict began."""
+    contacts_by_second: tuple[int, ...] = ()
+    """The same by the second of the contact."""
+
+
+class Funnel(Record):
+    """From what the ego touched to what is worth a person's time; each count is part of the one before."""
+
+    contacts: int
+    valid: int
+    distinct: int
+    preventable: int
+    """Distinct failures that the careful driver would have prevented."""
+
+    @classmethod
+    def of(cls, metrics: RunMetrics) -> "Funnel":
+        """The funnel of a run."""
+        return cls(
+            contacts=metrics.raw_collisions,
+            valid=metrics.failures,
+            distinct=metrics.distinct_failures,
+            preventable=metrics.distinct_preventable,
+        )
+
+
+class State(StrEnum):
+    """Where a campaign or a run stands."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    PAUSED = "paused"
+    CANCELLING = "cancelling"
+    CANCELLED = "cancelled"
+    SUCCEEDED = "succeeded"
+    FAILED = "failed"
+
+    @property
+    def final(self) -> bool:
+        """Whether nothing follows this state."""
+        return self in FINAL
+
+
+FINAL = frozenset({State.CANCELLED, State.SUCCEEDED, State.FAILED})
+
+# What another version knew can still be read; the schema names what this one knows.
+Family = Annotated[str, WithJsonSchema(TypeAdapter(FamilyName).json_schema())]
+SearchMethod = Annotated[str, WithJsonSchema(TypeAdapter(MethodName).json_schema())]
+Method = Annotated[str, WithJsonSchema(TypeAdapter(RunMethod).json_schema())]
+
+
+class RunSummary(Record):
+    """One (family, method, seed) of a campaign, or of its i.i.d. phase, whose methods begin with `iid-`."""
+
+    id: str
+    """Unique within the campaign."""
+    family: Family
+    method: Method
+    seed: int
+    state: State
+    reason: str | None
+    """Why it failed, is paused, or waits again."""
+    metrics: RunMetrics | None
+    """Of the search, or of the i.i.d. phase that the run is; null before the first episode."""
+
+
+class Run(RunSummary):
+    """How far a run is. Counts are sums of search and evaluation."""
+
+    attempts: int
+    """Workers that were started for it; more than one where some were lost."""
+    started_at: datetime | None
+    finished_at: datetime | None
+    episodes_done: int
+    episodes_total: int
+    failures: int
+    raw_collisions: int
+    rejected: int
+    distinct_failures: int
+    preventable: int
+    distinct_preventable: int
+
+
+class RunResult(RunSummary):
+    """What one run found."""
+
+    evaluation: RunMetrics | None
+    """Of the frozen policy; null until, or unless, the budget has evaluation episodes."""
+    spec_digest: str
+    """Equal for runs that must give equal results."""
+    digest: str | None
+    """SHA-256 of the results; null until the run succeeded."""
+    versions: Mapping[str, str]
+    """Software that produced the results."""
+    verified: int = 0
+    """Distinct failures that were the same each time they were replayed; none before the run has ended."""
+    flaky: int = 0
+    """Those that were not."""
+    busy_s: float
+    """Wall time spent, interrupted attempts included."""
