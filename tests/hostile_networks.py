@@ -80,18 +80,7 @@ def _documents() -> Iterator[Hostile]:
         f'<!DOCTYPE net [<!ENTITY e SYSTEM "file:///etc/passwd">]>{NET.replace("1.20", "&e;")}',
         doctype,
     )
-    yield document(
-        "external entity in text",
-        f'<!DOCTYPE net [<!ENTITY e SYSTEM "file:///etc/hostname">]>{NET.replace(ROAD, ROAD + "&e;")}',
-        doctype,
-    )
     yield document("external DTD", f'<!DOCTYPE net SYSTEM "http://127.0.0.1:9/evil.dtd">{NET}', doctype)
-    yield document("public DTD", f'<!DOCTYPE net PUBLIC "-//W3C//DTD X//EN" "http://127.0.0.1:9/x.dtd">{NET}', doctype)
-    yield document(
-        "parameter entity",
-        f'<!DOCTYPE net [<!ENTITY % p SYSTEM "http://127.0.0.1:9/p.dtd">%p;]>{NET}',
-        doctype,
-    )
     laughs = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 10))
     yield document(
         "billion laughs", f'<!DOCTYPE net [<!ENTITY l0 "ha">{laughs}]>{NET.replace("1.20", "&l9;")}', doctype
@@ -101,41 +90,25 @@ def _documents() -> Iterator[Hostile]:
         lambda: f'<!DOCTYPE net [<!ENTITY a "{"a" * 100_000}">]><net version="{"&a;" * 10_000}"/>'.encode(),
         doctype,
     )
-    yield document("recursive entity", '<!DOCTYPE net [<!ENTITY a "&b;"><!ENTITY b "&a;">]><net>&a;</net>', doctype)
     yield document("undefined entity", NET.replace("1.20", "&nbsp;"), "no well-formed XML")
-    yield document("XInclude", NET.replace(ROAD, '<xi:include href="/etc/passwd"/>' + ROAD), "no well-formed XML")
     yield document(
         "XInclude with its namespace",
         f'<net xmlns:xi="http://www.w3.org/2001/XInclude"><xi:include href="/etc/passwd"/>{ROAD}{WEST}{EAST}</net>',
         r"got <.*include> in <net>",
     )
     yield document("bad UTF-8", net("road_0", "r\0ad_0").replace(b"\0", b"\xff\xfe"), "is no UTF-8")
-    yield document("overlong UTF-8", net("road_0", "r_0").replace(b"r_0", b"r\xc0\xae_0"), "is no UTF-8")
-    yield document("surrogate in UTF-8", net("road_0", "r_0").replace(b"r_0", b"r\xed\xa0\x80_0"), "is no UTF-8")
     yield document("UTF-16", NET.encode("utf-16"), "is no xml|is no UTF-8")
-    yield document("UTF-16 without a mark", NET.encode("utf-16-le"), "byte 1 is NUL; wanted a file saved as UTF-8")
-    yield document("UTF-32", NET.encode("utf-32"), "is no xml|is no UTF-8")
     yield document("UTF-7 declared", f'<?xml version="1.0" encoding="UTF-7"?>{NET}', "encoding 'UTF-7'; wanted UTF-8")
-    yield document("UTF-16 declared in UTF-8", f'<?xml version="1.0" encoding="UTF-16"?>{NET}', "encoding|well-formed")
-    yield document(
-        "Latin-1 declared", f'<?xml version="1.0" encoding="ISO-8859-1"?>{NET}', "encoding 'ISO-8859-1'; wanted UTF-8"
-    )
-    yield document("unknown encoding", f'<?xml version="1.0" encoding="x-evil"?>{NET}', "encoding|well-formed")
     yield document("XML 1.1", f'<?xml version="1.1"?>{NET}', "XML 1.1; wanted 1.0|well-formed")
     yield document("NUL byte", NET.replace("road_0", "ro\0d_0", 1), "is NUL")
-    yield document("reference to NUL", NET.replace("road_0", "ro&#0;d_0", 1), "no well-formed XML")
     yield document("truncated", NET[: len(NET) // 2], "no well-formed XML")
-    yield document("unclosed comment", NET.replace(WEST, "<!--" + WEST), "no well-formed XML")
-    yield document("mismatched tags", NET.replace("</net>", "</ten>"), "no well-formed XML")
     yield document("two roots", NET + NET, "no well-formed XML")
     yield document("twice the same attribute", NET.replace("priority=", 'from="east" priority='), "no well-formed XML")
     yield document("text between elements", NET.replace(WEST, "rm -rf /" + WEST), "got the text 'rm -rf /'")
-    yield document("CDATA between elements", NET.replace(WEST, "<![CDATA[<x/>]]>" + WEST), "got the text '<x/>'")
     yield document("another namespace", NET.replace("<net", '<net xmlns="urn:evil"'), "its root is <{urn:evil}net>")
     yield document(
         "depth bomb", lambda: b"<net>" + b'<edge id="e" from="a" to="b">' * 200_000, "got <edge> in <edge>; wanted"
     )
-    yield document("nets in nets", lambda: b"<net>" * 100_000 + b"</net>" * 100_000, "got <net> in <net>")
     yield document(
         "100,000 attributes",
         lambda: b"<net " + b" ".join(b'a%d="1"' % i for i in range(100_000)) + b"/>",
@@ -144,30 +117,21 @@ def _documents() -> Iterator[Hostile]:
     yield document(
         "attribute of 25 MB", lambda: net("1.20", "x" * 25_000_000), "has 25000000 characters; wanted at most"
     )
-    yield document("element name of 5 MB", lambda: net(ROAD, f"<{'x' * 5_000_000}/>"), r"got <x{60}> in <net>")
     yield document(
         "400,000 elements",
         lambda: b"<net>" + b'<param key="a" value="b"/>' * 400_000 + b"</net>",
         "more than 300000 elements",
     )
-    yield document("comment of 20 MB", lambda: b"<!--" + b"x" * 20_000_000 + b"-->", "no well-formed XML")
     yield document("nothing", b"", "is empty; wanted a network")
-    yield document("blanks", b" \n" * 1000, "is no xml")
     yield document("an executable", b"\x7fELF" + bytes(1000), "is no xml")
-    yield document("JSON", b'{"net": []}', "is no xml")
     yield document("a page", "<!DOCTYPE html><html><script>alert(1)</script></html>", doctype)
-    yield document(
-        "a page without a type", "<html><script>alert(1)</script></html>", "its root is <html>; wanted <net>"
-    )
     yield document("only a declaration", '<?xml version="1.0"?>', "no well-formed XML")
-    yield document("only an instruction", "<?php system('id'); ?>", "no well-formed XML")
     yield document(
         "a simulation's configuration",
         '<configuration><input><net-file value="/etc/passwd"/></input>'
         '<output><tripinfo-output value="/tmp/evil.xml"/></output></configuration>',
         "its root is <configuration>",
     )
-    yield document("routes alone", ROUTES, "there are 0 nets in the upload; wanted one")
 
 
 def _numbers() -> Iterator[Hostile]:
@@ -176,12 +140,7 @@ def _numbers() -> Iterator[Hostile]:
     for name, value in {
         "NaN": "NaN,NaN 100,0",
         "infinite": "0,0 inf,0",
-        "1e308": "0,0 1e308,0",
-        "10^12": "0,0 1000000000000,0",
         "half": "0,0 100",
-        "hexadecimal": "0,0 0x1p10,0",
-        "Arabic digits": "0,0 \u0661\u0660\u0660,0",
-        "four-dimensional": "0,0,0,0 1,1,1,1",
         "empty": "",
         "wordy": "here there",
     }.items():
@@ -189,7 +148,7 @@ def _numbers() -> Iterator[Hostile]:
     yield Hostile("shape of one point", lambda: net(shape, "0,0"), "a shape of 1 points; wanted two at least")
     yield Hostile("shape of 10^6 points", lambda: net(shape, "1,1 " * 1_000_000), "characters; wanted at most")
     for attribute, good in {"length": "100.00", "speed": "13.89"}.items():
-        for value in ("NaN", "inf", "-inf", "1e308", "-1", "1e999", "0x10", "1_0", "", "${HOME}"):
+        for value in ("NaN", "inf", "-1", "1e999", "0x10", "", "${HOME}"):
             yield Hostile(
                 f"{attribute} {value!r}",
                 lambda attribute=attribute, good=good, value=value: net(
@@ -198,11 +157,7 @@ def _numbers() -> Iterator[Hostile]:
                 f"{attribute} of <lane> is {re.escape(repr(value))}; wanted a number from 0",
             )
     yield Hostile("junction at NaN", lambda: net('x="100.00"', 'x="nan"'), "x of <junction> is 'nan'; wanted a number")
-    yield Hostile(
-        "junction at 1e300", lambda: net('y="0.00"', 'y="1e300"'), "y of <junction> is '1e300'; wanted a number"
-    )
     yield Hostile("lane index 10^9", lambda: net('index="0"', 'index="1000000000"'), "index of <lane>")
-    yield Hostile("negative lane index", lambda: net('index="0"', 'index="-1"'), "index of <lane>")
     yield Hostile("priority of a million digits", lambda: net('"1"', f'"{"9" * 90_000}"'), "priority of <edge>")
 
 
@@ -216,14 +171,11 @@ def _references() -> Iterator[Hostile]:
     yield changed("unknown junction", 'to="east"', 'to="nowhere"', "names the junction 'nowhere'")
     yield changed("no junction", 'from="west" ', "", r"edge 'road' goes from and to \('east',\)")
     yield changed("the same edge twice", ROAD, ROAD + ROAD, "edge 'road' is there twice")
-    yield changed("the same lane twice", LANE, LANE + LANE, "lane 'road_0' is there twice")
-    yield changed("the same junction twice", EAST, EAST + EAST, "junction 'east' is there twice")
     yield changed("a lane out of turn", 'index="0"', 'index="5"', "has the index 5; wanted 0")
     yield changed("an edge without lanes", EAST, EAST + '<edge id="bare" from="east" to="west"/>', "'bare' has no lane")
     yield changed("no roads", ROAD, "", "names the lane 'road_0'")
     yield Hostile("nothing at all", lambda: b"<net/>", "no edge outside junctions")
     yield changed("unknown lane", 'incLanes="road_0"', 'incLanes="road_7"', "names the lane 'road_7'")
-    yield changed("unknown internal lane", 'intLanes=""', 'intLanes=":x_0_0"', "names the lane ':x_0_0'")
     yield changed("connection from nowhere", EAST, EAST + connection.replace("road", "x", 1), "names an edge that")
     yield changed(
         "connection to a lane too many",
@@ -232,27 +184,18 @@ def _references() -> Iterator[Hostile]:
         "has toLane 9; wanted less than 1",
     )
     yield changed(
-        "connection to lane -1", EAST, EAST + connection.replace('toLane="0"', 'toLane="-1"'), "toLane of <connection>"
-    )
-    yield changed(
         "connection via nothing",
         EAST,
         EAST + connection.replace("dir=", 'via=":x_0_0" dir='),
         "goes via the lane ':x_0_0'",
     )
-    yield changed("unknown roundabout", EAST, EAST + '<roundabout nodes="a b" edges="c"/>', "<roundabout> names")
     yield changed("crossing of nothing", ">" + LANE, ' crossingEdges="x y">' + LANE, "names the edge 'x'")
-    yield changed("neighbour of nothing", LANE, LANE[:-2] + '><neigh lane="x_0"/></lane>', "names the lane 'x_0'")
-    yield changed("no id", 'id="road" ', "", "<edge> has no id")
     for name, value in {
         "empty id": "",
         "id of 5,000 characters": "x" * 5000,
-        "id with a line break": "a&#10;b",
         "id with a control character": "a\x7fb",
-        "id with quotes": "a&quot;b",
         "id with a tag": "a&lt;b",
         "id from the environment": "${HOME}",
-        "id with a semicolon": "a;b",
         "id that turns the text": "a\u202eb",
     }.items():
         yield changed(name, 'id="road"', f'id="{value}"', "id of <edge> is .*; wanted an id")
@@ -263,7 +206,6 @@ def _references() -> Iterator[Hostile]:
         "more than 50000 edges",
         GZIP,
     )
-    yield Hostile("60,000 edges", lambda: _many(60_000), "more than 50000 edges")
     lanes = "".join(f'<lane id="l{i}" index="{i}" speed="1" length="1" shape="0,0 1,1"/>' for i in range(1000))
     yield changed("1,000 lanes", LANE, lanes, "index of <lane> is '64'")
 
@@ -330,40 +272,23 @@ def _outputs() -> Iterator[Hostile]:
     target = 'file="/tmp/evil.xml"'
     for element, rest in {
         "e1Detector": f'id="d" lane="road_0" pos="1" freq="1" {target}',
-        "inductionLoop": f'id="d" lane="road_0" pos="1" freq="1" {target}',
-        "e2Detector": f'id="d" lane="road_0" pos="1" {target}',
-        "e3Detector": f'id="d" freq="1" {target}',
-        "instantInductionLoop": f'id="d" lane="road_0" pos="1" {target}',
         "edgeData": f'id="d" {target}',
-        "laneData": f'id="d" {target}',
         "routeProbe": f'id="d" edge="road" freq="1" {target}',
-        "vTypeProbe": f'id="d" freq="1" {target}',
         "calibrator": 'id="d" edge="road" pos="0" output="/tmp/evil.xml"',
-        "rerouter": f'id="d" edges="road" {target}',
         "variableSpeedSign": 'id="d" lanes="road_0" file="/etc/passwd"',
         "timedEvent": 'type="SaveTLSStates" source="east" dest="/tmp/evil.xml"',
         "include": 'href="/etc/passwd"',
-        "vaporizer": 'id="road" begin="0" end="1"',
-        "WAUT": 'id="w" refTime="0" startProg="0"',
         "configuration": "",
     }.items():
         yield beside(element, f"<{element} {rest}/>", rf"got <{element}> in <additional>.*[Nn]othing that names a file")
     refused = "has the attribute .*Nothing that names a file"
-    yield beside("picture of a vehicle", '<vType id="t" imgFile="/etc/passwd"/>', refused)
-    yield beside("model of a vehicle", '<vType id="t" osgFile="/etc/passwd"/>', refused)
     yield beside("picture on the map", '<poly id="p" shape="0,0 1,1 1,0" imgFile="/etc/passwd"/>', refused)
     yield beside("output of a bus stop", '<busStop id="b" lane="road_0" output="/tmp/evil.xml"/>', refused)
     yield beside(
         "emissions from a file", '<vType id="t" emissionClass="PHEMlight/../../etc/passwd"/>', "emissionClass of"
     )
-    yield beside("emissions up the tree", '<vType id="t" emissionClass="HBEFA3/../../x"/>', "emissionClass of <vType>")
     ssm = '<param key="has.ssm.device" value="true"/><param key="device.ssm.file" value="/tmp/evil.xml"/>'
     yield beside("device that writes, of a type", f'<vType id="t">{ssm}</vType>', "got <param> in <vType>")
-    yield beside(
-        "device that writes, of a vehicle",
-        f'<vehicle id="v" depart="0"><route edges="road"/>{ssm}</vehicle>',
-        "got <param> in <vehicle>",
-    )
     yield beside(
         "signal that writes",
         '<tlLogic id="x" type="actuated" programID="1"><param key="file" value="/tmp/evil.xml"/></tlLogic>',
@@ -381,31 +306,21 @@ def _outputs() -> Iterator[Hostile]:
     )
     yield beside("line from the environment", '<vehicle id="v" depart="0" line="${HOME}"/>', "line of <vehicle>")
     yield beside("route to nowhere", '<route id="r" edges="road nowhere"/>', "names the edge 'nowhere'")
-    yield beside("stop nowhere", '<busStop id="b" lane="road_9"/>', "names the lane 'road_9'")
-    yield beside("trip from nowhere", '<trip id="t" depart="0" from="x" to="road"/>', "names the edge 'x'")
     yield beside("departure at NaN", '<vehicle id="v" depart="NaN"/>', "depart of <vehicle>")
-    yield beside("departure at 1e308", '<vehicle id="v" depart="1e308"/>', "depart of <vehicle>")
     yield beside(
         "flow of 10^9", '<flow id="f" from="road" to="road" begin="0" end="9" number="1000000000"/>', "number of"
     )
-    yield beside("flow of 1e300 per hour", '<flow id="f" from="road" to="road" vehsPerHour="1e300"/>', "vehsPerHour of")
     yield beside("flow with code", '<flow id="f" from="road" to="road" period="exp(__import__)"/>', "period of <flow>")
     yield beside(
         "car park for 2^31", '<parkingArea id="p" lane="road_0" roadsideCapacity="2147483647"/>', "roadsideCapacity"
     )
     yield beside("endless route", '<route id="r" edges="road" repeat="2000000000"/>', "repeat of <route>")
-    yield beside("bus for 10^12", '<vType id="t" personCapacity="1000000000000"/>', "personCapacity of <vType>")
-    yield beside("vehicle type of length NaN", '<vType id="t" length="NaN"/>', "length of <vType>")
     yield beside("unknown attribute", '<vehicle id="v" depart="0" onload="x"/>', refused)
     yield beside(
         "unknown type", '<vehicle id="v" depart="0" type="ghost"><route edges="road"/></vehicle>', "cannot load it"
     )
-    yield beside("unknown route", '<vehicle id="v" depart="0" route="ghost"/>', "cannot load it")
-    yield beside("unknown model", '<vType id="t" carFollowModel="evil"/>', "cannot load it")
     yield Hostile("two nets", lambda: zipped(NET, NET), "there are 2 nets", ZIP)
-    yield Hostile("no net", lambda: zipped(ROUTES, ADDITIONAL), "there are 0 nets", ZIP)
     yield Hostile("a configuration beside", lambda: zipped(NET, "<configuration/>"), "its root is <configuration>", ZIP)
-    yield Hostile("a page beside", lambda: zipped(NET, "<!DOCTYPE html><html/>"), "got a DOCTYPE", ZIP)
 
 
 def _archives() -> Iterator[Hostile]:
@@ -426,40 +341,24 @@ def _archives() -> Iterator[Hostile]:
         return Hostile(name, make, says, ZIP)
 
     yield named("up the tree", "../../../etc/cron.d/evil")
-    yield named("up in the middle", "nets/../../evil.xml")
     yield named("at the root", "/etc/cron.d/evil")
-    yield named("on a drive", "C:/windows/evil.xml")
     yield named("with backslashes", "..\\..\\evil.xml")
-    yield named("on a share", "\\\\host\\share\\evil.xml")
     yield named("with an escape sequence", "net\x1b[2J.xml", "wanted at most 200 printable characters")
-    yield named("with a long name", "n" * 5000, "wanted at most 200 printable characters")
     yield entry("symbolic link", "is a symbolic link", mode=stat.S_IFLNK | 0o777)
-    yield entry("device", "is a special file", mode=stat.S_IFBLK | 0o666)
     yield entry("named pipe", "is a special file", mode=stat.S_IFIFO | 0o666)
     yield entry("bzip2", "is packed by method 12", method=zipfile.ZIP_BZIP2)
-    yield entry("LZMA", "is packed by method 14", method=zipfile.ZIP_LZMA)
     yield Hostile("archive in an archive", lambda: zipped(zipped(NET)), "no well-formed XML|is no UTF-8", ZIP)
-    yield Hostile("gzip in an archive", lambda: zipped(gzip.compress(NET.encode())), "is no UTF-8", ZIP)
     yield Hostile("gzip in gzip", lambda: gzip.compress(gzip.compress(NET.encode())), "is no UTF-8", GZIP)
-    yield Hostile("archive in gzip", lambda: gzip.compress(zipped(NET)), "no well-formed XML|is no UTF-8", GZIP)
     yield Hostile("tar in gzip", _tar, "is NUL", GZIP)
     yield Hostile("10,000 entries", lambda: zipped(*["<x/>"] * 10_000), "has 10000 entries; wanted at most", ZIP)
     yield Hostile("no entries", lambda: zipped(), "is no zip", ZIP)
-    yield Hostile("only a folder", lambda: zipped("", names=("nets/",)), "there are 0 nets", ZIP)
     yield Hostile("gzip bomb of 1 GiB", lambda: _bomb(1 << 30), "times their size|more than 64 MiB", GZIP)
     yield Hostile("gzip bomb that looks like XML", lambda: _bomb(1 << 28, b"<net>", b" "), "times their size", GZIP)
-    yield Hostile("gzip bomb in layers", lambda: gzip.compress(_bomb(1 << 30)), "is no UTF-8", GZIP)
     yield Hostile("zip bomb", lambda: zipped(bytes(1 << 28)), "times their size|more than 64 MiB", ZIP)
-    yield Hostile(
-        "zip bomb of many", lambda: zipped(*[b"<net>" + b" " * (1 << 24)] * 15), "times their size|64 MiB", ZIP
-    )
     yield Hostile("half of a gzip file", lambda: gzip.compress(NET.encode())[:-30], "gzip file is damaged", GZIP)
     yield Hostile("gzip with a wrong checksum", lambda: _flipped(gzip.compress(NET.encode()), -6), "is damaged", GZIP)
-    yield Hostile("gzip and more", lambda: gzip.compress(NET.encode()) + b"evil", "is damaged", GZIP)
     yield Hostile("half of an archive", lambda: zipped(NET)[:-30], "zip file is damaged", ZIP)
     yield Hostile("XML called gzip", lambda: NET.encode(), "is no gzip", GZIP)
-    yield Hostile("gzip called XML", lambda: gzip.compress(NET.encode()), "is no xml", XML)
-    yield Hostile("archive called gzip", lambda: zipped(NET), "is no gzip", GZIP)
 
 
 def _forged_archives() -> Iterator[Hostile]:
@@ -482,18 +381,9 @@ def _forged_archives() -> Iterator[Hostile]:
     def understate(content: bytearray) -> None:
         struct.pack_into("<I", content, central(content) + 24, 10)
 
-    def overstate(content: bytearray) -> None:
-        struct.pack_into("<I", content, central(content) + 24, 0xFFFFFFF0)
-
-    def checksum(content: bytearray) -> None:
-        content[central(content) + 16] ^= 1
-
     def overlap(content: bytearray) -> None:
         second = content.index(b"PK\x01\x02", central(content) + 1)
         struct.pack_into("<I", content, second + 42, 0)
-
-    def outside(content: bytearray) -> None:
-        struct.pack_into("<I", content, central(content) + 42, 0x7FFFFFF0)
 
     def zip64(content: bytearray) -> None:
         struct.pack_into("<I", content, central(content) + 24, 0xFFFFFFFF)
@@ -513,10 +403,7 @@ def _forged_archives() -> Iterator[Hostile]:
 
     yield forged("encrypted entry", encrypt, "is encrypted")
     yield forged("size understated", understate, "is damaged: Bad CRC")
-    yield forged("size overstated", overstate, "which it says it has")
-    yield forged("wrong checksum", checksum, "is damaged: Bad CRC")
     yield forged("two entries in one place", overlap, "overlap")
-    yield forged("entry outside the file", outside, "overlap|is damaged")
     yield forged("64-bit size that is missing", zip64, "which it says it has")
     yield forged("the same name twice", same_name, "wanted each name once")
     yield forged("names that differ", other_name, "is damaged")

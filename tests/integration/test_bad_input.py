@@ -2,7 +2,10 @@
 
 import json
 
+import httpx
 import pytest
+
+from tests.hostile_formulas import formulas
 
 
 def low(**spec):
@@ -149,3 +152,59 @@ def test_a_bad_address_is_refused_by_field(client, path, status, field):
 
 def test_cancelling_what_does_not_exist_is_404(client):
     assert client.post("/v1/campaigns/none/cancel").status_code == 404
+
+
+def post(client: httpx.Client, body: str) -> httpx.Response:
+    return client.post("/v1/campaigns", content=body, headers={"content-type": "application/json"})
+
+
+def odd(text: str) -> str:
+    return f'{{"families": ["low"], "odd": {text}}}'
+
+
+def friction(low: str, high: str = "1") -> str:
+    return odd(f'{{"environment": {{"friction": {{"low": {low}, "high": {high}}}}}}}')
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        friction("NaN"),
+        friction("0.5", "1e999"),
+        friction("0.5", "9" * 5000),
+        friction("1e-300", "1e-299"),
+        friction("[0.5]"),
+        odd('{"environment": {"friction": {"low": 0.5}}}'),
+        odd('{"environment": {"__class__": {"__init__": {}}}}'),
+        odd('{"\\u0000": 1}'),
+        odd(f'{{"{"x" * 900_000}": 1}}'),
+        odd(f'{{"dynamic": {{"actor_kinds": {json.dumps(["ox"] * 100_000)}}}}}'),
+        odd('{"dynamic": {"actor_kinds": ["\\ud800"]}}'),
+        odd("[" * 100_000 + "]" * 100_000),
+        odd('{"environment": ' * 50_000 + "{}" + "}" * 50_000),
+        odd('{"environment": {"friction": {"low": 0.5, "high": 0.9, "low": 0.6}}}'),
+        odd('{"scenery": {"lanes": {"low": 9, "high": 10}}}'),
+    ],
+    ids=lambda body: body[29:60],
+)
+def test_a_hostile_odd_is_refused_with_its_reason(client: httpx.Client, body: str) -> None:
+    response = post(client, body)
+    assert response.status_code in (400, 422), response.text[:500]
+    assert response.headers["content-type"] == "application/problem+json"
+    assert 0 < len(response.json()["detail"]) < 5000
+
+
+def test_hostile_formulas_are_refused_or_queued(client: httpx.Client) -> None:
+    every = formulas()
+    outcomes = []
+    for formula in every[:: len(every) // 60]:
+        requirement = {"name": "mine", "formula": formula, "scale": 1}
+        spec = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 1}, "requirements": [requirement]}
+        response = post(client, json.dumps(spec))
+        assert response.status_code in (202, 400, 422), f"{formula!r}: {response.text[:500]}"
+        if response.status_code == 422:
+            assert response.json()["errors"][0]["field"] == "requirements[0].formula"
+        outcomes.append(response.status_code)
+    assert outcomes.count(422) > 25
+    assert outcomes.count(202) > 5
+    assert client.get("/healthz").status_code == 200

@@ -78,14 +78,6 @@ def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() ->
     assert verdict(results("succeeded", FEW), Bounds(ecr=0.14))[0] == 0
 
 
-def test_a_rate_that_keeps_its_bound_says_by_how_much() -> None:
-    status, reason = verdict(results("succeeded", {}), Bounds(ecr=0.2))
-    assert (status, reason) == (
-        0,
-        "ECR within 0.2: low sac 0.100, 95 % interval up to 0.120 (100 valid failures in 1000 episodes)",
-    )
-
-
 def test_the_rate_alone_is_judged_where_that_is_asked_for() -> None:
     assert verdict(results("succeeded", FEW), by_rate(ecr=0.1)) == (
         0,
@@ -93,16 +85,6 @@ def test_the_rate_alone_is_judged_where_that_is_asked_for() -> None:
     )
     assert verdict(results("succeeded", {"ecr": 0.1, "ecr_high": 0.9}), by_rate(ecr=0.1))[0] == 0
     assert verdict(results("succeeded", {"ecr": 0.11, "ecr_low": 0.0}), by_rate(ecr=0.1))[0] == 1
-
-
-def test_what_is_above_and_what_may_be_are_told_apart() -> None:
-    status, reason = verdict(results("succeeded", FEW, MANY), Bounds(ecr=0.1))
-    assert status == 1
-    assert reason.splitlines() == [
-        "ECR may be above 0.1: low sac 0.050, 95 % interval up to 0.137 (3 valid failures in 60 episodes)",
-        "ECR above 0.1: low random 0.200, 95 % interval up to 0.226 (200 valid failures in 1000 episodes)",
-        HINT.strip(),
-    ]
 
 
 def test_a_pcr_above_its_bound_is_named_whatever_the_ecr() -> None:
@@ -169,11 +151,6 @@ def test_a_file_that_is_no_earlier_campaign_is_refused_beforehand(
     with pytest.raises(ConfigError, match=complaint) as error:
         Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file}))
     assert error.value.field == "--no-new-failures"
-
-
-def test_controls_count_like_any_other_method() -> None:
-    found = {"method": "no-adversary", "ecr": 0.01, "failures": 10}
-    assert verdict(results("succeeded", found), by_rate(ecr=0.0))[0] == 1
 
 
 @pytest.mark.parametrize("bounds", [Bounds(), Bounds(ecr=0.5), Bounds(pcr=0.5)])
