@@ -16,8 +16,7 @@ from risk_sac.records import EpisodeRecord, Outcome, Phase, RunMetrics, SeriesFi
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import sha256
-from risk_sac.run_folder.episode_json import records_from_json, records_to_json
-from risk_sac.run_folder.results import FAILURES, series_name
+from risk_sac.run_folder.results import FAILURES, records_from_json, records_to_json, series_name
 from risk_sac.run_folder.series import write_series
 from risk_sac.searchers import Searchers
 

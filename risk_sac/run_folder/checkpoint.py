@@ -1,8 +1,7 @@
-"""A run's state on disk: written whole or not at all, and read only if every byte is as written.
+"""A run's state on disk.
 
-A file is an 8-byte magic, the SHA-256 of the rest, and a `torch.save` archive that `weights_only=True` reads, so a
-damaged file is told from a good one before anything in it is parsed, and no file can run code. The last but one is
-kept beside it, for the day on which the last one is damaged.
+A checkpoint is a `torch.save` archive that `weights_only=True` reads, so it can run no code, followed by its
+SHA-256. The last but one is kept beside it, for the case that the last one is damaged.
 """
 
 import errno
@@ -24,14 +23,13 @@ logger = logging.getLogger(__name__)
 State = dict[str, Any]
 """Nested dicts, lists and tuples of tensors, arrays, None, bool, int (of any size), float, str and bytes."""
 
-MAGIC = b"RISKSAC1"
-_HEADER_BYTES = len(MAGIC) + hashlib.sha256().digest_size
 _ARRAY = "__ndarray__"  # weights_only knows tensors but no arrays: {_ARRAY: tensor} stands for one
 _PLAIN = (type(None), bool, int, float, str, bytes)
+_DIGEST_BYTES = hashlib.sha256().digest_size
 
 
 def save(path: Path, state: State, run_digest: str) -> None:
-    """Replace the checkpoint at `path`, and keep the one before it; a crash at any moment leaves a good one.
+    """Replaces the checkpoint at `path` and keeps the one before it; a crash at any moment leaves a good one.
 
     One writer per path. Tensors are stored as they are on the CPU, views without the storage they look into.
 
@@ -46,8 +44,8 @@ def save(path: Path, state: State, run_digest: str) -> None:
     """
     archive = io.BytesIO()
     torch.save({"run_digest": run_digest, "state": _encode(state, "state")}, archive)
-    payload = archive.getbuffer()
-    replace_file(path, MAGIC, hashlib.sha256(payload).digest(), payload, keep=previous(path))
+    archive.write(hashlib.sha256(archive.getbuffer()).digest())
+    replace_file(path, archive.getbuffer(), keep=previous(path))
 
 
 def previous(path: Path) -> Path:
@@ -84,10 +82,10 @@ def load_newest(path: Path, run_digest: str) -> State | None:
 
 
 def load(path: Path, run_digest: str) -> State:
-    """Read a checkpoint back, tensors on the CPU.
+    """Reads a checkpoint, tensors on the CPU.
 
     Raises:
-        DamagedCheckpoint: it is no checkpoint, or its bytes are not those that were written.
+        DamagedCheckpoint: its bytes are not those that were written, or something else wrote it.
         CheckpointError: it is missing, or belongs to another run.
         OSError: it exists but cannot be read.
     """
@@ -95,9 +93,14 @@ def load(path: Path, run_digest: str) -> State:
         content = path.read_bytes()
     except FileNotFoundError as error:
         raise CheckpointError(f"there is no checkpoint at {path}; start the run from its first episode") from error
-    _verify(content, path)
+    archive, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
+    if hashlib.sha256(archive).digest() != digest:
+        raise DamagedCheckpoint(
+            f"checkpoint {path} is damaged or cut short, or an earlier version wrote it: "
+            f"its {len(content)} bytes do not end in the SHA-256 of those before"
+        )
     try:
-        stored = torch.load(io.BytesIO(content[_HEADER_BYTES:]), map_location="cpu", weights_only=True)
+        stored = torch.load(io.BytesIO(archive), map_location="cpu", weights_only=True)
         found, state = stored["run_digest"], stored["state"]
     except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError, TypeError) as error:
         raise CheckpointError(
@@ -110,20 +113,6 @@ def load(path: Path, run_digest: str) -> State:
         )
     decoded: State = _decode(state)
     return decoded
-
-
-def _verify(content: bytes, path: Path) -> None:
-    if not content.startswith(MAGIC):
-        raise DamagedCheckpoint(
-            f"{path} starts with {content[: len(MAGIC)]!r}; a checkpoint starts with {MAGIC!r}. It was written by "
-            "something else, or its start is damaged"
-        )
-    stored, actual = content[len(MAGIC) : _HEADER_BYTES], hashlib.sha256(content[_HEADER_BYTES:]).digest()
-    if stored != actual:
-        raise DamagedCheckpoint(
-            f"checkpoint {path} is damaged or cut short: its {len(content)} bytes have SHA-256 {actual.hex()}, and "
-            f"{stored.hex() or 'nothing'} was stored"
-        )
 
 
 def _encode(value: object, where: str) -> object:

@@ -1,27 +1,42 @@
-"""Files that are whole or not there: a crash or a full disk at any moment leaves the old file or the new one."""
+"""Files that are whole or absent, and JSON files that tell when they were damaged.
+
+A sealed file is a JSON object whose last field is the SHA-256 of all bytes before it.
+"""
 
 import contextlib
 import hashlib
 import os
+import re
+from functools import cache
 from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
+
+from risk_sac.errors import DamagedError
+
+T = TypeVar("T")
+_SEAL = re.compile(rb',\n  "sha256": "([0-9a-f]{64})"\n}\n\Z')
+_END = b"\n}"
 
 
-def replace_file(path: Path, *parts: bytes | memoryview, keep: Path | None = None) -> None:
-    """Puts the parts, one after the other, at `path` in one step. One writer per path.
+def replace_file(path: Path, content: bytes | memoryview, *, keep: Path | None = None, mode: int = 0o666) -> None:
+    """Replaces a file in one step: a crash or a full disk leaves the old file or the new one.
 
     Args:
-      path: in an existing folder.
-      parts: the content.
+      path: in an existing folder; it has one writer at a time.
+      content: of the new file.
       keep: where the old file goes; at every moment there is a whole one at `path` or at `keep`.
+      mode: of the new file, before the process's umask.
 
     Raises:
       OSError: the folder is missing, unwritable or full; an old file stays as it was.
     """
     temporary = path.with_name(f".{path.name}.tmp")  # same folder: a rename across file systems is not atomic
     try:
-        with temporary.open("wb") as file:
-            for part in parts:
-                file.write(part)
+        temporary.unlink(missing_ok=True)
+        with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
+            file.write(content)
             file.flush()
             os.fsync(file.fileno())
         if keep is not None and path.exists():
@@ -59,3 +74,57 @@ def sha256(path: Path) -> str | None:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return None
+
+
+def write_sealed(path: Path, document: object, *, mode: int = 0o666) -> None:
+    """Replaces a sealed file in one step.
+
+    Raises:
+      OSError: the folder cannot be written; an old file stays as it was.
+    """
+    replace_file(path, seal(document), mode=mode)
+
+
+def read_sealed(path: Path, kind: type[T]) -> T:
+    """Reads what `write_sealed` wrote.
+
+    Raises:
+      DamagedError: it is not as it was written, or it is something else.
+      OSError: it cannot be read.
+    """
+    try:
+        return unseal(path.read_bytes(), kind)
+    except DamagedError as error:
+        raise DamagedError(f"{path} is damaged: {error}") from error
+
+
+def seal(document: Any) -> bytes:
+    """A pydantic model, dataclass or dict with at least one field as sealed JSON."""
+    kind: Any = type(document)
+    text = _adapter(kind).dump_json(document, indent=2)
+    return text.removesuffix(_END) + f',\n  "sha256": "{hashlib.sha256(text).hexdigest()}"\n}}\n'.encode()
+
+
+def unseal(content: bytes, kind: type[T]) -> T:
+    """The document that was sealed.
+
+    Raises:
+      DamagedError: the content is not as it was sealed, or it is something else.
+    """
+    found = _SEAL.search(content)
+    if found is None:
+        raise DamagedError("it does not end in its SHA-256")
+    text = content[: found.start()] + _END
+    actual, wanted = hashlib.sha256(text).hexdigest(), found[1].decode()
+    if actual != wanted:
+        raise DamagedError(f"its SHA-256 is {actual}, wanted {wanted}")
+    try:
+        document: T = _adapter(kind).validate_json(text)  # type: ignore[arg-type] # a class is hashable
+    except ValidationError as error:
+        raise DamagedError(f"it holds something else: {error.errors()[0]['msg']}") from error
+    return document
+
+
+@cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)

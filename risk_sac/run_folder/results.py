@@ -1,9 +1,9 @@
-"""What a run leaves in its folder, under `risk-sac run` and in the service alike, and how it is read back.
+"""Files of a run's folder, under `risk-sac run` and in the service alike.
 
 results.json    the spec, the metrics and every contact, sealed; rewritten at each checkpoint and at the end
 episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
 failures/       the time series of every contact, see `risk_sac.run_folder.series`
-verified.json   which failures repeated, see `risk_sac.run_folder.verified`
+verified.json   which failures repeated, see `risk_sac.run_folder.verified`; sealed
 studies/        cores and regions that were asked for, see `risk_sac.failures.studied`
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
@@ -11,15 +11,13 @@ checkpoint      from which the run goes on; beside it the one before, `checkpoin
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import EpisodeRecord, RunMetrics
-from risk_sac.run_folder.durable import replace_file
-from risk_sac.run_folder.seal import seal, unseal
+from risk_sac.run_folder.durable import read_sealed, write_sealed
 
 RESULTS = "results.json"
 EPISODES = "episodes.jsonl"
@@ -49,8 +47,6 @@ class Contact:
 class Results:
     """Results of one run."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # see `unseal`
-
     spec: RunSpec
     spec_digest: str
     finished: bool
@@ -79,7 +75,7 @@ class Results:
         raise ConfigError("FAILURE", f"{id_!r}", f"one of the contacts ({every})")
 
 
-_RESULTS = TypeAdapter(Results)
+_RECORDS = TypeAdapter(list[EpisodeRecord])
 
 
 def write_results(folder: Path, results: Results) -> None:
@@ -88,7 +84,7 @@ def write_results(folder: Path, results: Results) -> None:
     Raises:
       OSError: the folder cannot be written.
     """
-    replace_file(folder / RESULTS, seal(_RESULTS.dump_json(results, indent=2)))
+    write_sealed(folder / RESULTS, results)
 
 
 def read_results(path: Path) -> Results:
@@ -99,12 +95,23 @@ def read_results(path: Path) -> Results:
     """
     file = path / RESULTS if path.is_dir() else path
     try:
-        return _RESULTS.validate_json(unseal(file.read_bytes()))
+        return read_sealed(file, Results)
     except FileNotFoundError as error:
         raise ConfigError("RESULTS", f"there is no {file}", remedy="name the folder of a run") from error
     except DamagedError as error:
-        raise ConfigError("RESULTS", f"{file} is damaged: {error}") from error
-    except ValidationError as error:
-        raise ConfigError(
-            "RESULTS", f"{file} is damaged, or was not written by a run: {error.errors()[0]['msg']}"
-        ) from error
+        raise ConfigError("RESULTS", str(error)) from error
+
+
+def records_to_json(records: list[EpisodeRecord]) -> str:
+    """Canonical JSON; floats keep every bit."""
+    return _RECORDS.dump_json(records).decode()
+
+
+def records_from_json(text: str) -> list[EpisodeRecord]:
+    """The inverse of `records_to_json`."""
+    return _RECORDS.validate_json(text)
+
+
+def records_from_lines(content: bytes) -> list[EpisodeRecord]:
+    """The records of an episodes.jsonl."""
+    return [EpisodeRecord.model_validate_json(line) for line in content.splitlines()]

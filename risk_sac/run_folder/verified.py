@@ -3,17 +3,14 @@
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
 from risk_sac.records import EpisodeRecord, Outcome, Repetition
 from risk_sac.rules import REPEATS
-from risk_sac.run_folder.durable import replace_file
+from risk_sac.run_folder.durable import read_sealed, write_sealed
 from risk_sac.run_folder.results import Results
-from risk_sac.run_folder.seal import seal, unseal
 from risk_sac.verdicts.distinct import DistinctFailures, niche_of
 
 VERIFIED = "verified.json"
@@ -23,8 +20,6 @@ TIMES = 3  # that a failure is replayed, if nobody says otherwise
 @dataclass(frozen=True, kw_only=True)
 class Verified:
     """The distinct failures of a run."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")  # see `unseal`
 
     digest: str  # of the results
     code: str  # SHA-256 over the sources that replayed them
@@ -54,9 +49,6 @@ class Verified:
         )
 
 
-_VERIFIED = TypeAdapter(Verified)
-
-
 def distinct_failures(results: Results) -> list[EpisodeRecord]:
     """The first failure of each kind in each phase, and the first preventable one, in the order of the episodes."""
     found: defaultdict[tuple[str, bool], DistinctFailures] = defaultdict(DistinctFailures)
@@ -78,13 +70,13 @@ def write_verified(folder: Path, verified: Verified) -> None:
     Raises:
       OSError: the folder cannot be written.
     """
-    replace_file(folder / VERIFIED, seal(_VERIFIED.dump_json(verified, indent=2)))
+    write_sealed(folder / VERIFIED, verified)
 
 
 def read_verified(folder: Path, digest: str) -> Verified | None:
     """What was found of the results with this digest; None if nothing was, or if the file is damaged."""
     try:
-        found = _VERIFIED.validate_json(unseal((folder / VERIFIED).read_bytes()))
-    except (FileNotFoundError, DamagedError, ValidationError):
+        found = read_sealed(folder / VERIFIED, Verified)
+    except (FileNotFoundError, DamagedError):
         return None
     return found if found.digest == digest else None

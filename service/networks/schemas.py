@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel
 
 from risk_sac.records import Page, Record
 from risk_sac.scenario.maps.found import Pattern
@@ -75,8 +75,6 @@ class Places(Record):
 
 
 class StoredNetwork(BaseModel):
-    """A network as it is stored; closed, so that a damaged seal is not taken for one more field."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    """A network as it is stored."""
 
     network: Network

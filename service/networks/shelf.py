@@ -18,11 +18,8 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from risk_sac.errors import DamagedError
-from risk_sac.run_folder.durable import sync_folder
-from risk_sac.run_folder.seal import seal, unseal
+from risk_sac.run_folder.durable import read_sealed, seal, sync_folder
 from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
 from service.networks.errors import BusyError
 from service.networks.incoming import Incoming
@@ -117,9 +114,7 @@ class Shelf:
             report = inspect(incoming.folder, packaging)
             network = _network(report, label, sha256, incoming.bytes)
             incoming.strip()
-            (incoming.folder / RECORD).write_bytes(
-                seal(StoredNetwork(network=network).model_dump_json(indent=2).encode())
-            )
+            (incoming.folder / RECORD).write_bytes(seal(StoredNetwork(network=network)))
             _sync(incoming.folder)
             with self._adding:
                 self._check_room(project)
@@ -216,8 +211,8 @@ def _number(path: Path) -> int:
 
 def _read(folder: Path) -> Network:
     try:
-        return StoredNetwork.model_validate_json(unseal((folder / RECORD).read_bytes())).network
-    except (DamagedError, ValidationError) as error:
+        return read_sealed(folder / RECORD, StoredNetwork).network
+    except DamagedError as error:
         raise StorageError(f"network {folder.name} is damaged: {error}") from error
 
 

@@ -24,8 +24,7 @@ from risk_sac.config import (
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder.checkpoint import previous
-from risk_sac.run_folder.episode_json import records_to_json
-from risk_sac.run_folder.results import FAILURES
+from risk_sac.run_folder.results import FAILURES, records_to_json
 from risk_sac.scene_optimizer.archive import INITIAL
 from risk_sac.train import train
 

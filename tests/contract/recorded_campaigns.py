@@ -13,8 +13,15 @@ from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.metrics import results_digest
 from risk_sac.records import Collision, EpisodeRecord, Grade, Judgement, Outcome, SeriesFile, State
 from risk_sac.report import FinishedRun
-from risk_sac.run_folder.episode_json import records_to_json
-from risk_sac.run_folder.results import EPISODES, FAILURES, Contact, Results, series_name, write_results
+from risk_sac.run_folder.results import (
+    EPISODES,
+    FAILURES,
+    Contact,
+    Results,
+    records_to_json,
+    series_name,
+    write_results,
+)
 from risk_sac.run_folder.series import PER_ACTOR, PER_OTHER, write_series
 from service.settings import ServiceSettings
 from service.store.reading import Store

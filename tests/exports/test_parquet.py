@@ -8,8 +8,7 @@ from pyarrow import compute, parquet
 
 from risk_sac.cli import main
 from risk_sac.failures.export.parquet import SPECS
-from risk_sac.run_folder.episode_json import records_from_lines
-from risk_sac.run_folder.results import EPISODES
+from risk_sac.run_folder.results import EPISODES, records_from_lines
 
 RUNS = {"low": "random", "mixed": "random"}
 

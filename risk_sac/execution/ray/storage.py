@@ -11,7 +11,6 @@ An attempt writes to its own folder alone, so that one that was given up can do 
 
 import contextlib
 import hashlib
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,8 +20,7 @@ from urllib.parse import urlsplit
 import fsspec
 
 from risk_sac.errors import DamagedError
-from risk_sac.run_folder.durable import replace_file
-from risk_sac.run_folder.seal import seal, unseal
+from risk_sac.run_folder.durable import replace_file, seal, unseal
 
 FENCE, BLOBS, MANIFEST, SEED, BESIDE = "fence", "blobs", "manifest.json", "seed.json", "beside.json"
 OWN = ".attempts"  # in a run's folder, where the storage is that folder
@@ -119,7 +117,7 @@ class Place:
 
     def write_manifest(self, name: str, manifest: Manifest) -> None:
         """Says which blobs belong together."""
-        self.write(name, seal(json.dumps({"files": dict(manifest)}, indent=2).encode()))
+        self.write(name, seal({"files": dict(manifest)}))
 
     def read_manifest(self, name: str) -> Manifest | None:
         """Which blobs belong together; None if nobody has said so yet.
@@ -128,7 +126,7 @@ class Place:
           DamagedError: what was said is damaged.
         """
         try:
-            content: dict[str, Any] = json.loads(unseal(self.read(name)))
+            content: dict[str, Any] = unseal(self.read(name), dict)
         except FileNotFoundError:
             return None
         files: Manifest = content["files"]

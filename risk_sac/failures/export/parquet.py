@@ -18,8 +18,7 @@ from pydantic import BaseModel
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import Files
 from risk_sac.records import EpisodeRecord
-from risk_sac.run_folder.episode_json import records_from_lines
-from risk_sac.run_folder.results import EPISODES, Results, read_results
+from risk_sac.run_folder.results import EPISODES, Results, read_results, records_from_lines
 from risk_sac.run_folder.verified import read_verified
 
 NAME = "episodes.parquet"

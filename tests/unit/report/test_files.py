@@ -23,9 +23,16 @@ from risk_sac.report import (
 )
 from risk_sac.report.drawing import LOOKS
 from risk_sac.report.figures import window_ecr, window_pcr
-from risk_sac.run_folder.episode_json import records_to_json
-from risk_sac.run_folder.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
-from risk_sac.run_folder.seal import seal, unseal
+from risk_sac.run_folder.durable import seal, unseal
+from risk_sac.run_folder.results import (
+    EPISODES,
+    RESULTS,
+    Contact,
+    Results,
+    read_results,
+    records_to_json,
+    write_results,
+)
 
 
 @pytest.fixture
@@ -258,12 +265,12 @@ def test_a_run_from_before_contacts_were_judged_can_still_be_read(runs, tmp_path
         contacts=tuple(Contact.of(run.spec.id, record) for record in records if record.collision is not None),
     )
     write_results(tmp_path, results)
-    stored = json.loads(unseal((tmp_path / RESULTS).read_bytes()))
+    stored = unseal((tmp_path / RESULTS).read_bytes(), dict)
     for name in NEW_METRICS:
         del stored["metrics"][name]
     for contact in stored["contacts"]:
         del contact["episode"]["collision"]["judgement"]
-    (tmp_path / RESULTS).write_bytes(seal(json.dumps(stored, indent=2).encode()))
+    (tmp_path / RESULTS).write_bytes(seal(stored))
     lines = json.loads(records_to_json(records))
     for record in lines:
         if record["collision"] is not None:
@@ -290,10 +297,10 @@ def test_a_run_in_which_nothing_was_ever_close_can_be_read(runs, tmp_path, writt
         contacts=tuple(Contact.of(runs[0].spec.id, record) for record in records if record.collision is not None),
     )
     write_results(tmp_path, results)
-    stored = unseal((tmp_path / RESULTS).read_bytes()).decode()
+    stored = json.dumps(unseal((tmp_path / RESULTS).read_bytes(), dict))
     lines = "".join(record.model_dump_json() + "\n" for record in records)
     assert '"min_ttc_s": "Infinity"' in stored
-    (tmp_path / RESULTS).write_bytes(seal(stored.replace('"Infinity"', written).encode()))
+    (tmp_path / RESULTS).write_bytes(seal(json.loads(stored.replace('"Infinity"', written))))
     (tmp_path / EPISODES).write_text(lines.replace('"Infinity"', written))
     assert read_run(tmp_path).records == tuple(records)
     assert read_results(tmp_path).contacts == results.contacts

@@ -84,18 +84,25 @@ def crashed(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("name", [COUNTS, CURRENT])
-def test_damage_is_noticed_and_blames_no_episode(crashed: Path, caplog, name: str) -> None:
-    content, log, other = ((crashed / part).read_bytes() for part in (name, LOG, CURRENT if name == COUNTS else COUNTS))
+def damages(content: bytes) -> list[bytes]:
     bits = range(0, 8 * len(content), 7)
-    cases = [content[: bit // 8] + bytes([content[bit // 8] ^ 1 << bit % 8]) + content[bit // 8 + 1 :] for bit in bits]
-    for damaged in [*cases, *(content[:length] for length in range(len(content)))]:
-        (crashed / name).write_bytes(damaged)
-        (crashed / LOG).write_bytes(log)
-        (crashed / (CURRENT if name == COUNTS else COUNTS)).write_bytes(other)
+    flips = [content[: bit // 8] + bytes([content[bit // 8] ^ 1 << bit % 8]) + content[bit // 8 + 1 :] for bit in bits]
+    return [*flips, *(content[:length] for length in range(len(content)))]
+
+
+@pytest.mark.parametrize("name", [COUNTS, CURRENT])
+def test_damage_leaves_out_no_other_episode(crashed: Path, caplog, name: str) -> None:
+    before = {part: (crashed / part).read_bytes() for part in (LOG, COUNTS, CURRENT)}
+    for damaged in damages(before[name]):
+        for part, content in (before | {name: damaged}).items():
+            (crashed / part).write_bytes(content)
         caplog.clear()
-        assert playable(crashed) == [0, 1, 2, 3, 4, 5]
-        assert any(str(crashed / name) in record.message for record in caplog.records), damaged
+        left = playable(crashed)
+        if name == COUNTS:
+            assert left == [0, 1, 2, 3, 4, 5]
+            assert str(crashed / COUNTS) in caplog.text
+        else:
+            assert set(left) >= {0, 1, 2, 4, 5}
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes anywhere")

@@ -5,7 +5,7 @@ from pydantic import ValidationError
 
 from risk_sac.metrics import results_digest
 from risk_sac.records import EpisodeRecord
-from risk_sac.run_folder.episode_json import records_from_json, records_from_lines, records_to_json
+from risk_sac.run_folder.results import records_from_json, records_from_lines, records_to_json
 from tests.builders import collision, episode_record
 
 RECORD = episode_record(4, collision=collision(min_ttc_s=0.7), min_ttc_s=0.0)

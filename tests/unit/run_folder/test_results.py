@@ -27,13 +27,6 @@ def test_results_are_plain_json_with_a_checksum(folder):
     assert len(stored["sha256"]) == 64
 
 
-def test_results_of_earlier_versions_have_no_checksum_and_are_read(folder):
-    stored = json.loads((folder / RESULTS).read_bytes())
-    del stored["sha256"]
-    (folder / RESULTS).write_text(json.dumps(stored, indent=2) + "\n")
-    assert read_results(folder).wall_s == 1.25
-
-
 def test_no_flipped_bit_and_no_lost_end_is_read(folder):
     content = (folder / RESULTS).read_bytes()
     chance = random.Random(0)
