@@ -113,7 +113,7 @@ def unseal(content: bytes, kind: type[T]) -> T:
     """
     found = _SEAL.search(content)
     if found is None:
-        raise DamagedError("it does not end in its SHA-256")
+        raise DamagedError("it does not end in its SHA-256: it was cut short, or something else wrote it")
     text = content[: found.start()] + _END
     actual, wanted = hashlib.sha256(text).hexdigest(), found[1].decode()
     if actual != wanted:
