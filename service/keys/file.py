@@ -1,39 +1,43 @@
 """The keys on disk: one small file, replaced as a whole."""
 
+import contextlib
 import fcntl
 import hashlib
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import to_json
 
-from risk_sac.run_folder.durable import sync_folder
+from risk_sac.errors import DamagedError
+from risk_sac.run_folder.durable import unseal, write_sealed
 from service.errors import KeysError
-from service.host.private import FOLDER_MODE
+from service.host.private import FILE_MODE, FOLDER_MODE
 from service.keys.key import Key, Scope, mint
 
 REMEDY = "restore their file from a copy, or begin anew with `risk-sac keys create --anew`"
 
 
 class Document(BaseModel):
-    """What the file says; the checksum notices a flipped bit where JSON would not, in a project's name say."""
+    """Content of the file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     keys: tuple[Key, ...]
     open: bool = False
-    """Whether nobody of this machine needs a key: somebody asked for it. That there are no keys does not mean it."""
+    """Whether processes of this machine need no key, because an administrator said so."""
+
+
+class _UnsealedDocument(Document):
+    """The file as version 0.1 wrote it, with a checksum over the keys."""
+
     sha256: str
 
-    @classmethod
-    def of(cls, keys: tuple[Key, ...], *, open_: bool = False) -> Self:
-        """The document that says so."""
-        return cls(keys=keys, open=open_, sha256=_checksum(keys, open_))
+    def whole(self) -> bool:
+        content = to_json(self.keys) + (b"open" if self.open else b"")
+        return hashlib.sha256(content).hexdigest() == self.sha256
 
 
 class KeyFile:
@@ -84,7 +88,7 @@ class KeyFile:
                 raise KeysError(f"keys file {str(self.path)!r} is whole; wanted a lost or damaged one: `revoke` keys")
             keys: list[Key] = []
             made = _add(keys, project, name, scope)
-            self._write(Document.of(tuple(keys)))
+            self._write(Document(keys=tuple(keys)))
         return made
 
     def open_all(self) -> None:
@@ -94,7 +98,7 @@ class KeyFile:
           KeysError: the file cannot be written.
         """
         with self._turn():
-            self._write(Document.of((), open_=True))
+            self._write(Document(keys=(), open=True))
 
     def revoke(self, key_id: str) -> Key:
         """Makes a key worthless; does nothing to one that is already.
@@ -124,7 +128,7 @@ class KeyFile:
         with self._turn():
             keys = list(self.read())
             yield keys
-            self._write(Document.of(tuple(keys)))
+            self._write(Document(keys=tuple(keys)))
 
     @contextmanager
     def _turn(self) -> Iterator[None]:
@@ -139,15 +143,7 @@ class KeyFile:
             raise KeysError(f"keys file {str(self.path)!r} cannot be written: {error.strerror}") from error
 
     def _write(self, document: Document) -> None:
-        """Replaces the file; after a crash there is the old one or the new one, on disk and whole."""
-        temporary = self.path.with_suffix(".tmp")
-        temporary.unlink(missing_ok=True)
-        with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-            file.write(document.model_dump_json(indent=1, exclude_defaults=True).encode())
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(self.path)
-        sync_folder(self.path.parent)
+        write_sealed(self.path, document, mode=FILE_MODE)
 
 
 def _add(keys: list[Key], project: str, name: str, scope: Scope) -> tuple[Key, str]:
@@ -160,12 +156,13 @@ def _add(keys: list[Key], project: str, name: str, scope: Scope) -> tuple[Key, s
 
 def _parse(content: bytes, path: Path) -> Document:
     try:
-        document = Document.model_validate_json(content)
-    except ValidationError as error:
+        return unseal(content, Document)
+    except DamagedError as error:
+        with contextlib.suppress(ValidationError):
+            old = _UnsealedDocument.model_validate_json(content)
+            if old.whole():
+                return Document(keys=old.keys, open=old.open)
         raise KeysError(_unusable(path, "damaged")) from error
-    if document.sha256 != _checksum(document.keys, document.open):
-        raise KeysError(_unusable(path, "damaged"))
-    return document
 
 
 def missing(path: Path) -> KeysError:
@@ -175,7 +172,3 @@ def missing(path: Path) -> KeysError:
 
 def _unusable(path: Path, how: str) -> str:
     return f"keys file {str(path)!r} is {how}; {REMEDY}, after which all earlier ones are worthless"
-
-
-def _checksum(keys: tuple[Key, ...], open_: bool) -> str:
-    return hashlib.sha256(to_json(keys) + (b"open" if open_ else b"")).hexdigest()

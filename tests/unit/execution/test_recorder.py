@@ -59,7 +59,7 @@ def test_a_damaged_file_of_episodes_is_written_anew(folder, finished, damaged):
 
 def test_results_of_something_else_are_left_alone(tmp_path):
     (tmp_path / RESULTS).write_text('{"accuracy": 0.9}')
-    with pytest.raises(ConfigError, match="is damaged: .* something else wrote it"):
+    with pytest.raises(ConfigError, match=r"is damaged: .* something else wrote it"):
         execute(tmp_path)
     assert (tmp_path / RESULTS).read_text() == '{"accuracy": 0.9}'
 

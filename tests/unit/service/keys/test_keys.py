@@ -62,7 +62,7 @@ def test_commands_at_the_same_time_lose_no_key(file: KeyFile) -> None:
 
 def test_what_a_killed_command_left_does_not_matter(file: KeyFile) -> None:
     key, _ = file.create("maps", "", Scope.READ)
-    file.path.with_suffix(".tmp").write_text('{"keys": [')
+    file.path.with_name(".keys.json.tmp").write_text('{"keys": [')
     assert file.read() == (key,)
     other, _ = file.create("maps", "", Scope.READ)
     assert file.read() == (key, other)
@@ -91,6 +91,46 @@ def test_every_truncation_and_every_flipped_bit_is_noticed(file: KeyFile) -> Non
         file.path.write_bytes(content)
         with pytest.raises(KeysError, match="is damaged; restore their file from a copy, or begin anew"):
             file.read()
+
+
+UNSEALED = """{
+ "keys": [
+  {
+   "id": "2bd7a5b8",
+   "project": "maps",
+   "name": "Ann",
+   "scope": "run",
+   "created_at": 1795636521.06,
+   "hash": "99f3be1e5bb1c5ad8bdd821ca5a19879cae21b69165a5e7a1a29ad80085bdc53"
+  },
+  {
+   "id": "fc4bff30",
+   "project": "nets",
+   "name": "",
+   "scope": "read",
+   "created_at": 1795636521.068,
+   "revoked_at": 1795636521.086,
+   "hash": "7c6fbdd42be272378f9b31aebc5f8fc5788237eef763a4dc4b58dd4edb78ef68"
+  }
+ ],
+ "sha256": "570dffa44ec99fb51b6aca19e6c4c204847d44ee46860aa47a81ded71ab7e850"
+}"""  # as version 0.1 wrote it
+
+
+def test_a_file_of_the_version_before_is_read_and_sealed_when_it_changes(file: KeyFile) -> None:
+    file.path.parent.mkdir()
+    file.path.write_text(UNSEALED)
+    before = file.read()
+    assert [(key.project, key.name, key.revoked_at is None) for key in before] == [
+        ("maps", "Ann", True),
+        ("nets", "", False),
+    ]
+    file.path.write_text(UNSEALED.replace("Ann", "Bob"))
+    with pytest.raises(KeysError, match="is damaged"):
+        file.read()
+    file.path.write_text(UNSEALED)
+    key, _ = file.create("maps", "", Scope.READ)
+    assert file.read() == (*before, key)
 
 
 def test_a_damaged_file_is_never_written_over(file: KeyFile) -> None:

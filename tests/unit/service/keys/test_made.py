@@ -100,7 +100,7 @@ def test_the_command_opens_only_when_told_that_it_is_meant(file: KeyFile) -> Non
         main(["open"])
     assert len(file.read()) == 1
     assert main(["open", "--yes"]) == 0
-    assert file.load() == Document.of((), open_=True)
+    assert file.load() == Document(keys=(), open=True)
     assert main(CREATE) == 0
     assert len(file.read()) == 1
     document = file.load()
