@@ -7,13 +7,13 @@ import sys
 
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
-from risk_sac.execution.executors import executor_named
+from risk_sac.execution.executor import executor_named
 from service.api.guards.connections import Server
 from service.app import create_app
 from service.host.environment import MISUSED, read_settings
 from service.host.logs import set_up_logs
 from service.keys.exposure import check_exposure
-from service.workers.program import program
+from service.runs.manager import worker_program
 
 ANSWERS_END_S = 2  # for answers and streams at work when the server is told to stop; workers are stopped after that
 SWITCH_S = 0.001  # for which a busy thread may hold up the event loop, and with it all answers; 5 ms by default
@@ -28,7 +28,7 @@ def main() -> None:
             os.environ[registry.FILE] = str(settings.egos.absolute())
         registry.cards()  # an operator who has registered nonsense hears of it now
         check_exposure(settings)
-        executor = executor_named(settings.executor)(program(settings))  # tries a cluster, which takes seconds
+        executor = executor_named(settings.executor)(worker_program(settings))  # tries a cluster, which takes seconds
     except ConfigError as error:
         print(error, file=sys.stderr)  # noqa: T201 - no log yet
         sys.exit(MISUSED)

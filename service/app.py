@@ -9,8 +9,8 @@ from fastapi import FastAPI
 from prometheus_client import Histogram
 
 from risk_sac import __version__
-from risk_sac.execution.executor import Executor
-from risk_sac.execution.executors import executor_named
+from risk_sac.execution.executor import Executor, executor_named
+from risk_sac.execution.messages import Event
 from risk_sac.scenario.library import VARIABLE
 from service.api.answer_cache import AnswerCache
 from service.api.answers.pages import Cursors
@@ -46,7 +46,7 @@ from service.keys.file import KeyFile
 from service.keys.made import KeysMade
 from service.networks.shelf import Shelf
 from service.networks.surveys import Surveys
-from service.runs.manager import Manager
+from service.runs.manager import Manager, worker_program
 from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
 from service.store.database import READERS, held
@@ -56,8 +56,6 @@ from service.views.pictures import pictures as pictures_of_contacts
 from service.views.reports import Reports
 from service.views.studies import Studies
 from service.views.tables import Tables
-from service.workers.messages import Event
-from service.workers.program import program
 
 
 def create_app(settings: ServiceSettings, executor: Executor[Event] | None = None) -> FastAPI:
@@ -73,7 +71,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         to_thread.current_default_thread_limiter().total_tokens = READERS
         with (
-            closing(executor or executor_named(settings.executor)(program(settings))) as chosen,
+            closing(executor or executor_named(settings.executor)(worker_program(settings))) as chosen,
             opened(settings, chosen, latencies, made) as context,
         ):
             app.state.context = context

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, FilePath
 from pydantic_core import from_json
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from risk_sac.execution.executors import ExecutorName
+from risk_sac.execution.executor import ExecutorName
 from risk_sac.execution.ray.settings import RaySettings
 from risk_sac.run_folder.verified import TIMES
 
@@ -60,7 +60,7 @@ class ServiceSettings(RaySettings, BaseSettings):
     max_workers: Annotated[int, Field(ge=1, le=MOST_WORKERS)] = Field(default_factory=_most_workers)
     """Runs executed at the same time, each in a process of its own; by default one per core, or as many as the cluster
     has room for."""
-    worker_module: str = "service.worker"
+    worker_module: str = "risk_sac.execution.worker"
     """Module that executes one run, started as `python -m`."""
     worker_niceness: Annotated[int, Field(ge=0, le=19)] = 5
     """Added to the niceness of workers."""

@@ -125,7 +125,7 @@ def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
 
 
 if TYPE_CHECKING:
-    from risk_sac.execution.processes import Job
+    from risk_sac.execution.jobs import Job
 
 SEEDS = 5  # of a comparison that names none
 
@@ -187,7 +187,7 @@ def _evaluate(options: argparse.Namespace) -> int:
 
 def drawn(board: Board, jobs: "Sequence[Job]") -> None:
     """Draws how runs go."""
-    done = {job.name: job.total if job.state == "finished" else job.done() for job in jobs}
+    done = {job.name: job.episodes for job in jobs}
     finished = sum(job.state == "finished" for job in jobs)
     failed = sum(job.state == "failed" for job in jobs)
     found = f"{finished}/{counted(len(jobs), 'run')}" + (f", {failed} failed" if failed else "")

@@ -16,9 +16,9 @@ from pathlib import Path
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import campaign_yaml, read_campaign
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executors import executor_named
-from risk_sac.execution.processes import Job, Progress, Queue, program
-from risk_sac.execution.stopping import STOPPING, stop_signal
+from risk_sac.execution.executor import executor_named
+from risk_sac.execution.jobs import Job, Progress, execute, worker_program
+from risk_sac.execution.runs import STOPPING, stop_signal
 from risk_sac.execution.verify import verify
 from risk_sac.problem import checked_campaign
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
@@ -55,7 +55,7 @@ def evaluate(
       command: what the user typed, for the report.
       jobs: processes at a time.
       progress: told how the runs go.
-      executor: where they execute, by its name in `risk_sac.execution.executors`.
+      executor: where they execute, by its name in `risk_sac.execution.executor`.
       times: how often each distinct failure is replayed, see `risk_sac.execution.verify`; 0: not at all.
 
     Raises:
@@ -70,10 +70,10 @@ def evaluate(
     spec = checked_campaign(spec)  # before the folder is claimed
     make_executor = executor_named(executor)
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
-    with _claimed(spec, folder) as lock, stop_signal((*STOPPING, *hung_up)) as stopping:
+    with _claimed(spec, folder), stop_signal((*STOPPING, *hung_up)) as stopping:
         queue = [Job(spec=run, folder=folder / RUNS / run.id) for run in spec.runs()]
-        with closing(make_executor(program(folder / SPEC, lock))) as chosen:
-            Queue(queue, chosen, progress).execute(jobs, stopping)
+        with closing(make_executor(worker_program(folder))) as chosen:
+            execute(queue, chosen, jobs, progress, stopping)
         if times and not stopping():
             finished = [job.folder for job in queue if job.state == "finished"]
             verify(finished, times, min(jobs, os.cpu_count() or 1), stopping)  # here, wherever they were executed
@@ -86,20 +86,14 @@ def evaluate(
 
 
 @contextmanager
-def _claimed(spec: CampaignSpec, folder: Path) -> Iterator[int]:
-    """Holds the folder for this campaign and its processes; yields the lock they inherit.
-
-    Should this process be killed, the lock stays with its runs: nobody begins them a second time while they live.
-    """
+def _claimed(spec: CampaignSpec, folder: Path) -> Iterator[None]:
+    """Holds the folder for this campaign; should this process be killed, its workers leave at once."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / LOCK).open("w") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise ConfigError(
-                "out",
-                f"{folder} is in use by another evaluation, or by runs that one left behind; wait for them to end",
-            ) from error
+            raise ConfigError("out", f"{folder} is in use by another evaluation; wait for it to end") from error
         file = folder / SPEC
         if file.exists():
             _check_same(spec, read_campaign(file, {}, {}), folder)
@@ -107,7 +101,7 @@ def _claimed(spec: CampaignSpec, folder: Path) -> Iterator[int]:
             temporary = folder / f".{SPEC}.tmp"
             temporary.write_text(campaign_yaml(spec), encoding="utf-8")
             temporary.replace(file)
-        yield lock.fileno()
+        yield
 
 
 def _check_same(wanted: CampaignSpec, found: CampaignSpec, folder: Path) -> None:

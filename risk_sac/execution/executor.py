@@ -1,15 +1,18 @@
-"""Where runs execute: the seam between who wants them, the command line or the service, and whatever has processors."""
+"""Where runs execute: the seam between the scheduler and the machines."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Generic, Literal, Protocol, TypeVar, get_args
 
 from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError
 
 Word = TypeVar("Word")  # what a worker may say
+WORDS = "RISK_SAC_WORDS"
+"""Variable that names the file descriptor to which a worker writes its words."""
 
 
 class Cause(StrEnum):
@@ -47,13 +50,10 @@ class Program(Generic[Word]):
     arguments: Callable[[RunSpec, Path], Sequence[str]]
     """For the Python interpreter, given a run and its folder."""
     log: str
-    """File in the run's folder for what it prints, but for its words."""
-    hear: Callable[[bytes], Heard[Word]] | None
-    """Reads a line of its standard output; a ValueError says that it is none of a worker's. Such a worker gets its run
-    as a line of JSON on its standard input, whose end tells it that nobody listens any more. None: it gets no input,
-    says nothing, and writes all that it prints to its log."""
-    inherited: tuple[int, ...] = ()
-    """Open files that a worker on this machine keeps open, as a lock is."""
+    """File in the run's folder for what it prints."""
+    hear: Callable[[bytes], Heard[Word]]
+    """Reads a line of the worker's words; a ValueError refuses it. A worker gets its run as a line of JSON on its
+    standard input, whose end tells it that its words are not read any more."""
     inputs: tuple[Path, ...] = ()
     """Files that the arguments name; a worker on another machine is given copies."""
     within: Path | None = None
@@ -132,3 +132,24 @@ class Executor(Protocol[Word]):
 
     def close(self) -> None:
         """Lets go of what it holds, when nothing is at work any more."""
+
+
+ExecutorName = Literal["local", "ray"]
+MakeExecutor = Callable[[Program[Any]], Executor[Any]]
+
+
+def executor_named(name: str) -> MakeExecutor:
+    """Returns what makes the executor of this name for one kind of worker.
+
+    Raises:
+      ConfigError: there is none of this name.
+    """
+    if name == "local":
+        from risk_sac.execution.local import LocalExecutor
+
+        return LocalExecutor
+    if name == "ray":
+        from risk_sac.execution.ray.executor import RayExecutor
+
+        return RayExecutor
+    raise ConfigError("RISK_SAC_EXECUTOR", f"{name!r}", f"one of {', '.join(get_args(ExecutorName))}")

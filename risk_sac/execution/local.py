@@ -4,21 +4,60 @@ import logging
 import math
 import threading
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic
 
 from risk_sac.config import RunSpec
 from risk_sac.execution.executor import Cause, Exited, Program, Word
-from risk_sac.execution.lease import Lease, Signs
 from risk_sac.execution.mailbox import Mailbox
 from risk_sac.execution.postmortem import exited
-from risk_sac.execution.subprocesses import Subprocess
+from risk_sac.execution.process import Subprocess
 
 logger = logging.getLogger(__name__)
 
 LOOK_S = 0.2  # between two looks at a worker
 HELD_UP_S = 1.0  # longer between them, and it was this process that was held up
 SHOWN = 80  # characters shown of a line that is none
+
+
+@dataclass(frozen=True, slots=True)
+class Signs:
+    """Signs of life of a worker since its start."""
+
+    words: int = 0  # lines it has written
+    episodes: int = 0  # of them, those that told of an episode
+    processor_s: float | None = None  # time its processor was used, s; None if that is unknown
+
+
+class Lease:
+    """How long a worker may be silent, or busy without a result, before it counts as lost.
+
+    A worker sends heartbeats. One whose interpreter is held up, by a long compilation say, cannot, but it uses its
+    processor; one that was stopped does neither. Only time during which this process watched counts.
+    """
+
+    def __init__(self, lease_s: float, stall_s: float) -> None:
+        self._lease_s = lease_s
+        self._stall_s = stall_s
+        self._signs = Signs()
+        self._silent_s = self._stalled_s = 0.0
+
+    def passed(self, watched_s: float, signs: Signs) -> str | None:
+        """Counts the time since the last call; returns the reason why the worker is lost, if it is.
+
+        Args:
+          watched_s: how much of that time somebody watched, s.
+          signs: what there are now.
+        """
+        before, self._signs = self._signs, signs
+        self._silent_s = 0.0 if signs != before else self._silent_s + watched_s
+        self._stalled_s = 0.0 if signs.episodes != before.episodes else self._stalled_s + watched_s
+        if self._silent_s >= self._lease_s:
+            return f"worker gave no sign of life for {self._lease_s:g} s"
+        if self._stalled_s >= self._stall_s:
+            return f"worker finished no episode for {self._stall_s:g} s"
+        return None
 
 
 class LocalExecutor(Generic[Word]):
@@ -123,7 +162,6 @@ class _Worker(Generic[Word]):
         """What it says up to its last word, waiting up to `timeout_s` for something."""
         words = []
         for line in self.process.lines(timeout_s):
-            assert self._program.hear is not None
             try:
                 heard = self._program.hear(line)
             except ValueError as error:
@@ -136,7 +174,7 @@ class _Worker(Generic[Word]):
                 words.append(heard.word)
             if heard.last:
                 self._last = True
-                self.process.stop_listening()
+                self.process.listening = False
                 break
         if not self.process.listening and self._leave_by == math.inf:
             self._leave_by = time.monotonic() + self._program.linger_s
@@ -156,11 +194,10 @@ class _Worker(Generic[Word]):
 
     def _give_up(self, reason: str, cause: Cause) -> None:
         self._given_up = Exited(reason, cause)
-        self.process.stop_listening()
+        self.process.listening = False
         self.process.kill()
 
     def exited(self, status: int) -> Exited:
         """What became of it."""
-        silent = self._program.hear is None
-        done = self._last or self._told_to_stop or (silent and status == 0)
+        done = self._last or self._told_to_stop
         return exited(status, self.process.log, done=done, given_up=self._given_up)

@@ -1,17 +1,20 @@
 """One run without a server: started or resumed in a folder, written down as it goes, stopped by Ctrl-C."""
 
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 
 from risk_sac.config import RunSpec
 from risk_sac.execution.recorder import Recorder
-from risk_sac.execution.stopping import stop_signal
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import Results
 from risk_sac.train import train
 
+STOPPING = (signal.SIGINT, signal.SIGTERM)
 Progress = Callable[[int, RunMetrics | None], None]
 """Told of the episodes done so far and of the metrics of the current phase."""
 
@@ -39,3 +42,23 @@ class Watcher:
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         """Counts an episode."""
         self.progress(record.index + 1, metrics)
+
+
+@contextmanager
+def stop_signal(numbers: Sequence[signal.Signals] = STOPPING) -> Iterator[Callable[[], bool]]:
+    """Turns the first of the signals into an answer; a second one acts as always."""
+    stopping = False
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal stopping
+        stopping = True
+        signal.signal(number, earlier[signal.Signals(number)])
+
+    earlier = {number: signal.getsignal(number) for number in numbers}
+    for number in earlier:
+        signal.signal(number, stop)
+    try:
+        yield lambda: stopping
+    finally:
+        for number, handler in earlier.items():
+            signal.signal(number, handler)

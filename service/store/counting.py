@@ -5,9 +5,9 @@ import time
 from pydantic_core import from_json
 from sqlalchemy.orm import Session
 
+from risk_sac.execution.messages import EpisodeDone
 from risk_sac.records import EpisodeRecord, Funnel, Outcome, stored
 from service.store.tables import EpisodeRow, RunRow, UsageRow
-from service.workers.messages import EpisodeDone
 
 HOUR_S = 3600
 

@@ -9,6 +9,7 @@ from sqlalchemy import delete, select, tuple_
 from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
+from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.records import EpisodeRecord, Outcome, State, Triage, TriageState, stored
 from risk_sac.rules import REPEATS
 from service.errors import ConflictError
@@ -20,7 +21,6 @@ from service.store.sequence import hold_campaigns, next_sequence
 from service.store.states import RESUMED, advance, campaign_state
 from service.store.stored import StoredCampaign
 from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow, TriageRow
-from service.workers.messages import EpisodeDone, Finished
 
 
 class Ledger:

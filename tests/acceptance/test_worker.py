@@ -13,13 +13,13 @@ import pytest
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunSpec, SceneOptimizerConfig, WarmStartConfig
 from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.local import LocalExecutor
+from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Started
 from risk_sac.records import Repetition
 from risk_sac.run_folder.results import FAILURES, read_results, series_name
 from risk_sac.run_folder.series import read_series, write_series
 from risk_sac.run_folder.verified import distinct_failures
+from service.runs.manager import worker_program
 from service.settings import ServiceSettings
-from service.workers.messages import EpisodeDone, Event, Failed, Finished, Started
-from service.workers.program import program
 
 EPISODES = 12
 SPEC = RunSpec(
@@ -44,7 +44,7 @@ class Launcher:
     def __init__(self, folder: Path, spec: RunSpec = SPEC, settings: ServiceSettings | None = None) -> None:
         self.folder = folder
         self.spec = spec
-        self.executor = LocalExecutor(program(settings or ServiceSettings(replays=0)))
+        self.executor = LocalExecutor(worker_program(settings or ServiceSettings(replays=0)))
         self.attempts = 0
 
     def submit(self) -> None:

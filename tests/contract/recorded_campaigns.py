@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.metrics import results_digest
 from risk_sac.records import Collision, EpisodeRecord, Grade, Judgement, Outcome, SeriesFile, State
 from risk_sac.report import FinishedRun
@@ -27,7 +28,6 @@ from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign, StoredRun
 from service.store.writing import Ledger
-from service.workers.messages import EpisodeDone, Finished
 from tests.builders import collision, episode_record, judgement
 
 BEGAN = 1_750_000_000.0

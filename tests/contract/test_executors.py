@@ -4,7 +4,7 @@ from contextlib import closing
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executors import MakeExecutor, executor_named
+from risk_sac.execution.executor import MakeExecutor, executor_named
 from risk_sac.execution.ray.executor import RayExecutor
 from risk_sac.execution.ray.link import Link
 from tests.contract.executor_contract import ExecutorContract

@@ -22,7 +22,7 @@ def test_the_server_process_loads_nothing_that_learns_compiles_or_simulates_and_
 ) -> None:
     assert "service.runs.manager" in loaded
     assert "risk_sac.report" in loaded
-    assert not {"torch", "libsumo", "botorch", "gpytorch", "numba", "matplotlib", "service.worker"} & loaded
+    assert not {"torch", "libsumo", "botorch", "gpytorch", "numba", "matplotlib", "risk_sac.execution.worker"} & loaded
 
 
 def test_the_server_loads_nothing_of_a_cluster_that_it_does_not_use(loaded: set[str]) -> None:

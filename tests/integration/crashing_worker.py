@@ -3,8 +3,8 @@
 import ctypes
 import sys
 
+from risk_sac.execution import worker
 from risk_sac.run_folder.crashes import CrashGuard
-from service import worker
 
 note = CrashGuard.step
 

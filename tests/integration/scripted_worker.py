@@ -1,6 +1,6 @@
 """A worker that speaks the real protocol and does what its run's seed says.
 
-Runs as `python -m scripted_worker FOLDER NICENESS` in place of `service.worker`.
+Runs as `python -m scripted_worker FOLDER NICENESS` in place of `risk_sac.execution.worker`.
 """
 
 import errno
@@ -12,8 +12,9 @@ import time
 from pathlib import Path
 
 from risk_sac.config import RunSpec
+from risk_sac.execution.executor import WORDS
+from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, encode
 from risk_sac.records import EpisodeRecord, RunMetrics
-from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, encode
 from tests.builders import episode_record, run_metrics
 
 WELL_BEHAVED, DIES, HANGS, BABBLES, DISK_FULL, EXITS, SEGFAULTS, FREEZES, WAITS = 0, 9, 15, 7, 28, 3, 11, 19, 41
@@ -92,7 +93,7 @@ def misbehave(seed: int) -> None:
     if seed == FREEZES:
         os.kill(os.getpid(), signal.SIGSTOP)
     if seed == BABBLES:
-        os.write(1, b"Loading net-file from 'low.net.xml' ... done (3ms).\n")
+        os.write(int(os.environ[WORDS]), b"Loading net-file from 'low.net.xml' ... done (3ms).\n")
         time.sleep(60)
     if seed == DISK_FULL and not (Path(sys.argv[1]).parent / "room").exists():
         send(Failed(reason=f"storage failed: {os.strerror(errno.ENOSPC)}", storage=True))
@@ -104,7 +105,7 @@ def misbehave(seed: int) -> None:
 
 
 def send(word: Event | Heartbeat) -> None:
-    os.write(1, encode(word))  # at once, so that two threads cannot mix their lines
+    os.write(int(os.environ[WORDS]), encode(word))  # at once, so that two threads cannot mix their lines
 
 
 def record(index: int) -> EpisodeRecord:

@@ -8,10 +8,11 @@ import sys
 import time
 
 sys.stdin.readline()
-os.write(1, b'{"type":"started","pid":%d}\n' % os.getpid())
+words = int(os.environ["RISK_SAC_WORDS"])
+os.write(words, b'{"type":"started","pid":%d}\n' % os.getpid())
 until = time.monotonic() + float(os.environ["SLEEPING_WORKER_S"])
 while (left_s := until - time.monotonic()) > 0:
-    os.write(1, b'{"type":"heartbeat"}\n')
+    os.write(words, b'{"type":"heartbeat"}\n')
     time.sleep(min(left_s, 2.0))
-os.write(1, os.environb[b"SLEEPING_WORKER_LAST"] + b"\n")
+os.write(words, os.environb[b"SLEEPING_WORKER_LAST"] + b"\n")
 os._exit(0)

@@ -132,7 +132,7 @@ def established(client):
 
 
 def test_a_run_that_needs_too_much_memory_takes_one_attempt(serve):
-    service = serve("service.worker", worker_memory_bytes=1 << 28)  # not even enough for the imports
+    service = serve("risk_sac.execution.worker", worker_memory_bytes=1 << 28)  # not even enough for the imports
     (run,) = service.wait(service.post(budget={"episodes": 1}))["runs"]
     assert (run["state"], run["attempts"]) == ("failed", 1)
     assert run["reason"].startswith("the run needs more than the 0.25 GiB of memory that a worker may take")

@@ -24,7 +24,7 @@ def run_folder(service, campaign_id, run_id):
 
 
 def test_a_campaign_finds_the_same_with_and_without_a_crash_of_the_server(serve):
-    service = serve("service.worker", grace_s=30)
+    service = serve("risk_sac.execution.worker", grace_s=30)
     calm = service.wait(service.post(**SPEC))
     assert calm["state"] == "succeeded", calm["reason"]
     results = service.get(calm["id"], "/results")
@@ -50,7 +50,7 @@ def test_a_campaign_finds_the_same_with_and_without_a_crash_of_the_server(serve)
 
 
 def test_every_contact_can_be_read_with_its_full_time_series_and_drawn(serve, tmp_path):
-    service = serve("service.worker", grace_s=30)
+    service = serve("risk_sac.execution.worker", grace_s=30)
     campaign_id = service.post(families=["mixed"], methods=["random"], budget={"episodes": 60})
     campaign = service.wait(campaign_id)
     assert campaign["state"] == "succeeded", campaign["reason"]
@@ -83,7 +83,7 @@ def test_every_contact_can_be_read_with_its_full_time_series_and_drawn(serve, tm
 
 
 def test_a_search_ends_once_it_has_had_its_processor_time(serve):
-    service = serve("service.worker", grace_s=30)
+    service = serve("risk_sac.execution.worker", grace_s=30)
     spent = service.wait(service.post(families=["low"], methods=["random"], budget={"episodes": 1000, "cpu_s": 0.5}))
     assert spent["state"] == "succeeded", spent["reason"]
     assert 0 < spent["progress"]["episodes_done"] < 1000

@@ -23,7 +23,7 @@ RUNS = ["low-archive-601", "low-iid-undisturbed-3", "low-iid-random-3"]
 
 @pytest.fixture(scope="module")
 def service(serve_shared):
-    return serve_shared("service.worker", grace_s=30)
+    return serve_shared("risk_sac.execution.worker", grace_s=30)
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ TYPES = {"json": "application/json", "md": "text/markdown; charset=utf-8", "csv"
 
 @pytest.fixture(scope="module")
 def service(serve_shared):
-    return serve_shared("service.worker", grace_s=30)
+    return serve_shared("risk_sac.execution.worker", grace_s=30)
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ SPEC = {"families": ["low"], "methods": ["archive"], "seeds": [3], "budget": {"e
 @pytest.fixture(scope="module")
 def campaign(serve_shared):
     """A server, the id of a campaign that has ended, and that of one of its failures."""
-    service = serve_shared("service.worker", grace_s=30, replays=2)
+    service = serve_shared("risk_sac.execution.worker", grace_s=30, replays=2)
     campaign_id = service.post(**SPEC)
     ended = service.wait(campaign_id)
     assert ended["state"] == "succeeded", ended["reason"]

@@ -51,7 +51,7 @@ class Phase:
 def measure(seconds: float, phase_s: float, warm_up_s: float, pollers: int, streams: int) -> list[Phase]:
     """Run the phases on a service of their own, `seconds` of them loaded."""
     with tempfile.TemporaryDirectory() as folder, servers(Path(folder)) as serve:
-        service = serve("service.worker", lease_s=60)
+        service = serve("risk_sac.execution.worker", lease_s=60)
         ids = [service.post(label=f"campaign {seed}", seeds=[seed], **SPEC) for seed in range(CAMPAIGNS)]
         service.wait_until(lambda: all(service.get(each)["progress"]["episodes_done"] for each in ids))
         time.sleep(warm_up_s)

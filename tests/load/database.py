@@ -44,7 +44,7 @@ def measure(campaigns: int, episodes: int) -> Measured:
     """Fill a database, start a service on it, and ask."""
     first = {"families": ["low"], "methods": ["bo-only"], "budget": {"episodes": max(1, episodes // campaigns)}}
     with tempfile.TemporaryDirectory() as folder, servers(Path(folder)) as serve:
-        service = serve("service.worker", lease_s=60, rate_limit=1_000_000)
+        service = serve("risk_sac.execution.worker", lease_s=60, rate_limit=1_000_000)
         service.wait(service.post(**first))
         service.stop()
         began = time.monotonic()

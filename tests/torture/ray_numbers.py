@@ -26,12 +26,13 @@ from typing import Any
 
 import psutil
 
-from service.workers.messages import Finished
+from risk_sac.execution.messages import Finished
 from tests.builders import run_metrics
 from tests.ray_cluster import Cluster, running
 from tests.server import Service, servers
 
 LONG_S = 3600.0
+WORKER = "risk_sac.execution.worker"
 FEW = {"seeds": [0], "budget": {"episodes": 2}}
 
 
@@ -45,14 +46,14 @@ def throughput(options: argparse.Namespace) -> str:
     found = []
     for turn in range(options.turns):
         with servers(options.folder / "local") as serve:
-            service = serve("service.worker", data_dir=options.folder / f"local-{turn}", max_workers=2, lease_s=60)
+            service = serve(WORKER, data_dir=options.folder / f"local-{turn}", max_workers=2, lease_s=60)
             service.wait(service.post(**campaign | FEW), LONG_S)  # what is compiled once is compiled
             spent["local"].append(executed(service, campaign, found, ()))
         with (
             running(options.folder, nodes=2, cpus=1) as cluster,
             servers(options.folder / "ray") as serve,
         ):
-            service = serve("service.worker", data_dir=options.folder / f"ray-{turn}", max_workers=1024, lease_s=60)
+            service = serve(WORKER, data_dir=options.folder / f"ray-{turn}", max_workers=1024, lease_s=60)
             service.wait(service.post(**campaign | FEW), LONG_S)  # and Ray's processes are there
             spent["Ray"].append(executed(service, campaign, found, tuple(cluster.nodes.values())))
     for where, turns in spent.items():
@@ -144,9 +145,9 @@ def overhead(options: argparse.Namespace) -> str:
         return found[1:]
 
     with servers(options.folder / "local") as serve:
-        here = firsts(serve("service.worker", max_workers=1, lease_s=60))
+        here = firsts(serve(WORKER, max_workers=1, lease_s=60))
     with running(options.folder, nodes=1, cpus=1), servers(options.folder / "ray") as serve:
-        there = firsts(serve("service.worker", max_workers=1, lease_s=60))
+        there = firsts(serve(WORKER, max_workers=1, lease_s=60))
     more_s = median(there) - median(here)
     return (
         f"start to first episode, medians of {options.runs}: local {median(here):.2f} s, Ray {median(there):.2f} s, "
@@ -198,14 +199,14 @@ def kills(options: argparse.Namespace) -> str:
         "learner": {"checkpoint_every": 3, "agent": {"warmup_steps": 200}, "warm_start": {"episodes": 2}},
     }  # fmt: skip
     with servers(options.folder / "local") as serve:
-        service = serve("service.worker", lease_s=60)
+        service = serve(WORKER, lease_s=60)
         undisturbed = outcome(service, service.post(**spec))
     done, slowest_s, campaigns = 0, 0.0, []
     with (
         running(options.folder, nodes=2, cpus=1, RISK_SAC_RAY_LEASE_S="10") as cluster,
         servers(options.folder / "ray") as serve,
     ):
-        service = serve("service.worker", lease_s=60, attempts=100)
+        service = serve(WORKER, lease_s=60, attempts=100)
         campaigns.append(service.post(**spec))
         while done < options.times:
             time.sleep(chance.uniform(1, options.within_s))
@@ -256,7 +257,7 @@ def workers(service: Service) -> list[psutil.Process]:
 
 
 def _worker(cluster: Cluster, service: Service, chance: random.Random) -> bool:
-    found = [each for each in workers(service) if "service.worker" in each.cmdline()]
+    found = [each for each in workers(service) if WORKER in each.cmdline()]
     if found:
         chance.choice(found).kill()
     return bool(found)
@@ -284,7 +285,7 @@ def _hang(cluster: Cluster, service: Service, chance: random.Random) -> bool:
     if not any("raylet" in name for name in cluster.names(1)):  # the head has given it up since the last time
         cluster.end(1)
         cluster.add(1)
-    at_work = any("service.worker" in each.cmdline() for each, _ in cluster.processes(1))
+    at_work = any(WORKER in each.cmdline() for each, _ in cluster.processes(1))
     cluster.kill(1, "", number_of_signal=signal.SIGSTOP)
     time.sleep(chance.uniform(12, 40))
     cluster.kill(1, "", number_of_signal=signal.SIGCONT)

@@ -40,7 +40,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A data folder with a campaign that ended and one that a kill interrupted."""
     folder = tmp_path_factory.mktemp("damage")
     with servers(folder) as serve:
-        service = serve("service.worker", lease_s=60)
+        service = serve("risk_sac.execution.worker", lease_s=60)
         assert service.wait(service.post(**SPEC))["state"] == "succeeded"
         interrupted = service.post(**SPEC | {"budget": {"episodes": 400}})
         service.wait_for(interrupted, lambda seen: all(run["episodes_done"] > 5 for run in seen["runs"]))

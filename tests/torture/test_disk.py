@@ -18,7 +18,7 @@ SPEC = {"families": ["low"], "methods": ["bo-only"], "budget": {"episodes": 4}, 
 def wanted(tmp_path_factory):
     """What the campaign comes to on a sound disk."""
     with servers(tmp_path_factory.mktemp("sound")) as serve:
-        service = serve("service.worker")
+        service = serve("risk_sac.execution.worker")
         return outcome(service, service.post(**SPEC))
 
 
@@ -31,7 +31,9 @@ def test_no_write_that_the_disk_refuses_loses_or_breaks_anything(serve, wanted, 
     for number in numbers:
         root = tmp_path / f"data{number}"
         disk = Disk(tmp_path, root)
-        service = serve("service.worker", data_dir=root, environment=disk.environment, started=since == "campaign")
+        service = serve(
+            "risk_sac.execution.worker", data_dir=root, environment=disk.environment, started=since == "campaign"
+        )
         (disk.fill if number % 2 else disk.fail_once)(number)
         if since == "start" and not service.launch():
             unstarted += 1

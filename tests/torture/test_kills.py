@@ -33,7 +33,7 @@ def spec(times: Callable[[int, int], int]) -> dict[str, Any]:
 def undisturbed(spec: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     """What the campaign comes to if nothing happens."""
     with servers(tmp_path_factory.mktemp("undisturbed")) as serve:
-        service = serve("service.worker", lease_s=60)
+        service = serve("risk_sac.execution.worker", lease_s=60)
         return outcome(service, service.post(**spec))
 
 
@@ -47,7 +47,7 @@ def outcome(service: Service, campaign_id: str) -> Outcome:
 
 @pytest.mark.timeout(3600)
 def test_a_server_killed_at_random_moments_loses_and_repeats_no_episode(serve, spec, undisturbed, times, chance, tell):
-    service = serve("service.worker", lease_s=60)
+    service = serve("risk_sac.execution.worker", lease_s=60)
     kills = times(3, 50)
     done, campaigns = 0, [service.post(**spec)]
     while done < kills:
@@ -70,7 +70,7 @@ def test_a_server_killed_at_random_moments_loses_and_repeats_no_episode(serve, s
 def test_workers_killed_crashed_and_stopped_at_random_moments_change_nothing(
     serve, spec, undisturbed, times, chance, tell
 ):
-    service = serve("service.worker", attempts=100)
+    service = serve("risk_sac.execution.worker", attempts=100)
     server = service.process.pid
     done, slowest_s, campaigns = dict.fromkeys(("SIGKILL", "SIGSEGV", "SIGSTOP"), 0), 0.0, [service.post(**spec)]
     while sum(done.values()) < times(6, 100):
@@ -98,7 +98,7 @@ def test_workers_killed_crashed_and_stopped_at_random_moments_change_nothing(
 
 @pytest.mark.timeout(900)
 def test_a_server_told_to_stop_leaves_within_20_s_and_goes_on_afterwards(serve, spec, undisturbed, times, chance, tell):
-    service = serve("service.worker")
+    service = serve("risk_sac.execution.worker")
     campaign_id, slowest_s = service.post(**spec), 0.0
     stops = times(2, 10)
     for _ in range(stops):

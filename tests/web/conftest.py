@@ -47,7 +47,7 @@ def browser() -> Iterator["Browser"]:
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     """A service with real workers."""
     with servers(tmp_path_factory.mktemp("page")) as start:
-        yield start("service.worker")
+        yield start("risk_sac.execution.worker")
 
 
 @pytest.fixture(scope="session")

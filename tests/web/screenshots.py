@@ -26,7 +26,7 @@ def main(folder: Path) -> None:
     """Draws all."""
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as data, servers(Path(data)) as start, sync_playwright() as playwright:
-        service = start("service.worker", replays=3)
+        service = start("risk_sac.execution.worker", replays=3)
         campaign = service.post(**CAMPAIGN)
         service.wait(campaign)
         failure = f"campaigns/{campaign}/failures/{chosen(service, campaign)}"

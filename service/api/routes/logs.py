@@ -14,8 +14,8 @@ from service.api.answers.representations import caching, entity_tag, has, not_mo
 from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN
 from service.api.context import Service
 from service.errors import NotFoundError
+from service.runs.manager import LOG
 from service.views.logs import log_tail
-from service.workers.program import LOG
 
 MOST_LINES = 1000
 TEXT = TAGGED | {200: TAGGED[200] | {"content": {"text/plain": {"schema": {"type": "string"}}}}}

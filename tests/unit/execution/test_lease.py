@@ -1,4 +1,4 @@
-from risk_sac.execution.lease import Lease, Signs
+from risk_sac.execution.local import Lease, Signs
 
 FOREVER = 1e9
 

@@ -1,6 +1,5 @@
 """What is so of processes of this machine, beyond what every executor must pass."""
 
-import fcntl
 import time
 
 import psutil
@@ -33,21 +32,22 @@ def patience(**settings):
         ("sys.exit(4)", Exited("worker exited with status 4: it left no message", Cause.CRASHED, 4)),
         ("sys.exit('first\\nlast')", Exited("worker exited with status 1: first | last", Cause.CRASHED, 1)),
         ("pass", Exited("worker left without a word", Cause.CRASHED, 0)),
-        ("print('{}')", Exited("worker wrote b'{}\\n' where an event was wanted", Cause.CRASHED, 0)),
-        ("print('{}', end='')", Exited("worker left without a word", Cause.CRASHED, 0)),
+        ("os.write(words, b'{}\\n')", Exited("worker wrote b'{}\\n' where an event was wanted", Cause.CRASHED, 0)),
+        ("os.write(words, b'{}')", Exited("worker left without a word", Cause.CRASHED, 0)),
+        ("print('noise')", Exited("worker left without a word", Cause.CRASHED, 0)),
     ],
 )
 def test_the_last_message_says_why_the_worker_is_gone(runs, code, exited):
     runs.submit(code)
     ((_, found),) = runs.messages()
     # A worker that said what it may not is killed, if it has not left by then.
-    status = -9 if code.startswith("print('{}')") and found.status == -9 else exited.status
+    status = -9 if exited.reason.startswith("worker wrote") and found.status == -9 else exited.status
     assert found == Exited(exited.reason, exited.cause, status)
 
 
 @patience(linger_s=0.5)
 def test_a_worker_that_cannot_be_heard_any_more_is_killed(runs):
-    runs.submit("os.close(1); time.sleep(60)")
+    runs.submit("os.close(words); time.sleep(60)")
     assert [message for _, message in runs.messages()] == [Exited("worker was killed by SIGKILL", Cause.KILLED, -9)]
 
 
@@ -105,7 +105,10 @@ def execute(code, folder, **program):
 
 
 def test_a_worker_that_reads_late_gets_all_of_its_run(tmp_path):
-    code = "import sys, time; time.sleep(1); print(len(sys.stdin.readline()))"
+    code = (
+        "import os, sys, time; time.sleep(1);"
+        "os.write(int(os.environ['RISK_SAC_WORDS']), b'%d\\n' % len(sys.stdin.readline()))"
+    )
     executor = execute(code, tmp_path, hear=lambda line: Heard(int(line), last=True))
     assert read(executor) == [len(large_run().model_dump_json()) + 1, Exited(None, Cause.ENDED, 0)]
 
@@ -127,20 +130,3 @@ def test_a_worker_computes_with_one_thread_in_its_own_folder(runs):
     runs.submit("say(os.environ['OMP_NUM_THREADS']); say(folder); print('printed', file=sys.stderr); say('last')")
     assert outcome(runs.messages()) == (["1", str(runs.folder(1)), "last"], Cause.ENDED)
     assert (runs.folder(1) / "log").read_text() == "printed\n"
-
-
-def test_a_worker_keeps_what_it_inherits_open(tmp_path):
-    with (tmp_path / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        program = Program(
-            arguments=lambda spec, folder: ["-c", "import time; time.sleep(60)"],
-            log="log", hear=None, inherited=(lock.fileno(),),
-        )  # fmt: skip
-        executor = LocalExecutor(program)
-        executor.submit(1, 1, SPEC, tmp_path / "run")
-    with (tmp_path / "lock").open() as again:
-        with pytest.raises(BlockingIOError):
-            fcntl.flock(again, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        executor.cancel(1, 0)
-        read(executor)
-        fcntl.flock(again, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -5,9 +5,9 @@ from threading import Barrier, Event
 import pytest
 
 from risk_sac.config import CampaignSpec
+from risk_sac.execution.messages import Finished
 from risk_sac.records import Episode, Outcome, State, StateChange
 from service.errors import NotFoundError
-from service.workers.messages import Finished
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from alembic.config import Config
 from sqlalchemy import create_engine, inspect
 
 from risk_sac.config import CampaignSpec
+from risk_sac.execution.messages import EpisodeDone
 from risk_sac.records import Outcome, TriageState
 from service.errors import StorageError
 from service.host.data_folder import hold_data_folder
@@ -20,7 +21,6 @@ from service.store.reading import Store
 from service.store.steps import newest_step, present_step, step_back
 from service.store.stored import StoredCampaign
 from service.store.writing import Ledger
-from service.workers.messages import EpisodeDone
 
 BEFORE = "0007"
 SPEC = CampaignSpec(families=("low",), methods=("random",))

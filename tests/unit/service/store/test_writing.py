@@ -1,13 +1,13 @@
 import pytest
 
 from risk_sac.config import CampaignSpec
+from risk_sac.execution.messages import Finished
 from risk_sac.records import Episode, Outcome, State, TriageState
 from service.errors import ConflictError, NotFoundError, TransitionError
 from service.store.finding import Judged
 from service.views.curves import curves
 from service.views.progress import progress
 from service.views.totals import results
-from service.workers.messages import Finished
 from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))

@@ -6,9 +6,8 @@ from risk_sac.config import CampaignSpec
 from risk_sac.execution.local import LocalExecutor
 from risk_sac.records import Outcome, State
 from service.api.telemetry.metrics import registry, request_latencies
-from service.runs.manager import Manager
+from service.runs.manager import Manager, worker_program
 from service.settings import ServiceSettings
-from service.workers.program import program
 
 SPEC = CampaignSpec(families=("low",), methods=("random", "sac"), seeds=(0, 1))
 
@@ -16,7 +15,7 @@ SPEC = CampaignSpec(families=("low",), methods=("random", "sac"), seeds=(0, 1))
 @pytest.fixture
 def manager(store, tmp_path):
     settings = ServiceSettings(data_dir=tmp_path)
-    return Manager(settings, store, LocalExecutor(program(settings)))
+    return Manager(settings, store, LocalExecutor(worker_program(settings)))
 
 
 @pytest.fixture

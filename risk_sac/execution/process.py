@@ -13,7 +13,7 @@ from typing import Any
 import psutil
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import Program
+from risk_sac.execution.executor import WORDS, Program
 from risk_sac.execution.postmortem import WorkerLog
 
 logger = logging.getLogger(__name__)
@@ -27,7 +27,8 @@ class Subprocess:
     """One attempt at a run.
 
     Attributes:
-      log: what it prints, but for its words.
+      log: what it prints.
+      listening: whether its words can still be read.
     """
 
     def __init__(self, program: Program[Any], spec: RunSpec, folder: Path) -> None:
@@ -37,25 +38,33 @@ class Subprocess:
           OSError: its folder or its log cannot be written, or there is no room for one more process.
         """
         folder.mkdir(parents=True, exist_ok=True)
-        path, talks = folder / program.log, program.hear is not None
+        path = folder / program.log
         with path.open("ab") as log:
             self.log = WorkerLog(path, log.tell())
-            self._process = subprocess.Popen(
-                [sys.executable, *program.arguments(spec, folder)],
-                stdin=subprocess.PIPE if talks else subprocess.DEVNULL,
-                stdout=subprocess.PIPE if talks else log,
-                stderr=log,
-                env={**os.environ, **THREADS, **program.environment},
-                pass_fds=program.inherited,
-                bufsize=0,
-                start_new_session=True,  # Ctrl-C is for whoever started us; the worker hears of it from us
-            )
+            self._words, words = os.pipe()
+            try:
+                self._process = subprocess.Popen(
+                    [sys.executable, *program.arguments(spec, folder)],
+                    stdin=subprocess.PIPE,
+                    stdout=log,
+                    stderr=log,
+                    env={**os.environ, **THREADS, **program.environment, WORDS: str(words)},
+                    pass_fds=(words,),
+                    bufsize=0,
+                    start_new_session=True,  # Ctrl-C is for whoever started us; the worker hears of it from us
+                )
+            except BaseException:
+                os.close(self._words)
+                raise
+            finally:
+                os.close(words)
+        assert self._process.stdin is not None
+        self._stdin = self._process.stdin
+        os.set_blocking(self._stdin.fileno(), False)  # a worker may be stopped before it reads
         self._usage = psutil.Process(self._process.pid)
-        self._listening = talks
-        self._untold = spec.model_dump_json().encode() + b"\n" if talks else b""
+        self.listening = True
+        self._untold = spec.model_dump_json().encode() + b"\n"
         self._unread = b""
-        if self._process.stdin is not None:
-            os.set_blocking(self._process.stdin.fileno(), False)  # a worker may be stopped before it reads
 
     @property
     def pid(self) -> int:
@@ -67,51 +76,40 @@ class Subprocess:
         """Of its exit, negative for a signal; None as long as it is there."""
         return self._process.poll()
 
-    @property
-    def listening(self) -> bool:
-        """Whether it can still be heard."""
-        return self._listening
-
     def lines(self, timeout_s: float) -> list[bytes]:
         """What it has said, waiting up to `timeout_s` for something, or for its end if it cannot be heard.
 
         A line longer than `LONGEST_LINE` comes in pieces, and what its end cuts off is no line.
         """
-        if not self._listening:
+        if not self.listening:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._process.wait(timeout_s)
             return []
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
         poll = select.poll()  # select.select() knows no descriptor beyond 1023
-        poll.register(self._process.stdout, select.POLLIN)
+        poll.register(self._words, select.POLLIN)
         if self._untold:
-            poll.register(self._process.stdin, select.POLLOUT)
+            poll.register(self._stdin, select.POLLOUT)
         ready = {descriptor for descriptor, _ in poll.poll(timeout_s * 1000)}
-        if self._process.stdin.fileno() in ready:
-            self._tell(self._process.stdin.fileno())
-        return self._read(self._process.stdout.fileno()) if self._process.stdout.fileno() in ready else []
+        if self._untold and self._stdin.fileno() in ready:
+            self._tell()
+        return self._read() if self._words in ready else []
 
-    def _tell(self, descriptor: int) -> None:
+    def _tell(self) -> None:
         """Hands it some more of its run."""
         try:
-            self._untold = self._untold[os.write(descriptor, self._untold) :]
+            self._untold = self._untold[os.write(self._stdin.fileno(), self._untold) :]
         except BrokenPipeError:
             logger.warning("worker %d ended before it read its run", self.pid)  # its exit status says why
             self._untold = b""
 
-    def _read(self, descriptor: int) -> list[bytes]:
-        new = os.read(descriptor, LONGEST_LINE)  # more than a pipe holds, so all there is
-        self._listening = bool(new)
+    def _read(self) -> list[bytes]:
+        new = os.read(self._words, LONGEST_LINE)  # more than a pipe holds, so all there is
+        self.listening = bool(new)
         *lines, self._unread = (self._unread + new).split(b"\n")
         if len(self._unread) >= LONGEST_LINE:
             lines.append(self._unread)
             self._unread = b""
         return [line + b"\n" for line in lines]
-
-    def stop_listening(self) -> None:
-        """What else it says is of no interest."""
-        self._listening = False
 
     def processor_s(self) -> float | None:
         """Time that its processor was used, s; None if that is unknown."""
@@ -132,7 +130,6 @@ class Subprocess:
                 os.killpg(self.pid, signal.SIGKILL)
 
     def close(self) -> None:
-        """Lets go of its input and output."""
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream is not None:
-                stream.close()
+        """Closes its input and output."""
+        self._stdin.close()
+        os.close(self._words)

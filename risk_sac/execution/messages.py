@@ -1,4 +1,4 @@
-"""What a worker tells the manager: one JSON object per line on the worker's standard output.
+"""What a worker tells the scheduler: one JSON object per line, over a pipe of its own.
 
 Every line is strict JSON from which nothing is lost: words are written as `risk_sac.records.Record` writes them.
 """
@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
+from risk_sac.execution.executor import Heard
 from risk_sac.records import EpisodeRecord, Record, Repetition, RunMetrics
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -92,3 +93,15 @@ def decode(line: bytes) -> Event | Heartbeat:
       pydantic.ValidationError: it says nothing that a worker may say.
     """
     return _WORD.validate_json(line)
+
+
+def hear(line: bytes) -> Heard[Event]:
+    """What one line of a worker means to an executor.
+
+    Raises:
+      pydantic.ValidationError: it says nothing that a worker may say; it is a ValueError.
+    """
+    word = decode(line)
+    if isinstance(word, Heartbeat):
+        return Heard(None)
+    return Heard(word, progress=isinstance(word, EpisodeDone), last=isinstance(word, Finished | Failed))

@@ -1,17 +1,18 @@
-"""`python -m service.worker FOLDER NICENESS MEMORY_BYTES REPLAYS`: execute one run in a process of its own.
+"""`python -m risk_sac.execution.worker FOLDER NICENESS MEMORY_BYTES REPLAYS`: executes one run.
 
-A finished run's distinct failures are then replayed, each so often, in fresh processes.
+A finished run's distinct failures are then replayed `REPLAYS` times, in fresh processes. 0 bytes set no limit.
 
-The run is one line of JSON on stdin, events are lines of JSON on stdout, everything else a library
-prints goes to stderr. SIGTERM stops the run at the next episode boundary, with a checkpoint; before the first
-episode there is nothing to keep, and it ends the process at once. The end of stdin means
-that the server has died: nobody would store what comes now, so the worker leaves at once, and the
-next server resumes from the last checkpoint.
+The run is one line of JSON on stdin; events are lines of JSON in the pipe that `WORDS` names. SIGTERM stops the run at
+the next episode boundary, with a checkpoint; before the first episode it ends the process at once. The end of stdin
+means that the scheduler has died: the worker leaves at once, and the run resumes from its last checkpoint.
 """
 
+import errno
+import fcntl
 import io
 import logging
 import os
+import resource
 import signal
 import sys
 import threading
@@ -20,16 +21,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
+
+import psutil
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import RiskSacError
+from risk_sac.execution.executor import WORDS
+from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.rules import REPEATS
-from service.workers.memory import limit_memory, out_of_memory
-from service.workers.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
-from service.workers.takeover import take_over
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -37,10 +39,21 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 BEAT_S = 1.0
+LOCK = ".lock"  # in the run's folder
+PATIENCE_S = 5.0  # a worker leaves as soon as its scheduler is gone, but one that was stopped cannot
+POLL_S = 0.05
+# Torch, C++ and the loader of libraries have no class of errors for it.
+_OUT_OF_MEMORY = (
+    "can't allocate memory",
+    "cannot allocate memory",
+    "out of memory",
+    "bad_alloc",
+    "failed to map segment",
+)
 
 
 class Reporter:
-    """The observer of a run that tells the manager."""
+    """The observer of a run that tells the scheduler."""
 
     def __init__(self, stream: io.FileIO) -> None:
         self._stream = stream
@@ -58,7 +71,7 @@ class Reporter:
         self._since = now
 
     def should_stop(self) -> bool:
-        """Whether the manager asked to stop.
+        """Whether the scheduler asked to stop.
 
         The run asks before each episode. From the second time on there is an episode worth a checkpoint, so SIGTERM
         waits for the next question; until then it acts as always, in the middle of an import or a compilation too.
@@ -83,7 +96,7 @@ class Reporter:
                 while line:
                     line = line[self._stream.write(line) :]
         except BrokenPipeError:
-            os._exit(0)  # the server has died
+            os._exit(0)  # the scheduler has died
 
     @contextmanager
     def beating(self) -> Iterator[None]:
@@ -118,10 +131,11 @@ def main() -> int:
     """Execute the run; returns the exit status."""
     folder, (niceness, memory_bytes, replays) = Path(sys.argv[1]), map(int, sys.argv[2:5])
     os.nice(niceness)
-    reporter = Reporter(_take_stdout())
+    reporter = Reporter(io.FileIO(int(os.environ.pop(WORDS)), "wb"))
+    _lose_what_a_full_disk_refuses()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     spec = RunSpec.model_validate_json(sys.stdin.buffer.readline())
-    threading.Thread(target=_leave_with_server, daemon=True).start()
+    threading.Thread(target=_leave_with_scheduler, daemon=True).start()
     reporter.send(Started(pid=os.getpid()))
     with reporter.beating():
         last = _run(spec, folder, reporter, memory_bytes, replays)
@@ -153,7 +167,8 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
     from risk_sac.run_folder.verified import Verified
     from risk_sac.train import train
 
-    limit_memory(memory_bytes)  # from here on: where it ends while libsumo is loaded, the process crashes
+    if memory_bytes:
+        limit_memory(memory_bytes)  # from here on: where it ends while libsumo is loaded, the process crashes
     with Recorder(spec, folder, reporter) as recorder:
         summary = train(spec, folder, recorder)
         recorder.finish(summary)
@@ -185,20 +200,70 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
     )
 
 
-def _take_stdout() -> io.FileIO:
-    """Keep stdout for events alone: whatever else is printed, by C++ too, goes to the log."""
-    events = io.FileIO(os.dup(1), "wb")
-    os.dup2(2, 1)
+def _lose_what_a_full_disk_refuses() -> None:
     sys.stdout, sys.stderr = (
         io.TextIOWrapper(
             io.BufferedWriter(LossyLog(number, "wb", closefd=False)), errors="replace", line_buffering=True
         )
         for number in (1, 2)
     )
-    return events
 
 
-def _leave_with_server() -> None:
+def limit_memory(most_bytes: int) -> None:
+    """Limits the memory that this process may write to; libraries reserve far more address space than they use.
+
+    Raises:
+      MemoryError: it has taken more already.
+    """
+    if psutil.Process().memory_info().data > most_bytes:
+        raise MemoryError
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    most = most_bytes if hard == resource.RLIM_INFINITY else min(most_bytes, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+
+
+def out_of_memory(error: Exception) -> bool:
+    """Whether an error says that there is no more memory."""
+    if isinstance(error, MemoryError):
+        return True
+    if isinstance(error, OSError):
+        return error.errno == errno.ENOMEM
+    return isinstance(error, RuntimeError | ImportError) and any(sign in str(error).lower() for sign in _OUT_OF_MEMORY)
+
+
+def take_over(folder: Path) -> IO[bytes]:
+    """Locks a run's folder for this worker; close the returned file to give it back.
+
+    A worker that still holds it has lost its scheduler, since one scheduler at a time starts workers here. It is given
+    some time, then it is killed.
+
+    Raises:
+      OSError: the folder cannot be written.
+    """
+    killing_at = time.monotonic() + PATIENCE_S
+    lock = (folder / LOCK).open("ab")
+    while True:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= killing_at:
+                _kill_others()
+            time.sleep(POLL_S)
+        else:
+            return lock
+
+
+def _kill_others() -> None:
+    """Kills processes that were started as this one was, with the same module and folder."""
+    own = psutil.Process()
+    started_as = slice(1, 4)  # -m MODULE FOLDER
+    for other in psutil.process_iter(["cmdline"]):
+        if other != own and (other.info["cmdline"] or [])[started_as] == sys.orig_argv[started_as]:
+            logger.warning("process %d is a worker of this run and has lost its scheduler; it is killed", other.pid)
+            other.kill()
+
+
+def _leave_with_scheduler() -> None:
     while os.read(0, 4096):
         pass
     os._exit(0)

@@ -12,9 +12,9 @@ from tests.server import LONG_S
 HOLDER = """
 import sys
 from pathlib import Path
-from service.workers import takeover
-takeover.PATIENCE_S = 0.3
-with takeover.take_over(Path(sys.argv[1])):
+from risk_sac.execution import worker
+worker.PATIENCE_S = 0.3
+with worker.take_over(Path(sys.argv[1])):
     print("holds", flush=True)
     sys.stdin.read()
 """

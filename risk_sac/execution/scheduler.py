@@ -1,0 +1,196 @@
+"""Starts waiting runs, passes on what their workers say, and decides what becomes of a run whose worker is gone.
+
+`risk-sac evaluate` and the service share it; each keeps its runs in a store of its own.
+"""
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from risk_sac.config import RunSpec
+from risk_sac.execution.executor import Cause, Executor, Exited
+from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Started
+
+logger = logging.getLogger(__name__)
+
+MOST_AT_ONCE = 500  # messages that are gathered
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class QueuedRun:
+    """A run that may start."""
+
+    number: int  # unique in its store
+    attempt: int  # higher than those before
+    spec: RunSpec
+    folder: Path
+    project: str = ""
+    ids: Mapping[str, str] = field(default_factory=dict)  # of campaign and run, for the log
+
+
+class RunStore(Protocol):
+    """Keeps runs; called by the thread that calls the scheduler. Only `start_next` may raise."""
+
+    def start_next(self) -> QueuedRun | None:
+        """Takes the next run from those that wait, and notes that its worker is about to start."""
+
+    def not_started(self, run: QueuedRun, error: OSError) -> None:
+        """Its worker could not be started."""
+
+    def add_episodes(self, events: Sequence[tuple[int, EpisodeDone]]) -> set[int]:
+        """Keeps episodes, which a resumed run tells again; returns the numbers of runs to which one was new."""
+
+    def succeeded(self, run: QueuedRun, result: Finished) -> None:
+        """It is done."""
+
+    def failed(self, run: QueuedRun, reason: str) -> None:
+        """It cannot be done."""
+
+    def cancelled(self, run: QueuedRun) -> None:
+        """It was cancelled, and its worker has left."""
+
+    def requeued(self, run: QueuedRun, reason: str | None) -> None:
+        """It waits again; `reason` says why its worker was lost, None that the scheduler stops."""
+
+    def storage_refused(self, run: QueuedRun, reason: str) -> None:
+        """Its worker has left because the disk refused."""
+
+
+@dataclass(slots=True)
+class Active:
+    """A run whose worker lives."""
+
+    run: QueuedRun
+    cancelled: bool = False
+    abandoned: bool = False  # what it still says is not wanted, since another worker will say it again
+    last: Finished | Failed | None = None
+
+
+class Scheduler:
+    """Keeps runs at work until nothing waits; not safe for threads without a lock around it, but for `hear`.
+
+    Attributes:
+      active: runs whose workers live, by number.
+      restarts: workers that were lost and replaced, by cause.
+      stopping: whether no run starts any more.
+    """
+
+    def __init__(self, executor: Executor[Event], store: RunStore, attempts: int) -> None:
+        """Starts nothing yet.
+
+        Args:
+          executor: where runs execute.
+          store: keeps them.
+          attempts: workers that a run may lose in a row without a new episode.
+        """
+        self.active: dict[int, Active] = {}
+        self.restarts: Counter[str] = Counter()
+        self.stopping = False
+        self._executor = executor
+        self._store = store
+        self._attempts = attempts
+        self._deaths: Counter[int] = Counter()
+
+    def fill(self, most: float) -> None:
+        """Starts waiting runs until `most` are at work, or as many as the executor has room for."""
+        while len(self.active) < min(most, self._executor.slots):
+            run = self._store.start_next()
+            if run is None:
+                return
+            self.active[run.number] = Active(run)
+            try:
+                self._executor.submit(run.number, run.attempt, run.spec, run.folder)
+            except OSError as error:
+                del self.active[run.number]
+                self._store.not_started(run, error)
+
+    def hear(self, timeout_s: float, gather_s: float = 0.0) -> list[tuple[int, Event | Exited]]:
+        """What workers say, waiting up to `timeout_s`; episodes are gathered, since one write of many costs less."""
+        heard = more = self._executor.events(timeout_s)
+        until = time.monotonic() + gather_s
+        while more and all(isinstance(message, EpisodeDone) for _, message in more) and len(heard) < MOST_AT_ONCE:
+            left_s = until - time.monotonic()
+            more = self._executor.events(left_s) if left_s > 0.0 else []
+            heard = heard + more
+        return heard
+
+    def take_in(self, heard: Sequence[tuple[int, Event | Exited]]) -> None:
+        """Acts on messages in their order, on episodes that come one after the other at once."""
+        episodes: list[tuple[int, EpisodeDone]] = []
+        for number, message in heard:
+            if isinstance(message, EpisodeDone):
+                episodes.append((number, message))
+                continue
+            self._add_episodes(episodes)
+            episodes = []
+            active = self.active[number]
+            if isinstance(message, Exited):
+                del self.active[number]
+                self._end(active, message)
+            elif isinstance(message, Started):
+                logger.info("process %d", message.pid, extra=active.run.ids)
+            else:
+                active.last = message
+        self._add_episodes(episodes)
+
+    def cancel(self, number: int, grace_s: float) -> None:
+        """Cancels a run if it is at work."""
+        if number in self.active:
+            self.active[number].cancelled = True
+            self._executor.cancel(number, grace_s)
+
+    def stop(self, grace_s: float) -> None:
+        """Starts no more runs, and stops those at work after their episode."""
+        self.stopping = True
+        for number in self.active:
+            self._executor.cancel(number, grace_s)
+
+    def abandon(self, grace_s: float) -> None:
+        """Stops the runs at work and hears nothing more of them; their store says what becomes of them."""
+        for number, active in self.active.items():
+            active.abandoned = True
+            self._executor.cancel(number, grace_s)
+
+    def _add_episodes(self, told: Sequence[tuple[int, EpisodeDone]]) -> None:
+        wanted = [(number, event) for number, event in told if not self.active[number].abandoned]
+        for number in self._store.add_episodes(wanted) if wanted else ():
+            self._deaths.pop(number, None)
+
+    def _end(self, active: Active, exited: Exited) -> None:
+        """Decides what becomes of a run; a worker's own account goes before its exit status."""
+        run, last = active.run, active.last
+        if active.abandoned:
+            return
+        if active.last is not None or active.cancelled:
+            self._deaths.pop(run.number, None)
+        if isinstance(last, Finished) and last.finished:
+            self._store.succeeded(run, last)
+        elif isinstance(last, Failed) and last.storage:
+            self._store.storage_refused(run, last.reason)
+        elif isinstance(last, Failed):
+            self._store.failed(run, last.reason)
+        elif active.cancelled:
+            self._store.cancelled(run)
+        elif self.stopping:
+            self._store.requeued(run, None)
+        elif isinstance(last, Finished):
+            self._replace(run, Exited("worker was told to stop by somebody else", Cause.KILLED))
+        else:
+            self._replace(run, exited)
+
+    def _replace(self, run: QueuedRun, exited: Exited) -> None:
+        """A worker was lost: another one goes on from the checkpoint, unless that has failed too often."""
+        reason = exited.reason or "worker stopped before its run was done"
+        self._deaths[run.number] += exited.cause is not Cause.LOST  # which is nothing that the run has done
+        self.restarts[exited.cause] += 1
+        deaths = self._deaths[run.number]
+        logger.warning("%s; attempt %d", reason, deaths, extra=run.ids)
+        if deaths < self._attempts:
+            self._store.requeued(run, f"{reason}; goes on from its checkpoint")
+        else:
+            del self._deaths[run.number]
+            self._store.failed(run, f"{reason}; {deaths} workers in a row finished no episode")

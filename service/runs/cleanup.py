@@ -1,0 +1,120 @@
+"""Removes campaigns with their folders, old campaigns, and places that no campaign names.
+
+A campaign goes whole or not at all, whenever the server dies: its folder is first renamed, then the rows go, then the
+renamed folder. What a server that died in between left behind says by its name how far it was.
+"""
+
+import logging
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from risk_sac.scenario import library
+from service.errors import StorageError
+from service.settings import ServiceSettings
+from service.store.reading import Store
+
+logger = logging.getLogger(__name__)
+
+PREFIX = ".deleted-"
+RETENTION_S = 10.0  # between two looks for campaigns to delete
+DAY_S = 86400.0
+BATCH = 10  # campaigns deleted in one look, so that the manager is free in between
+LOOK_S = 600.0  # between two looks for unused places
+UNUSED_S = 3600.0  # that a place is kept for a campaign that has only been checked, or is just being posted
+
+
+def dispose(folder: Path, forget: Callable[[], None]) -> None:
+    """Remove a folder, which may be missing, and what the database knows of it.
+
+    Args:
+      folder: of the campaign.
+      forget: removes the rows; where it raises, the folder stays.
+
+    Raises:
+      OSError: the folder cannot be renamed or removed.
+    """
+    grave = folder.with_name(f"{PREFIX}{folder.name}")
+    if folder.exists():
+        folder.rename(grave)
+    try:
+        forget()
+    except BaseException:
+        if grave.exists():
+            grave.rename(folder)
+        raise
+    if grave.exists():
+        shutil.rmtree(grave)
+
+
+def settle(campaigns: Path, exists: Callable[[str], bool]) -> None:
+    """Finish, or take back, what an earlier server had begun to remove.
+
+    Args:
+      campaigns: the folder of all campaigns' folders.
+      exists: whether the database has a campaign with this id.
+
+    Raises:
+      OSError: the folder cannot be written.
+    """
+    for folder in sorted(campaigns.glob("*")):
+        name = folder.name.removeprefix(PREFIX)
+        if exists(name):
+            if folder.name != name:
+                folder.rename(folder.with_name(name))
+        elif folder.name != name:
+            shutil.rmtree(folder)
+        else:
+            logger.warning("folder %s belongs to no campaign of the database; it is left alone", folder)
+
+
+class Retention:
+    """Deletes what ended `retention_days` ago, a batch at a time."""
+
+    def __init__(self, settings: ServiceSettings, store: Store) -> None:
+        self._days = settings.retention_days
+        self._store = store
+        self._looked_at = float("-inf")
+
+    def retire(self, dispose: Callable[[str], None]) -> None:
+        """Look for campaigns to delete, if it is time.
+
+        Args:
+          dispose: deletes the campaign with this id.
+
+        Raises:
+          StorageError: the database cannot be read, or `dispose` says so.
+        """
+        if self._days is None or time.monotonic() - self._looked_at < RETENTION_S:
+            return
+        old = self._store.ended_before(time.time() - self._days * DAY_S, BATCH)
+        for campaign_id in old:
+            dispose(campaign_id)
+        if len(old) < BATCH:
+            self._looked_at = time.monotonic()
+
+
+class UnusedPlaces:
+    """Removes places from the library that no campaign names."""
+
+    def __init__(self, folder: Path, store: Store) -> None:
+        self._folder = folder
+        self._store = store
+        self._looked_at = float("-inf")
+
+    def remove(self) -> None:
+        """Look for them, if it is time.
+
+        Raises:
+          StorageError: the database cannot be read, or the library cannot be written.
+        """
+        if time.monotonic() - self._looked_at < LOOK_S:
+            return
+        try:
+            removed = library.prune(self._folder, self._store.families(), UNUSED_S)
+        except OSError as error:
+            raise StorageError(f"the library of places cannot be tidied ({error.strerror})") from error
+        self._looked_at = time.monotonic()
+        if removed:
+            logger.info("%d places that no campaign names are gone", len(removed))
