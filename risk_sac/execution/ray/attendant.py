@@ -91,7 +91,8 @@ class _Attempt:
         self._publisher_due = 0.0
         self._refused_since: float | None = None
         self._wished: float | None = None
-        hear = None if order.hear is None else _raw(pkgutil.resolve_name(order.hear))
+        assert order.hear is not None
+        hear = _raw(pkgutil.resolve_name(order.hear))
         program: Program[bytes] = Program(
             arguments=lambda spec, folder: order.arguments,
             log=order.log,

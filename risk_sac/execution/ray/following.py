@@ -14,7 +14,7 @@ from ray.exceptions import OutOfMemoryError, RayError, RayTaskError, TaskCancell
 
 from risk_sac.errors import ConfigError, DamagedError, RiskSacError
 from risk_sac.execution.executor import Cause, Exited
-from risk_sac.execution.lease import Lease, Signs
+from risk_sac.execution.local import Lease, Signs
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.execution.ray import tasks
 from risk_sac.execution.ray.attendant import attend
