@@ -14,8 +14,8 @@ from service.runs.manager import Manager
 from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
 from service.store.reading import Store
+from service.views.on_demand import OnDemandCache
 from service.views.pictures import Picture
-from service.views.products import Products
 from service.views.reports import Reports
 from service.views.studies import Studies
 from service.views.tables import Tables
@@ -29,7 +29,7 @@ class Context:
     store: Store
     manager: Manager
     reports: Reports
-    pictures: Products[Picture]
+    pictures: OnDemandCache[Picture]
     studies: Studies
     tables: Tables
     regressions: Regressions

@@ -15,9 +15,8 @@ from service.errors import StorageError
 from service.host.data_folder import hold_data_folder
 from service.keys.file import KeyFile
 from service.settings import ServiceSettings
-from service.store.database import connected, held, sqlite_file
+from service.store.database import connected, held, newest_step, present_step, sqlite_file, step_forward
 from service.store.server import keys_were_made, noting_keys
-from service.store.steps import newest_step, present_step, step_forward
 
 logger = logging.getLogger(__name__)
 

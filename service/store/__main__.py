@@ -12,8 +12,7 @@ from service.host.data_folder import hold_data_folder
 from service.host.environment import MISUSED, read_settings
 from service.host.private import create_private
 from service.settings import ServiceSettings
-from service.store.database import connected, held, sqlite_file
-from service.store.steps import present_step, step_back
+from service.store.database import connected, held, present_step, sqlite_file, step_back
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

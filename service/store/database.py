@@ -1,17 +1,23 @@
 """Opens the database: SQLite in the data folder, or PostgreSQL by URL."""
 
-from collections.abc import Iterator
+import secrets
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from sqlite3 import Connection as SqliteConnection
 
-from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from alembic.util import CommandError
+from sqlalchemy import Connection, Engine, create_engine, event, insert, inspect, make_url, text
 from sqlalchemy.exc import ArgumentError, DatabaseError, IntegrityError, NoSuchModuleError, ProgrammingError
 
 from risk_sac.execution.postmortem import without_folders
 from service.errors import StorageError
 from service.host.private import create_private, make_private
-from service.store.steps import step_forward
+from service.store.tables import Base, ServerRow
 
 READERS = 8  # requests answered in threads at once; of more, each would only wait longer for the interpreter
 ADVISORY_LOCK = 0x5249534B  # any number that all servers of this project agree on
@@ -143,3 +149,64 @@ def _check(engine: Engine) -> None:
         raise StorageError(f"database {engine.url.database!r} is damaged ({found[0]}); restore a copy or move it away")
     if orphan is not None:
         raise StorageError(f"database {engine.url.database!r} is damaged ({orphan[0]!r} lacks its {orphan[2]!r} row)")
+
+
+def present_step(engine: Engine) -> str | None:
+    """The step of `service.store.migrations` that the database is at; None for a new one."""
+    with engine.connect() as connection:
+        return MigrationContext.configure(connection).get_current_revision()
+
+
+def newest_step() -> str:
+    """The step that this version of the service works with."""
+    newest = ScriptDirectory.from_config(_config()).get_current_head()
+    assert newest is not None
+    return newest
+
+
+def step_forward(engine: Engine) -> None:
+    """Creates the tables of a new database, or takes all steps that are missing, in one transaction.
+
+    Raises:
+      StorageError: another version wrote the database.
+    """
+    if present_step(engine) is None and not inspect(engine).has_table(ServerRow.__tablename__):
+        _take(engine, _create)
+    else:
+        _take(engine, lambda config: command.upgrade(config, "head"))
+
+
+def step_back(engine: Engine) -> None:
+    """Takes the newest step back.
+
+    Raises:
+      StorageError: it cannot be taken back, or was never taken.
+    """
+    step, newest = present_step(engine), newest_step()
+    if step != newest:
+        raise StorageError(f"database is at step {step}; wanted {newest}, the newest: nothing else is taken back")
+    _take(engine, lambda config: command.downgrade(config, "-1"))
+
+
+def _create(config: Config) -> None:
+    connection = config.attributes["connection"]
+    Base.metadata.create_all(connection)
+    connection.execute(insert(ServerRow).values(number=1, cursor_secret=secrets.token_bytes(32).hex()))
+    command.stamp(config, "head")
+
+
+def _take(engine: Engine, steps: Callable[[Config], None]) -> None:
+    config = _config()
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        try:
+            steps(config)
+        except CommandError as error:
+            message = f"database cannot be brought up to date: {error}; a newer version wrote it, or a much older one"
+            raise StorageError(message) from error
+
+
+def _config() -> Config:
+    config = Config()
+    config.set_main_option("script_location", "service.store:migrations")
+    return config

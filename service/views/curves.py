@@ -14,7 +14,7 @@ from risk_sac.records import RECORDED, Grade, Outcome
 from risk_sac.types import Floats
 from service.schemas.curves import Curves, RunCurves
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
-from service.views.plain import Kinds, Plain
+from service.views.failure_table import Kinds, Plain
 
 SEARCH = RECORDED["search"]
 Counts = NDArray[np.int64]

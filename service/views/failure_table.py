@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from risk_sac.records import Grade, Outcome, TriageState
+from risk_sac.verdicts.distinct import Cell, cell
 from service.schemas.failure_table import FailureKind, FailureTable, FamilyScenes
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
-from service.views.plain import Kinds, Plain, signature_of
 
+Plain = Mapping[str, Any]
+"""A JSON object as it is stored, see `risk_sac.records.stored`."""
 DECIMALS = 4
 OF_RUN = {"run_ids": "id", "families": "family", "methods": "method", "seeds": "seed"}  # column -> field
 OF_COLLISION = {
@@ -32,6 +34,37 @@ UNJUDGED: Plain = dict.fromkeys(OF_JUDGEMENT) | {"broke": []}
 _of_collision, _of_judgement = itemgetter(*OF_COLLISION.values()), itemgetter(*OF_JUDGEMENT)
 
 Columns = Mapping[str, Sequence[Any]]
+
+
+class Kinds:
+    """Tells which failures are the first of their kind, as `risk_sac.verdicts.distinct.DistinctFailures` does."""
+
+    def __init__(self) -> None:
+        self._found: set[tuple[str, Cell]] = set()
+
+    def add(self, collision: Plain) -> bool:
+        """Whether none of those before was alike."""
+        niche = signature_of(collision), _cell(collision)
+        new = niche not in self._found
+        self._found.add(niche)
+        return new
+
+
+def signature_of(collision: Plain) -> str:
+    """Its judgement's; of one stored before contacts were judged, its striker."""
+    judged = collision.get("judgement")
+    signature: str = judged["signature"] if judged else _unjudged(collision)
+    return signature
+
+
+def _unjudged(collision: Plain) -> str:
+    return f"unjudged {collision['other_role']} {collision['other_kind']}"
+
+
+def _cell(collision: Plain) -> Cell:
+    judged = collision.get("judgement")
+    from_conflict_s = float(collision["time_s"]) - float(judged["conflict_s"]) if judged else 0.0
+    return cell((float(collision["ego_speed_mps"]), float(collision["other_speed_mps"]), from_conflict_s))
 
 
 def failure_table(

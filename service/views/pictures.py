@@ -1,4 +1,4 @@
-"""Pictures of contacts, alone or beside a twin."""
+"""What is shown of one contact: pictures, the ground, and how its twin went."""
 
 import hashlib
 from dataclasses import dataclass, field, replace
@@ -6,13 +6,18 @@ from dataclasses import dataclass, field, replace
 from risk_sac import __version__
 from risk_sac.failures.question import Twin, read_twin
 from risk_sac.failures.recording import Recording
+from risk_sac.failures.roads import roads_of
+from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.records import Episode
 from risk_sac.run_folder.results import Contact
+from service.schemas.failures import Roads, Surface, TwinPlay
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign, StoredContact, StoredRun
 from service.views.bodies import series_file
-from service.views.products import Products
-from service.views.series import load_arrays
+from service.views.on_demand import OnDemandCache
+from service.views.series import load_arrays, series_body
+
+MM = 3  # decimals of a metre
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +69,7 @@ class Picture:
     """That twin as a study told it."""
 
 
-def pictures(settings: ServiceSettings) -> Products[Picture]:
+def pictures(settings: ServiceSettings) -> OnDemandCache[Picture]:
     """PNGs of contacts; StorageError where the time series is lost."""
 
     def draw(picture: Picture) -> bytes:
@@ -76,4 +81,33 @@ def pictures(settings: ServiceSettings) -> Products[Picture]:
             twin = replace(recording, series=series, twin=told.title)
         return recording_bytes(picture.contact.run.family, recording, "png", twin)
 
-    return Products(draw, "pictures")
+    return OnDemandCache(draw, "pictures")
+
+
+def roads_body(contact: ContactOfARun) -> Roads:
+    """The surfaces of a contact's scene."""
+    surfaces = roads_of(contact.run.family, contact.episode.scene)
+    return Roads(
+        surfaces=[Surface(use=surface.use, outline=surface.outline.round(MM).tolist()) for surface in surfaces]
+    )
+
+
+def thumbnail_of(contact: ContactOfARun, settings: ServiceSettings) -> str:
+    """A contact as a small SVG.
+
+    Raises:
+      StorageError: its time series is lost.
+    """
+    roads = roads_of(contact.run.family, contact.episode.scene)
+    return thumbnail(recording_of(contact, settings), roads)
+
+
+def twin_body(twin: Twin, played: bytes) -> TwinPlay:
+    """A twin with its full time series.
+
+    Args:
+      twin: which.
+      played: as a study told it.
+    """
+    told, arrays = read_twin(played)
+    return TwinPlay(twin=twin, outcome=told.outcome, collision=told.collision, series=series_body(arrays))

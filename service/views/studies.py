@@ -12,8 +12,8 @@ from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
 from service.errors import OutdatedError, ServiceError, StorageError
 from service.settings import ServiceSettings
 from service.views.bodies import series_file
+from service.views.on_demand import OnDemandCache
 from service.views.pictures import ContactOfARun
-from service.views.products import Products
 from service.views.series import load_arrays
 
 logger = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ class Study:
     """Of an export, which."""
 
 
-class Studies(Products[Study]):
+class Studies(OnDemandCache[Study]):
     """Answers, one at a time; StorageError where the time series is lost, CannotBePlayed where nothing can be said."""
 
     def __init__(self, settings: ServiceSettings) -> None:

@@ -12,7 +12,7 @@ from risk_sac.failures.export.formats import FormatName
 from risk_sac.run_folder.results import RESULTS
 from service.errors import StorageError
 from service.settings import ServiceSettings
-from service.views.products import Products
+from service.views.on_demand import OnDemandCache
 
 logger = logging.getLogger(__name__)
 
@@ -40,7 +40,7 @@ class Table:
         return cls(tuple(written_ns), tuple(written_ns.values()), format)
 
 
-class Tables(Products[Table]):
+class Tables(OnDemandCache[Table]):
     """Makes them, one at a time; StorageError where one cannot be made, and the log has the reason."""
 
     def __init__(self, settings: ServiceSettings) -> None:

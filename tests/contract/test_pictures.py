@@ -20,7 +20,7 @@ from risk_sac.records import wire
 from risk_sac.run_folder.results import FAILURES, series_name
 from service.settings import ServiceSettings
 from service.store.database import READERS
-from service.views import products
+from service.views import on_demand
 from service.views.studies import Studies
 from tests.contract.recorded_campaigns import ENDED_ID, Recorded, known_times_and_ids
 from tests.contract.serving import serving
@@ -147,7 +147,7 @@ def test_a_picture_is_drawn_once_for_all_who_ask_for_it_and_holds_up_nothing_els
 
 def test_no_more_than_a_bounded_number_waits_and_others_are_told_when_to_come_back(fresh, drawn, monkeypatch):
     client = fresh
-    monkeypatch.setattr(products, "MOST_WAITING", 1)
+    monkeypatch.setattr(on_demand, "MOST_WAITING", 1)
     first, *others = (f"{FOLDER}/{failure}/picture.png" for failure in ids(client)[:3])
     with ThreadPoolExecutor(3) as askers:
         answers = [askers.submit(client.get, first)]

@@ -7,7 +7,7 @@ from risk_sac.failures.export.formats import FORMATS, FormatName
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import STORAGE, Responses, header, problem
 from service.schemas.problems import Reason
-from service.views.products import TooManyWaiting
+from service.views.on_demand import TooManyWaiting
 
 RETRY_AFTER_S = 2  # in which some of those who wait get theirs
 LACKING = problem(501, "The service lacks a package that makes this format")

@@ -85,7 +85,7 @@ def list_egos() -> Egos:
         )
         for name, summary in PROFILES.items()
     ]
-    return Egos(items=[*models, *map(Ego.model_validate, cards())])
+    return Egos(items=[*models, *(Ego.model_validate(card, from_attributes=True) for card in cards())])
 
 
 @router.get("/methods")

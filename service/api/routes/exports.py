@@ -12,7 +12,7 @@ from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, 
 from service.api.context import Service
 from service.errors import ConflictError
 from service.store.stored import StoredCampaign
-from service.views.products import TooManyWaiting
+from service.views.on_demand import TooManyWaiting
 from service.views.tables import Table
 
 TABLE: Responses = {200: {"content": {FORMATS[name].media_type: {} for name in names("episodes")}}}
@@ -38,7 +38,7 @@ async def get_episodes_export(campaign: Asked, format: FormatName, service: Serv
     if not table.folders:
         raise ConflictError(f"no run of campaign {campaign.id} has results yet", reason="not_ended")
     try:
-        content = await service.tables.product(table)
+        content = await service.tables.get(table)
     except TooManyWaiting as error:
         raise crowded(error) from error
     row = FORMATS[format]

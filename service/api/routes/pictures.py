@@ -20,10 +20,9 @@ from service.api.context import Context, Service
 from service.errors import StorageError
 from service.schemas.failures import TwinPlay
 from service.schemas.problems import Reason
-from service.views.pictures import ContactOfARun, Picture
-from service.views.products import TooManyWaiting
+from service.views.on_demand import TooManyWaiting
+from service.views.pictures import ContactOfARun, Picture, twin_body
 from service.views.studies import CannotBePlayed, Study
-from service.views.twins import twin_body
 
 PNG, JSON, NPZ = "image/png", "application/json", "application/zip"
 
@@ -58,19 +57,19 @@ Asked = Annotated[ContactOfARun, Depends(_contact)]
 @router.get("/failures/{failure_id}/picture.png", response_class=Response, responses=PICTURE)
 async def get_picture(contact: Asked, request: Request, service: Service) -> Response:
     """One collision, valid or not: both paths from above, and what was measured along the way."""
-    return await _answer(contact, request, PNG, lambda: service.pictures.product(Picture(contact)))
+    return await _answer(contact, request, PNG, lambda: service.pictures.get(Picture(contact)))
 
 
 @router.get("/failures/{failure_id}/bundle.npz", response_class=Response, responses=BUNDLE)
 async def get_bundle(contact: Asked, request: Request, service: Service) -> Response:
     """One collision in a file that stands alone, once it was played again; `risk-sac replay` plays it anywhere."""
-    return await _answer(contact, request, NPZ, lambda: service.studies.product(Study(contact, "bundle")))
+    return await _answer(contact, request, NPZ, lambda: service.studies.get(Study(contact, "bundle")))
 
 
 @router.get("/failures/{failure_id}/core.npz", response_class=Response, responses=BUNDLE)
 async def get_core(contact: Asked, request: Request, service: Service) -> Response:
     """The same with all taken away that the failure does not need; takes up to 150 episodes, some 10 s."""
-    return await _answer(contact, request, NPZ, lambda: service.studies.product(Study(contact, "core")))
+    return await _answer(contact, request, NPZ, lambda: service.studies.get(Study(contact, "core")))
 
 
 @router.get("/failures/{failure_id}/export", response_class=Response, responses=EXPORT)
@@ -80,7 +79,7 @@ async def get_export(contact: Asked, format: FormatName, request: Request, servi
     check_installed(format, "failure")
     check_carries(format, "failure")
     study = Study(contact, "export", format=format)
-    answer = await _answer(contact, request, row.media_type, lambda: service.studies.product(study))
+    answer = await _answer(contact, request, row.media_type, lambda: service.studies.get(study))
     name = f"{contact.episode.id}{f'-{format}' if row.media_type == NPZ else ''}{row.suffix}"
     answer.headers["Content-Disposition"] = f'attachment; filename="{name}"'
     return answer
@@ -89,7 +88,7 @@ async def get_export(contact: Asked, format: FormatName, request: Request, servi
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=TOLD)
 async def get_region(contact: Asked, request: Request, service: Service) -> Response:
     """How many of its neighbours fail as it does: nearby scenes, other traffic, other actions; takes 170 episodes."""
-    return await _answer(contact, request, JSON, lambda: service.studies.product(Study(contact, "region")))
+    return await _answer(contact, request, JSON, lambda: service.studies.get(Study(contact, "region")))
 
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=TWIN)
@@ -97,7 +96,7 @@ async def get_twin(contact: Asked, twin: Twin, request: Request, service: Servic
     """One collision beside the same scene with nobody attacking (`idle`), or with another ego, on one clock."""
 
     async def draw() -> bytes:
-        return await service.pictures.product(Picture(contact, twin, await _played(contact, twin, service)))
+        return await service.pictures.get(Picture(contact, twin, await _played(contact, twin, service)))
 
     return await _answer(contact, request, PNG, draw)
 
@@ -115,7 +114,7 @@ async def get_twin_play(contact: Asked, twin: Twin, request: Request, service: S
 
 async def _played(contact: ContactOfARun, twin: Twin, service: Context) -> bytes:
     """A twin as a study tells it, which is played once for its picture and its time series."""
-    return await service.studies.product(Study(contact, "twin", twin))
+    return await service.studies.get(Study(contact, "twin", twin))
 
 
 async def _answer(

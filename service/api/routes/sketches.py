@@ -15,7 +15,7 @@ from service.api.routes.pictures import Asked
 from service.errors import StorageError
 from service.schemas.failures import Roads
 from service.schemas.problems import Reason
-from service.views.sketches import roads_body, thumbnail_of
+from service.views.pictures import roads_body, thumbnail_of
 
 SVG = "image/svg+xml"
 THUMBNAIL = TAGGED | {200: TAGGED[200] | {"content": {SVG: {}}}}

@@ -1,3 +1,4 @@
+import math
 import sqlite3
 from pathlib import Path
 
@@ -17,52 +18,43 @@ from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
 
-BEFORE_JUDGEMENTS = Path(__file__).with_name("before_judgements.sql")
-
-BEFORE_VERSIONS = """
-CREATE TABLE campaigns (number INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT, id VARCHAR NOT NULL, spec TEXT NOT NULL,
-  state VARCHAR NOT NULL, reason VARCHAR, created_at FLOAT NOT NULL, started_at FLOAT, finished_at FLOAT, UNIQUE (id));
-CREATE TABLE runs (number INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT, campaign_number INTEGER NOT NULL,
-  id VARCHAR NOT NULL, family VARCHAR NOT NULL, method VARCHAR NOT NULL, seed INTEGER NOT NULL,
-  spec_digest VARCHAR NOT NULL, state VARCHAR NOT NULL, reason VARCHAR, started_at FLOAT, finished_at FLOAT,
-  episodes_total INTEGER NOT NULL,
-  episodes_done INTEGER NOT NULL, rejected INTEGER NOT NULL, raw_collisions INTEGER NOT NULL, failures INTEGER NOT NULL,
-  busy_s FLOAT NOT NULL, metrics TEXT, evaluation TEXT, digest VARCHAR, versions TEXT NOT NULL,
-  UNIQUE (campaign_number, id),
-  FOREIGN KEY(campaign_number) REFERENCES campaigns (number));
-CREATE INDEX runs_queue ON runs (state, number);
-CREATE TABLE episodes (number INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT, campaign_number INTEGER NOT NULL,
-  run_number INTEGER NOT NULL, phase VARCHAR NOT NULL, "index" INTEGER NOT NULL, outcome VARCHAR NOT NULL,
-  record TEXT NOT NULL, series VARCHAR, wall_s FLOAT NOT NULL, UNIQUE (run_number, phase, "index"),
-  FOREIGN KEY(campaign_number) REFERENCES campaigns (number), FOREIGN KEY(run_number) REFERENCES runs (number));
-CREATE INDEX episodes_pages ON episodes (campaign_number, number);
-CREATE INDEX episodes_outcomes ON episodes (campaign_number, outcome, number);
-"""
+STEP_0007 = Path(__file__).with_name("step_0007.sql")
 
 
-def test_a_database_from_before_contacts_were_judged_is_brought_up_to_date(tmp_path):
-    """Written by the version before: five episodes of one run, whose two phases have one distinct failure each."""
-    old = sqlite3.connect(tmp_path / "test.db")
-    old.executescript(BEFORE_JUDGEMENTS.read_text(encoding="utf-8"))
+def opened_from_step_0007(file):
+    """The store of a database that the version before wrote: two runs, the first of which ended with two contacts."""
+    old = sqlite3.connect(file)
+    old.executescript(STEP_0007.read_text(encoding="utf-8"))
     old.close()
-    store = Store(f"sqlite:///{tmp_path}/test.db")
-    (campaign,) = store.campaigns(limit=2).items
-    found, waiting = campaign.runs
-    assert (found.failures, found.distinct_failures, found.preventable, found.distinct_preventable) == (2, 2, 0, 0)
-    assert (waiting.distinct_failures, waiting.metrics) == (0, None)
-    assert (found.metrics.distinct_failures, found.metrics.preventable, found.metrics.signatures) == (1, 0, {})
+    return Store(f"sqlite:///{file}")
+
+
+def test_a_database_of_the_version_before_is_brought_up_to_date(tmp_path):
+    store = opened_from_step_0007(tmp_path / "test.db")
+    (campaign,) = store.campaigns(limit=2, label="of today").items
+    ended, running = campaign.runs
+    assert (ended.state, ended.failures, ended.distinct_failures, ended.verified) == (State.SUCCEEDED, 1, 1, 1)
+    assert (running.state, running.metrics, ended.metrics.episodes) == (State.RUNNING, None, 3)
     episodes = store.episodes(campaign.id, limit=9).items
-    assert [each.collision is not None for each in episodes] == [False, True, True, False, True]
-    assert {each.funnel for each in episodes} == {None}
-    assert episodes[1].collision.judgement is None
-    assert store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.CAREFUL)).items == ()
+    assert [each.collision is not None for each in episodes] == [False, True, True]
+    assert (episodes[0].min_ttc_s, episodes[1].collision.min_ttc_s) == (math.inf, math.inf)
+    assert (episodes[1].repetition.same, episodes[1].funnel.contacts) == (3, 1)
+    assert [each.id for each in store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.CAREFUL)).items] == [
+        "low-random-0-train-1"
+    ]
+    assert store.triage(campaign.id, "low-random-0-train-1").comment == "seen"
+    assert [type(each).__name__ for each in store.events(campaign.id, limit=9).items].count("StateChange") == 4
+    assert Ledger(store).resume() == 1
     store.close()
 
 
-def test_the_migrations_lead_to_the_tables(store):
-    with store.engine.connect() as connection:
-        context = MigrationContext.configure(connection, opts={"compare_type": False})  # SQLite forgets them
-        assert compare_metadata(context, Base.metadata) == []
+def test_the_migrations_lead_to_the_tables_of_a_new_database(tmp_path, store):
+    upgraded = opened_from_step_0007(tmp_path / "old.db")
+    for engine in (upgraded.engine, store.engine):
+        with engine.connect() as connection:
+            context = MigrationContext.configure(connection, opts={"compare_type": False})  # SQLite forgets them
+            assert compare_metadata(context, Base.metadata) == []
+    upgraded.close()
 
 
 def test_a_file_that_is_no_database_is_a_storage_error(tmp_path):
@@ -86,25 +78,6 @@ def test_what_is_written_is_on_the_disk_before_the_answer(tmp_path):
     other = sqlite3.connect(tmp_path / "test.db")
     assert other.execute("SELECT count(*) FROM runs").fetchone() == (4,)
     other.close()
-    store.close()
-
-
-def test_a_database_from_before_there_were_versions_is_brought_up_to_date(tmp_path):
-    old = sqlite3.connect(tmp_path / "test.db")
-    old.executescript(BEFORE_VERSIONS)
-    spec = SPEC.model_copy(update={"label": "old"})
-    old.execute("INSERT INTO campaigns VALUES (7, 'c1', ?, 'running', NULL, 1.0, 2.0, NULL)", [spec.model_dump_json()])
-    old.execute(
-        "INSERT INTO runs VALUES (9, 7, 'low-sac-0', 'low', 'sac', 0, 'd', 'running', NULL, 2.0, NULL, 5, 0, 0, 0, 0,"
-        " 0.0, NULL, NULL, NULL, '{}')"
-    )
-    old.commit()
-    old.close()
-    store = Store(f"sqlite:///{tmp_path}/test.db")
-    assert Ledger(store).resume() == 1
-    campaign = store.campaign("c1", "default")
-    assert (campaign.spec.label, campaign.state, campaign.runs[0].id) == ("old", State.QUEUED, "low-sac-0")
-    assert [item.id for item in store.campaigns(limit=2, label="old").items] == ["c1"]
     store.close()
 
 

@@ -1,94 +1,12 @@
-"""The one order of events, and how it came over what had been numbered apart.
+"""The one order of a campaign's events."""
 
-`before_sequences.sql` was written by the version before: three runs of one campaign, the first of which lost its worker
-once, and whose second and third waited again when the server stopped; a campaign that ended meanwhile, and one that
-waits.
-"""
-
-from contextlib import closing
-from pathlib import Path
 from random import Random
 
 import pytest
-from alembic import command
-from alembic.config import Config
-from sqlalchemy import create_engine
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Episode, State
+from risk_sac.records import State
 from service.errors import StorageError, TransitionError
-from service.store.reading import Store
-from service.store.writing import Ledger
-
-BEFORE_SEQUENCES = Path(__file__).with_name("before_sequences.sql")
-TABLES = ("campaigns", "runs", "episodes", "changes")
-
-
-@pytest.fixture
-def former_url(database_url):
-    """A database from before there was one order."""
-    engine, config = create_engine(database_url), Config()
-    config.set_main_option("script_location", "service.store:migrations")
-    with engine.begin() as connection:
-        config.attributes["connection"] = connection
-        command.upgrade(config, "0003")
-        for line in BEFORE_SEQUENCES.read_text(encoding="utf-8").splitlines():
-            connection.exec_driver_sql(line)
-        if engine.dialect.name == "postgresql":  # which did not give the numbers itself
-            for table in TABLES:
-                connection.exec_driver_sql(f"SELECT setval(pg_get_serial_sequence('{table}', 'number'), 100)")
-    engine.dispose()
-    return database_url
-
-
-@pytest.fixture
-def upgraded(former_url):
-    store = Store(former_url)
-    yield store
-    store.close()
-
-
-def first_id(store):
-    return store.campaigns(limit=3).items[-1].id
-
-
-def read_first(url):
-    with closing(Store(url)) as store:
-        return store.events(first_id(store), limit=100)
-
-
-def told(store, campaign_id, after=0):
-    events = store.events(campaign_id, limit=100, after=after).items
-    return [each.id if isinstance(each, Episode) else f"{each.run_id} {each.state}" for each in events]
-
-
-def test_what_was_numbered_apart_comes_into_one_order(upgraded):
-    posted, ended, running = upgraded.campaigns(limit=3).items
-    assert told(upgraded, posted.id) == []
-    episodes = ["low-random-0-train-0", "low-random-0-train-1"]
-    ends = ["low-random-0 succeeded", "None succeeded"]
-    assert told(upgraded, ended.id) == ["low-random-0 running", "None running", *episodes, *ends]
-    assert [each.replace("low-random-", "").replace("-train-", ".") for each in told(upgraded, running.id)] == [
-        *(
-            "0 running",
-            "None running",
-            "1 running",
-            "0 queued",
-            "0 running",
-        ),  # when it waited, nobody can tell any more
-        *("0.0", "1.0", "0.1", "1.1", "1.2", "0.2", "0 succeeded", "2 running", "1.3", "2.0", "1.4", "2.1"),
-        *("2 queued", "1.5", "1 queued"),
-    ]
-
-
-def test_what_is_there_goes_on(upgraded, episode):
-    campaign_id = first_id(upgraded)
-    before = told(upgraded, campaign_id)
-    ledger = Ledger(upgraded)
-    number = upgraded.waiting()["default"]
-    ledger.start_run(number)
-    ledger.add_episodes([(number, episode(6))])
-    assert told(upgraded, campaign_id) == [*before, "low-random-1 running", "low-random-1-train-6"]
 
 
 def test_a_page_of_events_ends_where_it_says(store, ledger, episode):

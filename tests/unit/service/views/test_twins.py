@@ -3,7 +3,7 @@ import math
 
 from risk_sac.failures.question import TwinPlay, twin_bytes
 from risk_sac.records import wire
-from service.views.twins import twin_body
+from service.views.pictures import twin_body
 from tests.builders import collision, judgement
 from tests.unit.service.views.test_series import arrays
 

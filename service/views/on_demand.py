@@ -1,4 +1,4 @@
-"""What takes seconds to make: made when it is asked for, one at a time, the newest kept."""
+"""A cache of what takes seconds to make: made on demand, one at a time, the newest kept."""
 
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
@@ -15,34 +15,34 @@ KEPT = 64  # of pictures and bundles, each of some 150 kB
 
 
 class TooManyWaiting(ServiceError):
-    """Asking again pays once others have theirs."""
+    """Too many requests wait for the cache."""
 
 
 S = TypeVar("S", bound=Hashable)
-"""What a product is made of; two that are equal make the same product."""
+"""What the content is made of; equal subjects have the same content."""
 
 
-class Products(Generic[S]):
-    """Makes products in threads of its own, so that they hold up nothing else that the service does."""
+class OnDemandCache(Generic[S]):
+    """Makes content in threads of its own, which hold up no other request."""
 
     def __init__(self, make: Callable[[S], bytes], what: str, kept: int = KEPT) -> None:
         """Makes nothing yet.
 
         Args:
-          make: makes one; may take seconds.
-          what: they are called, in the plural.
-          kept: how many of the newest.
+          make: makes the content of a subject; may take seconds.
+          what: names the contents in messages, in the plural.
+          kept: how many of the newest are kept.
         """
         self._make, self._what = make, what
         self._threads = anyio.CapacityLimiter(AT_ONCE)
         self._begun = 0  # that are being made, or wait
-        self._made = alru_cache(maxsize=kept)(self._queue)  # who asks for one that is being made waits for it
+        self._made = alru_cache(maxsize=kept)(self._queue)  # a second request for the same waits for the first
 
-    async def product(self, subject: S) -> bytes:
-        """The product of a subject, or whatever its making raises.
+    async def get(self, subject: S) -> bytes:
+        """The content of a subject, or whatever its making raises.
 
         Raises:
-          TooManyWaiting: for theirs.
+          TooManyWaiting: the queue is full.
         """
         return await self._made(subject)
 
