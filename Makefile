@@ -63,7 +63,7 @@ bench: $(STAMP) ## measure speed as ratios
 
 # What is marked `torture`, and what the suite does in part.
 torture: $(STAMP) ## kill, fill, damage and fuzz the service in earnest, about two hours
-	$(PYTHON) -m pytest -m torture --timeout 7200 tests/acceptance tests/integration tests/unit
+	$(PYTHON) -m pytest -m torture --timeout 7200 tests/acceptance tests/integration tests/unit tests/web
 	RISK_SAC_TORTURE=full RISK_SAC_SCHEMATHESIS_CASES=20000 $(PYTHON) -m pytest -m "not bench" --timeout 7200 \
 		tests/torture tests/contract/test_fuzzing.py
 	for times in "worker --times 30" "raylet --times 10" "head --times 5" "server --times 10"; do \

@@ -10,7 +10,7 @@ from playwright.sync_api import Locator, Page, expect
 from pyarrow import parquet
 
 from tests.server import Service, servers
-from tests.web.conftest import LONG_MS, PHONE
+from tests.web.conftest import LONG_MS
 
 STEPS = ("raw_collisions", "failures", "distinct_failures", "distinct_preventable")
 
@@ -218,16 +218,6 @@ def test_the_log_of_a_run_is_read_on_demand(page_at: Callable[..., Page], campai
     assert not any("/log" in url for url in asked)
     run.get_by_text("Log", exact=True).click()
     expect(run.get_by_role("region", name="Log of archive, low")).to_be_visible()
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_it_fits_a_phone(
-    scheme: str, page_at: Callable[..., Page], campaign: str, check_axe: Callable[[Page], None]
-) -> None:
-    page = page_at(f"campaigns/{campaign}", viewport=PHONE, color_scheme=scheme)
-    plot(page, "Sliding ECR").wait_for()
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
-    check_axe(page)
 
 
 def test_a_campaign_that_never_was_says_so(page_at: Callable[..., Page]) -> None:

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.server import Service
-from tests.web.conftest import CAMPAIGN, PHONE
+from tests.web.conftest import CAMPAIGN
 
 HOSTILE = "<img src=x onerror=alert(1)> ‮& \"'"
 
@@ -217,22 +217,3 @@ def test_the_list_can_be_used_by_keyboard_alone(page_at: Callable[..., Page], ca
     page.keyboard.press("Tab")
     page.keyboard.press("Enter")
     expect(page).to_have_url(re.compile(f"#/campaigns/{campaign}$"))
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_question_and_the_choice_keep_the_rules_of_accessibility(
-    scheme: str, page_at: Callable[..., Page], check_axe: Callable[[Page], None], small: dict[str, str]
-) -> None:
-    page = page_at("campaigns", color_scheme=scheme)
-    page.get_by_label("Select all").check()
-    check_axe(page)
-    page.get_by_role("button", name="Delete one more").click()
-    check_axe(page)
-
-
-def test_a_phone_shows_the_rows_without_scrolling_the_page_sideways(
-    page_at: Callable[..., Page], small: dict[str, str]
-) -> None:
-    page = page_at("campaigns", viewport=PHONE)
-    expect(rows(page)).to_have_count(3)
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

@@ -11,7 +11,6 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.server import Service
-from tests.web.conftest import PHONE
 
 
 @pytest.fixture(scope="session")
@@ -138,17 +137,6 @@ def test_a_campaign_that_is_gone_does_not_hide_the_others(page_at: Callable[...,
     page = page_at(f"compare?ids={campaign},unknown", allowed=("404",))
     expect(page.get_by_role("alert")).to_contain_text("unknown")
     expect(row_of(page, f"{campaign} archive")).to_be_visible()
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_it_fits_a_phone(
-    scheme: str, page_at: Callable[..., Page], methods: str, campaign: str, check_axe: Callable[[Page], None]
-) -> None:
-    for place in (f"campaigns/{methods}/compare", f"compare?ids={methods},{campaign}"):
-        page = page_at(place, viewport=PHONE, color_scheme=scheme)
-        page.locator("tr[data-row]").first.wait_for()
-        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
-        check_axe(page)
 
 
 def _check_total(row: Locator, letter: str, total: dict[str, Any]) -> None:

@@ -12,7 +12,6 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from tests.server import Service
-from tests.web.conftest import PHONE
 
 HOSTILE = '"><img src=x onerror="window.hacked=1"></script><script>window.hacked=1</script>'
 
@@ -305,26 +304,7 @@ def test_a_lost_service_is_told_and_comes_back(new_page: Callable[..., Page], se
     expect(page.locator(".cards li").first).to_be_visible()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("query", ["?every=1&family=mixed&brush=closing:1:", "?tab=refused"])
-def test_everybody_can_use_it(
-    screen: Callable[..., Page], check_axe: Callable[[Page], None], query: str, scheme: str
-) -> None:
-    page = screen(query, color_scheme=scheme)
-    page.get_by_text("Ranges by numbers").click()
-    check_axe(page)
-    page.locator(".cards li").first.get_by_role("button", name="Triage").click()
-    expect(page.get_by_role("dialog").get_by_label("Comment")).to_be_visible()
-    check_axe(page)
-
-
-def test_a_phone_shows_it_without_scrolling_sideways(screen: Callable[..., Page]) -> None:
-    page = screen(viewport=PHONE)
-    page.get_by_role("button", name="Plots").click()
-    expect(page.locator(".scatter canvas")).to_be_visible()
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
-
-
+@pytest.mark.torture
 def test_ten_thousand_failures(new_page: Callable[..., Page], service: Service, campaign: str) -> None:
     page = new_page(allowed=("404",))
     body = json.dumps(synthetic(15_000))

@@ -11,7 +11,6 @@ from playwright.sync_api import Page, expect
 
 import sumo_nets
 from tests.server import Service
-from tests.web.conftest import PHONE
 
 NET = Path(sumo_nets.__path__[0]) / "dense" / "dense.net.xml"
 HOSTILE = "<img src=x onerror=alert(1)> a very long label " + "x" * 100
@@ -104,26 +103,3 @@ def test_a_map_is_deleted_after_a_question(page_at: Callable[..., Page], service
     expect(page.get_by_role("link", name="to be deleted")).to_have_count(0)
     labels = [each["label"] for each in service.client.get("/v1/networks").json()["items"]]
     assert "to be deleted" not in labels
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_maps_keep_the_rules_of_accessibility(
-    scheme: str, page_at: Callable[..., Page], network: str, check_axe: Callable[[Page], None]
-) -> None:
-    page = page_at("maps", color_scheme=scheme)
-    page.get_by_role("link", name="<img").wait_for()
-    check_axe(page)
-    page.get_by_role("link", name="<img").click()
-    page.get_by_alt_text("The map from above").wait_for()
-    page.get_by_text("Why elsewhere not").click()
-    check_axe(page)
-
-
-def test_a_phone_shows_maps_without_scrolling_sideways(page_at: Callable[..., Page], network: str) -> None:
-    page = page_at("maps", viewport=PHONE)
-    page.get_by_role("link", name="<img").click()
-    page.get_by_alt_text("The map from above").wait_for()
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
-    page.get_by_role("link", name=re.compile("^Start a campaign: Junction")).first.click()
-    page.get_by_text("of a map of yours").wait_for()
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

@@ -6,13 +6,12 @@ import shlex
 from collections.abc import Callable
 from typing import Any
 
-import pytest
 import yaml
 from playwright.sync_api import Locator, Page, Request, Route, expect
 
 from risk_sac.config import CampaignSpec
 from tests.server import Service
-from tests.web.conftest import CAMPAIGN, PHONE
+from tests.web.conftest import CAMPAIGN
 
 HOSTILE = "</pre><script>alert('1')</script> yes: \"no\" #\\ \u2028"
 
@@ -217,26 +216,3 @@ def test_a_perfect_ego_has_neither_delay_nor_sensor(page_at: Callable[..., Page]
 def test_an_unknown_campaign_to_clone_is_told(page_at: Callable[..., Page]) -> None:
     page = page_at("new?from=c0", allowed=("404",))
     expect(page.get_by_role("alert")).to_contain_text("c0")
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_all_of_the_form_keeps_the_rules_of_accessibility(
-    scheme: str, page_at: Callable[..., Page], check_axe: Callable[[Page], None]
-) -> None:
-    page = page_at("new", color_scheme=scheme, allowed=("422",))
-    for title in ("Ego", "Operational design domain", "Requirements", "Learner", "Agent"):
-        opened(page, title)
-    page.get_by_role("button", name="Add a requirement").click()
-    page.get_by_label("Formula").fill("ttc_s >== 3")
-    page.locator(".fault pre").wait_for()
-    check_axe(page)
-
-
-def test_a_phone_shows_all_of_the_form_without_scrolling_sideways(page_at: Callable[..., Page]) -> None:
-    page = page_at("new", viewport=PHONE, allowed=("422",))
-    for title in ("Ego", "Operational design domain", "Requirements", "Learner", "Agent"):
-        opened(page, title)
-    page.get_by_role("button", name="Add a requirement").click()
-    page.get_by_label("Formula").fill("ttc_s >== 3 and " + "ttc_s > 1 and " * 20 + "ttc_s > 1")
-    page.locator(".fault pre").wait_for()
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]

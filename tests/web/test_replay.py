@@ -12,7 +12,6 @@ from PIL import Image
 from playwright.sync_api import Locator, Page, expect
 
 from tests.server import Service
-from tests.web.conftest import PHONE
 
 DRAWN = "(canvas) => canvas.drawn"
 ACTORS, STEPS = 20, 150
@@ -272,26 +271,6 @@ def test_picture_and_data_can_be_taken_along(failure: dict[str, Any], page_at: C
         assert animation.n_frames > 10
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_replay_and_pair_keep_the_rules_of_accessibility(
-    scheme: str, failure: dict[str, Any], page_at: Callable[..., Page], check_axe: Callable[[Page], None]
-) -> None:
-    page = page_at(failure["place"], color_scheme=scheme)
-    stage(page)
-    page.locator(".time-plot .u-over").nth(5).wait_for()
-    check_axe(page)
-    pair = page_at(f"{failure['place']}/twin/idle", color_scheme=scheme)
-    pair.locator("canvas.stage[data-time]").nth(1).wait_for()
-    check_axe(pair)
-
-
-def test_a_phone_need_not_scroll_sideways(failure: dict[str, Any], page_at: Callable[..., Page]) -> None:
-    for place in (failure["place"], f"{failure['place']}/twin/idle"):
-        page = page_at(place, viewport=PHONE)
-        page.locator(".time-plot .u-over").first.wait_for()
-        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
-
-
 @pytest.mark.parametrize("kind", LATE_DRIVERS)
 def test_a_twin_is_shown_at_the_same_time_as_its_failure(
     kind: str, failure: dict[str, Any], service: Service, page_at: Callable[..., Page]
@@ -323,6 +302,7 @@ def test_a_twin_that_cannot_be_played_says_so(
     expect(twin).to_contain_text("the scene has <b>other</b> parameters now")
 
 
+@pytest.mark.torture
 def test_frames_per_second_with_many_actors(
     failure: dict[str, Any], new_page: Callable[..., Page], service: Service, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -7,13 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import httpx
-import pytest
 from playwright.sync_api import Page, expect
 
 from tests.server import Service, servers
-from tests.web.conftest import PHONE
-
-PLACES = ("campaigns", "new", "compare", "nowhere")
 
 
 def test_a_browser_comes_from_the_entrance_to_the_page_and_a_program_does_not(
@@ -42,23 +38,6 @@ def test_the_assets_are_small_and_kept(service: Service) -> None:
         assert "immutable" in answer.headers["cache-control"]
         sizes.append(len(gzip.compress(answer.content)))
     assert sum(sizes) <= 250_000
-
-
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_no_place_violates_the_rules_of_accessibility(
-    place: str, scheme: str, page_at: Callable[..., Page], check_axe: Callable[[Page], None], campaign: str
-) -> None:
-    page = page_at(place, color_scheme=scheme)
-    page.get_by_role("heading", level=1).first.wait_for()
-    check_axe(page)
-
-
-@pytest.mark.parametrize("place", PLACES)
-def test_a_phone_need_not_scroll_sideways(place: str, page_at: Callable[..., Page], campaign: str) -> None:
-    page = page_at(place, viewport=PHONE)
-    page.get_by_role("heading", level=1).first.wait_for()
-    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
 
 
 def test_the_choice_of_a_theme_survives_a_reload(page_at: Callable[..., Page]) -> None:

@@ -59,7 +59,7 @@ export function Kinds({ campaign, family, overview, cells }: Found) {
 }
 
 function Heat({ value, most }: { value: number; most: number }) {
-  const strength = value ? 12 + (36 * value) / most : 0;
+  const strength = value ? 10 + (24 * value) / most : 0; // more is too little contrast in the dark theme
   return (
     <td class="number" style={{ background: `color-mix(in srgb, var(--series-6) ${strength}%, transparent)` }}>
       {value ? count(value) : <span class="faint">–</span>}
