@@ -12,14 +12,11 @@ from risk_sac import __version__
 from risk_sac.execution.executor import Executor, executor_named
 from risk_sac.execution.messages import Event
 from risk_sac.scenario.library import VARIABLE
-from service.api.answer_cache import AnswerCache
 from service.api.answers.pages import Cursors
 from service.api.answers.problems import add_problem_handlers
-from service.api.compression import Compression
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
-from service.api.guards import add_guards
-from service.api.head import Head
+from service.api.middleware import add_middleware
 from service.api.routes import (
     campaigns,
     catalogue,
@@ -39,7 +36,6 @@ from service.api.routes import (
 )
 from service.api.stream import Streams
 from service.api.telemetry.metrics import registry, request_latencies
-from service.api.telemetry.requests import Observe
 from service.host.data_folder import hold_data_folder
 from service.keys.exposure import check_exposure
 from service.keys.file import KeyFile
@@ -91,11 +87,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
         app.include_router(routes.router)
     app.router.routes += page.routes()
     add_problem_handlers(app)
-    app.add_middleware(AnswerCache)
-    app.add_middleware(Compression)
-    add_guards(app, settings, made)
-    app.add_middleware(Head)
-    app.add_middleware(Observe, latencies=latencies)
+    add_middleware(app, settings, made, latencies)
     app.openapi = lambda: openapi(app)  # type: ignore[method-assign]  # FastAPI's documented way
     return app
 

@@ -1,8 +1,7 @@
-"""How many connections there may be, and how long one may keep the server waiting.
+"""Guards against clients that keep the server waiting: with connections, request heads, bodies or unread answers.
 
-A connection costs a descriptor, and the database and the workers need descriptors, too: a server that has none left
-stands still. So there is room for so many, and once it is full, the connection that has owed a request for longest
-goes, which is none that has just come to send one.
+A connection costs a descriptor, and the database and the workers need descriptors, too. So the number of connections
+is bounded; a newcomer takes the place of the connection that has owed a request head for longest.
 """
 
 import asyncio
@@ -16,7 +15,7 @@ from http import HTTPStatus
 from typing import Any, cast
 
 import uvicorn
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from service.api.answers.problems import ProblemError, problem_response
@@ -26,32 +25,32 @@ from service.settings import ServiceSettings
 OWN_FILES = 64  # that the server may have open without any connection: database, log, keys, reports, uploads
 WORKER_FILES = 4  # for each worker
 FEWEST = 8
-WAITING = 2048  # connections that the kernel keeps until they are accepted
+BACKLOG = 2048  # connections that the kernel queues until they are accepted
 UNREAD_S = 60.0  # for which a client may take nothing of its answer
-CALM_S = 60.0  # after which a full room is worth another line in the log
+CALM_S = 60.0  # between two log lines about a full room
+UPLOADS = "/v1/networks"
 
 logger = logging.getLogger(__name__)
 
 
 class Server(uvicorn.Server):
-    """Uvicorn's, with room for so many connections and no more."""
+    """Uvicorn's server with a bounded number of connections."""
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings, **options: Any) -> None:
         http = cast(type[asyncio.Protocol], partial(Connection, room=Room(settings)))
         super().__init__(uvicorn.Config(app, http=http, backlog=_accepted_at_once(), **options))
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Starts to listen."""
+        """Starts to listen, with a long queue of connections that are not accepted yet."""
         await super().startup(sockets)
-        # The backlog is two things: what the event loop accepts before it looks up, and what waits to be accepted.
-        # The second may be large: else, in a rush, newcomers would be passed over and try again only seconds later.
+        # asyncio also takes the backlog as the number of connections that it accepts in one turn, which must be small.
         for listening in (each for server in self.servers for each in server.sockets):
             with socket.socket(fileno=os.dup(listening.fileno())) as same:
-                same.listen(WAITING)
+                same.listen(BACKLOG)
 
 
 def _accepted_at_once() -> int:
-    return max(4, min(WAITING, _descriptors() // 32))
+    return max(4, min(BACKLOG, _descriptors() // 32))
 
 
 def _descriptors() -> int:
@@ -63,26 +62,24 @@ class Room:
 
     def __init__(self, settings: ServiceSettings) -> None:
         self.head_s = settings.head_timeout_s
-        # Of those that go, some still have their descriptor when the next ones are accepted.
+        self.owing: dict[Connection, None] = {}  # those that owe a request head, longest first
+        # Closed connections may still hold their descriptors when the next ones are accepted.
         workers = settings.max_workers if settings.executor == "local" else 0
-        others = OWN_FILES + WORKER_FILES * workers + 4 * _accepted_at_once()
-        possible = max(FEWEST, _descriptors() - others)
+        possible = max(FEWEST, _descriptors() - OWN_FILES - WORKER_FILES * workers - 4 * _accepted_at_once())
         self._most = min(possible, settings.max_connections or possible)
         self._open: set[Connection] = set()
-        self._owing: dict[Connection, None] = {}  # those that owe the head of a request, for longest the first
         self._full_at = float("-inf")
 
     def enter(self, connection: "Connection") -> None:
-        """One more, for which another one may have to go."""
+        """Adds a connection; if there are too many, drops the one that has owed a head for longest."""
         self._open.add(connection)
-        self.owe(connection)
         if len(self._open) <= self._most:
             return
         now = time.monotonic()
         if now - self._full_at > CALM_S:
             logger.warning("%d connections are as many as may be; for a new one the longest idle goes", self._most)
         self._full_at = now
-        longest = next(iter(self._owing))
+        longest = next(iter(self.owing))
         self.leave(longest)
         if longest is connection:  # all others are being answered
             connection.refuse(f"{self._most} connections are open; wanted fewer: try again in 1 s")
@@ -90,70 +87,59 @@ class Room:
             longest.transport.abort()
 
     def leave(self, connection: "Connection") -> None:
-        """It is gone, or as good as gone."""
+        """Removes a connection."""
         self._open.discard(connection)
-        self.settle(connection)
-
-    def owe(self, connection: "Connection") -> None:
-        """It is to send the head of a request now."""
-        self._owing[connection] = None
-
-    def settle(self, connection: "Connection") -> None:
-        """It has sent one."""
-        self._owing.pop(connection, None)
+        self.owing.pop(connection, None)
 
 
 class Connection(HttpToolsProtocol):
-    """Uvicorn's, with an end to its patience."""
+    """Uvicorn's HTTP protocol with deadlines for the request head and for reading the answer."""
 
     def __init__(self, *args: Any, room: Room, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self._room = room
         self._head_due: asyncio.TimerHandle | None = None
         self._reading_due: asyncio.TimerHandle | None = None
-        self._unread = 0  # bytes of answers, when the client was last looked at
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """A client has come."""
+        """Expects a request head, as uvicorn calls it."""
         super().connection_made(transport)
         self._await_head()
         self._room.enter(self)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """It has left, or had to."""
+        """Cancels the deadlines."""
         self._room.leave(self)
-        for timer in (self._head_due, self._reading_due):
-            if timer is not None:
-                timer.cancel()
+        for timer in filter(None, (self._head_due, self._reading_due)):
+            timer.cancel()
         super().connection_lost(exc)
 
     def on_headers_complete(self) -> None:
-        """The head of a request is here."""
+        """Begins the answer."""
         if self._head_due is not None:
             self._head_due.cancel()
-        self._room.settle(self)
+        self._room.owing.pop(self, None)
         super().on_headers_complete()
 
     def on_response_complete(self) -> None:
-        """An answer is written."""
+        """Expects the next request head, unless it has come already."""
         super().on_response_complete()
-        if self.cycle.response_complete and not self.transport.is_closing():  # it has not sent the next request yet
+        if self.cycle.response_complete and not self.transport.is_closing():
             self._await_head()
-            self._room.owe(self)
 
     def pause_writing(self) -> None:
-        """The client does not read as fast as the answer is written."""
+        """Sets a deadline for the client that reads more slowly than the answer is written."""
         super().pause_writing()
         self._await_reading()
 
     def resume_writing(self) -> None:
-        """It has caught up."""
+        """Cancels that deadline."""
         super().resume_writing()
         if self._reading_due is not None:
             self._reading_due.cancel()
 
     def refuse(self, detail: str) -> None:
-        """Say that there is no room."""
+        """Answers 503 before any request and closes."""
         headers = {"Retry-After": "1", "Connection": "close"}
         status = HTTPStatus.SERVICE_UNAVAILABLE
         answer = problem_response("", ProblemError(status, Reason.CONNECTIONS_BUSY, detail, headers=headers))
@@ -162,19 +148,77 @@ class Connection(HttpToolsProtocol):
         self.transport.close()
 
     def _await_head(self) -> None:
-        # From now on, whatever comes in the meantime: a head that comes byte by byte is late, too.
-        self._head_due = self.loop.call_later(self._room.head_s, self._hang_up)
+        self._room.owing[self] = None
+        self._head_due = self.loop.call_later(self._room.head_s, self._hang_up)  # also if it comes byte by byte
 
     def _hang_up(self) -> None:
         self.transport.close()  # which first writes what is left of an answer
         self._await_reading()
 
     def _await_reading(self) -> None:
-        self._unread = self.transport.get_write_buffer_size()
-        self._reading_due = self.loop.call_later(UNREAD_S, self._look_whether_it_reads)
+        unread = self.transport.get_write_buffer_size()
+        self._reading_due = self.loop.call_later(UNREAD_S, self._check_reading, unread)
 
-    def _look_whether_it_reads(self) -> None:
-        if self.transport.get_write_buffer_size() < self._unread:
+    def _check_reading(self, unread: int) -> None:
+        if self.transport.get_write_buffer_size() < unread:
             self._await_reading()
         else:
             self.transport.abort()
+
+
+class BodyLimit:
+    """ASGI middleware that refuses bodies that are too large or arrive too slowly."""
+
+    def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
+        self._app = app
+        self._settings = settings
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes on; where the body is refused, reading it raises, and the refusal replaces the app's answer."""
+        headers = dict(scope["headers"]) if scope["type"] == "http" else {}
+        if b"content-length" not in headers and b"transfer-encoding" not in headers:
+            await self._app(scope, receive, send)
+            return
+        settings = self._settings
+        upload = scope["path"].startswith(UPLOADS)
+        limit = settings.max_upload_bytes if upload else settings.max_body_bytes
+        if int(headers.get(b"content-length", 0)) > limit:  # uvicorn has checked that it is a number
+            await problem_response(scope["path"], _too_large(limit))(scope, receive, send)
+            return
+        received, waited_s, complete = 0, 0.0, False
+        refusal: ProblemError | None = None
+
+        async def limited_receive() -> Message:
+            nonlocal received, waited_s, complete, refusal
+            if complete:  # what is waited for now is that the client leaves
+                return await receive()
+            began = time.monotonic()
+            try:
+                async with asyncio.timeout(settings.body_patience_s + received / settings.min_body_rate - waited_s):
+                    message = await receive()
+            except TimeoutError as error:
+                slow = f"{settings.min_body_rate} bytes per second, for more than {settings.body_patience_s:g} s"
+                detail, status = f"the body comes more slowly than {slow}; wanted it faster", HTTPStatus.REQUEST_TIMEOUT
+                close = {"Connection": "close"}  # nobody waits for the rest
+                refusal = ProblemError(status, Reason.UPLOAD_TOO_SLOW, detail, headers=close)
+                raise refusal from error
+            waited_s += time.monotonic() - began  # without the time that the service takes itself
+            received += len(message.get("body", b""))
+            complete = not message.get("more_body", False)
+            if received > limit:
+                refusal = _too_large(limit)
+                raise refusal
+            return message
+
+        async def limited_send(message: Message) -> None:
+            if refusal is None:  # else FastAPI's form parser would answer 400
+                await send(message)
+
+        await self._app(scope, limited_receive, limited_send)
+        if refusal is not None:
+            await problem_response(scope["path"], refusal)(scope, receive, send)
+
+
+def _too_large(limit: int) -> ProblemError:
+    detail = f"the body is larger than {limit} bytes; wanted a smaller one"
+    return ProblemError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, Reason.TOO_LARGE, detail)

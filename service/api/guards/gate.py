@@ -3,17 +3,16 @@
 A route that is added tomorrow is therefore guarded today: it wants a key unless `PUBLIC` or `PAGE` names it.
 """
 
-from collections.abc import Mapping
+import re
+import time
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.access import CALLER, LOCAL, Caller, check_scope
-from service.api.answers.problems import ProblemError
-from service.api.guards.hosts import Hosts
-from service.api.guards.origins import SAFE, Origins
-from service.api.guards.rate import RateLimit
-from service.api.guards.refusal import refuse
+from service.api.answers.problems import ProblemError, problem_response
 from service.errors import KeysError
 from service.keys.exposure import is_loopback
 from service.keys.file import REMEDY
@@ -23,10 +22,12 @@ from service.keys.ring import KeyRing
 from service.schemas.problems import Reason
 from service.settings import ServiceSettings
 
+SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # methods that change nothing
 HEALTH = frozenset({"/healthz", "/readyz"})
 _PAGE = {"/docs", "/docs/swagger-ui-bundle.js", "/docs/swagger-ui.css", "/docs/favicon.png"}
 PUBLIC = HEALTH | _PAGE | {"/", "/openapi.json", "/page"}
 PAGE = "/page/"  # and what lies below: it asks for the key itself
+_HOST = re.compile(r"(?:\[(?P<address>[0-9a-f:.]+)\]|(?P<name>[^:\[\]]*))(?::\d*)?")
 
 RequestHeaders = Mapping[bytes, bytes]
 
@@ -36,8 +37,8 @@ class Gate:
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings, made: KeysMade) -> None:
         self._app = app
-        self._hosts = Hosts([*settings.allowed_hosts, settings.host])
-        self._origins = Origins(settings.cors_origins)
+        self._hosts = allowed_hosts([*settings.allowed_hosts, settings.host])
+        self._origins = frozenset(origin.lower() for origin in settings.cors_origins)
         self._rate = RateLimit(settings.rate_limit)
         self._keys = KeyRing(settings.keys_file, made)
         self._keyless = is_loopback(settings.host)
@@ -51,7 +52,7 @@ class Gate:
         try:
             self._check(scope, headers)
         except ProblemError as error:
-            await refuse(error, scope, receive, send)
+            await problem_response(scope["path"], error)(scope, receive, send)
             return
         caller, ended = scope.get(CALLER), False
 
@@ -66,13 +67,9 @@ class Gate:
         await self._app(scope, receive, send_while_let_in)
 
     def _check(self, scope: Scope, headers: RequestHeaders) -> None:
-        """Lets the caller in.
-
-        Raises:
-          ProblemError: or does not.
-        """
-        self._hosts.check(scope, headers)
-        self._origins.check(scope, headers)
+        """Lets the caller in, or raises ProblemError."""
+        check_host(scope, headers, self._hosts)
+        check_origin(scope["method"], headers, self._origins)
         path, method = scope["path"], scope["method"]
         if path in HEALTH:  # not counted, or a flood from one address would make the service look ill
             return
@@ -99,7 +96,7 @@ class Gate:
             return False
 
     def _caller(self, headers: RequestHeaders) -> Caller:
-        """Who holds the key that a request carries.
+        """Finds the caller by the key that a request carries.
 
         Raises:
           ProblemError: 401, or 503 where that cannot be known.
@@ -119,3 +116,74 @@ class Gate:
                 HTTPStatus.UNAUTHORIZED, Reason.UNAUTHORIZED, detail, headers={"WWW-Authenticate": "Bearer"}
             )
         return Caller(key.project, key.scope, key.id)
+
+
+class RateLimit:
+    """Counts the requests of each key, and of each address without one, in windows of a second."""
+
+    def __init__(self, per_second: int) -> None:
+        self._per_second = per_second
+        self._window = 0
+        self._counts = Counter[tuple[str, ...]]()
+
+    def count(self, *who: str) -> None:
+        """Counts a request.
+
+        Raises:
+          ProblemError: 429, too many.
+        """
+        window = int(time.monotonic())
+        if window != self._window:
+            self._window = window
+            self._counts.clear()
+        self._counts[who] += 1
+        if self._counts[who] > self._per_second:
+            detail = f"rate is more than {self._per_second} requests per second; wanted fewer: wait 1 s"
+            raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.RATE_LIMITED, detail, headers={"Retry-After": "1"})
+
+
+def allowed_hosts(hosts: Iterable[str]) -> frozenset[str]:
+    """Names of hosts, as `check_host` compares them."""
+    return frozenset(map(_host_name, hosts))
+
+
+def check_host(scope: Scope, headers: RequestHeaders, allowed: frozenset[str]) -> None:
+    """Refuses a Host that names another service: a web page that rebinds its own name to this address.
+
+    Not Starlette's TrustedHostMiddleware: any address that the connection was made to is allowed, and a refusal is a
+    problem.
+
+    Raises:
+      ProblemError: 421.
+    """
+    given = headers.get(b"host", b"").decode("latin-1")
+    server = scope.get("server")
+    reached_at = None if server is None else server[0].lower().removeprefix("::ffff:")  # IPv4 on a socket for both
+    if "*" in allowed or _host_name(given) in {*allowed, reached_at}:
+        return
+    detail = f"host is {given!r}; wanted one of {', '.join(sorted(allowed))}: RISK_SAC_ALLOWED_HOSTS adds to them"
+    raise ProblemError(HTTPStatus.MISDIRECTED_REQUEST, Reason.UNKNOWN_HOST, detail)
+
+
+def _host_name(host: str) -> str:
+    """A host without its port and without the brackets of IPv6: `[::1]:8000` -> `::1`."""
+    host = host.lower()
+    parts = _HOST.fullmatch(host)
+    return host if parts is None else parts["address"] or parts["name"]
+
+
+def check_origin(method: str, headers: RequestHeaders, allowed: frozenset[str]) -> None:
+    """Refuses a change that a foreign web page asks for; programs send no Origin.
+
+    Raises:
+      ProblemError: 403.
+    """
+    given = headers.get(b"origin")
+    if given is None or "*" in allowed or method in SAFE:
+        return
+    origin = given.decode("latin-1").lower()
+    # Without the scheme, which a proxy in front may have changed; the host has been checked.
+    if origin in allowed or origin.partition("://")[2] == headers.get(b"host", b"").decode("latin-1").lower():
+        return
+    detail = f"origin is {origin!r}; wanted the service's own, or one that RISK_SAC_CORS_ORIGINS names"
+    raise ProblemError(HTTPStatus.FORBIDDEN, Reason.FOREIGN_ORIGIN, detail)

@@ -6,7 +6,7 @@ from starlette.applications import Starlette
 from starlette.responses import Response, StreamingResponse
 from starlette.routing import Route
 
-from service.api.compression import LEAST_BYTES, Compression
+from service.api.middleware import LEAST_BYTES, Compression
 
 CONTENT = b"<svg/>" * LEAST_BYTES
 
@@ -18,7 +18,7 @@ async def answer(media_type, accepted="gzip", content=CONTENT, respond=Response,
         return respond(content, media_type=media_type, **more)
 
     app = Starlette(routes=[Route("/", route)])
-    app.add_middleware(Compression)
+    app.add_middleware(Compression, minimum_size=LEAST_BYTES)
     client = httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://test")
     async with client, client.stream("GET", "/", headers={"accept-encoding": accepted}) as response:
         return response.headers, b"".join([part async for part in response.aiter_raw()])
