@@ -16,6 +16,7 @@ from service.api.answers.pages import Cursors
 from service.api.answers.problems import add_problem_handlers
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
+from service.api.metrics import registry, request_latencies
 from service.api.middleware import add_middleware
 from service.api.routes import (
     campaigns,
@@ -25,17 +26,13 @@ from service.api.routes import (
     events,
     evidence,
     exports,
-    logs,
     networks,
     operations,
-    page,
     pictures,
     regressions,
     reports,
-    sketches,
 )
 from service.api.stream import Streams
-from service.api.telemetry.metrics import registry, request_latencies
 from service.host.data_folder import hold_data_folder
 from service.keys.exposure import check_exposure
 from service.keys.file import KeyFile
@@ -82,10 +79,10 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
         docs_url=None,  # the routes have pages that need no network
         redoc_url=None,
     )
-    shown = (episodes, logs, pictures, exports, sketches, events, reports, evidence)
+    shown = (episodes, pictures, exports, events, reports, evidence)
     for routes in (campaigns, *shown, regressions, networks, catalogue, operations, docs):
         app.include_router(routes.router)
-    app.router.routes += page.routes()
+    app.router.routes += docs.page_routes()
     add_problem_handlers(app)
     add_middleware(app, settings, made, latencies)
     app.openapi = lambda: openapi(app)  # type: ignore[method-assign]  # FastAPI's documented way

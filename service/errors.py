@@ -8,6 +8,8 @@ RiskSacError
     ├── KeysError          the API keys cannot be read, or have no such key
     ├── StorageError       the database or the data folder refused
     │   └── OutdatedError  what a stored campaign asks for is refused by now
+    ├── UploadError        an upload is refused
+    ├── BusyError          as much is at work as may be
     └── TransitionError    a change of state that the table of transitions does not allow
 """
 
@@ -53,6 +55,19 @@ class StorageError(ServiceError):
 
 class OutdatedError(StorageError):
     """What a stored campaign asks for is refused by now; it can be listed and deleted, and its runs fail."""
+
+
+class UploadError(ServiceError):
+    """An upload holds something that it must not, or does not load; the message says what and where."""
+
+
+class BusyError(ServiceError):
+    """As much is at work as may be; `reason` names what, and asking again pays after `retry_after_s` seconds."""
+
+    def __init__(self, message: str, retry_after_s: int, reason: str = "uploads_busy") -> None:
+        super().__init__(message)
+        self.retry_after_s = retry_after_s
+        self.reason = reason
 
 
 class TransitionError(ServiceError):

@@ -12,8 +12,8 @@ from typing import Any
 from fastapi import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.access import CALLER
 from service.api.answers.representations import Representation
+from service.api.context import CALLER
 from service.store.reading import Store
 
 MOST_BYTES = 16 << 20  # of all kept answers

@@ -1,17 +1,21 @@
-"""What routes work with; the app puts it in place when it starts."""
+"""What routes work with: the running service, and the caller whom the gate let in."""
 
 from dataclasses import dataclass
+from http import HTTPStatus
 from typing import Annotated, cast
 
 from fastapi import Depends, Request
 from prometheus_client import CollectorRegistry
 
 from service.api.answers.pages import Cursors
+from service.api.answers.problems import ProblemError
 from service.api.stream import Streams
+from service.keys.key import Scope
 from service.networks.shelf import Shelf
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager
 from service.runs.regressions import Regressions
+from service.schemas.problems import Reason
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.views.on_demand import OnDemandCache
@@ -46,3 +50,46 @@ async def _context(request: Request) -> Context:
 
 
 Service = Annotated[Context, Depends(_context)]
+
+CALLER = "risk_sac.caller"  # in the ASGI scope, where the gate puts it
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Somebody whom the gate let in."""
+
+    project: str  # owns what the caller posts
+    scope: Scope
+    key_id: str | None  # None: a process of this machine, which needs no key
+
+    @property
+    def sees(self) -> str | None:
+        """The one project whose campaigns the caller may know of; None: all."""
+        return None if self.scope is Scope.ADMIN else self.project
+
+
+LOCAL = Caller("default", Scope.ADMIN, None)
+
+
+def check_scope(caller: Caller, scope: Scope) -> None:
+    """Refuses a caller whose key does not reach so far.
+
+    Raises:
+      ProblemError: 403.
+    """
+    if not caller.scope.includes(scope):
+        detail = f"scope of this key is {caller.scope}; wanted {scope}: ask for another key"
+        raise ProblemError(HTTPStatus.FORBIDDEN, Reason.FORBIDDEN, detail)
+
+
+async def _caller(request: Request) -> Caller:
+    # Without a default: where the gate is not in place, nobody gets in.
+    return cast(Caller, request.scope[CALLER])
+
+
+CurrentCaller = Annotated[Caller, Depends(_caller)]
+
+
+async def require_admin(caller: CurrentCaller) -> None:
+    """A dependency for routes that want more than the gate does, which is `read` to look and `run` to change."""
+    check_scope(caller, Scope.ADMIN)

@@ -12,7 +12,7 @@ from service.api.answer_cache import AnswerCache
 from service.api.answers.representations import takes
 from service.api.guards.connections import BodyLimit
 from service.api.guards.gate import Gate
-from service.api.telemetry.requests import Observe
+from service.api.observe import Observe
 from service.keys.made import KeysMade
 from service.settings import ServiceSettings
 

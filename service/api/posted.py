@@ -1,6 +1,7 @@
 """Posted JSON, read strictly: `"3"` and `true` are no numbers, as the API's description says."""
 
 import json
+from collections.abc import Collection
 from http import HTTPStatus
 from typing import Any, TypeVar
 
@@ -9,7 +10,6 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ValidationError
 
 from service.api.answers.problems import ProblemError
-from service.api.media_types import media_type
 from service.schemas.problems import Reason
 
 MOST_MISTAKES = 50  # that a refusal names one by one
@@ -73,3 +73,31 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> None:
         if names.count(name) > 1:  # no object of a campaign that passed has many fields
             detail = f"the body has the field {name!r} twice in one object; wanted it once"
             raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail)
+
+
+def media_type(request: Request, wanted: Collection[str]) -> str:
+    """The media type of a body.
+
+    Args:
+      request: which has the body.
+      wanted: media types that the route reads, the one to recommend first.
+
+    Raises:
+      ProblemError: 415, it is none of them, or the body is packed for the way.
+    """
+    given = request.headers.get("content-type", "")
+    declared = given.partition(";")[0].strip().lower()
+    if declared not in wanted:
+        example = f"curl -H 'content-type: {next(iter(wanted))}' --data-binary @FILE"
+        detail = (
+            f"content-type is {given[:100]!r}; wanted {' or '.join(wanted)}: send the file alone, as in `{example}`"
+        )
+        raise _unsupported(detail)
+    encoding = request.headers.get("content-encoding", "identity")
+    if encoding.strip().lower() != "identity":
+        raise _unsupported(f"content-encoding is {encoding[:100]!r}; wanted none: send the body as it is")
+    return declared
+
+
+def _unsupported(detail: str) -> ProblemError:
+    return ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, Reason.UNSUPPORTED_MEDIA_TYPE, detail)

@@ -10,14 +10,10 @@ from pydantic import Field, model_validator
 from risk_sac.config import CampaignSpec, Settings
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.maps.found import Pattern
-from service.api.access import Caller, CurrentCaller
-from service.api.answers.busy import busy
 from service.api.answers.problems import invalid_field
-from service.api.context import Context, Service
-from service.api.media_types import media_type
-from service.api.posted import REFERENCE, input_schemas, read_content, refuse_repeats
+from service.api.context import Caller, Context, CurrentCaller, Service
+from service.api.posted import REFERENCE, input_schemas, media_type, read_content, refuse_repeats
 from service.errors import NotFoundError
-from service.networks.errors import BusyError
 
 ON_MAP = "CampaignOnMap"
 
@@ -98,5 +94,3 @@ def _families(ground: Ground, service: Context, caller: Caller) -> list[str]:
         return service.surveys.keep(ground.network, caller.sees, ground.pattern, ground.place)
     except NotFoundError as error:
         raise invalid_field("network", ground.network, "the id of one of GET /v1/networks") from error
-    except BusyError as error:
-        raise busy(error) from error

@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 
-from service.networks.errors import UploadError
+from service.errors import UploadError
 
 
 class Packaging(StrEnum):

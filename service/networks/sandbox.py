@@ -8,8 +8,7 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from risk_sac.execution.helper import ANSWER, run_helper
-from service.errors import StorageError
-from service.networks.errors import UploadError
+from service.errors import StorageError, UploadError
 from service.networks.limits import LOG_BYTES, WALL_S
 from service.networks.packaging import Packaging
 from service.networks.report import CheckReport

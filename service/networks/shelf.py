@@ -20,8 +20,7 @@ from pathlib import Path
 
 from risk_sac.errors import DamagedError
 from risk_sac.run_folder.durable import read_sealed, seal, sync_folder
-from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
-from service.networks.errors import BusyError
+from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError
 from service.networks.incoming import Incoming
 from service.networks.packaging import Packaging
 from service.networks.report import CheckReport

@@ -11,8 +11,7 @@ from typing import Any
 from risk_sac.errors import ConfigError
 from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.scenario.library import VARIABLE
-from service.errors import StorageError
-from service.networks.errors import BusyError
+from service.errors import BusyError, StorageError
 from service.networks.limits import SURVEY_MEMORY_BYTES, SURVEY_S
 from service.networks.report import PICTURE, PLACES
 from service.networks.schemas import Places

@@ -7,15 +7,12 @@ import anyio
 from anyio import to_thread
 from async_lru import alru_cache
 
-from service.errors import ServiceError
+from service.errors import BusyError
 
 AT_ONCE = 1  # of a kind
 MOST_WAITING = 16
+RETRY_AFTER_S = 2  # in which some of those that wait are made
 KEPT = 64  # of pictures and bundles, each of some 150 kB
-
-
-class TooManyWaiting(ServiceError):
-    """Too many requests wait for the cache."""
 
 
 S = TypeVar("S", bound=Hashable)
@@ -42,13 +39,15 @@ class OnDemandCache(Generic[S]):
         """The content of a subject, or whatever its making raises.
 
         Raises:
-          TooManyWaiting: the queue is full.
+          BusyError: the queue is full.
         """
         return await self._made(subject)
 
     async def _queue(self, subject: S) -> bytes:
         if self._begun >= AT_ONCE + MOST_WAITING:
-            raise TooManyWaiting(f"{MOST_WAITING} {self._what} wait to be made; wanted fewer")
+            raise BusyError(
+                f"{MOST_WAITING} {self._what} wait to be made; wanted fewer", RETRY_AFTER_S, "pictures_busy"
+            )
         self._begun += 1
         try:
             return await to_thread.run_sync(self._make, subject, limiter=self._threads)

@@ -16,7 +16,7 @@ from starlette.routing import compile_path
 
 from risk_sac.config.invalid import LONGEST_VALUE, causes, field_error, shown
 from risk_sac.errors import ConfigError
-from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
+from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError, UploadError
 from service.schemas.problems import FieldProblem, Problem, Reason
 
 logger = logging.getLogger(__name__)
@@ -65,7 +65,7 @@ def invalid_field(field: str, got: object, wanted: str) -> ProblemError:
 
 # Errors that say what is wrong; any other is a bug of the service.
 _OF_REQUESTS = (RequestValidationError, HTTPException, ProblemError, ConfigError)
-_OF_THE_SERVICE = (NotFoundError, ConflictError, QuotaError, StorageError)
+_OF_THE_SERVICE = (NotFoundError, ConflictError, QuotaError, BusyError, UploadError, StorageError)
 
 
 def add_problem_handlers(app: FastAPI) -> None:
@@ -113,6 +113,11 @@ def _problem(request: Request, error: Exception) -> ProblemError:
         case QuotaError():
             headers = {"Retry-After": str(math.ceil(error.retry_after_s))}
             return ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.QUOTA_EXCEEDED, said, headers=headers)
+        case BusyError():
+            headers = {"Retry-After": str(error.retry_after_s)}
+            return ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason(error.reason), said, headers=headers)
+        case UploadError():
+            return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.UPLOAD_REFUSED, said)
         case StorageError():
             logger.error("%s %s: %s", request.method, request.url.path, said)
             return ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.STORAGE_UNAVAILABLE, said)

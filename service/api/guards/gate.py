@@ -11,8 +11,8 @@ from http import HTTPStatus
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.access import CALLER, LOCAL, Caller, check_scope
 from service.api.answers.problems import ProblemError, problem_response
+from service.api.context import CALLER, LOCAL, Caller, check_scope
 from service.errors import KeysError
 from service.keys.exposure import is_loopback
 from service.keys.file import REMEDY

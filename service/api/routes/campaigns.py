@@ -5,14 +5,14 @@ from hashlib import blake2b
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi.responses import PlainTextResponse
 
 from risk_sac import __version__, problem
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.records import Campaign, CampaignPage, Record, Results, State, wire
-from service.api.access import Caller, CurrentCaller
 from service.api.answer_cache import keep
-from service.api.answers.pages import Cursor, Limit
-from service.api.answers.representations import Representation, caching, entity_tag, has
+from service.api.answers.pages import TIERS, Cursor, Limit, Tier
+from service.api.answers.representations import Representation, caching, entity_tag, has, not_modified
 from service.api.answers.responses import (
     ACCEPTED,
     INVALID,
@@ -25,15 +25,17 @@ from service.api.answers.responses import (
     TAGGED,
     UNKNOWN,
 )
-from service.api.answers.tiers import TIERS, Tier
-from service.api.context import Context, Service
+from service.api.context import Caller, Context, CurrentCaller, Service
 from service.api.posted_campaign import PostedCampaign, documented_campaign
+from service.errors import NotFoundError
+from service.runs.manager import LOG
 from service.schemas.curves import Curves
 from service.schemas.failure_table import FailureTable
 from service.store.stored import StoredCampaign
 from service.views.bodies import campaign_body, summary_body
 from service.views.curves import curves
 from service.views.failure_table import failure_table
+from service.views.logs import log_tail
 from service.views.progress import retry_after_s
 from service.views.totals import results
 
@@ -51,6 +53,8 @@ IdempotencyKey = Annotated[
     ),
 ]
 Points = Annotated[int, Query(ge=1, le=1000, description="Of each curve, at most.")]
+
+LOG_TEXT = TAGGED | {200: TAGGED[200] | {"content": {"text/plain": {"schema": {"type": "string"}}}}}
 
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
 
@@ -160,6 +164,25 @@ def get_curves(
         caller,
         lambda found: curves(found, service.store.plain_episodes(found.number), points),
     )
+
+
+@router.get("/{campaign_id}/runs/{run_id}/log", response_class=Response, responses=UNKNOWN | LOG_TEXT)
+def get_log(
+    campaign_id: str,
+    run_id: str,
+    request: Request,
+    service: Service,
+    caller: CurrentCaller,
+    lines: Annotated[int, Query(ge=1, le=1000, description="At most; fewer where they are long.")] = 200,
+) -> Response:
+    """The last lines that the workers of a run printed, without the server's folders; empty before there are any."""
+    campaign = service.store.campaign(campaign_id, caller.sees)
+    if run_id not in {run.id for run in campaign.runs}:
+        message = f"campaign {campaign_id} has no run {run_id!r}; GET it lists all runs"
+        raise NotFoundError(message, field="run_id", got=run_id)
+    text = log_tail(service.settings.run_folder(campaign_id, run_id) / LOG, lines).encode()
+    tag = entity_tag(blake2b(text, digest_size=8).hexdigest())
+    return not_modified(tag) if has(request, tag) else PlainTextResponse(text, headers=caching(tag))
 
 
 def _kept(

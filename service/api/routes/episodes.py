@@ -5,12 +5,10 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from risk_sac.records import Episode, EpisodePage, Failure, Grade, Outcome, Triage
-from service.api.access import CurrentCaller
-from service.api.answers.pages import Cursor, Limit
+from service.api.answers.pages import TIERS, Cursor, Limit, Tier
 from service.api.answers.representations import as_json
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN
-from service.api.answers.tiers import TIERS, Tier
-from service.api.context import Service
+from service.api.context import CurrentCaller, Service
 from service.api.posted import documented, read_posted
 from service.schemas.posted import PostedTriage
 from service.store.finding import Judged

@@ -7,10 +7,9 @@ from fastapi import APIRouter, Header, Query, Response
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from service.api.access import CurrentCaller
 from service.api.answers.problems import invalid_field
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses
-from service.api.context import Service
+from service.api.context import CurrentCaller, Service
 from service.api.stream import decode_position
 from service.store.reading import Store
 

@@ -13,10 +13,9 @@ from risk_sac.failures.cases import Regression
 from risk_sac.records import State
 from risk_sac.report import FinishedRun
 from risk_sac.report.evidence import POLICY, Evidence, Origin, gathered, html, markdown, report
-from service.api.access import CurrentCaller
 from service.api.answers.representations import accepted_format, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
-from service.api.context import Context, Service
+from service.api.context import Context, CurrentCaller, Service
 from service.api.routes.reports import CACHED, UNCHANGED, commands
 from service.errors import ConflictError, NotFoundError
 from service.runs.regressions import StoredRegression, campaign_of

@@ -1,24 +1,44 @@
 """/v1/campaigns/{id}/export: all its episodes in a format of other tools; a failure's own is among `pictures`."""
 
-from typing import Annotated
+from http import HTTPStatus
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Response
 from starlette.concurrency import run_in_threadpool
 
 from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names
-from service.api.access import CurrentCaller
-from service.api.answers.made import CROWDED, LACKING, check_installed, crowded
-from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, problem
-from service.api.context import Service
+from service.api.answers.problems import ProblemError
+from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, header, problem
+from service.api.context import CurrentCaller, Service
 from service.errors import ConflictError
+from service.schemas.problems import Reason
 from service.store.stored import StoredCampaign
-from service.views.on_demand import TooManyWaiting
 from service.views.tables import Table
 
+LACKING = problem(501, "The service lacks a package that makes this format")
+CROWDED: Responses = {
+    503: STORAGE[503]
+    | {
+        "description": "The database cannot be read, or too many wait for theirs",
+        "headers": {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)},
+    }
+}
 TABLE: Responses = {200: {"content": {FORMATS[name].media_type: {} for name in names("episodes")}}}
 NOTHING_YET = problem(409, "No run has played an episode yet")
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
+
+
+def check_installed(format: FormatName, of: Literal["failure", "episodes"]) -> None:
+    """Refuses a format whose packages the service lacks: that is no mistake of who asks.
+
+    Raises:
+      ProblemError: naming them, and what brings them.
+    """
+    row = FORMATS[format]
+    if row.of == of and row.missing:
+        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: {row.remedy}"
+        raise ProblemError(HTTPStatus.NOT_IMPLEMENTED, Reason.NOT_INSTALLED, lacks)
 
 
 def _campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> StoredCampaign:
@@ -37,10 +57,7 @@ async def get_episodes_export(campaign: Asked, format: FormatName, service: Serv
     table = await run_in_threadpool(Table.of, folders, format)
     if not table.folders:
         raise ConflictError(f"no run of campaign {campaign.id} has results yet", reason="not_ended")
-    try:
-        content = await service.tables.get(table)
-    except TooManyWaiting as error:
-        raise crowded(error) from error
+    content = await service.tables.get(table)
     row = FORMATS[format]
     name = f'attachment; filename="{campaign.id}{row.suffix}"'
     return Response(content, headers={"Content-Disposition": name}, media_type=row.media_type)

@@ -7,14 +7,11 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from service.api.access import CurrentCaller
-from service.api.answers.busy import busy
 from service.api.answers.pages import Cursor, Limit
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, header, problem
-from service.api.context import Service
-from service.api.media_types import media_type
-from service.networks.errors import BusyError, UploadError
+from service.api.context import CurrentCaller, Service
+from service.api.posted import media_type
 from service.networks.limits import MAX_EDGES, MAX_EXPANDED_BYTES, MAX_FILES, WALL_S
 from service.networks.packaging import MEDIA_TYPES, Packaging
 from service.networks.schemas import Network, NetworkPage, Places
@@ -75,10 +72,6 @@ async def post_network(
                 async for chunk in request.stream():
                     incoming.write(chunk)
             network = await run_in_threadpool(service.networks.add, incoming, packaging, caller.project, label)
-    except UploadError as error:
-        raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.UPLOAD_REFUSED, str(error)) from error
-    except BusyError as error:
-        raise busy(error) from error
     except TimeoutError as error:
         detail = f"the body took longer than {RECEIVE_S} s; wanted it faster"
         raise ProblemError(HTTPStatus.REQUEST_TIMEOUT, Reason.UPLOAD_TOO_SLOW, detail) from error
@@ -102,19 +95,13 @@ def get_network(network_id: str, service: Service, caller: CurrentCaller) -> Net
 @router.get("/{network_id}/places", responses=UNKNOWN | FINDING)
 def get_places(network_id: str, service: Service, caller: CurrentCaller) -> Places:
     """Where the patterns fit on a network, and why elsewhere they do not; looked for when first asked for."""
-    try:
-        return service.surveys.places(network_id, caller.sees)
-    except BusyError as error:
-        raise busy(error) from error
+    return service.surveys.places(network_id, caller.sees)
 
 
 @router.get("/{network_id}/places.png", response_class=Response, responses=UNKNOWN | FINDING | DRAWN)
 def get_places_picture(network_id: str, service: Service, caller: CurrentCaller) -> Response:
     """The network from above with its places."""
-    try:
-        return Response(service.surveys.picture(network_id, caller.sees), media_type="image/png")
-    except BusyError as error:
-        raise busy(error) from error
+    return Response(service.surveys.picture(network_id, caller.sees), media_type="image/png")
 
 
 @router.delete("/{network_id}", status_code=204, responses=UNKNOWN)

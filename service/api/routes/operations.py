@@ -5,10 +5,9 @@ from http import HTTPStatus
 from fastapi import APIRouter, Depends, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
-from service.api.access import require_admin
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import STOPPED, UNREADY, Responses
-from service.api.context import Service
+from service.api.context import Service, require_admin
 from service.schemas.operations import Health, Ready
 from service.schemas.problems import Reason
 from service.store.statistics import check_readable

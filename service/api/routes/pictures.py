@@ -1,4 +1,4 @@
-"""/v1/campaigns/{id}/failures/{id}/…: what takes seconds to make of a collision, made when it is asked for."""
+"""/v1/campaigns/{id}/failures/{id}/…: what a page shows of a collision, made when it is asked for."""
 
 from collections.abc import Awaitable, Callable
 from http import HTTPStatus
@@ -11,32 +11,32 @@ from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries,
 from risk_sac.failures.question import Twin
 from risk_sac.failures.studied import Region
 from risk_sac.records import wire
-from service.api.access import CurrentCaller
-from service.api.answers.made import CROWDED, LACKING, check_installed, crowded
 from service.api.answers.problems import ProblemError
-from service.api.answers.representations import caching, entity_tag, has, not_modified
+from service.api.answers.representations import Representation, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, Responses, problem
-from service.api.context import Context, Service
+from service.api.context import Context, CurrentCaller, Service
+from service.api.routes.exports import CROWDED, LACKING, check_installed
 from service.errors import StorageError
-from service.schemas.failures import TwinPlay
+from service.schemas.failures import Roads, TwinPlay
 from service.schemas.problems import Reason
-from service.views.on_demand import TooManyWaiting
-from service.views.pictures import ContactOfARun, Picture, twin_body
+from service.views.pictures import ContactOfARun, Picture, roads_body, thumbnail_of, twin_body
 from service.views.studies import CannotBePlayed, Study
 
-PNG, JSON, NPZ = "image/png", "application/json", "application/zip"
+PNG, SVG, JSON, NPZ = "image/png", "image/svg+xml", "application/json", "application/zip"
+LOST = problem(404, "Nothing has this id, or its time series is lost")
 
 
 def _made(media_type: str) -> Responses:
     """Responses of what is made of a collision."""
     return TAGGED | {
         200: TAGGED[200] | {"content": {media_type: {}}},
-        **problem(404, "Nothing has this id, or its time series is lost"),
+        **LOST,
         **CROWDED,
     }
 
 
 PICTURE = _made(PNG)
+THUMBNAIL = TAGGED | LOST | {200: TAGGED[200] | {"content": {SVG: {}}}}
 PLAYED = problem(409, "The collision does not repeat here, or cannot be played")
 _EXPORTED: dict[str, Any] = {FORMATS[name].media_type: {} for name in names("failure")}
 EXPORT = _made(NPZ) | PLAYED | LACKING | {200: TAGGED[200] | {"content": _EXPORTED}}
@@ -52,6 +52,26 @@ async def _contact(campaign_id: str, failure_id: str, service: Service, caller: 
 
 
 Asked = Annotated[ContactOfARun, Depends(_contact)]
+
+
+@router.get("/failures/{failure_id}/roads", response_model=Roads, responses=TAGGED)
+def get_roads(contact: Asked, request: Request) -> Response:
+    """The ground on which a collision came about, as polygons on the map that its time series is on."""
+    tag = entity_tag(contact.edition)
+    return Representation(roads_body(contact).model_dump_json().encode(), tag, caching(tag)).response(request)
+
+
+@router.get("/failures/{failure_id}/thumbnail.svg", response_class=Response, responses=THUMBNAIL)
+def get_thumbnail(contact: Asked, request: Request, service: Service) -> Response:
+    """One collision from above, small: the roads, both paths in the last 3 s, and both bodies as they touch."""
+    tag = entity_tag(contact.edition)
+    if has(request, tag):
+        return not_modified(tag)
+    try:
+        drawn = thumbnail_of(contact, service.settings)
+    except StorageError as error:
+        raise _lost(contact, error) from error
+    return Response(drawn, headers=caching(tag), media_type=SVG)
 
 
 @router.get("/failures/{failure_id}/picture.png", response_class=Response, responses=PICTURE)
@@ -124,13 +144,14 @@ async def _answer(
     tag = entity_tag(contact.edition)
     if has(request, tag):
         return not_modified(tag)
-    id_ = contact.episode.id
     try:
         content = await make()
     except StorageError as error:
-        raise ProblemError(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, f"{id_!r} cannot be shown: {error}") from error
+        raise _lost(contact, error) from error
     except CannotBePlayed as error:
-        raise ProblemError(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, f"{id_!r}: {error}") from error
-    except TooManyWaiting as error:
-        raise crowded(error) from error
+        raise ProblemError(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, f"{contact.episode.id!r}: {error}") from error
     return Response(content, headers=caching(tag), media_type=media_type)
+
+
+def _lost(contact: ContactOfARun, error: StorageError) -> ProblemError:
+    return ProblemError(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, f"{contact.episode.id!r} cannot be shown: {error}")

@@ -6,9 +6,8 @@ from fastapi import APIRouter, Depends, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from risk_sac.failures.cases import CampaignRegression
-from service.api.access import CurrentCaller
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses, header, problem
-from service.api.context import Service
+from service.api.context import CurrentCaller, Service
 from service.api.posted import documented, read_posted
 from service.runs.regressions import campaign_of
 from service.schemas.posted import PostedRegression

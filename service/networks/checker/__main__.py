@@ -11,10 +11,10 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+from service.errors import UploadError
 from service.networks import limits
 from service.networks.checker.bounds import bind
 from service.networks.checker.check import check
-from service.networks.errors import UploadError
 from service.networks.packaging import Packaging
 from service.networks.report import CheckReport
 

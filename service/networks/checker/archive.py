@@ -15,7 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import IO
 
-from service.networks.errors import UploadError
+from service.errors import UploadError
 from service.networks.limits import MAX_EXPANDED_BYTES, MAX_FILES, MAX_NAME, MAX_RATIO, RATIO_FREE_BYTES
 from service.networks.packaging import Packaging
 

@@ -5,12 +5,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from service.errors import UploadError
 from service.networks.checker import simulator
 from service.networks.checker.archive import documents
 from service.networks.checker.bounds import bind_simulator
 from service.networks.checker.document import Observer, read, root_of
 from service.networks.checker.roads import Demand, Net
-from service.networks.errors import UploadError
 from service.networks.packaging import Packaging
 from service.networks.report import CheckReport, Kind, NetworkFile, Summary
 

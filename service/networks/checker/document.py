@@ -13,8 +13,8 @@ from xml.sax.saxutils import escape
 from defusedxml.common import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
+from service.errors import UploadError
 from service.networks.checker.vocabulary import DOCUMENT, VOCABULARIES, Element
-from service.networks.errors import UploadError
 from service.networks.limits import MAX_ATTRIBUTES, MAX_DEPTH, MAX_ELEMENTS, MAX_VALUE
 
 Attributes = Mapping[str, str]

@@ -16,7 +16,7 @@ from defusedxml.ElementTree import DefusedXMLParser
 from risk_sac.errors import MapError
 from risk_sac.scenario.maps.convert import Format, conversion, netconvert, remarks
 from risk_sac.scenario.maps.sides import side_remarks
-from service.networks.errors import UploadError
+from service.errors import UploadError
 from service.networks.limits import MAX_FOREIGN_DEPTH, MAX_FOREIGN_ELEMENTS, MAX_VALUE, WALL_S
 
 FORMATS = {"osm": Format.OSM, "OpenDRIVE": Format.OPENDRIVE}

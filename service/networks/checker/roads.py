@@ -3,9 +3,9 @@
 from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
+from service.errors import UploadError
 from service.networks.checker.document import Attributes
 from service.networks.checker.values import points
-from service.networks.errors import UploadError
 from service.networks.limits import MAX_EDGES, MAX_LANES
 from service.networks.report import Summary
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from service.networks.errors import UploadError
+from service.errors import UploadError
 from service.networks.limits import MAX_VEHICLES, STEP_S, STEPS
 
 LOG = Path("log")  # where the file descriptors 1 and 2 lead to

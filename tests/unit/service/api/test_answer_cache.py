@@ -8,9 +8,9 @@ import httpx
 import pytest
 from fastapi import FastAPI, Request, Response
 
-from service.api.access import CALLER, Caller
 from service.api.answer_cache import MOST_BYTES, AnswerCache, keep
 from service.api.answers.representations import Representation, caching, entity_tag
+from service.api.context import CALLER, Caller
 from service.errors import StorageError
 from service.keys.key import Scope
 

@@ -1,7 +1,7 @@
 import pytest
 
-from service.api.access import Caller, check_scope
 from service.api.answers.problems import ProblemError
+from service.api.context import Caller, check_scope
 from service.api.guards.gate import RateLimit, allowed_hosts, check_host, check_origin
 from service.app import create_app
 from service.keys.key import Scope

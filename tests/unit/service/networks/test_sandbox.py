@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from service.errors import StorageError
+from service.errors import StorageError, UploadError
 from service.networks import limits
-from service.networks.errors import UploadError
 from service.networks.packaging import Packaging
 from service.networks.sandbox import inspect
 from tests.hostile_networks import NET, ROUTES, zipped

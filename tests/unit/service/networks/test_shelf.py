@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
-from service.networks.errors import BusyError, UploadError
+from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError, UploadError
 from service.networks.packaging import Packaging
 from service.networks.schemas import Network
 from service.networks.shelf import INCOMING, RECORD, Shelf

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from service.errors import UploadError
 from service.networks.checker import archive
 from service.networks.checker.archive import documents
-from service.networks.errors import UploadError
 from service.networks.packaging import Packaging, sniff
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
 

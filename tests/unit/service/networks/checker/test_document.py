@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from service.errors import UploadError
 from service.networks.checker import document
 from service.networks.checker.check import rewrite
 from service.networks.checker.document import Attributes, read, root_of
 from service.networks.checker.roads import Demand, Net
-from service.networks.errors import UploadError
 from tests.hostile_networks import EAST, NET, ROAD
 
 NETS = sorted(Path("sumo_nets").glob("*/*.net.xml"))

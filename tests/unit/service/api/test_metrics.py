@@ -5,7 +5,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.local import LocalExecutor
 from risk_sac.records import Outcome, State
-from service.api.telemetry.metrics import registry, request_latencies
+from service.api.metrics import registry, request_latencies
 from service.runs.manager import Manager, worker_program
 from service.settings import ServiceSettings
 

@@ -8,8 +8,8 @@ import time
 from prometheus_client import Histogram
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.access import CALLER, Caller
 from service.api.answer_cache import FROM_CACHE
+from service.api.context import CALLER, Caller
 
 logger = logging.getLogger("service.access")
 

@@ -1,1 +1,0 @@
-"""What is noted of requests, and the metrics of the service."""
