@@ -151,7 +151,21 @@ def crash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], No
     return arrange
 
 
-ONE = ["--families", "low", "--methods", "random", "--seeds", "1", "--first-seed", "4", "--episodes", "1", "--out"]
+ONE = [
+    "--families",
+    "low",
+    "--methods",
+    "random",
+    "--seeds",
+    "1",
+    "--first-seed",
+    "4",
+    "--episodes",
+    "1",
+    "--verify",
+    "0",
+    "--out",
+]
 
 
 def test_a_crashed_run_is_tried_again(crash: Callable[[int], None], tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from tests.builders import moved
 
 ROUNDING = 0.02  # of SUMO's positions and speeds, divided by the step where a derivative is taken
 WINDOW = 9  # steps, 0.8 s, over which an acceleration is fitted to positions: SUMO's lanes have corners
-EPISODES = 20
+EPISODES = 12  # a multiple of four: each way to act
 NAMES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
 
 

@@ -23,8 +23,7 @@ from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Frame, Role
 
 LEFT, RIGHT = 1, -1
-SPEEDS_MPS = (5.0, 9.5, 13.8)
-FRICTIONS = (0.6, 1.0)
+CONDITIONS = ((5.0, 1.0), (9.5, 0.6), (13.8, 1.0))  # speed in m/s, friction
 REACTION_S = 0.5
 BUILD_UP_S = 0.36  # 4.5 m/s² at 12.65 m/s³
 PACES_MPS = {"walking": 1.4, "running": 3.0, "standing": 0.0, "turning back": 1.4}
@@ -151,14 +150,15 @@ def has_the_distance(speed_mps: float, warning_s: float) -> bool:
 @pytest.mark.parametrize("where", PLACES)
 def test_pedestrians_from_either_side_are_alike(sim: SumoSimulation, where: str, motion: str) -> None:
     place = PLACES[where]
-    for speed in (speed for speed in SPEEDS_MPS if speed <= place.fastest_mps):
-        for friction in FRICTIONS:
-            left, right = (meet_pedestrian(sim, place, side, motion, speed, friction) for side in (LEFT, RIGHT))
-            assert (left.touched, left.stood) == (right.touched, right.stood), (speed, friction, left, right)
-            assert left.least_m == pytest.approx(right.least_m, abs=0.3), (speed, friction)
-            pace = PACES_MPS[motion]
-            if not pace or has_the_distance(speed, place.aside_m / pace):
-                assert not left.touched, (speed, friction, left)
+    for speed, friction in CONDITIONS:
+        if speed > place.fastest_mps:
+            continue
+        left, right = (meet_pedestrian(sim, place, side, motion, speed, friction) for side in (LEFT, RIGHT))
+        assert (left.touched, left.stood) == (right.touched, right.stood), (speed, friction, left, right)
+        assert left.least_m == pytest.approx(right.least_m, abs=0.3), (speed, friction)
+        pace = PACES_MPS[motion]
+        if not pace or has_the_distance(speed, place.aside_m / pace):
+            assert not left.touched, (speed, friction, left)
 
 
 def meet_vehicle(sim: SumoSimulation, side: int, kind: str, speed_mps: float, friction: float) -> Drive:
@@ -194,9 +194,8 @@ def meet_vehicle(sim: SumoSimulation, side: int, kind: str, speed_mps: float, fr
 
 @pytest.mark.parametrize("kind", ["standing across", "standing tilted", "cutting in", "turning from the oncoming lane"])
 def test_vehicles_from_either_side_are_alike(sim: SumoSimulation, kind: str) -> None:
-    for speed in SPEEDS_MPS:
-        for friction in FRICTIONS:
-            left, right = (meet_vehicle(sim, side, kind, speed, friction) for side in (LEFT, RIGHT))
-            assert (left.touched, left.stood) == (right.touched, right.stood), (speed, friction, left, right)
-            assert left.least_m == pytest.approx(right.least_m, abs=0.3), (speed, friction)
-            assert not left.touched, (speed, friction, left)
+    for speed, friction in CONDITIONS:
+        left, right = (meet_vehicle(sim, side, kind, speed, friction) for side in (LEFT, RIGHT))
+        assert (left.touched, left.stood) == (right.touched, right.stood), (speed, friction, left, right)
+        assert left.least_m == pytest.approx(right.least_m, abs=0.3), (speed, friction)
+        assert not left.touched, (speed, friction, left)

@@ -127,19 +127,22 @@ def uniform(env: RiskSacEnv, seed: int) -> Policy:
     return lambda _: generator.uniform(-1, 1, env.action_size).astype(np.float32)
 
 
-def statistics(env: RiskSacEnv, seeds: range, policy: Callable[[int], Policy]) -> Statistics:
-    traces, costs = [], []
+def statistics(env: RiskSacEnv, seeds: range, policy: Callable[[int], Policy]) -> tuple[Statistics, int]:
+    """What the episodes say, and how many ended in a contact."""
+    traces, costs, contacts = [], [], 0
     for seed in seeds:
-        trace, paid, _ = episode(env, seed, policy(seed))
+        trace, paid, collision = episode(env, seed, policy(seed))
         traces.append(trace)
         costs += paid
-    return Statistics.of(env, traces, costs)
+        contacts += collision is not None
+    return Statistics.of(env, traces, costs), contacts
 
 
 @each_family
-def test_undisturbed_traffic_meets_the_requirements_and_costs_nothing(family: FamilyName) -> None:
+def test_undisturbed_traffic_meets_the_requirements_costs_nothing_and_touches_nobody(family: FamilyName) -> None:
     with closing(environment(family, controlled=False)) as env:
-        found = statistics(env, UNDISTURBED_SEEDS, lambda _: idle(env))
+        found, contacts = statistics(env, UNDISTURBED_SEEDS, lambda _: idle(env))
+    assert contacts == 0
     assert found.positive >= 0.99, found
     assert max(found.minimum.values()) <= 0.6, found
     assert found.clipped < 0.01, found
@@ -150,8 +153,15 @@ def test_undisturbed_traffic_meets_the_requirements_and_costs_nothing(family: Fa
 @each_family
 def test_uniformly_random_actions_cost_much(family: FamilyName) -> None:
     with closing(environment(family, controlled=True)) as env:
-        found = statistics(env, RANDOM_SEEDS, lambda seed: uniform(env, seed))
+        found, _ = statistics(env, RANDOM_SEEDS, lambda seed: uniform(env, seed))
     assert found.cost >= 0.4, found
+
+
+@each_family
+def test_adversaries_that_do_nothing_are_hardly_ever_touched(family: FamilyName) -> None:
+    with closing(environment(family, controlled=True)) as env:
+        _, contacts = statistics(env, UNDISTURBED_SEEDS, lambda _: idle(env))
+    assert contacts <= 1
 
 
 def dangerous(env: RiskSacEnv, seed: int) -> Scene:

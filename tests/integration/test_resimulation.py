@@ -30,7 +30,7 @@ from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.reference import LEAD_M, reference_outcomes, replayed_contact_s
 from risk_sac.verdicts.rollout import STANDING_MPS
 
-EPISODES = 120
+EPISODES = 60
 FINE = 10  # looks between two steps
 AGREE = 0.99
 
