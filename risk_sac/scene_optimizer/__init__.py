@@ -2,11 +2,9 @@
 
 from risk_sac.scene_optimizer.archive import ArchiveOptimizer
 from risk_sac.scene_optimizer.bandit import DiscountedBandit
-from risk_sac.scene_optimizer.base import NOBODY, Encounter, SceneOptimizer, State
+from risk_sac.scene_optimizer.base import NOBODY, Encounter, SceneOptimizer
 from risk_sac.scene_optimizer.bayesian import BotorchOptimizer
-from risk_sac.scene_optimizer.iid import IidSampler
-from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
-from risk_sac.scene_optimizer.sobol import SobolOptimizer
+from risk_sac.scene_optimizer.samplers import IidSampler, SobolOptimizer
 
 __all__ = [
     "NOBODY",
@@ -15,10 +13,6 @@ __all__ = [
     "DiscountedBandit",
     "Encounter",
     "IidSampler",
-    "RunningMaximum",
     "SceneOptimizer",
     "SobolOptimizer",
-    "State",
-    "objective",
-    "update_running_maximum",
 ]

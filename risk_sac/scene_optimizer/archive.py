@@ -1,23 +1,135 @@
-"""Archive search: scenes and scripts are bred from those that led to distinct failures; nothing is learned.
+"""Archive search: breeds scenes and scripts from those that led to distinct failures; nothing is learned.
 
 A point is a scene and, behind it, the genes of the adversaries' scripts, all in the unit cube.
 
-Choice: no pyribs. Its archives have a number of cells that is known beforehand, and ours are found, in words; its
-emitters draw parents evenly, and which parent to build on is what matters here.
+Source: Mouret and Clune, "Illuminating search spaces by mapping elites" (arXiv 1504.04909).
+Choice: niches are the product's distinct failures, so that the search fills what its user counts. No pyribs: the number
+of cells of its archives is fixed beforehand, and its emitters draw parents evenly, where the choice of parent matters.
 """
+
+import math
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.scene_optimizer.base import NOBODY, Encounter, State, check_identity, check_told
-from risk_sac.scene_optimizer.elites import Elite, Elites
-from risk_sac.scene_optimizer.objective import RunningMaximum, objective, update_running_maximum
+from risk_sac.records import Collision
+from risk_sac.scene_optimizer.base import NOBODY, Encounter, RunningMaximum, State, check_identity, check_told
 from risk_sac.types import Floats
+from risk_sac.verdicts.distinct import cell_of, signature_of
 
 INITIAL, RANDOM_SHARE = 12, 0.15  # points drawn at random: the first ones, and of the rest, where elites abound
 DEVIATIONS = (0.05, 0.15, 0.4)  # of a mutation
 SHARES = (0.2, 0.5, 1.0)  # of the coordinates that it changes
 CROSSED, CROSSING_DEVIATION = 0.5, 0.2  # how often, and how far, it also moves along the line to another elite
+PREVENTABLE_WORTH = 1.0
+ALMOST_WORTH, IMPACT_MPS = 0.4, 5.0  # where the careful driver only just touches; a third of it where at 5.5 m/s
+LEAST_WORTH = 0.02  # of a failure
+NEAR_MISS_WORTH = 0.1
+NEW, NEW_PREVENTABLE = 0.5, 2.0  # credit of a parent for a distinct failure, and for a preventable one
+
+
+@dataclass(slots=True, kw_only=True)
+class Elite:
+    """An episode worth building on."""
+
+    point: Floats  # its scene and its genes, in the unit cube
+    worth: float
+    striker: str
+    kind: str  # elites of one kind share their chances
+    missed_s: float = 0.0  # of a near miss: its smallest time to encounter
+    drawn: int = 0
+    credit: float = 0.0  # for what was new among its children
+
+
+class Elites:
+    """One elite for each distinct failure, and one near miss for each adversary that has struck nothing."""
+
+    def __init__(self) -> None:
+        self._failures: dict[str, Elite] = {}  # by niche
+        self._misses: dict[str, Elite] = {}  # by adversary
+        self._preventable: set[str] = set()  # niches
+
+    @property
+    def failures(self) -> int:
+        """Niches that were reached."""
+        return len(self._failures)
+
+    def pool(self) -> list[Elite]:
+        """Returns all failures, and the near misses of the adversaries that have none."""
+        struck = {elite.striker for elite in self._failures.values()}
+        return [*self._failures.values(), *(miss for name, miss in self._misses.items() if name not in struck)]
+
+    def draw(self, pool: list[Elite], random: np.random.Generator) -> Elite:
+        """Draws one of the pool.
+
+        p ∝ worth · (1 + credit) / (1 + drawn) / √(elites of its kind)
+        """
+        alike = Counter(elite.kind for elite in pool)
+        weights = np.array([e.worth * (1 + e.credit) / (1 + e.drawn) / math.sqrt(alike[e.kind]) for e in pool])
+        elite = pool[random.choice(len(pool), p=weights / weights.sum())]
+        elite.drawn += 1
+        return elite
+
+    def add_failure(self, point: Floats, collision: Collision, parent: Elite | None) -> None:
+        """Adds a valid failure if it is the first in its niche, or worth more than that."""
+        kind = signature_of(collision)
+        niche = f"{kind} {cell_of(collision)}"
+        known = self._failures.get(niche)
+        worth = _worth(collision)
+        if parent is not None:
+            new_preventable = collision.preventable and niche not in self._preventable
+            parent.credit += NEW * (known is None) + NEW_PREVENTABLE * new_preventable
+        if collision.preventable:
+            self._preventable.add(niche)
+        if known is None or known.worth < worth:
+            self._failures[niche] = Elite(point=point, worth=worth, striker=collision.other_id, kind=kind)
+
+    def add_misses(self, point: Floats, encounters_s: Mapping[str, float]) -> None:
+        """Adds near misses by adversary, where none was nearer.
+
+        Choice: by the time to encounter, and not by the gap, which is small whenever something passes by.
+        """
+        for name, missed_s in encounters_s.items():
+            known = self._misses.get(name)
+            if known is None or missed_s <= known.missed_s:
+                self._misses[name] = Elite(
+                    point=point, worth=NEAR_MISS_WORTH, striker=name, kind=f"near miss of {name}", missed_s=missed_s
+                )
+
+    def state(self) -> State:
+        """Returns plain values to continue from."""
+        return {
+            "failures": {niche: _plain(elite) for niche, elite in self._failures.items()},
+            "misses": {name: _plain(elite) for name, elite in self._misses.items()},
+            "preventable": sorted(self._preventable),
+        }
+
+    def load(self, state: State) -> None:
+        """Continues from `state()`."""
+        self._failures = {niche: _elite(elite) for niche, elite in state["failures"].items()}
+        self._misses = {name: _elite(elite) for name, elite in state["misses"].items()}
+        self._preventable = set(state["preventable"])
+
+
+def _plain(elite: Elite) -> State:
+    return {**asdict(elite), "point": elite.point.tolist()}
+
+
+def _elite(plain: State) -> Elite:
+    return Elite(**{**plain, "point": np.array(plain["point"])})
+
+
+def _worth(collision: Collision) -> float:
+    """1 for a preventable failure; of the rest the more, the slower the careful driver would have touched."""
+    if collision.preventable:
+        return PREVENTABLE_WORTH
+    judged = collision.judgement
+    if judged is None or "careful" not in judged.drivers:
+        return LEAST_WORTH
+    return ALMOST_WORTH * math.exp(-judged.drivers["careful"].impact_speed_mps / IMPACT_MPS) + LEAST_WORTH
 
 
 class ArchiveOptimizer:
@@ -26,12 +138,11 @@ class ArchiveOptimizer:
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:
         self._identity: State = {"kind": "archive", "dimension": dimension, "seed": seed}
         self._dimension = dimension
-        self._config = config
         self._random = np.random.default_rng(seed)
         self._elites = Elites()
         self._asked = 0
         self._parent: Elite | None = None  # of the point that was asked for last
-        self._maximum: RunningMaximum | None = None
+        self._maximum = RunningMaximum(config.running_maximum_rate)
 
     def ask(self) -> Floats:
         """See `SceneOptimizer.ask`."""
@@ -53,8 +164,7 @@ class ArchiveOptimizer:
         self._elites.add_misses(point, encounter.encounters_s)
         if encounter.collision is not None and encounter.collision.valid:
             self._elites.add_failure(point, encounter.collision, parent)
-        self._maximum = update_running_maximum(self._maximum, mean_return, self._config.running_maximum_rate)
-        return objective(mean_return, self._maximum.smoothed)
+        return self._maximum.score(mean_return)
 
     def state(self) -> State:
         """See `SceneOptimizer.state`; taken between two episodes, when no point is out."""
@@ -63,7 +173,7 @@ class ArchiveOptimizer:
             "random": self._random.bit_generator.state,
             "elites": self._elites.state(),
             "asked": self._asked,
-            "maximum": None if self._maximum is None else tuple(self._maximum),
+            "maximum": self._maximum.state(),
         }
 
     def load(self, state: State) -> None:
@@ -72,11 +182,11 @@ class ArchiveOptimizer:
         self._random.bit_generator.state = state["random"]
         self._elites.load(state["elites"])
         self._asked = state["asked"]
-        self._maximum = None if state["maximum"] is None else RunningMaximum(*state["maximum"])
+        self._maximum.load(state["maximum"])
 
 
 def mutated(parent: Floats, other: Floats, random: np.random.Generator) -> Floats:
-    """A point near `parent`, perhaps on the way to `other`; what would leave the unit cube is reflected.
+    """Returns a point near `parent`, perhaps on the way to `other`; what would leave the unit cube is reflected.
 
     Source: the line between two elites is that of Vassiliades and Mouret, "Discovering the elite hypervolume by
     leveraging interspecies correlation" (arXiv 1804.03906).

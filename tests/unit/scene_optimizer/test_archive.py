@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision, Grade, ReferenceOutcome
 from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
-from risk_sac.scene_optimizer.archive import INITIAL, mutated
-from risk_sac.scene_optimizer.elites import NEW, NEW_PREVENTABLE, Elites
+from risk_sac.scene_optimizer.archive import INITIAL, NEW, NEW_PREVENTABLE, Elites, mutated
 from tests.builders import collision, judgement
 
 HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)

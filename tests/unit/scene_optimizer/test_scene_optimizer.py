@@ -13,13 +13,11 @@ from risk_sac.errors import CheckpointError, NotFinite, SceneError
 from risk_sac.scene_optimizer import (
     ArchiveOptimizer,
     BotorchOptimizer,
-    RunningMaximum,
     SceneOptimizer,
     SobolOptimizer,
-    objective,
     surrogate,
-    update_running_maximum,
 )
+from risk_sac.scene_optimizer.base import RunningMaximum, objective
 from risk_sac.types import Floats
 
 QUICK = SceneOptimizerConfig(initial_scenes=6, window=24, refit_every=5, candidates=64)
@@ -74,23 +72,20 @@ def test_objective_is_never_negative_and_falls_with_the_return(a, b, maximum):
 
 
 def test_running_maximum_literals():
-    first = update_running_maximum(None, 1.0, 0.1)
-    second = update_running_maximum(first, 3.0, 0.1)
-    third = update_running_maximum(second, 0.0, 0.1)
-    assert first == RunningMaximum(1.0, 1.0)
-    assert second == pytest.approx(RunningMaximum(3.0, 1.2))
-    assert third == pytest.approx(RunningMaximum(3.0, 1.38))
+    maximum = RunningMaximum(0.1)
+    scores = [maximum.score(mean_return) for mean_return in (1.0, 3.0, 0.0)]
+    assert (maximum.largest, maximum.smoothed) == pytest.approx((3.0, 1.38))  # after 1 and 1.2
+    assert scores == pytest.approx([0.0, 0.0, 1.38 / 1.381])
 
 
 @settings(deadline=None)
 @given(st.lists(returns, min_size=1, max_size=30), st.floats(0.01, 1))
 def test_running_maximum_rises_towards_the_largest_return_and_never_past_it(values, rate):
-    maximum = None
-    for value in values:
-        before = maximum
-        maximum = update_running_maximum(before, value, rate)
-        assert maximum.smoothed <= maximum.largest == max(value, before.largest if before else value)
-        assert before is None or maximum.smoothed >= before.smoothed
+    maximum, before = RunningMaximum(rate), -math.inf
+    for count, value in enumerate(values, start=1):
+        maximum.score(value)
+        assert before <= maximum.smoothed <= maximum.largest == max(values[:count])
+        before = maximum.smoothed
 
 
 # What all optimisers promise
@@ -246,37 +241,43 @@ def observations(count: int, dimension: int, seed: int) -> tuple[torch.Tensor, t
     return torch.from_numpy(points), torch.from_numpy(values)
 
 
-@pytest.mark.parametrize(("count", "dimension"), [(10, 1), (40, 12), (150, 5)])
-def test_posterior_and_acquisition_equal_botorchs(count, dimension):
-    from botorch.acquisition.analytic import LogExpectedImprovement
+def test_the_posterior_is_that_of_the_equations():
+    """m(x) = k(x)ᵀ K⁻¹ (y - c) + c,  s²(x) = 1 - k(x)ᵀ K⁻¹ k(x): Rasmussen and Williams 2006, Alg. 2.1."""
+    points, values = observations(40, 5, seed=0)
+    model = surrogate.condition(points, values, surrogate.fit(points, values, None, seed=0))
+    lengthscales, constant = model.covar_module.lengthscale.detach(), model.mean_module.constant.detach()
 
-    points, values = observations(count, dimension, seed=count)
-    model = surrogate.condition(points, values, surrogate.fit(points, values, None))
-    ours = surrogate.Posterior(model)
-    x = torch.cat((points, torch.from_numpy(np.random.default_rng(0).random((50, dimension)))))
-    with torch.no_grad():
-        theirs = model.posterior(x)
-        acquisition = LogExpectedImprovement(model, model.posterior(points).mean.max())(x.unsqueeze(-2))
-    mean, deviation = ours(x)
-    torch.testing.assert_close(mean, theirs.mean[:, 0], rtol=1e-8, atol=1e-8)
-    torch.testing.assert_close(deviation**2, theirs.variance[:, 0], rtol=1e-8, atol=1e-8)
-    torch.testing.assert_close(ours.log_expected_improvement(x), acquisition, rtol=1e-6, atol=1e-6)
+    def kernel(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+        return (-0.5 * torch.cdist(a / lengthscales, b / lengthscales) ** 2).exp()
+
+    x = torch.from_numpy(np.random.default_rng(1).random((20, 5)))
+    weights = torch.linalg.inv(kernel(points, points) + model.likelihood.noise.detach() * torch.eye(40).double())
+    cross, residuals = kernel(points, x), (values - values.mean()) / values.std() - constant
+    posterior = model.posterior(x)
+    torch.testing.assert_close(posterior.mean[:, 0], constant + cross.T @ weights @ residuals, rtol=1e-6, atol=1e-6)
+    torch.testing.assert_close(posterior.variance[:, 0], 1 - (cross * (weights @ cross)).sum(0), rtol=1e-6, atol=1e-6)
 
 
-@pytest.mark.parametrize(("count", "dimension"), [(10, 1), (40, 12), (150, 5)])
-def test_loss_and_its_gradient_equal_gpytorchs(count, dimension):
+def test_a_fit_raises_the_likelihood():
     from gpytorch.mlls import ExactMarginalLogLikelihood
 
-    points, values = observations(count, dimension, seed=count)
-    model = surrogate.condition(points, values, None).train()
-    likelihood = ExactMarginalLogLikelihood(model.likelihood, model)
-    parameters = list(model.parameters())
-    ours, theirs = surrogate.loss(model), -likelihood(model(*model.train_inputs), model.train_targets)
-    torch.testing.assert_close(ours, theirs, rtol=1e-10, atol=1e-10)
-    for gradient, wanted in zip(
-        torch.autograd.grad(ours, parameters), torch.autograd.grad(theirs, parameters), strict=True
-    ):
-        torch.testing.assert_close(gradient, wanted, rtol=1e-8, atol=1e-8)
+    points, values = observations(40, 5, seed=0)
+
+    def likelihood(hyperparameters: surrogate.Hyperparameters | None) -> float:
+        model = surrogate.condition(points, values, hyperparameters).train()
+        return ExactMarginalLogLikelihood(model.likelihood, model)(model(points), model.train_targets).item()
+
+    first = surrogate.fit(points, values, None, seed=0)
+    assert likelihood(None) + 0.1 < likelihood(first) <= likelihood(surrogate.fit(points, values, first, seed=0)) + 1e-6
+
+
+def test_expected_improvement_leads_away_from_the_choices_and_the_mean_does_not():
+    points, values = observations(40, 5, seed=0)
+    model, choices = surrogate.condition(points, values, None), points[:10] * 0.9
+    assert surrogate.best_by_mean(model, choices).tolist() in choices.tolist()
+    proposed = surrogate.maximise_expected_improvement(model, choices)
+    assert proposed.tolist() not in choices.tolist()
+    assert 0 <= proposed.min() <= proposed.max() <= 1
 
 
 # How well it searches
