@@ -46,7 +46,9 @@ def milliseconds(optimizer: BotorchOptimizer, random: np.random.Generator, episo
 
 
 def report(what: str, spent: Floats) -> None:
-    print(f"\n{what}, d={DIMENSION}: mean {spent.mean():.1f} ms, median {np.median(spent):.1f}, worst {spent.max():.0f}")
+    print(
+        f"\n{what}, d={DIMENSION}: mean {spent.mean():.1f} ms, median {np.median(spent):.1f}, worst {spent.max():.0f}"
+    )
 
 
 @pytest.mark.bench
