@@ -18,7 +18,7 @@ from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene, RiskSacError, SimulationError
 from risk_sac.failures.play import play
 from risk_sac.failures.recording import actions_of, trajectory_digest
-from risk_sac.risk.soft_min import soft_min
+from risk_sac.risk.measures import soft_min
 from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
 from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import distinct_failures

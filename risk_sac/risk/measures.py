@@ -1,14 +1,37 @@
 """All that is measured of a frame. Measuring acts on nothing: nobody in the simulation can tell that it was done."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from risk_sac.config import Requirement
+from risk_sac.jit import compiled
 from risk_sac.risk.publish import Assessment, assess, publish
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.risk.soft_min import soft_min
 from risk_sac.risk.stl import Monitor
 from risk_sac.types import STEP_S, Bools, Floats, Frame
+
+
+@compiled
+def soft_min(robustness: Floats, beta: float) -> float:
+    """Soft minimum of the requirements' robustness, ρ(Φ, s).
+
+    ρ(Φ, s) = -(1/β) log Σ_i exp(-β ρ_i)                                             (7)
+
+    Args:
+      robustness: `M`, M ≥ 1, scaled; below 0 means violated.
+      beta: sharpness β > 0; larger is closer to the true minimum.
+
+    Returns:
+      A value in [min_i ρ_i - log(M)/β, min_i ρ_i].
+
+    Source: RISK-SAC, Sec. III-C.
+    """
+    least = robustness.min()  # taken out so that exp cannot overflow
+    summed = 0.0
+    for value in robustness:
+        summed += math.exp(beta * (least - value))
+    return float(least - math.log(summed) / beta)
 
 
 class Measures(NamedTuple):

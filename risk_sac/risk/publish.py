@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from risk_sac.geometry import RelativeView, frame_view
 from risk_sac.jit import compiled
-from risk_sac.risk.encounter import ENCOUNTER_CAP_S, time_to_encounter
 from risk_sac.risk.rss import LONGITUDINAL_CAP_M, SCALED_HIGH, margins
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.risk.ttc import TTC_CAP_S, time_to_collision
+from risk_sac.risk.ttc import ENCOUNTER_CAP_S, TTC_CAP_S, time_to_collision, time_to_encounter
 from risk_sac.types import Bools, Floats, Frame, Kind, Signal
 
 GAP_CAP_M = 50.0

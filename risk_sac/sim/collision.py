@@ -1,7 +1,7 @@
-"""The collision oracle: our own box test and the contact's place.
+"""The collision oracle: our own box test, and the contact's place and time.
 
-`risk_sac.verdicts` says what to make of a contact. SUMO's list is only a cross-check. A contact found between two
-frames is located by bisection on the interpolated poses, so that where it lies does not depend on the step length.
+A contact between two frames is located by bisection on the interpolated poses, so the step length does not
+matter. SUMO's list is only a cross-check.
 """
 
 import math
@@ -120,8 +120,3 @@ def _describe(before: Frame, other: int, frame: Frame, share: float) -> Contact:
         closing_lateral_other_mps=-side * other_lateral,
         relative_speed_mps=float(math.hypot(view.vx[0], view.vy[0])),
     )
-
-
-def agrees(frame: Frame, ego: str, other: str) -> bool:
-    """Whether SUMO lists the pair in this frame."""
-    return any({ego, other} == set(pair) for pair in frame.simulator_collisions)

@@ -1,7 +1,11 @@
-"""What adversaries are told to do in the next step."""
+"""Commands of adversaries for the next step, and how fast they may change before a bound."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
+
+from risk_sac.jit import compiled
+from risk_sac.types import STEP_S
 
 
 @dataclass(slots=True)
@@ -16,7 +20,27 @@ class Walker:
 
 
 class VehicleCommand(NamedTuple):
-    """What an adversary vehicle does during the next step."""
+    """Speeds of an adversary vehicle during the next step."""
 
     speed_mps: float
     lateral_mps: float
+
+
+@compiled
+def taper(distance: float, rate: float) -> float:
+    """Largest value that falls to 0 by at most `rate` per second while its sum over steps stays within `distance`.
+
+    With decrements of c = rate·dt and D = distance/dt, k full decrements fit, k(k+1)/2·c <= D, and the rest is
+    spread over k + 1 steps. The continuous √(2·rate·distance) would overshoot by up to half a decrement.
+    """
+    if distance <= 0.0 or rate <= 0.0:
+        return 0.0
+    change, total = rate * STEP_S, distance / STEP_S
+    full = int((math.sqrt(1.0 + 8.0 * total / change) - 1.0) / 2.0)
+    return full * change / 2.0 + total / (full + 1)
+
+
+@compiled
+def clip(value: float, low: float, high: float) -> float:
+    """The value, or the bound that it is beyond."""
+    return low if value < low else high if value > high else value

@@ -1,4 +1,4 @@
-"""What the ego perceives: a line-of-sight sensor and the memory of who was seen since when."""
+"""The ego's perception: a line-of-sight sensor, and a memory of the actors it saw."""
 
 import math
 from typing import NamedTuple, Protocol
@@ -38,38 +38,32 @@ MOTION = (X, Y, HEADING, VX, VY)
 
 
 class Belief(NamedTuple):
-    """What the ego makes of the `n` actors of a frame."""
+    """The ego's belief about the `n` actors of a frame."""
 
     known: Bools  # of the rest it knows nothing
     state: Floats  # the frame's, but those that it remembers are where it expects them
 
 
 class Senses(Protocol):
-    """How the ego gets to know of others; the simulation asks for each frame of an episode once."""
+    """Perception of the ego; the simulation calls `look` once per frame of an episode."""
 
     def reset(self) -> None:
         """Begins an episode."""
 
     def look(self, frame: Frame) -> Belief:
-        """What the ego makes of a frame."""
+        """The ego's belief about a frame."""
 
 
 class Perception:
-    """Whom the ego sees, and whom it remembers.
+    """Actors that the ego sees or remembers.
 
-    An actor is remembered for the sensor's memory after it went out of sight, and expected to go on as it did then.
+    An actor out of sight is remembered for the sensor's memory, and expected to keep its velocity.
 
     Attributes:
       seen: which of the others of the latest frame are in sight, `n - 1`.
     """
 
     def __init__(self, memory_s: float, sight: Sight) -> None:
-        """Knows nobody yet.
-
-        Args:
-          memory_s: for how long an actor is remembered.
-          sight: what is in it is seen.
-        """
         self._memory_s = memory_s
         self._sight = sight
         self.reset()
@@ -117,7 +111,7 @@ def _look(
     half_view_rad: float,
     occlusion: bool,
 ) -> tuple[Bools, Bools, Floats]:
-    """Who of the others is in sight, and both parts of the belief; the memory is brought up to date."""
+    """Updates the memory; returns which of the others are in sight, and both parts of the belief."""
     seen = in_sight(frame_view(state), kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion))
     n = state.shape[1]
     known, believed = np.ones(n, dtype=np.bool_), state.copy()

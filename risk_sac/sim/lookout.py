@@ -1,12 +1,11 @@
-"""Who is on a collision course with a vehicle's corridor: what its driver is told beyond what SUMO's models see.
+"""Actors on a collision course with a vehicle's corridor, which its driver has to stop for or to follow.
 
 SUMO's drivers see pedestrians on crossings from one side only, none inside a junction or beside a crossing, and take a
 tilted car for a straight one: `MSPModel_Striping` derives the walking direction of a person that is moved by command
-from its route, not from its motion, and whoever "walks away" blocks nobody. So SUMO is told about no person at all, and
-one rule, the same from both sides, says what a driver has to stop for or to follow.
+from its route, not from its motion. So SUMO knows no person at all, and one rule applies, the same from both sides.
 
-Choice: others keep their velocity. The driver asks whether it would touch somebody if it kept its speed, or went as
-fast as it may: so one that has stopped for a pedestrian does not start before the pedestrian has left its path.
+Choice: others keep their velocity. The driver asks whether it would touch one of them if it kept its speed, or drove as
+fast as it may. So a driver that has stopped for a pedestrian does not start before the pedestrian has left its path.
 """
 
 import math
@@ -23,19 +22,19 @@ from risk_sac.sim.paths import Y as PATH_Y
 from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
 
 LOOK_S = 4.0  # how far ahead a collision course counts
-CUT_IN_LOOK_S = 2.0  # the same for whoever drives in the vehicle's own direction, whose sideways motion is soon over
+CUT_IN_LOOK_S = 2.0  # the same in the vehicle's own direction, where sideways motion is soon over
 TICK_S = 0.1
 MARGIN_M = 0.375  # on either side of the vehicle's body: the room in which a lane keeper wanders (UN R157)
-YIELDING_MPS2 = 2.5  # of crossing traffic; SUMO's drivers, who stop well before the junction, never need more for it
+YIELDING_MPS2 = 2.5  # of crossing traffic; SUMO's drivers, which stop well before the junction, never need more
 SAME_WAY_COS = 0.5
 MOVING_MPS = 0.5
 BEHIND_M, BEYOND_M = 60.0, 10.0  # of a path beside what is driven meanwhile, on which others are looked for
-NEAR_M = 40.0  # beyond it nobody has to brake for a pedestrian yet
+NEAR_M = 40.0  # beyond it no vehicle has to brake for a pedestrian yet
 
 
 @compiled
 def near_pedestrians(state: Floats, vehicle: Bools) -> Bools:
-    """Who of the `n` actors in a frame's state has a pedestrian within `NEAR_M`; pedestrians have themselves."""
+    """Which of the `n` actors have a pedestrian within `NEAR_M`; pedestrians have themselves."""
     x, y, n = state[X], state[Y], len(vehicle)
     near = np.zeros(n, dtype=np.bool_)
     for k in range(n):
@@ -85,8 +84,8 @@ def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
 def stretch(points: Floats, first_m: float, last_m: float) -> Floats:
     """The segments of a path between two stations.
 
-    A path may come back beside itself, as behind a roundabout. Who is on the ego's way now would be found where the ego
-    comes by much later, were the whole path looked at.
+    A path may come back beside itself, as behind a roundabout, so the whole path would place an actor where the ego
+    passes much later.
     """
     stations, first, last = points[STATION], 0, points.shape[1] - 1
     while first + 1 < last and stations[first + 1] <= first_m:
@@ -100,8 +99,7 @@ def stretch(points: Floats, first_m: float, last_m: float) -> Floats:
 def foreseen(points: Floats, front_m: float, speed_mps: float, accel_mps2: float) -> Floats:
     """Where a driver's front bumper will be at each tick of LOOK_S if it speeds up by `accel_mps2`, `ticks`.
 
-    It goes no faster than SUMO's drivers take the path, and so slowly through a bend: who passes before somebody at its
-    present speed may well meet them at that of the bend.
+    It goes no faster than SUMO's drivers take the path, and so slowly through a bend.
     """
     ticks = round(LOOK_S / TICK_S) + 1
     front = np.empty(ticks)

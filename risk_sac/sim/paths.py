@@ -1,4 +1,4 @@
-"""Where a vehicle will drive: the centre line of its lanes along its route, junctions included."""
+"""Paths of vehicles: the centre line of the lanes along a route, junctions included."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ import numpy as np
 
 from risk_sac.types import Floats
 
-AHEAD_M = 120.0  # of road beyond a lane's own end: at 16 m/s more than anybody looks ahead
+AHEAD_M = 120.0  # of road beyond a lane's own end: at 16 m/s more than any driver looks ahead
 SAME_POINT_M = 1e-3
 SHIFT_M = 1.0  # by which a lane may begin beside or before the end of the one that leads to it
 TAPER_M = 5.0  # of the way to that lane on which the path makes up for it
@@ -46,7 +46,7 @@ class Along(NamedTuple):
 
 
 class Paths:
-    """The paths of one net, each made once; needs a simulation that has loaded the net."""
+    """Paths of one net, each made once; needs a simulation that has loaded the net."""
 
     def __init__(self) -> None:
         self._paths: dict[tuple[tuple[str, ...], str], Path] = {}
@@ -56,7 +56,7 @@ class Paths:
         self._paths.clear()
 
     def of(self, route: tuple[str, ...], lane: str) -> Path:
-        """The path from the start of `lane` along `route`; where the lane does not lead on, it ends with the lane."""
+        """The path from the start of `lane` along `route`; a lane that does not lead on ends it."""
         path = self._paths.get((route, lane))
         if path is None:
             path = self._paths[route, lane] = _path(_lanes_ahead(route, lane))
@@ -122,17 +122,11 @@ def path_along(lines: Sequence[Floats], limits_mps: Sequence[float]) -> Path:
 
 
 def joined(lines: Sequence[Floats]) -> list[Floats]:
-    """The lines of lanes that follow each other, without the step from one to the next.
+    """The lines of consecutive lanes, `points x 2` each, without the step from one to the next.
 
-    Nets are rounded to centimetres, and some are drawn less exactly, so that a lane begins a little beside
-    where the one before it ends. The step there is a segment of the path in any direction, across it or back. Whoever
-    is near it would be taken to be on the path for a moment, and gone from it in the next.
-
-    Args:
-      lines: `points x 2` each.
-
-    Returns:
-      The same; of a lane that leads to such a step the last `TAPER_M` are left out.
+    Nets are rounded to centimetres, and some are drawn less exactly, so that a lane may begin beside the end of the one
+    before. That step would be a segment of the path in any direction, across it or back; actors near it would be on the
+    path for a moment. So the last `TAPER_M` of a lane that leads to such a step are left out.
     """
     found = list(lines)
     for i, (line, following) in enumerate(pairwise(lines)):

@@ -1,7 +1,6 @@
-"""Who drives the ego in the place of SUMO's models, and how SUMO is told where it is.
+"""Pilots, which drive the ego in place of SUMO's models, and how SUMO is told where it is.
 
-SUMO maps such an ego onto the lane that is nearest along its route, so that its drivers follow it and yield to it as to
-anybody. Its own models of the ego decide nothing any more. Where it is, and how fast, is ours.
+SUMO maps such an ego onto the nearest lane along its route, so that its drivers follow it and yield to it.
 """
 
 import math
@@ -65,25 +64,12 @@ class MovedEgo:
     """
 
     def __init__(self, vehicle: str, motion: Motion, length_m: float, points: Floats) -> None:
-        """Takes it from SUMO's models.
-
-        Args:
-          vehicle: its id.
-          motion: now.
-          length_m: of its body.
-          points: of its path.
-        """
         self._vehicle, self._half_m = vehicle, length_m / 2
         self.motion, self.told = motion, self._told(motion, points)
         libsumo.vehicle.setLaneChangeMode(vehicle, NO_LANE_CHANGE)
 
     def move(self, motion: Motion, along: Along) -> None:
-        """Has SUMO put it there in its next step.
-
-        Args:
-          motion: after the step.
-          along: the ego on its path before.
-        """
+        """Has SUMO put it there in its next step; `along` is the ego on its path before."""
         self.motion, self.told = motion, self._told(motion, along.path.points)
         x, y, angle, *_ = self.told
         libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, angle, KEEP_ROUTE)

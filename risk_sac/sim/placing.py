@@ -1,4 +1,4 @@
-"""How an episode begins in SUMO: the types of its vehicles, its vehicles, and its signal."""
+"""Places an episode's vehicles and signal in SUMO."""
 
 import libsumo
 
@@ -12,12 +12,12 @@ STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFact
 
 
 def emergency_decel_mps2(friction: float) -> float:
-    """The hardest that a car of SUMO's can brake on such a road."""
+    """Hardest braking of SUMO's cars on a road of this friction."""
     return min(EGO_EMERGENCY_DECEL_MPS2, friction * GRAVITY_MPS2)
 
 
 def place(layout: Layout, ego: EgoConfig) -> None:
-    """Puts everybody but the pedestrians where the layout has them; SUMO inserts them in its next step."""
+    """Places all vehicles of the layout; SUMO inserts them in its next step."""
     ego_type = f"ego_{ego.car_following}"
     libsumo.vehicletype.setActionStepLength(ego_type, ego.reaction_time_s)
     libsumo.vehicletype.setEmergencyDecel(ego_type, emergency_decel_mps2(layout.friction))
@@ -30,7 +30,7 @@ def place(layout: Layout, ego: EgoConfig) -> None:
 
 
 def hand_over(start: VehicleStart) -> None:
-    """Lets a vehicle drive as commanded, whatever is in its way."""
+    """Makes a vehicle drive as commanded, whatever is in its way."""
     libsumo.vehicle.setType(start.id, f"adversary_{start.body}")
     for name, value in STEERED.items():  # a change of type leaves the lane-change model as it is
         libsumo.vehicle.setParameter(start.id, f"laneChangeModel.{name}", value)

@@ -1,4 +1,4 @@
-"""What SUMO says after a step, as a frame. SUMO's conventions, front bumpers and compass degrees, end here."""
+"""Reads a frame from SUMO after a step. SUMO's conventions, front bumpers and compass degrees, end here."""
 
 import math
 import re
@@ -36,30 +36,30 @@ from risk_sac.types import (
 )
 
 PEDESTRIAN_SIZE_M = 0.5
-SIDEWALK_M = 1.0  # whoever stands so near a crossing looks at its signal
+SIDEWALK_M = 1.0  # a pedestrian so near a crossing looks at its signal
 CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
 EgoTold = tuple[float, float, float, float, float, float]  # as SUMO does: see `MovedEgo.told`
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
 
 
 class Reading(NamedTuple):
-    """A frame, and what its vehicles' drivers look at; rows are those of the frame, vehicles first, the ego 0."""
+    """A frame and what its drivers look at; rows are those of the frame, vehicles first, the ego 0."""
 
     frame: Frame
     vehicles: tuple[str, ...]
     row: Mapping[str, int]  # of each vehicle
     speed_and_accel: Sequence[tuple[float, float]]  # of each vehicle, m/s and m/s²: also in the frame, but quicker here
     offset_m: Sequence[float]  # of each vehicle from its lane's centre; the same
-    drives: Bools  # of all actors of the frame, who is a vehicle
+    drives: Bools  # of all actors of the frame, which are vehicles
     walks: Bools  # the rest
-    near: Sequence[bool]  # of all actors, who has a pedestrian nearby
+    near: Sequence[bool]  # of all actors, which have a pedestrian nearby
 
 
 class Reader:
     """Reads the frames of an episode."""
 
     def __init__(self, layout: Layout, walkers: Collection[str]) -> None:
-        """Looks at who is there; all vehicles of the layout have been inserted."""
+        """Prepares to read; all vehicles of the layout have been inserted."""
         starts = (layout.ego, *layout.vehicles)
         self._roles = {start.id: start.role for start in starts}
         self._roles |= {start.id: start.role for start in layout.pedestrians}
@@ -71,7 +71,7 @@ class Reader:
         self._told = np.full((len(self._ids), 7), np.nan)
 
     def _describe(self) -> None:
-        """Takes down what stays the same until a vehicle leaves the net."""
+        """Computes what stays the same until a vehicle leaves the net."""
         driving, walking = len(self._vehicles), len(self._walkers)
         self._ids = (*self._vehicles, *self._walkers)
         self._kind = np.array([Kind.VEHICLE] * driving + [Kind.PEDESTRIAN] * walking, dtype=np.int8)
@@ -91,10 +91,10 @@ class Reader:
         self._describe()
 
     def read(self, walkers: Mapping[str, Walker], ego: EgoTold | None = None) -> Reading:
-        """What there is now; SUMO knows nothing of the walkers, so they are told.
+        """Reads all actors.
 
         Args:
-          walkers: all pedestrians.
+          walkers: all pedestrians; SUMO does not know them.
           ego: what SUMO would tell of an ego that it does not drive.
         """
         get_position, get_angle = libsumo.vehicle.getPosition, libsumo.vehicle.getAngle

@@ -1,4 +1,4 @@
-"""Where vehicles are on their roads: along the path they take, and how far they may move aside."""
+"""Positions of vehicles along their paths, and their lateral room."""
 
 from itertools import takewhile
 from typing import NamedTuple
@@ -23,7 +23,7 @@ class Room(NamedTuple):
 
 
 class Roads:
-    """The roads that the vehicles of an episode take; what was asked of a net is kept for the next episode on it."""
+    """Roads of an episode's vehicles; answers about a net are kept for the next episode on it."""
 
     def __init__(self) -> None:
         self._net = ""
@@ -47,7 +47,7 @@ class Roads:
         return self._along(vehicle, lane, libsumo.vehicle.getLateralLanePosition(vehicle))
 
     def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
-        """The way ahead of a vehicle whose centre is there: x and y of points, its centre first."""
+        """Points x and y of the way ahead of a vehicle, its centre first."""
         path, station_m, offset_m = self.along(vehicle)
         ahead = path.points[:, path.points[STATION] > station_m]
         sin, cos = np.sin(ahead[HEADING]), np.cos(ahead[HEADING])
@@ -58,10 +58,10 @@ class Roads:
     def place(self, vehicle: str, offset_m: float, width_m: float) -> tuple[Room, Along]:
         """How far a vehicle may move sideways, and where it is on its path.
 
-        The lanes that its route goes on from end at a wall: SUMO halts a vehicle dead at the end of any other.
+        Only lanes that its route continues from count: SUMO halts a vehicle at the end of any other.
 
         Args:
-          vehicle: one that is there.
+          vehicle: its id.
           offset_m: of its centre from that of its lane, positive to the left.
           width_m: of its body.
         """
@@ -118,5 +118,5 @@ def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
 
 
 def _admits_cars(lane: str) -> bool:
-    allowed = libsumo.lane.getAllowed(lane)  # nothing: everybody but those who are disallowed
+    allowed = libsumo.lane.getAllowed(lane)  # empty: all classes but the disallowed ones
     return CAR in allowed if allowed else CAR not in libsumo.lane.getDisallowed(lane)

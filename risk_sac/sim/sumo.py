@@ -1,10 +1,7 @@
 """An episode in SUMO behind a few verbs: reset, release, apply, step, close.
 
-libsumo holds one simulation per process, so a worker process runs one episode at a time. The modules of this package
-call it, and so does the checker of uploaded networks, `service.networks.checker`; nobody else does.
-
-Pedestrians are points of our own dynamics, and SUMO knows nothing of them: `risk_sac.sim.lookout` says why, and
-`risk_sac.sim.drivers` tells its drivers what to stop for.
+libsumo holds one simulation per process. Only this package and the checker of uploaded networks call it. Pedestrians
+are points of our own dynamics that SUMO does not know, see `risk_sac.sim.lookout`.
 """
 
 import math
@@ -31,7 +28,7 @@ from risk_sac.types import STEP_S, Floats, Frame, Role
 NETS = files("sumo_nets")
 LISTED_WITHIN_S = 0.3
 OFF_ROAD = "ego_off_road"
-BESIDE_M = 1.0  # from the middle of its lane; nobody who is nearer can be off the road
+BESIDE_M = 1.0  # from the middle of its lane; an ego that is nearer is on the road
 OPTIONS = (
     f"--step-length {STEP_S} --lateral-resolution 0.8 --default.speeddev 0 --insertion-checks none "
     "--collision.action warn --collision.mingap-factor 0 --collision.check-junctions "
@@ -57,7 +54,7 @@ class SumoSimulation:
         Args:
           ego: SUMO's models that drive it.
           senses: what it perceives; everything if not given.
-          pilot: who drives it in their place once `hand_over_ego` was called.
+          pilot: drives it in their place once `hand_over_ego` was called.
         """
         self._ego = ego
         self._senses = senses or Perception(0.0, EVERYTHING)
@@ -67,12 +64,12 @@ class SumoSimulation:
         self._roads = Roads()
 
     def reset(self, layout: Layout, seed: int) -> Frame:
-        """Sets up an episode and returns its first frame; SUMO drives everybody until `release`.
+        """Sets up an episode and returns its first frame; SUMO drives all vehicles until `release`.
 
-        It drives adversaries at the speed they start with, or slower where its models want that.
+        Adversaries keep the speed they start with, or drive slower where SUMO's models want that.
 
         Args:
-          layout: where everybody starts.
+          layout: where all actors start.
           seed: SUMO's seed; the same seed and commands give the same episode.
 
         Raises:
@@ -123,17 +120,14 @@ class SumoSimulation:
         self._moved = MovedEgo(self._layout.ego.id, motion, float(frame.length_m[0]), points)
 
     def release(self) -> None:
-        """Hands the adversary vehicles over: from now on they wait for commands.
-
-        Only adversaries lose SUMO's safety checks; anyone else would drive through traffic.
-        """
+        """Hands the adversary vehicles over to commands; only they lose SUMO's safety checks."""
         for start in self._layout.vehicles:
             if start.role is Role.ADVERSARY and start.id in self._reading.row:
                 hand_over(start)
                 self._drivers.release(start.id)
 
     def apply(self, vehicles: Mapping[str, VehicleCommand], walkers: Mapping[str, Walker]) -> None:
-        """Hands the adversaries their commands for the next step; vehicles that left the net are skipped."""
+        """Commands the adversaries' next step; vehicles that left the net are skipped."""
         for id_, (speed_mps, lateral_mps) in vehicles.items():
             if id_ in self._reading.row:
                 libsumo.vehicle.setSpeed(id_, speed_mps)
@@ -141,7 +135,7 @@ class SumoSimulation:
         self._walkers.update(walkers)
 
     def brake(self, braking_mps2: float) -> None:
-        """Lets the ego brake at least so hard in the next step."""
+        """Makes the ego brake by at least `braking_mps2` in the next step."""
         self._reflex_mps2 = braking_mps2
 
     def step(self) -> Frame:
@@ -183,7 +177,7 @@ class SumoSimulation:
         ego.move(self._pilot.drive(frame, self._belief, along), along)
 
     def _refuse_off_road(self, frame: Frame, along: Along) -> None:
-        """SUMO itself keeps who leaves the road at its edge."""
+        """Raises if the ego is off its road; SUMO itself would keep it at the edge."""
         width_m = float(frame.width_m[0])
         _, offset_m, _ = project(along.path.points, float(frame.x_m[0]), float(frame.y_m[0]))
         room, _ = self._roads.place(self._layout.ego.id, offset_m, width_m)
@@ -196,15 +190,12 @@ class SumoSimulation:
         return "".join(states).encode()
 
     def _look(self) -> Belief:
-        """Reads what there is, and lets the ego perceive it."""
+        """Reads a frame, and lets the ego perceive it."""
         self._reading = self._reader.read(self._walkers, None if self._moved is None else self._moved.told)
         return self._senses.look(self._reading.frame)
 
     def _hide(self) -> None:
-        """Makes the ego blind to the vehicles that it does not know of.
-
-        Its car-following and junction models, that is: SUMO's lane-change model has no list of vehicles to ignore.
-        """
+        """Hides the vehicles that the ego does not know from its models; the lane-change model cannot ignore any."""
         ego, vehicles = self._layout.ego.id, self._reading.vehicles
         ignored = " ".join(id_ for id_, known in zip(vehicles, self._belief.known, strict=False) if not known)
         libsumo.vehicle.setParameter(ego, "carFollowModel.ignoreIDs", ignored)
@@ -242,12 +233,10 @@ class SumoSimulation:
         return self._roads.place(vehicle, self._reading.offset_m[row], float(self._reading.frame.width_m[row]))
 
     def lists_collision(self, other: str) -> bool | None:
-        """Whether SUMO lists a collision of the ego with a vehicle, now or if it goes on for `LISTED_WITHIN_S`.
+        """Whether SUMO lists a collision of the ego with a vehicle, now or within `LISTED_WITHIN_S`.
 
-        None of an ego that a pilot drives, whose place SUMO is told, and which goes by the oracle's own boxes.
-
-        SUMO tests rectangles that lie along their lanes, so it is a little late or early where a body is turned. It
-        ends the episode: the simulation is past the contact afterwards.
+        Ends the episode: the simulation is past the contact afterwards. SUMO tests rectangles along their lanes, so it
+        is a little late or early where a body is turned. None if a pilot drives the ego, whose place we tell SUMO.
         """
         if self._moved is not None:
             return None

@@ -11,22 +11,31 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.jit import compiled
+from risk_sac.scenario.layout import CAR_LENGTH_M
 from risk_sac.scenario.limits import Limits
-from risk_sac.sim.bends import BODY_M, CAP, HERE, SOON, bends, index
-from risk_sac.sim.commands import VehicleCommand
-from risk_sac.sim.paths import Along, Path
+from risk_sac.sim.commands import VehicleCommand, clip, taper
+from risk_sac.sim.paths import HEADING, STATION, Along, Path
 from risk_sac.sim.roads import Room
-from risk_sac.sim.taper import clip, taper
 from risk_sac.types import STEP_S, Floats
 
 CORRECTION_PER_M = 0.05  # curvature that is left for steering in the tightest bend, and so before a road's edge
 TURNING_BACK = 0.85  # share of the heading that leaves just enough room; a step of 0.1 s resolves no more
 EDGE_M = 0.03  # of the road that is kept free: what a car overshoots by that brakes while it straightens
-SKID = 0.98  # who is too fast for a curve keeps a fifth of its grip for braking, or it would never slow down
+SKID = 0.98  # a vehicle too fast for a curve keeps a fifth of its grip for braking, or it would never slow down
+
+GRID_M = 0.5
+BODY_M = CAR_LENGTH_M  # SUMO turns a body while it passes a corner of the lane, over the body's own length
+AHEAD_M = 5.0  # so early braking makes way for a bend; more than BODY_M, or a bend is not seen whole as it begins
+NO_BEND_PER_M = 1e-6
+
+# Rows of the bends of a path.
+HERE = 0  # amount of the curvature, 1/m
+SOON = 1  # the largest from there until AHEAD_M on
+CAP = 2  # speed from which all bends ahead can be driven as planned, m/s
 
 
 class Bounds(NamedTuple):
-    """What compiled code knows of a vehicle's `Limits`; named as there."""
+    """Fields of a vehicle's `Limits` for compiled code."""
 
     speed_mps: float
     accel_mps2: float
@@ -42,7 +51,7 @@ class Bounds(NamedTuple):
 
     @classmethod
     def of(cls, limits: Limits) -> "Bounds":
-        """Those of some limits."""
+        """The bounds of some limits."""
         preview_s = (limits.accel_mps2 + limits.approach_mps2) / limits.jerk_mps3
         return cls(**{name: getattr(limits, name) for name in cls._fields[:-1]}, preview_s=preview_s)
 
@@ -179,3 +188,38 @@ def _steer(
     turn, change = curvature * speed**2 * STEP_S, limits.lateral_accel_mps2 * STEP_S
     wanted = clip(wanted, same_heading - turn, same_heading + turn)
     return clip(wanted, lateral - change, lateral + change)
+
+
+def bends(path: Path, limits: Limits) -> Floats:
+    """The bends of a path at the stations 0, GRID_M, 2·GRID_M …, and how fast they can be approached; `3 x stations`.
+
+    v(s)² = min over s' ≥ s of  a / κ(s') + 2 b (s' - s),   a the planned cornering, b the braking left beside it
+    """
+    points = path.points
+    return _profile(points[STATION], points[HEADING], limits.cornering_mps2, limits.approach_mps2)
+
+
+@compiled
+def index(bends: Floats, station_m: float) -> int:
+    """Column of a station; beyond the path's ends, that of its ends."""
+    column: int = min(max(int(station_m / GRID_M), 0), bends.shape[1] - 1)
+    return column
+
+
+@compiled
+def _profile(station: Floats, heading: Floats, cornering: float, braking: float) -> Floats:
+    n = int(station[-1] / GRID_M) + 1
+    found = np.zeros((3, n))
+    curvature, ahead, cap = found[HERE], found[SOON], found[CAP]
+    for i in range(1, len(station)):
+        turn = (heading[i] - heading[i - 1] + math.pi) % (2 * math.pi) - math.pi
+        for k in range(math.ceil(station[i] / GRID_M), min(math.ceil((station[i] + BODY_M) / GRID_M), n)):
+            curvature[k] += turn / BODY_M
+    curvature[:] = np.abs(curvature)
+    reachable = np.inf  # square of the speed from which the next station's cap can be braked to
+    for k in range(n - 1, -1, -1):
+        ahead[k] = curvature[k : k + int(AHEAD_M / GRID_M) + 1].max()
+        square = min(cornering / max(ahead[k], NO_BEND_PER_M), reachable)
+        cap[k] = math.sqrt(square)
+        reachable = square + 2 * braking * GRID_M
+    return found

@@ -22,8 +22,8 @@ from risk_sac.errors import InfeasibleScene, SceneError
 from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, Grade
-from risk_sac.risk.encounter import time_to_encounter
 from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
+from risk_sac.risk.ttc import time_to_encounter
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.types import Frame, Kind, Scene
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.geometry import RelativeView, relative_view, time_to_contact
-from risk_sac.risk.encounter import BEHIND_S_PER_M, DRIFT_MPS, SPEED_SHARE, WALK_MPS, time_to_encounter
+from risk_sac.risk.ttc import BEHIND_S_PER_M, DRIFT_MPS, SPEED_SHARE, WALK_MPS, time_to_encounter
 from tests.builders import frame_of
 
 Other = tuple[float, float, float, float, float]

@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 
 from risk_sac.config import Requirement
-from risk_sac.risk.measures import Gauge, Measures
+from risk_sac.risk.measures import Gauge, Measures, soft_min
 from risk_sac.risk.publish import assess, publish
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.risk.soft_min import soft_min
 from risk_sac.types import Frame
 from tests.builders import frame_of
 

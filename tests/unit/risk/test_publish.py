@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from risk_sac.geometry import relative_view
-from risk_sac.risk.encounter import ENCOUNTER_CAP_S
 from risk_sac.risk.publish import (
     CROSSED_ON_RED_M,
     ENCOUNTER,
@@ -24,7 +23,7 @@ from risk_sac.risk.publish import (
 from risk_sac.risk.rss import SCALED_HIGH, SCALED_LOW
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.signals import SIGNALS
-from risk_sac.risk.ttc import TTC_CAP_S
+from risk_sac.risk.ttc import ENCOUNTER_CAP_S, TTC_CAP_S
 from risk_sac.types import Frame, Kind, Signal
 from tests import builders
 

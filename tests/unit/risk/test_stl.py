@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 from risk_sac.config import DynamicElements, Environment, Interval, Odd, Requirement, Scenery
 from risk_sac.errors import FormulaError, NotFinite
 from risk_sac.risk.formula import parse
+from risk_sac.risk.measures import soft_min
 from risk_sac.risk.signals import SIGNALS
-from risk_sac.risk.soft_min import soft_min
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, check_requirements
 from risk_sac.scenario.odd import requirements_from_odd
 

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import Limits, limits_from_odd
-from risk_sac.sim.bends import BODY_M, CAP, GRID_M, HERE, SOON, bends, index
 from risk_sac.sim.paths import Path
+from risk_sac.sim.vehicle_control import BODY_M, CAP, GRID_M, HERE, SOON, bends, index
 from tests.roads import STRAIGHT_M, arc_m, road
 
 LIMITS = limits_from_odd(FAMILIES["dense"].odd, friction=0.8)

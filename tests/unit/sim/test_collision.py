@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from risk_sac.sim.collision import agrees
 from tests.builders import moved
 from tests.unit.sim.contacts import (
     CAR,
@@ -109,11 +108,3 @@ def test_headings_that_pass_south_are_interpolated_the_short_way() -> None:
     assert contact is not None
     assert contact.time_s == pytest.approx(5.0, abs=0.005)
     assert contact.ego_zone == "front"
-
-
-def test_sumo_agrees_when_it_names_the_pair_in_either_order() -> None:
-    _, frame = frames(*INTO_LEADER)
-    assert not agrees(frame, "ego", "lead")
-    assert agrees(frame._replace(simulator_collisions=(("lead", "ego"),)), "ego", "lead")
-    assert agrees(frame._replace(simulator_collisions=(("a", "b"), ("ego", "lead"))), "ego", "lead")
-    assert not agrees(frame._replace(simulator_collisions=(("ego", "left"),)), "ego", "lead")

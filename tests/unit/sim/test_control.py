@@ -14,8 +14,8 @@ from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import GRAVITY_MPS2, Limits, limits_from_odd
 from risk_sac.scenario.odd import intersect
 from risk_sac.sim.commands import VehicleCommand, Walker
+from risk_sac.sim.control import PedestrianControl
 from risk_sac.sim.paths import Along, Path
-from risk_sac.sim.pedestrian_control import PedestrianControl
 from risk_sac.sim.roads import Room
 from risk_sac.sim.vehicle_control import CORRECTION_PER_M, VehicleControl
 from risk_sac.types import STEP_S
