@@ -3,22 +3,92 @@
 import csv
 import io
 import json
-from dataclasses import asdict, fields
+from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import Field
+
+from risk_sac.config import CampaignSpec, FamilyName, MethodName
+from risk_sac.failures.clusters import Overview
+from risk_sac.failures.studied import Studied
 from risk_sac.metrics import METRICS
+from risk_sac.records import Phase, Record, RunMetrics
 from risk_sac.report.cells import Cell
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.figures import FORMATS, figure_files, figure_names
 from risk_sac.report.markdown import table_markdown
 from risk_sac.report.page import this_platform
-from risk_sac.report.runs import FinishedRun
+from risk_sac.report.paired import PairedTest
 from risk_sac.run_folder.durable import replace_file
 
 FIGURES = "figures"
 FORMAT_VERSION = 1
 _PLAIN = tuple(each.name for each in fields(Cell) if each.type in (int, float, float | None))  # a column each
+
+
+class MissingRun(Record):
+    """A run that the tables lack."""
+
+    family: FamilyName
+    method: MethodName
+    seed: int
+    reason: Annotated[str, Field(examples=["queued", "failed: worker was killed by SIGKILL"])]
+    """Its state, and why it failed."""
+
+
+class ReportedRun(Record):
+    """One finished run."""
+
+    family: FamilyName
+    method: MethodName
+    seed: int
+    digest: str
+    """SHA-256 of the results: the same whenever the run is repeated."""
+    spec_digest: str
+    metrics: Mapping[Phase, RunMetrics]
+    wall_s: float
+    cpu_s: float
+    versions: Mapping[str, str]
+
+
+class Table(Record):
+    """The comparison of a campaign's methods over seeds; `table.json` of `risk-sac evaluate`."""
+
+    format_version: int
+    command: Annotated[
+        str,
+        Field(
+            examples=[
+                "curl -s http://127.0.0.1:8000/v1/campaigns/ca39e56a9cd896b07/spec"
+                " | curl http://127.0.0.1:8000/v1/campaigns -H 'content-type: application/json' -d @-"
+            ]
+        ),
+    ]
+    """What to type to have the same campaign run again."""
+    spec_digest: str
+    spec: CampaignSpec
+    versions: Annotated[Mapping[str, str], Field(examples=[{"libsumo": "1.28.0", "torch": "2.10.0"}])]
+    """Software that produced the runs; all versions where runs differ."""
+    platform: Mapping[str, str]
+    """Machine, processor and Python of the server."""
+    complete: bool
+    """Whether all runs are in the tables."""
+    missing: list[MissingRun]
+    reference: MethodName
+    """The method that the others are compared with: risk-sac, or the first where it does not take part."""
+    cells: list[Cell]
+    """By family, phase and method, the reference first; none before a run has finished."""
+    tests: list[PairedTest]
+    headline: list[PairedTest]
+    """Of distinct preventable failures within 30 processor seconds: risk-sac-diverse, or the first method, against the
+    others; declared before any run, so corrected by themselves."""
+    failures: Mapping[FamilyName, Overview]
+    """The kinds of failures that all methods have found together."""
+    studies: Mapping[FamilyName, Mapping[str, Studied]]
+    """By family and id, the cores and the regions of failures that were asked for in the runs' folders."""
+    runs: list[ReportedRun]
 
 
 def write_report(comparison: Comparison, folder: Path) -> None:
@@ -40,36 +110,47 @@ def write_report(comparison: Comparison, folder: Path) -> None:
         replace_file(folder / name, content)
 
 
-def document(comparison: Comparison) -> dict[str, Any]:
+def table_of(comparison: Comparison) -> Table:
     """What `table.json` holds."""
-    return {
-        "format_version": FORMAT_VERSION,
-        "command": comparison.command,
-        "spec_digest": comparison.spec.digest,
-        "spec": comparison.spec.model_dump(mode="json"),
-        "versions": dict(comparison.versions),
-        "platform": dict(this_platform()),
-        "complete": not comparison.missing,
-        "missing": [
-            {"family": run.spec.family, "method": run.spec.method, "seed": run.spec.seed, "reason": run.reason}
+    return Table(
+        format_version=FORMAT_VERSION,
+        command=comparison.command,
+        spec_digest=comparison.spec.digest,
+        spec=comparison.spec,
+        versions=comparison.versions,
+        platform=this_platform(),
+        complete=not comparison.missing,
+        missing=[
+            MissingRun(family=run.spec.family, method=run.spec.method, seed=run.spec.seed, reason=run.reason)
             for run in comparison.missing
         ],
-        "reference": comparison.reference,
-        "cells": [asdict(cell) for cell in comparison.cells],
-        "tests": [asdict(test) for test in comparison.tests],
-        "headline": [asdict(test) for test in comparison.headline],
-        "failures": {family: each.model_dump(mode="json") for family, each in comparison.overviews.items()},
-        "studies": {
-            family: {id_: each.model_dump(mode="json") for id_, each in comparison.studies(family).items()}
-            for family in comparison.overviews
-        },
-        "runs": [_row(run) for run in comparison.runs],
-    }
+        reference=comparison.reference,
+        cells=list(comparison.cells),
+        tests=list(comparison.tests),
+        headline=list(comparison.headline),
+        failures=comparison.overviews,
+        studies={family: comparison.studies(family) for family in comparison.overviews},
+        runs=[
+            ReportedRun(
+                family=run.spec.family,
+                method=run.spec.method,
+                seed=run.spec.seed,
+                digest=run.digest,
+                spec_digest=run.spec.digest,
+                metrics=run.metrics,
+                wall_s=run.wall_s,
+                cpu_s=run.cpu_s,
+                versions=run.versions,
+            )
+            for run in comparison.runs
+        ],
+    )
 
 
 def table_json(comparison: Comparison) -> str:
     """`table.json`."""
-    return json.dumps(document(comparison), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    content = table_of(comparison).model_dump(mode="json")
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def table_csv(comparison: Comparison) -> str:
@@ -95,17 +176,3 @@ def _cell_row(cell: Cell) -> dict[str, Any]:
             f"{name}_runs": estimate.runs,
         }
     return row
-
-
-def _row(run: FinishedRun) -> dict[str, Any]:
-    return {
-        "family": run.spec.family,
-        "method": run.spec.method,
-        "seed": run.spec.seed,
-        "digest": run.digest,
-        "spec_digest": run.spec.digest,
-        "metrics": {phase: metrics.model_dump() for phase, metrics in run.metrics.items()},
-        "wall_s": run.wall_s,
-        "cpu_s": run.cpu_s,
-        "versions": dict(run.versions),
-    }

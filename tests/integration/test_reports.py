@@ -15,7 +15,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import read_campaign
 from risk_sac.report import compare, figure_bytes, figure_names, read_run, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS
-from service.schemas.reports import Table
+from risk_sac.report.files import Table
 
 SPEC = {
     "methods": ["random", "no-adversary"],

@@ -14,10 +14,11 @@ from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.report import Comparison, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS, Format
+from risk_sac.report.files import Table
 from service.api.answers.representations import accepted_format, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses
 from service.api.context import Context, CurrentCaller, Service
-from service.schemas.reports import Clusters, Figure, FigureFile, Figures, Table
+from service.schemas.reports import Clusters, Figure, FigureFile, Figures
 from service.store.stored import StoredCampaign
 from service.views.reports import CampaignReport
 
