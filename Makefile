@@ -21,7 +21,7 @@ $(STAMP): pyproject.toml constraints.txt $(COMMONROAD)
 	@python=$$($(FIND_PYTHON)); \
 	if [ -z "$$python" ]; then echo "make: found neither python3.11 nor python3.12; install one of them" >&2; exit 1; fi; \
 	test -x $(PYTHON) || "$$python" -m venv .venv
-	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,export,s3]"
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,export]"
 	@# By itself: commonroad-io insists on protobuf 3.20.2.
 	$(PYTHON) -m venv .venv/commonroad
 	.venv/commonroad/bin/python -m pip install --quiet --disable-pip-version-check -r $(COMMONROAD)

@@ -54,10 +54,6 @@ class Program(Generic[Word]):
     hear: Callable[[bytes], Heard[Word]]
     """Reads a line of the worker's words; a ValueError refuses it. A worker gets its run as a line of JSON on its
     standard input, whose end tells it that its words are not read any more."""
-    inputs: tuple[Path, ...] = ()
-    """Files that the arguments name; a worker on another machine is given copies."""
-    within: Path | None = None
-    """Folder that holds those of all runs, for executors that have to bring other machines to it."""
     environment: Mapping[str, str] = field(default_factory=dict)
     """Variables that it finds beside those of whoever starts it."""
     lease_s: float = math.inf

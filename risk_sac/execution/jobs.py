@@ -61,18 +61,13 @@ Progress = Callable[[Sequence[Job]], None]
 """Told about all jobs a few times a second."""
 
 
-def worker_program(within: Path) -> Program[Event]:
-    """The worker without limits on its memory, that replays no failures.
-
-    Args:
-      within: holds the folders of all runs.
-    """
+def worker_program() -> Program[Event]:
+    """The worker without a limit on its memory, that replays no failures."""
     return Program(
         arguments=lambda spec, folder: ["-m", "risk_sac.execution.worker", str(folder), "0", "0", "0"],
         log=LOG,
         hear=hear,
         linger_s=LINGER_S,
-        within=within,
     )
 
 

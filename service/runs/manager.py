@@ -273,5 +273,4 @@ def worker_program(settings: ServiceSettings) -> Program[Event]:
         lease_s=settings.lease_s,
         stall_s=settings.stall_s,
         linger_s=settings.grace_s,
-        within=settings.data_dir,
     )

@@ -1,12 +1,13 @@
 from collections.abc import Iterator
-from contextlib import closing
+from typing import Any
 
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import MakeExecutor, executor_named
+from risk_sac.execution.executor import MakeExecutor, Program, executor_named
+from risk_sac.execution.jobs import worker_program
+from risk_sac.execution.mailbox import Mailbox
 from risk_sac.execution.ray.executor import RayExecutor
-from risk_sac.execution.ray.link import Link
 from tests.contract.executor_contract import ExecutorContract
 from tests.ray_cluster import Cluster, needs_ray, running
 
@@ -23,18 +24,32 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         yield cluster
 
 
+class Reused(RayExecutor[Any]):
+    """One for all tests, since another client of Ray costs several seconds of a processor."""
+
+    def begin_anew(self, program: Program[Any]) -> "Reused":
+        self._program, self._mailbox, self._ordered = program, Mailbox(), {}
+        return self
+
+    def close(self) -> None:
+        """The module does it."""
+
+    def really_close(self) -> None:
+        super().close()
+
+
 @pytest.fixture(scope="module")
-def link(cluster: Cluster) -> Iterator[Link]:
-    """One for all tests: another client costs Ray, and them, several seconds of a processor."""
-    with closing(Link()) as link:
-        yield link
+def reused(cluster: Cluster) -> Iterator[Reused]:
+    executor = Reused(worker_program())
+    yield executor
+    executor.really_close()
 
 
 @needs_ray
 class TestRay(ExecutorContract):
     @pytest.fixture
-    def make(self, link: Link) -> MakeExecutor:
-        return lambda program: RayExecutor(program, link)
+    def make(self, reused: Reused) -> MakeExecutor:
+        return reused.begin_anew
 
 
 def test_an_executor_that_does_not_exist_is_named_with_those_that_do():

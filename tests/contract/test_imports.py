@@ -27,7 +27,7 @@ def test_the_server_process_loads_nothing_that_learns_compiles_or_simulates_and_
 
 def test_the_server_loads_nothing_of_a_cluster_that_it_does_not_use(loaded: set[str]) -> None:
     assert "risk_sac.execution.executor" in loaded
-    assert not {"ray", "fsspec", "risk_sac.execution.ray.executor", "risk_sac.execution.ray.bridge"} & loaded
+    assert not {"ray", "risk_sac.execution.ray.executor", "risk_sac.execution.ray.bridge"} & loaded
 
 
 def test_the_server_reads_no_upload_itself(loaded: set[str]) -> None:

@@ -1,4 +1,4 @@
-"""The command line and the service on a Ray cluster of two nodes, whose files go through an S3 of our own."""
+"""The command line and the service on a Ray cluster of two nodes."""
 
 import contextlib
 import json
@@ -15,47 +15,17 @@ import pytest
 from risk_sac.scenario import library
 from risk_sac.scenario.place import PLACES
 from tests.integration.scripted_worker import DIES, ONCE, WAITS, WELL_BEHAVED
-from tests.ray_cluster import ROOT, Cluster, free_port, needs_ray, running
+from tests.ray_cluster import ROOT, Cluster, needs_ray, running
 from tests.server import servers
 
 pytestmark = needs_ray
-BUCKET = "risk-sac"
 TINY = ["--methods", "random", "--seeds", "1", "--episodes", "3", "--verify", "0"]
 LONG_S = 300
 
 
 @pytest.fixture(scope="module")
-def s3(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
-    """What a client of it needs in its environment."""
-    port = free_port()
-    environment = {
-        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}",
-        "AWS_ACCESS_KEY_ID": "nobody",
-        "AWS_SECRET_ACCESS_KEY": "nothing",
-        "AWS_DEFAULT_REGION": "us-east-1",
-    }
-    log = tmp_path_factory.mktemp("s3") / "log"
-    with log.open("wb") as output:
-        server = subprocess.Popen(
-            [sys.executable, "-W", "ignore", "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)],
-            stdout=output, stderr=output, env=os.environ | environment,
-        )  # fmt: skip
-    make = (
-        "import fsspec, time\nfor _ in range(600):\n  try:\n    "
-        f"fsspec.filesystem('s3').mkdir({BUCKET!r}); break\n  except OSError: time.sleep(0.1)"
-    )
-    try:
-        subprocess.run([sys.executable, "-c", make], check=True, env=os.environ | environment, timeout=LONG_S)
-        yield environment
-    finally:
-        server.kill()
-        server.wait()
-
-
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory, s3: dict[str, str]) -> Iterator[Cluster]:
-    storage = {"RISK_SAC_RAY_STORAGE": f"s3://{BUCKET}/runs", "RISK_SAC_RAY_LEASE_S": "10"}
-    with running(tmp_path_factory.mktemp("cluster"), nodes=2, cpus=1, **s3, **storage) as cluster:
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    with running(tmp_path_factory.mktemp("cluster"), nodes=2, cpus=1, RISK_SAC_RAY_LEASE_S="10") as cluster:
         yield cluster
 
 
@@ -76,16 +46,22 @@ def digests(folder: Path) -> dict[str, str]:
     return {path.parent.name: json.loads(path.read_text())["digest"] for path in folder.glob("runs/*/results.json")}
 
 
-def stored() -> list[str]:
-    """What lies in the bucket."""
-    code = f"import fsspec; print(*fsspec.filesystem('s3').find({BUCKET!r}), sep='\\n')"
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=LONG_S)
-    return shown.stdout.split()
+def actors(cluster: Cluster) -> list[psutil.Process]:
+    """Processes of Ray that attend a run."""
+    processes = [process for node in cluster.nodes for process in cluster.processes(node)]
+    return [process for process, name in processes if name.startswith("ray::Attendant")]
 
 
-def tasks(cluster: Cluster) -> list[psutil.Process]:
-    """Processes of Ray that look after a run."""
-    return [each for node in cluster.nodes for each, name in cluster.processes(node) if name.startswith("ray::run-")]
+def folder_beside(cluster: Cluster, run: str, *others: Path) -> Path:
+    """Where the next attempt at a run works."""
+    found: list[Path] = []
+
+    def there() -> bool:
+        found[:] = [each for each in cluster.scratch.glob(f"{run}-*/{run}") if each not in others]
+        return len(found) == 1
+
+    wait_until(there)
+    return found[0]
 
 
 def wait_until(holds: Callable[[], object], seconds: float = LONG_S) -> None:
@@ -113,11 +89,10 @@ def test_a_comparison_comes_to_the_same_on_a_cluster_and_leaves_nothing_there(cl
     for name in digests(tmp_path / "local"):
         files = {path.name for path in (tmp_path / "local" / "runs" / name).iterdir()}
         assert {path.name for path in (tmp_path / "ray" / "runs" / name).iterdir()} >= files - {".lock"}
-    assert stored() == []
     wait_until(lambda: not list(cluster.scratch.glob("*")))
 
 
-def test_a_worker_and_a_task_that_are_killed_are_replaced_from_the_checkpoint(serve, cluster):
+def test_a_worker_and_an_actor_that_are_killed_are_replaced_from_the_checkpoint(serve, cluster):
     service = serve()
     campaign_id = service.post(seeds=[WELL_BEHAVED, ONCE + DIES, WAITS], budget={"episodes": 12})
     run = f"low-random-{WAITS}"
@@ -125,22 +100,20 @@ def test_a_worker_and_a_task_that_are_killed_are_replaced_from_the_checkpoint(se
     metrics = service.client.get("/metrics").text
     assert "risk_sac_cluster_connected 1.0" in metrics
     assert sum(line.startswith("risk_sac_node_alive{") and line.endswith(" 1.0") for line in metrics.splitlines()) == 2
-    wait_until(lambda: len(tasks(cluster)) == 1)  # on a busy machine the other runs are at work for longer
-    # The task goes, and with it go the worker that it looks after and the folder of that.
-    (task,) = tasks(cluster)
-    workers = [each for each in task.children() if "scripted_worker" in each.cmdline()]
+    wait_until(lambda: len(actors(cluster)) == 1)  # on a busy machine the other runs are at work for longer
+    # The actor goes, and with it go its worker and the folder of that.
+    (actor,) = actors(cluster)
+    workers = [each for each in actor.children() if "scripted_worker" in each.cmdline()]
     assert len(workers) == 1
-    task.kill()
+    old = folder_beside(cluster, run)
+    actor.kill()
     assert psutil.wait_procs(workers, LONG_S)[1] == []
-    wait_until(lambda: list(cluster.scratch.glob(f"{run}-2-*/{run}")))
-    (folder,) = cluster.scratch.glob(f"{run}-2-*/{run}")
-    (folder / "go-10").touch()
+    (folder_beside(cluster, run, old) / "go-10").touch()
     campaign = service.wait(campaign_id)
     assert campaign["state"] == "succeeded", campaign
     for each in campaign["runs"]:
         assert service.episodes(campaign_id, each["id"]) == list(range(12))
     wait_until(lambda: not list(cluster.scratch.glob("*")))
-    assert stored() == []
 
 
 def test_what_a_hung_node_says_later_is_dropped(serve, cluster):
@@ -148,15 +121,15 @@ def test_what_a_hung_node_says_later_is_dropped(serve, cluster):
     campaign_id = service.post(seeds=[WAITS], budget={"episodes": 12})
     run = f"low-random-{WAITS}"
     service.wait_for(campaign_id, lambda seen: service.episodes(campaign_id, run) == list(range(10)))
-    (task,) = tasks(cluster)
-    hung = [task, *(each for each in task.children() if "scripted_worker" in each.cmdline())]
-    (old,) = cluster.scratch.glob(f"{run}-1-*/{run}")
+    (actor,) = actors(cluster)
+    hung = [actor, *(each for each in actor.children() if "scripted_worker" in each.cmdline())]
+    old = folder_beside(cluster, run)
     for process in hung:
         process.suspend()
     service.wait_for(campaign_id, lambda seen: seen["runs"][0]["attempts"] == 2)
-    wait_until(lambda: list(cluster.scratch.glob(f"{run}-2-*/{run}")))
-    (folder,) = cluster.scratch.glob(f"{run}-2-*/{run}")
-    (old / "go-10").touch()  # it would go on now
+    folder = folder_beside(cluster, run, old)
+    with contextlib.suppress(FileNotFoundError):
+        (old / "go-10").touch()  # it would go on now
     for process in hung:
         with contextlib.suppress(psutil.NoSuchProcess):
             process.resume()
@@ -165,12 +138,3 @@ def test_what_a_hung_node_says_later_is_dropped(serve, cluster):
     (folder / "go-10").touch()
     assert service.wait(campaign_id)["state"] == "succeeded"
     assert service.episodes(campaign_id, run) == list(range(12))
-
-
-def test_a_bucket_that_is_not_there_is_told_before_the_first_run(cluster, tmp_path):
-    shown = evaluated(tmp_path / "out", ["low"], RISK_SAC_RAY_STORAGE="s3://no-such-bucket/runs")
-    assert shown.returncode == 2, shown.stderr
-    text = " ".join(shown.stderr.split())
-    assert "RISK_SAC_RAY_STORAGE" in text
-    assert "this machine cannot use" in text
-    assert not list(tmp_path.glob("out/runs/*"))

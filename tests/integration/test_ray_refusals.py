@@ -12,7 +12,8 @@ import psutil
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.execution.ray.link import Link
+from risk_sac.execution.jobs import worker_program
+from risk_sac.execution.ray.executor import RayExecutor
 from tests.ray_cluster import ROOT, Cluster, needs_ray, running
 
 LONG_S = 300
@@ -32,10 +33,6 @@ import collections, sys
 Version = collections.namedtuple("Version", "major minor micro releaselevel serial")
 sys.version_info = Version(*sys.version_info[:2], 99, *sys.version_info[3:])
 """
-may_unshare = pytest.mark.skipif(
-    subprocess.run(["unshare", "-m", "true"], capture_output=True, check=False).returncode != 0,
-    reason="mount namespaces are root's",
-)
 
 
 def path_with(*folders: Path) -> dict[str, str]:
@@ -73,9 +70,9 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         yield cluster
 
 
-def refusal(within: Path | None = None) -> ConfigError:
+def refusal() -> ConfigError:
     with pytest.raises(ConfigError) as caught:
-        Link(within).close()
+        RayExecutor(worker_program()).close()
     return caught.value
 
 
@@ -96,19 +93,16 @@ def wait_until(holds: Callable[[], object]) -> None:
         ({"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1", "RISK_SAC_RAY_JOIN": "1"}, "RISK_SAC_RAY_ADDRESS", "nothing answers"),
         ({"RISK_SAC_RAY_CPUS_PER_RUN": "3"}, "RISK_SAC_RAY_CPUS_PER_RUN", "no node of the cluster has as much"),
         ({"RISK_SAC_RAY_CPUS_PER_RUN": "none"}, "RISK_SAC_RAY_CPUS_PER_RUN", "got 'none'"),
-        ({"RISK_SAC_RAY_STORAGE": "cloud://runs"}, "RISK_SAC_RAY_STORAGE", "this machine cannot use"),
-        ({"RISK_SAC_RAY_STORAGE": "file:///proc/runs"}, "RISK_SAC_RAY_STORAGE", "this machine cannot use"),
         ({"RISK_SAC_RAY_SCRATCH_DIR": "/proc/runs"}, "RISK_SAC_RAY_SCRATCH_DIR", "cannot write to"),
         ({"RAY_AUTH_TOKEN": "0" * 32}, "RISK_SAC_RAY_ADDRESS", "with its token"),
     ],
 )
-def test_settings_that_cannot_work_are_named(cluster, monkeypatch, tmp_path, environment, field, said):
+def test_settings_that_cannot_work_are_named(cluster, monkeypatch, environment, field, said):
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
-    error = refusal(tmp_path)
+    error = refusal()
     assert error.field == field
     assert said in str(error)
-    assert list(tmp_path.iterdir()) == []
 
 
 @needs_ray
@@ -156,35 +150,14 @@ def test_a_node_with_another_python_and_other_packages_is_refused_before_any_run
 
 
 @needs_ray
-@may_unshare
-@pytest.mark.parametrize("told", [True, False])
-def test_a_node_that_does_not_see_the_storage_is_refused_before_any_run(cluster, monkeypatch, tmp_path, told):
-    shared = tmp_path / "shared"
-    shared.mkdir()
-    hidden = ["unshare", "-m", "sh", "-c", 'mount -t tmpfs none "$0" && exec "$@"', str(shared)]
-    if told:
-        monkeypatch.setenv("RISK_SAC_RAY_STORAGE", f"file://{shared}")
-    cluster.add(1, prefix=hidden)
-    try:
-        error = refusal(shared)
-    finally:
-        cluster.end(1)
-    assert error.field == "RISK_SAC_RAY_STORAGE"
-    assert "what the server has just written is not to be seen there" in str(error)
-    assert list(shared.iterdir()) == []
-    with closing(Link(shared)):  # without that node all is well
-        pass
-
-
-@needs_ray
 @pytest.mark.parametrize("killed", [False, True])
 def test_a_machine_that_joins_is_a_node_without_room_for_as_long_as_its_bridge_lives(cluster, monkeypatch, killed):
     monkeypatch.setenv("RISK_SAC_RAY_JOIN", "true")
-    with closing(Link()) as link:
+    with closing(RayExecutor(worker_program())) as executor:
         (bridge,) = [each for each in psutil.Process().children() if "risk_sac.execution.ray.bridge" in each.cmdline()]
         joined = bridge.children(recursive=True)
         assert any("raylet" in each.name() for each in joined)
-        wait_until(lambda: sorted(node.slots for node in link.cluster.nodes if node.alive) == [0, 1])
+        wait_until(lambda: sorted(node.slots for node in executor.cluster.nodes if node.alive) == [0, 1])
         if killed:
             bridge.kill()
             assert psutil.wait_procs(joined, LONG_S)[1] == []

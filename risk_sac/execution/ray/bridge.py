@@ -1,142 +1,235 @@
-"""`python -m risk_sac.execution.ray.bridge [FOLDER]`: stands between server and cluster, and may die in its place.
+"""`python -m risk_sac.execution.ray.bridge FD`: the process that knows Ray, between the server and the cluster.
 
-FOLDER holds those of all runs; without it nobody tries whether the nodes see it.
-
-Ray ends the process that uses it when its cluster is lost for a minute. So the server does not use it: it talks to
-this process by lines of JSON, and starts another one when this one has ended. The end of standard input ends it, and
-with it go its tasks on all nodes.
+Ray ends the process that uses it when its cluster has been lost for a minute. So the server does not use it: it talks
+to this process, and starts another one when this one has ended. The end of the connection `FD` ends this process, and
+with it go its actors on all nodes.
 """
 
-import json
+import contextlib
 import logging
+import math
 import os
 import sys
 import threading
 import time
-from dataclasses import asdict, replace
-from pathlib import Path
-from typing import IO, Any
+from collections.abc import Callable
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from typing import Any
 
 import ray
+from ray.exceptions import RayError, RayTaskError
 
 from risk_sac.errors import ConfigError
-from risk_sac.execution.ray import checks, reach
-from risk_sac.execution.ray.following import Followed
-from risk_sac.execution.ray.join import joined
+from risk_sac.execution.executor import Cause, Cluster, Exited
+from risk_sac.execution.local import Lease, Signs
+from risk_sac.execution.postmortem import without_folders
+from risk_sac.execution.ray.cluster import connected, nodes
+from risk_sac.execution.ray.node import Attendant, Files, Order, Report, read, write
 from risk_sac.execution.ray.settings import RaySettings, read_settings
 from risk_sac.execution.ray.versions import versions
-from risk_sac.execution.ray.words import Order, exited_json, line, order_of
 
 logger = logging.getLogger("risk_sac.execution.ray.bridge")
 
 LOOK_S = 1.0
+HELD_UP_S = 2.0  # longer between two looks, and it was this process that was held up
+HURRY_S = 2.0  # on top of the grace of a run that is to stop, until its actor is killed
 NODES_S = 2.0
+BEATS = 5  # reports within a lease
+
+
+class _Over(Exception):
+    """Nothing more is wanted of an attempt."""
+
+    def __init__(self, cause: Cause, reason: str) -> None:
+        super().__init__(reason)
+        self.exited = Exited(reason, cause)
+
+
+class Attempt:
+    """An attempt at a run; a thread follows it, others may stop it or give it up.
+
+    Attributes:
+      node: Ray's name of the node that executes it; None until its worker has begun.
+    """
+
+    def __init__(self, order: Order, settings: RaySettings, say: Callable[..., None]) -> None:
+        self.order = order
+        self.node: str | None = None
+        self._settings = settings
+        self._say = say
+        self._lock = threading.Lock()
+        self._given_up = False
+        self._stop_by = math.inf
+        self._heard_at = time.monotonic()
+        self._lease = Lease(settings.ray_lease_s, math.inf)
+        self._reports = 0
+        self._actor: Any = None
+
+    @property
+    def silent_s(self) -> float:
+        """Since its last report, s."""
+        return time.monotonic() - self._heard_at
+
+    def give_up(self) -> None:
+        """Kills it; once this returns, it writes no file any more."""
+        with self._lock:
+            self._given_up = True
+        self._kill()
+
+    def stop(self, grace_s: float) -> None:
+        """Tells its worker to stop; after the shortest grace time it is killed."""
+        with self._lock:
+            self._stop_by = min(self._stop_by, time.monotonic() + grace_s)
+        if self.node is None or grace_s <= 0:
+            self._kill()
+        else:
+            self._actor.cancel.remote(grace_s)
+
+    def follow(self) -> Exited:
+        """Passes on what it says from the beginning to the end; returns what became of it."""
+        try:
+            exited = self._followed()
+        except _Over as over:
+            exited = over.exited
+        except RayTaskError as error:
+            exited = Exited(_blamed(error.cause or error), Cause.CRASHED)
+        except RayError as error:
+            exited = Exited(f"its actor or its node was lost ({type(error).__name__})", Cause.KILLED)
+        except OSError as error:
+            exited = Exited(_blamed(error), Cause.CRASHED)
+        self._kill()
+        if self._stop_by < math.inf and exited.cause is not Cause.ENDED:
+            exited = replace(exited, cause=Cause.ENDED)
+        return exited
+
+    def _followed(self) -> Exited:
+        order, settings = self.order, self._settings
+        memory = {"memory": settings.ray_memory_bytes_per_run} if settings.ray_memory_bytes_per_run else {}
+        with self._lock:
+            if self._given_up or self._stop_by < math.inf:
+                raise _Over(Cause.ENDED, "stopped before it began")
+            self._actor = (
+                ray.remote(Attendant)
+                .options(
+                    num_cpus=settings.ray_cpus_per_run,
+                    max_concurrency=2,
+                    scheduling_strategy="SPREAD",
+                    **memory,
+                )
+                .remote()
+            )
+        order.folder.mkdir(parents=True, exist_ok=True)
+        beside: Files = {name: path.read_bytes() for name, path in order.beside.items()}
+        self.node = self._answer(self._actor.begin.remote(order, read(order.folder), beside, versions()))
+        while True:
+            report: Report = self._answer(self._actor.poll.remote(settings.ray_lease_s / BEATS))
+            with self._lock:
+                if self._given_up:
+                    raise _Over(Cause.ENDED, "another attempt has begun")
+                write(order.folder, report.files)  # before the words that tell of them
+            if report.lines:
+                self._say("said", order.id, report.lines)
+            if report.exited is not None:
+                return report.exited
+
+    def _answer(self, reference: Any) -> Any:
+        """What a call of the actor returns; it is patient until the worker has begun, since it may wait for room."""
+        looked_at = time.monotonic()
+        while not ray.wait([reference], timeout=LOOK_S)[0]:
+            now = time.monotonic()
+            watched_s, looked_at = min(now - looked_at, HELD_UP_S), now
+            if self._given_up:
+                raise _Over(Cause.ENDED, "another attempt has begun")
+            if now >= self._stop_by + HURRY_S:
+                raise _Over(Cause.ENDED, "killed after its grace time")
+            if self.node is not None and self._lease.passed(watched_s, Signs(self._reports)) is not None:
+                raise _Over(Cause.STOPPED, f"nothing was heard of its node for {self._settings.ray_lease_s:g} s")
+        self._reports, self._heard_at = self._reports + 1, time.monotonic()
+        return ray.get(reference)
+
+    def _kill(self) -> None:
+        if self._actor is not None:
+            ray.kill(self._actor)
 
 
 class Bridge:
-    """Carries orders to the cluster and reports back; a thread follows each attempt."""
+    """Carries orders to the cluster and words back; a thread follows each attempt."""
 
-    def __init__(self, settings: RaySettings, words: IO[bytes]) -> None:
+    def __init__(self, settings: RaySettings, server: Connection) -> None:
         self._settings = settings
-        self._words = words
-        self._telling = threading.Lock()
-        self._lock = threading.Lock()
-        self._latest: dict[int, Followed] = {}
-        self._expected = versions()
-        self.heard_of_head = time.monotonic()
+        self._server = server
+        self._saying = threading.Lock()
+        self._attempts: dict[str, Attempt] = {}
 
-    def tell(self, kind: str, **content: Any) -> None:
-        """Says something to the server."""
-        message = line(kind, **content)
-        with self._telling:
-            self._words.write(message)
-            self._words.flush()
+    def say(self, kind: str, *content: Any) -> None:
+        """Says something to the server; the end of the connection ends this process elsewhere."""
+        with self._saying:
+            self._server.send((kind, *content))
 
-    def submit(self, order: Order) -> None:
-        """Begins an attempt; an older one at the same run is given up."""
-        followed = Followed(order, self._settings, self._expected, self._said)
-        with self._lock:
-            overtaken = self._latest.get(order.number)
-            self._latest[order.number] = followed
-        threading.Thread(target=self._follow, args=(followed, overtaken), daemon=True).start()
-
-    def _follow(self, followed: Followed, overtaken: Followed | None) -> None:
-        if overtaken is not None:
-            overtaken.give_up()
-        exited, order = followed.follow(), followed.order
-        with self._lock:
-            if self._latest.get(order.number) is not followed:
-                return
-            del self._latest[order.number]
-        self.tell("exited", number=order.number, token=order.token, exited=exited_json(exited))
-
-    def _said(self, order: Order, lines: list[str]) -> None:
-        self.tell("said", number=order.number, token=order.token, lines=lines)
-
-    def cancel(self, number: int, token: str, grace_s: float) -> None:
-        """Tells an attempt to stop."""
-        with self._lock:
-            followed = self._latest.get(number)
-        if followed is not None and followed.order.token == token:
-            followed.stop(grace_s)
-
-    def watch(self) -> None:
-        """Tells of the cluster every few seconds."""
+    def carry(self) -> None:
+        """Acts on what the server says until it says nothing any more."""
+        self.say("ready")
+        threading.Thread(target=self._watch, daemon=True).start()
         while True:
-            found = ray.nodes()
-            self.heard_of_head = time.monotonic()
-            with self._lock:
-                at_work = list(self._latest.values())
-            nodes = []
-            for node in checks.nodes(found, self._settings):
+            match self._server.recv():
+                case "submit", Order() as order:
+                    begun = self._attempts[order.id] = Attempt(order, self._settings, self.say)
+                    threading.Thread(target=self._follow, args=(begun,), daemon=True).start()
+                case "give up", id_:
+                    if attempt := self._attempts.get(id_):
+                        attempt.give_up()
+                case "cancel", id_, grace_s:
+                    if attempt := self._attempts.get(id_):
+                        attempt.stop(grace_s)
+                case _:
+                    return
+
+    def _follow(self, attempt: Attempt) -> None:
+        exited = attempt.follow()
+        del self._attempts[attempt.order.id]
+        self.say("exited", attempt.order.id, exited)
+
+    def _watch(self) -> None:
+        """Tells of the cluster every few seconds; ends this process if its head is silent, as clusters die with it."""
+        heard_at = time.monotonic()
+        threading.Thread(target=self._leave_with_head, args=(lambda: heard_at,), daemon=True).start()
+        while True:
+            found = nodes(self._settings)
+            heard_at = time.monotonic()
+            at_work = list(self._attempts.values())
+            listed = []
+            for node in found:
                 silences = [each.silent_s for each in at_work if each.node == node.id]
-                nodes.append(asdict(replace(node, runs=len(silences), silent_s=min(silences, default=0.0))))
-            self.tell("nodes", nodes=nodes)
+                listed.append(replace(node, runs=len(silences), silent_s=min(silences, default=0.0)))
+            self.say("cluster", Cluster(tuple(listed)))
             time.sleep(NODES_S)
 
+    def _leave_with_head(self, heard_at: Callable[[], float]) -> None:
+        while time.monotonic() - heard_at() <= self._settings.ray_lease_s:
+            time.sleep(LOOK_S)
+        logger.error("nothing was heard of the cluster's head for %g s", self._settings.ray_lease_s)
+        os._exit(1)
 
-def main() -> None:
-    """Connects, checks the cluster, and carries orders until nobody gives any more."""
+
+def main(descriptor: int) -> None:
+    """Connects, checks the cluster, and carries orders until the server has gone."""
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
-    words = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what Ray prints of itself is no message
-    within = Path(sys.argv[1]) if len(sys.argv) > 1 else None
+    server = Connection(descriptor)
     try:
         settings = read_settings()
-        bridge = Bridge(settings, words)
-        reach.check_head(settings)
-        with joined(settings) as node:
-            reach.connect(settings, node)
-            checks.check(settings, within)
-            bridge.tell("ready")
-            _carry(bridge, settings.ray_lease_s)
+        with connected(settings), contextlib.suppress(EOFError, OSError):  # the server has gone
+            Bridge(settings, server).carry()
     except ConfigError as error:
-        words.write(line("refused", error=error.args))
-        words.flush()
+        server.send(("refused", error))
         return
     os._exit(0)
 
 
-def _carry(bridge: Bridge, lease_s: float) -> None:
-    """Until nobody gives orders any more, or the head is gone: a cluster dies with it."""
-    over = threading.Event()
-    threading.Thread(target=bridge.watch, daemon=True).start()
-    threading.Thread(target=_listen, args=(bridge, over), daemon=True).start()
-    while not over.wait(LOOK_S):
-        if time.monotonic() - bridge.heard_of_head > lease_s:
-            logger.error("nothing was heard of the cluster's head for %g s", lease_s)
-            return
-
-
-def _listen(bridge: Bridge, over: threading.Event) -> None:
-    for text in sys.stdin:
-        content = json.loads(text)
-        if content.pop("kind") == "submit":
-            bridge.submit(order_of(content))
-        else:
-            bridge.cancel(content["number"], content["token"], content["grace_s"])
-    over.set()
+def _blamed(error: BaseException) -> str:
+    why = without_folders(str(error))
+    return why if isinstance(error, ConfigError) else f"{type(error).__name__}: {why}"
 
 
 if __name__ == "__main__":
-    main()
+    main(int(sys.argv[1]))

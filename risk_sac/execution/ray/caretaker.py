@@ -1,7 +1,6 @@
-"""`python -IS caretaker.py`: ends what another process was looking after, should that be killed. Needs no package.
+"""`python -IS caretaker.py [FOLDER]`: ends a group of processes and removes a folder once its starter has gone.
 
-One line on its standard input for each group of processes that begins, `+PID FOLDER`, where the folder may be left
-out, and that is over, `-PID`. At the end of its input it kills what has not been taken back, and removes its folder.
+It needs no package. Standard input names the group; its end is the sign to act.
 """
 
 import contextlib
@@ -13,62 +12,42 @@ import sys
 import time
 from pathlib import Path
 
-GONE_S = 5.0
-
-
-def main() -> None:
-    """Reads until nobody writes any more."""
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-    left: dict[int, str] = {}
-    for line in sys.stdin:
-        pid, _, folder = line[1:].rstrip("\n").partition(" ")
-        if line.startswith("+"):
-            left[int(pid)] = folder
-        else:
-            left.pop(int(pid), None)
-    for group in left:
-        kill(group)
-    for folder in filter(None, left.values()):
-        remove(folder)
+GONE_S = 10.0
 
 
 class Caretaker:
-    """The other end: a process that ends what this one has started, should this one be killed."""
+    """The starter's end. The process is a grandchild, since Ray kills the children of a process that it ends."""
 
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-IS", __file__],
-            stdin=subprocess.PIPE,
-            start_new_session=True,
-            bufsize=0,
-        )
+    def __init__(self, *folder: Path) -> None:
+        command = [sys.executable, "-IS", __file__, *map(str, folder)]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, bufsize=0)
+        self._process.wait()
 
-    def begin(self, group: int, folder: Path | None = None) -> None:
-        """From here on it would end that group of processes, and remove the folder."""
-        self._say(f"+{group} {folder or ''}\n")
-
-    def over(self, group: int) -> None:
-        """There is nothing left to end."""
-        self._say(f"-{group}\n")
-
-    def _say(self, text: str) -> None:
+    def watch(self, group: int) -> None:
+        """Names the group of processes that is to end with this one."""
         assert self._process.stdin is not None
-        self._process.stdin.write(text.encode())
+        self._process.stdin.write(str(group).encode())
+
+    def act(self) -> None:
+        """Ends the group and removes the folder now."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
 
 
-def kill(group: int) -> None:
-    """Kills a process and all that it started."""
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(group, signal.SIGKILL)
-
-
-def remove(folder: str) -> None:
-    """Removes a folder; what was killed may still be writing to it for a moment."""
-    until = time.monotonic() + GONE_S
-    while os.path.lexists(folder) and time.monotonic() < until:
-        shutil.rmtree(folder, ignore_errors=True)
-        if os.path.lexists(folder):
+def main() -> None:
+    """Waits for the end of its input and acts."""
+    if os.fork():
+        os._exit(0)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    group = sys.stdin.read()
+    if group:
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(int(group), signal.SIGKILL)
+    until = time.monotonic() + GONE_S  # what was killed may still be writing for a moment
+    for folder in sys.argv[1:]:
+        while os.path.lexists(folder) and time.monotonic() < until:
+            shutil.rmtree(folder, ignore_errors=True)
             time.sleep(0.05)
 
 

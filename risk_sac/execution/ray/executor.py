@@ -1,24 +1,34 @@
-"""Runs as tasks of a Ray cluster, seen from the server: it knows Ray only through the bridge, a process of its own."""
+"""Runs on a Ray cluster, seen from the server: it knows Ray only through the bridge, a process of its own."""
 
-import math
+import contextlib
+import logging
+import os
 import secrets
+import socket
+import subprocess
+import sys
 import threading
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib.util import find_spec
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic
 
-from risk_sac.config import RunSpec
+from risk_sac.config import SHIPPED, RunSpec
+from risk_sac.egos import registry
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Cause, Cluster, Exited, Program, Word
 from risk_sac.execution.mailbox import Mailbox
-from risk_sac.execution.ray.beside import beside
-from risk_sac.execution.ray.link import Link
-from risk_sac.execution.ray.scratch import BESIDE
-from risk_sac.execution.ray.settings import read_settings
-from risk_sac.execution.ray.words import Order, exited_of
+from risk_sac.execution.ray.node import Order
+from risk_sac.execution.ray.settings import read_settings, variable
+from risk_sac.scenario import library
 
-FOREVER_S = 1e9  # JSON has no infinity
+logger = logging.getLogger(__name__)
+
+FIRST_WAIT_S, LONGEST_WAIT_S = 1.0, 15.0  # between two attempts to reach a cluster that was lost
+CLOSE_S = 10.0
+ADDRESS = variable("ray_address")
 
 
 @dataclass(slots=True)
@@ -26,23 +36,24 @@ class _Ordered:
     """An attempt that has not ended."""
 
     order: Order
+    number: int
+    attempt: int
     sent: bool = False
     told_to_stop: bool = False
 
 
 class RayExecutor(Generic[Word]):
-    """Orders attempts and hands on what is said of them.
+    """Orders attempts and passes on what is said of them.
 
-    When the cluster is lost, what was at work on it is told to be lost, and what is submitted waits until there is a
-    cluster again. Each attempt has a token; what is said with another one is dropped.
+    A thread listens to the bridge. When the cluster is lost, what was at work on it is told to be lost, and what is
+    submitted waits until there is a cluster again.
+
+    Attributes:
+      cluster: as it was a few seconds ago; without nodes while it is lost.
     """
 
-    def __init__(self, program: Program[Word], link: Link | None = None) -> None:
+    def __init__(self, program: Program[Word]) -> None:
         """Reaches the cluster.
-
-        Args:
-          program: how a worker is started.
-          link: to the cluster, of which somebody else takes care; by default one of its own.
 
         Raises:
           ConfigError: Ray is not installed, the cluster cannot be reached, or it cannot do what it will have to;
@@ -52,69 +63,65 @@ class RayExecutor(Generic[Word]):
             raise ConfigError(
                 "RISK_SAC_EXECUTOR", "'ray', which is not installed", "`local`, or `pip install risk-sac[ray]`"
             )
+        self.cluster = Cluster()
         self._program = program
-        self._settings = read_settings()
+        self._scratch = read_settings().ray_scratch_dir
         self._mailbox: Mailbox[Word] = Mailbox()
-        self._ordered: dict[int, _Ordered] = {}
+        self._ordered: dict[str, _Ordered] = {}
         self._lock = threading.RLock()
-        self._own = link is None
-        self._link = link or Link(program.within)
-        self._link.attach(self)
-
-    @property
-    def cluster(self) -> Cluster:
-        """As it was a few seconds ago; without nodes while it is lost."""
-        return self._link.cluster
-
-    @property
-    def losses(self) -> int:
-        """How often the cluster was lost."""
-        return self._link.losses
+        self._closed = threading.Event()
+        self._bridge: _Bridge | None = _Bridge()
+        threading.Thread(target=self._work, args=(self._bridge,), name="ray", daemon=True).start()
 
     @property
     def slots(self) -> float:
         """See `Executor.slots`."""
-        return self._link.cluster.slots
+        return self.cluster.slots
 
     def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
         """See `Executor.submit`."""
         self._mailbox.admit(number, attempt)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            order = self._order(number, attempt, spec, folder)
+            order = self._order(spec, folder.resolve())
         except OSError:
             self._mailbox.dismiss(number)
             raise
         with self._lock:
-            self._ordered[number] = ordered = _Ordered(order)
-            self._send(ordered)
+            for overtaken in [each for each in self._ordered.values() if each.number == number]:
+                del self._ordered[overtaken.order.id]
+                self._say("give up", overtaken.order.id)
+            self._ordered[order.id] = ordered = _Ordered(order, number, attempt)
+            ordered.sent = self._say("submit", order)
 
-    def _order(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> Order:
-        token = secrets.token_hex(8)
-        own = self._settings.ray_scratch_dir / f"{folder.name}-{attempt}-{token}"
-        scratch = own / folder.name
-        copies = {str(path): str(own / BESIDE / path.name) for path in self._program.inputs}
-        taken = beside(spec, self._program.inputs, own / BESIDE)
-        hear = self._program.hear
+    def _order(self, spec: RunSpec, folder: Path) -> Order:
+        """An attempt, with the egos that the server's operator has registered and the run's place."""
+        id_ = secrets.token_hex(8)
+        scratch = self._scratch / f"{folder.name}-{id_}"
+        beside: dict[str, Path] = {}
+        environment = {registry.FILE: ""}  # whatever a node registers by itself does not count
+        if registered := os.environ.get(registry.FILE):
+            beside["egos.toml"] = Path(registered).resolve()
+            environment[registry.FILE] = str(scratch / "egos.toml")
+        if spec.family not in SHIPPED:
+            place = (library.library() / spec.family).resolve()
+            beside |= {f"places/{spec.family}/{file.name}": file for file in place.iterdir()}
+            environment[library.VARIABLE] = str(scratch / "places")
+        program = self._program
         return Order(
-            number=number,
-            attempt=attempt,
-            token=token,
-            spec=spec.model_dump_json(),
-            folder=str(folder.resolve()),
-            scratch=str(scratch),
-            arguments=tuple(copies.get(each, each) for each in self._program.arguments(spec, scratch)),
-            beside=taken.files,
-            environment=taken.environment | dict(self._program.environment),
-            log=self._program.log,
-            hear=None if hear is None else f"{hear.__module__}:{hear.__qualname__}",
-            lease_s=_finite(self._program.lease_s),
-            stall_s=_finite(self._program.stall_s),
-            linger_s=_finite(self._program.linger_s),
+            id=id_,
+            spec=spec,
+            folder=folder,
+            scratch=scratch,
+            arguments=tuple(program.arguments(spec, scratch / folder.name)),
+            beside=beside,
+            environment=environment | dict(program.environment),
+            log=program.log,
+            hear=program.hear,
+            lease_s=program.lease_s,
+            stall_s=program.stall_s,
+            linger_s=program.linger_s,
         )
-
-    def _send(self, ordered: _Ordered) -> None:
-        ordered.sent = self._link.say("submit", **asdict(ordered.order))
 
     def events(self, timeout_s: float) -> list[tuple[int, Word | Exited]]:
         """See `Executor.events`."""
@@ -127,55 +134,128 @@ class RayExecutor(Generic[Word]):
     def cancel(self, number: int, grace_s: float) -> None:
         """See `Executor.cancel`."""
         with self._lock:
-            ordered = self._ordered.get(number)
-            if ordered is None:
-                return
-            ordered.told_to_stop = True
-            if ordered.sent:
-                self._link.say("cancel", token=ordered.order.token, number=number, grace_s=min(grace_s, FOREVER_S))
-            else:
-                self._end(ordered, Exited("stopped before it began", Cause.ENDED))
+            for ordered in [each for each in self._ordered.values() if each.number == number]:
+                ordered.told_to_stop = True
+                if ordered.sent:
+                    self._say("cancel", ordered.order.id, grace_s)
+                else:
+                    self._end(ordered, Exited("stopped before it began", Cause.ENDED))
 
     def close(self) -> None:
-        """See `Executor.close`."""
-        if self._own:
-            self._link.close()
-
-    def hear(self, message: dict[str, Any]) -> None:
-        """See `Listener.hear`."""
+        """Leaves the cluster; actors that are still there end."""
+        self._closed.set()
         with self._lock:
-            ordered = self._ordered.get(message["number"])
-            if ordered is None or ordered.order.token != message["token"]:
-                return  # of an attempt that was overtaken
-            if message["kind"] == "exited":
-                self._end(ordered, exited_of(message["exited"]))
+            bridge, self._bridge = self._bridge, None
+        if bridge is not None:
+            bridge.close()
+
+    def _say(self, kind: str, *content: Any) -> bool:
+        """Tells the bridge something; False if there is none at present."""
+        with self._lock:
+            if self._bridge is not None:
+                self._bridge.say(kind, *content)
+            return self._bridge is not None
+
+    def _work(self, bridge: "_Bridge | None") -> None:
+        """Listens to one bridge after the other."""
+        while bridge is not None:
+            for kind, *content in bridge.messages():
+                self._hear(kind, *content)
+            bridge.close()
+            if self._closed.is_set():
                 return
-        assert self._program.hear is not None
-        for text in message["lines"]:
-            word = self._program.hear(text.encode(errors="surrogateescape")).word
-            if word is not None:
-                self._mailbox.put(ordered.order.number, ordered.order.attempt, word)
-
-    def lose(self) -> None:
-        """See `Listener.lose`."""
-        with self._lock:
-            for ordered in list(self._ordered.values()):
-                if ordered.sent:
+            logger.error("the cluster is lost; runs go on from their checkpoints once there is one again")
+            with self._lock:
+                self._bridge, self.cluster = None, Cluster()
+                for ordered in [each for each in self._ordered.values() if each.sent]:
                     cause = Cause.ENDED if ordered.told_to_stop else Cause.LOST
                     self._end(ordered, Exited("the cluster was lost", cause))
+            bridge = self._reached_again()
 
-    def go_on(self) -> None:
-        """See `Listener.go_on`."""
+    def _hear(self, kind: str, *content: Any) -> None:
         with self._lock:
-            for ordered in self._ordered.values():
-                if not ordered.sent:
-                    self._send(ordered)
-        self._mailbox.wake()
+            if kind == "cluster":
+                before, (self.cluster,) = self.cluster.slots, content
+                if before != self.cluster.slots:
+                    self._mailbox.wake()
+                return
+            id_, said = content
+            ordered = self._ordered.get(id_)
+            if ordered is None:
+                return  # an attempt that was overtaken
+            if kind == "exited":
+                self._end(ordered, said)
+                return
+            for line in said:
+                word = self._program.hear(line).word
+                if word is not None:
+                    self._mailbox.put(ordered.number, ordered.attempt, word)
+
+    def _reached_again(self) -> "_Bridge | None":
+        """Another bridge, once there is a cluster; None if this was closed."""
+        wait_s = FIRST_WAIT_S
+        while not self._closed.wait(wait_s):
+            try:
+                bridge = _Bridge()
+            except ConfigError as error:
+                logger.warning("the cluster cannot be reached: %s", error)
+                wait_s = min(2 * wait_s, LONGEST_WAIT_S)
+                continue
+            with self._lock:
+                if self._closed.is_set():
+                    bridge.close()
+                    return None
+                self._bridge = bridge
+                for ordered in self._ordered.values():  # which were submitted meanwhile
+                    ordered.sent = self._say("submit", ordered.order)
+            logger.info("there is a cluster again")
+            return bridge
+        return None
 
     def _end(self, ordered: _Ordered, exited: Exited) -> None:
-        del self._ordered[ordered.order.number]
-        self._mailbox.put(ordered.order.number, ordered.order.attempt, exited)
+        del self._ordered[ordered.order.id]
+        self._mailbox.put(ordered.number, ordered.attempt, exited)
 
 
-def _finite(seconds: float) -> float | None:
-    return None if math.isinf(seconds) else seconds
+class _Bridge:
+    """The process that knows Ray."""
+
+    def __init__(self) -> None:
+        """Starts it and waits until it has checked the cluster.
+
+        Raises:
+          ConfigError: something is wrong with the cluster, or with what the settings say of it.
+        """
+        ours, theirs = socket.socketpair()
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "risk_sac.execution.ray.bridge", str(theirs.fileno())],
+                stdin=subprocess.DEVNULL,
+                pass_fds=(theirs.fileno(),),
+                start_new_session=True,  # Ctrl-C is for whoever started us
+            )
+        self._connection = Connection(ours.detach())
+        kind, *content = next(self.messages(), ("refused",))
+        if kind == "refused":
+            self.close()
+            raise content[0] if content else ConfigError(ADDRESS, "Ray ended while it was reaching the cluster")
+
+    def say(self, kind: str, *content: Any) -> None:
+        """Tells it something; what it does not read any more is lost with it."""
+        with contextlib.suppress(OSError):
+            self._connection.send((kind, *content))
+
+    def messages(self) -> Iterator[tuple[Any, ...]]:
+        """What it says until it ends."""
+        with contextlib.suppress(EOFError, OSError):
+            while True:
+                yield self._connection.recv()
+
+    def close(self) -> None:
+        """Ends it, and with it `messages`."""
+        self.say("close")
+        try:
+            self._process.wait(CLOSE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()

@@ -12,7 +12,7 @@ from risk_sac.errors import ConfigError
 
 
 class RaySettings(BaseSettings):
-    """Where the cluster is, what a run takes of it, and where its files go."""
+    """Where the cluster is, and what a run takes of it."""
 
     model_config = SettingsConfigDict(
         env_prefix="RISK_SAC_",
@@ -29,9 +29,6 @@ class RaySettings(BaseSettings):
     """Processors that a run takes of its node."""
     ray_memory_bytes_per_run: Annotated[int, Field(ge=0)] = 1 << 30
     """Memory that a run takes of its node, as Ray counts it, bytes; 0 leaves it uncounted."""
-    ray_storage: str | None = None
-    """URL under which nodes and server exchange checkpoints and series, as fsspec has it (`s3://bucket/folder`); by
-    default the run's own folder, which then has to be the same on all of them."""
     ray_scratch_dir: Path = Path("/tmp/risk-sac")
     """Folder of every node in which runs work."""
     ray_lease_s: Annotated[float, Field(ge=1, le=600)] = 15.0

@@ -1,0 +1,197 @@
+"""What is executed on a node: an actor per attempt, which starts the worker and hands on its words and files.
+
+The worker is a process of the local executor, so one that falls silent, lingers or dies is treated as on one machine.
+It works in a folder of its node, which begins with the files of the run's folder on the server's machine.
+"""
+
+import contextlib
+import os
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError
+from risk_sac.execution.executor import Exited, Heard, Program
+from risk_sac.execution.local import LocalExecutor
+from risk_sac.execution.ray.caretaker import Caretaker
+from risk_sac.execution.ray.settings import variable
+from risk_sac.execution.ray.versions import Versions, differing, versions
+from risk_sac.run_folder.durable import replace_file
+
+GATHER_S = 0.25  # words within it are handed on at once
+GROWN_S = 2.0  # between two copies of files that only grow
+GROWN_BYTES_PER_S = 1 << 20  # that such copies may take on average
+Files = Mapping[str, bytes]  # by their paths in a folder, the oldest first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Order:
+    """An attempt at a run."""
+
+    id: str  # of this attempt and no other, of this server or an earlier one
+    spec: RunSpec
+    folder: Path  # of the run, on the server's machine
+    scratch: Path  # of the attempt, on its node
+    arguments: tuple[str, ...]  # for the Python interpreter
+    beside: Mapping[str, Path]  # what the worker reads beside the run's folder, by its path in `scratch`
+    environment: Mapping[str, str]
+    log: str
+    hear: Callable[[bytes], Heard[Any]]
+    lease_s: float
+    stall_s: float
+    linger_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What has happened to an attempt since the last report."""
+
+    lines: tuple[bytes, ...] = ()  # that the worker has said
+    files: Files = field(default_factory=dict)  # written before it said so
+    exited: Exited | None = None  # in the last report
+
+
+class Attendant:
+    """Ray's actor for one attempt; `cancel` may be called while `poll` waits."""
+
+    def begin(self, order: Order, seed: Files, beside: Files, expected: Versions) -> str:
+        """Starts the worker; returns Ray's name of this node.
+
+        Raises:
+          ConfigError: the node has other versions, or its folder for attempts belongs to somebody else.
+          OSError: the folder cannot be written.
+        """
+        import ray
+
+        if other := differing(versions(), expected):
+            raise ConfigError(variable("ray_address"), f"a node has joined whose {other}")
+        scratch_dir(order.scratch.parent)
+        order.scratch.mkdir(mode=0o700)
+        self._caretaker = Caretaker(order.scratch)
+        self._folder = order.scratch / order.folder.name
+        self._folder.mkdir()
+        write(self._folder, seed)
+        write(order.scratch, beside)
+        self._seen = signatures(self._folder)
+        self._grown_due = 0.0
+        self._local = LocalExecutor(
+            Program(
+                arguments=lambda spec, folder: order.arguments,
+                log=order.log,
+                hear=_raw(order.hear),
+                lease_s=order.lease_s,
+                stall_s=order.stall_s,
+                linger_s=order.linger_s,
+                environment=order.environment,
+            )
+        )
+        self._local.submit(1, 1, order.spec, self._folder)
+        if (pid := self._local.pid(1)) is not None:
+            self._caretaker.watch(pid)
+        return str(ray.get_runtime_context().get_node_id())
+
+    def poll(self, wait_s: float) -> Report:
+        """What has happened since the last call, waiting up to `wait_s` for something."""
+        heard = self._local.events(wait_s)
+        if heard and not isinstance(heard[-1][1], Exited):
+            time.sleep(GATHER_S)
+            heard += self._local.events(0)
+        lines = tuple(message for _, message in heard if not isinstance(message, Exited))
+        exited = next((message for _, message in heard if isinstance(message, Exited)), None)
+        files = self._changed(exited is not None)
+        if exited is not None:
+            self._caretaker.act()
+        return Report(lines, files, exited)
+
+    def cancel(self, grace_s: float) -> None:
+        """Tells the worker to stop."""
+        self._local.cancel(1, grace_s)
+
+    def _changed(self, final: bool) -> Files:
+        """New and replaced files, and from time to time those that have only grown.
+
+        It looks again after reading, so that a checkpoint comes with every file that was written before it.
+        """
+        grown = final or time.monotonic() >= self._grown_due
+        found: dict[str, bytes] = {}
+        size = 0
+        while True:
+            there, new = signatures(self._folder), []
+            for name, signature in there.items():
+                seen = self._seen.get(name)
+                if signature != seen and (grown or seen is None or seen[0] != signature[0]):
+                    new.append(name)
+            for name in sorted(new, key=lambda name: there[name][2]):
+                with contextlib.suppress(FileNotFoundError):  # replaced or removed just now
+                    found.pop(name, None)
+                    found[name] = (self._folder / name).read_bytes()
+                    size += grown * len(found[name])
+                self._seen[name] = there[name]
+            if not new:
+                return found
+            if grown:
+                self._grown_due = time.monotonic() + max(GROWN_S, size / GROWN_BYTES_PER_S)
+                grown = False
+
+
+def scratch_dir(folder: Path) -> None:
+    """Makes the folder for all attempts of this node.
+
+    Raises:
+      ConfigError: it belongs to another user.
+      OSError: it cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if folder.stat().st_uid != os.getuid():
+        got = f"{str(folder)!r}, which belongs to another user on this node"
+        raise ConfigError(variable("ray_scratch_dir"), got, "a folder of its own")
+    tempfile.TemporaryFile(dir=folder).close()
+
+
+def signatures(folder: Path) -> dict[str, tuple[int, int, int]]:
+    """Inode, size and time of each file of a folder, by its path in it."""
+    found = {}
+    for parent, _, names in os.walk(folder):
+        for name in names:
+            path = Path(parent, name)
+            if not name.endswith(".tmp") and name != ".lock":
+                with contextlib.suppress(FileNotFoundError):
+                    status = path.stat()
+                    found[str(path.relative_to(folder))] = status.st_ino, status.st_size, status.st_mtime_ns
+    return found
+
+
+def read(folder: Path) -> Files:
+    """All files of a folder that an attempt may read or write."""
+    return {name: (folder / name).read_bytes() for name in signatures(folder)}
+
+
+def write(folder: Path, files: Files) -> None:
+    """Writes files, each whole or not at all."""
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, content)
+
+
+def look(folder: Path) -> tuple[Versions, str | None]:
+    """What has to hold on a node: its versions, and what keeps it from its folder for attempts."""
+    try:
+        scratch_dir(folder)
+    except (OSError, ConfigError) as error:
+        return versions(), str(error)
+    return versions(), None
+
+
+def _raw(hear: Callable[[bytes], Heard[Any]]) -> Callable[[bytes], Heard[bytes]]:
+    """Understands a line as the server will, and hands it on as it is."""
+
+    def heard(line: bytes) -> Heard[bytes]:
+        understood = hear(line)
+        return Heard(None if understood.word is None else line, understood.progress, understood.last)
+
+    return heard
