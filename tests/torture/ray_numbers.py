@@ -1,8 +1,5 @@
-"""`python -m tests.torture.ray_numbers WHAT …`: what runs cost on a Ray cluster of this machine, and what they outlive.
+"""`python -m tests.torture.ray_numbers WHAT …`: runs on a Ray cluster of this machine: load and kills.
 
-throughput --runs 12         the same campaign locally and on two nodes, with as many workers: digests, times and
-                             processor time, by turns
-overhead --runs 5            from the start of a run to its first episode, locally and on a warm cluster
 scale --runs 1000 --slots 64 stand-ins that sleep, through the service: the server's share of a processor, lost runs
 kills --of worker --times 30 kill -9 at random moments of a worker, a raylet, the head or the server; or a node hangs
 
@@ -10,18 +7,13 @@ Each ends with a line that has its figures and the machine's load while they wer
 """
 
 import argparse
-import contextlib
 import os
 import random
 import signal
 import sys
 import tempfile
 import time
-from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import psutil
@@ -36,91 +28,6 @@ WORKER = "risk_sac.execution.worker"
 FEW = {"seeds": [0], "budget": {"episodes": 2}}
 
 
-def throughput(options: argparse.Namespace) -> str:
-    """By turns locally and on two nodes, since the machine's other load changes; nothing is counted of any start."""
-    campaign = {
-        "families": ["low"], "methods": ["risk-sac", "random"], "seeds": list(range(options.runs // 2)),
-        "budget": {"episodes": options.episodes},
-    }  # fmt: skip
-    spent: dict[str, list[Spent]] = {"local": [], "Ray": []}
-    found = []
-    for turn in range(options.turns):
-        with servers(options.folder / "local") as serve:
-            service = serve(WORKER, data_dir=options.folder / f"local-{turn}", max_workers=2, lease_s=60)
-            service.wait(service.post(**campaign | FEW), LONG_S)  # what is compiled once is compiled
-            spent["local"].append(executed(service, campaign, found, ()))
-        with (
-            running(options.folder, nodes=2, cpus=1) as cluster,
-            servers(options.folder / "ray") as serve,
-        ):
-            service = serve(WORKER, data_dir=options.folder / f"ray-{turn}", max_workers=1024, lease_s=60)
-            service.wait(service.post(**campaign | FEW), LONG_S)  # and Ray's processes are there
-            spent["Ray"].append(executed(service, campaign, found, tuple(cluster.nodes.values())))
-    for where, turns in spent.items():
-        for each in turns:
-            print(f"  {where}: {each}", file=sys.stderr)
-    wall = sum(each.wall_s for each in spent["local"]) / sum(each.wall_s for each in spent["Ray"])
-    processor = sum(each.total_s for each in spent["local"]) / sum(each.total_s for each in spent["Ray"])
-    taken = ", ".join(f"{where} {' and '.join(f'{each.wall_s:.0f}' for each in spent[where])} s" for where in spent)
-    return (
-        f"{len(found[0])} runs, same digests: {all(each == found[0] for each in found)}; {taken}: "
-        f"throughput {wall:.3f} of local; by processor time {processor:.3f}"
-    )
-
-
-@dataclass(frozen=True)
-class Spent:
-    """What a campaign took, s."""
-
-    wall_s: float
-    processor_s: dict[str, float]  # by what the process is called
-
-    @property
-    def total_s(self) -> float:
-        """Of all processes."""
-        return sum(self.processor_s.values())
-
-    def __str__(self) -> str:
-        parts = sorted(self.processor_s.items(), key=lambda item: -item[1])
-        shown = ", ".join(f"{name} {taken_s:.1f}" for name, taken_s in parts if taken_s >= 0.05)
-        return f"{self.wall_s:.1f} s; processor {self.total_s:.1f} s: {shown}"
-
-
-def executed(
-    service: Service, campaign: dict[str, Any], found: list[dict[str, str]], roots: tuple[psutil.Process, ...]
-) -> Spent:
-    """What a campaign takes; `found` gets its digests."""
-    everybody = (psutil.Process(service.process.pid), *roots)
-    before = used_s(everybody)
-    began = time.monotonic()
-    campaign_id = service.post(**campaign)
-    waited(service, [campaign_id])
-    wall_s = time.monotonic() - began
-    used = used_s(everybody)
-    found.append({run["id"]: run["digest"] for run in service.get(campaign_id, "/results")["runs"]})
-    return Spent(wall_s, {name: used[name] - before.get(name, 0.0) for name in used})
-
-
-def used_s(roots: Iterable[psutil.Process]) -> dict[str, float]:
-    """Processor time of processes with all that they have started, by what they are called; those that ended, too."""
-    used: Counter[str] = Counter()
-    for root in roots:
-        for process in (root, *root.children(recursive=True)):
-            with contextlib.suppress(psutil.Error):
-                times, name = process.cpu_times(), called(process)
-                used[name] += times.user + times.system
-                used[f"ended under {name}"] += times.children_user + times.children_system
-    return used
-
-
-def called(process: psutil.Process) -> str:
-    """What a process is, in a word."""
-    command = process.cmdline()
-    if len(command) > 2 and command[1] in ("-m", "-u", "-IS"):
-        return Path(command[2]).name
-    return Path(command[0]).name.split("-")[0] if command else process.name()
-
-
 def waited(service: Service, campaigns: list[str]) -> list[dict[str, Any]]:
     """Campaigns that have ended; asked for as seldom as a client should."""
     ended = []
@@ -129,30 +36,6 @@ def waited(service: Service, campaigns: list[str]) -> list[dict[str, Any]]:
             time.sleep(1.0)
         ended.append(seen)
     return ended
-
-
-def overhead(options: argparse.Namespace) -> str:
-    """One run after the other; the first on each warms up."""
-
-    def firsts(service: Service) -> list[float]:
-        found = []
-        for seed in range(options.runs + 1):
-            began = time.monotonic()
-            campaign_id = service.post(seeds=[seed], budget={"episodes": 1})
-            service.wait_until(lambda at=campaign_id: service.get(at)["progress"]["episodes_done"] > 0, LONG_S)
-            found.append(time.monotonic() - began)
-            service.wait(campaign_id, LONG_S)
-        return found[1:]
-
-    with servers(options.folder / "local") as serve:
-        here = firsts(serve(WORKER, max_workers=1, lease_s=60))
-    with running(options.folder, nodes=1, cpus=1), servers(options.folder / "ray") as serve:
-        there = firsts(serve(WORKER, max_workers=1, lease_s=60))
-    more_s = median(there) - median(here)
-    return (
-        f"start to first episode, medians of {options.runs}: local {median(here):.2f} s, Ray {median(there):.2f} s, "
-        f"overhead {more_s:.2f} s"
-    )
 
 
 def scale(options: argparse.Namespace) -> str:
@@ -226,7 +109,7 @@ def kills(options: argparse.Namespace) -> str:
             time.sleep(0.2)
         left = [str(each.name) for each in cluster.scratch.glob("*")] + [
             " ".join(each.cmdline()[:4]) for each in workers(service)
-        ] + [str(each) for each in service.data_dir.glob("campaigns/*/*/.attempts")]  # fmt: skip
+        ]  # fmt: skip
     changed = sum(each != undisturbed for each in outcomes)
     what = "a node that hangs" if options.of == "hang" else f"kill -9 of a {options.of}"
     return (
@@ -304,10 +187,9 @@ KILL = {"worker": _worker, "raylet": _raylet, "head": _head, "server": _server, 
 def main() -> None:
     """Prints one line of figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("throughput", "overhead", "scale", "kills"))
-    parser.add_argument("--runs", type=int)
+    parser.add_argument("what", choices=("scale", "kills"))
+    parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--episodes", type=int, default=30)
-    parser.add_argument("--turns", type=int, default=2)
     parser.add_argument("--slots", type=int, default=64)
     parser.add_argument("--sleep-s", type=float, default=30.0)
     parser.add_argument("--of", choices=KILL, default="worker")
@@ -315,7 +197,6 @@ def main() -> None:
     parser.add_argument("--within-s", type=float, default=9.0)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    options.runs = options.runs or {"throughput": 12, "overhead": 5, "scale": 1000}.get(options.what)
     with tempfile.TemporaryDirectory() as folder:
         options.folder = Path(folder)
         for name in ("local", "ray"):

@@ -25,9 +25,8 @@ from risk_sac.execution.executor import Cause, Cluster, Exited
 from risk_sac.execution.local import Lease, Signs
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.execution.ray.cluster import connected, nodes
-from risk_sac.execution.ray.node import Attendant, Files, Order, Report, read, write
+from risk_sac.execution.ray.node import Attendant, Files, Order, Report, read, versions, write
 from risk_sac.execution.ray.settings import RaySettings, read_settings
-from risk_sac.execution.ray.versions import versions
 
 logger = logging.getLogger("risk_sac.execution.ray.bridge")
 
@@ -59,7 +58,7 @@ class Attempt:
         self._settings = settings
         self._say = say
         self._lock = threading.Lock()
-        self._given_up = False
+        self._given_up = self._told_to_stop = False
         self._stop_by = math.inf
         self._heard_at = time.monotonic()
         self._lease = Lease(settings.ray_lease_s, math.inf)
@@ -80,6 +79,7 @@ class Attempt:
     def stop(self, grace_s: float) -> None:
         """Tells its worker to stop; after the shortest grace time it is killed."""
         with self._lock:
+            self._told_to_stop = True
             self._stop_by = min(self._stop_by, time.monotonic() + grace_s)
         if self.node is None or grace_s <= 0:
             self._kill()
@@ -99,7 +99,7 @@ class Attempt:
         except OSError as error:
             exited = Exited(_blamed(error), Cause.CRASHED)
         self._kill()
-        if self._stop_by < math.inf and exited.cause is not Cause.ENDED:
+        if self._told_to_stop and exited.cause is not Cause.ENDED:
             exited = replace(exited, cause=Cause.ENDED)
         return exited
 
@@ -107,7 +107,7 @@ class Attempt:
         order, settings = self.order, self._settings
         memory = {"memory": settings.ray_memory_bytes_per_run} if settings.ray_memory_bytes_per_run else {}
         with self._lock:
-            if self._given_up or self._stop_by < math.inf:
+            if self._given_up or self._told_to_stop:
                 raise _Over(Cause.ENDED, "stopped before it began")
             self._actor = (
                 ray.remote(Attendant)
@@ -119,7 +119,6 @@ class Attempt:
                 )
                 .remote()
             )
-        order.folder.mkdir(parents=True, exist_ok=True)
         beside: Files = {name: path.read_bytes() for name, path in order.beside.items()}
         self.node = self._answer(self._actor.begin.remote(order, read(order.folder), beside, versions()))
         while True:
@@ -150,7 +149,8 @@ class Attempt:
 
     def _kill(self) -> None:
         if self._actor is not None:
-            ray.kill(self._actor)
+            with contextlib.suppress(RayError):  # there may be no head any more
+                ray.kill(self._actor)
 
 
 class Bridge:
@@ -160,6 +160,7 @@ class Bridge:
         self._settings = settings
         self._server = server
         self._saying = threading.Lock()
+        self._heard_of_head = time.monotonic()
         self._attempts: dict[str, Attempt] = {}
 
     def say(self, kind: str, *content: Any) -> None:
@@ -168,10 +169,12 @@ class Bridge:
             self._server.send((kind, *content))
 
     def carry(self) -> None:
-        """Acts on what the server says until it says nothing any more."""
+        """Acts on what the server says, until it has gone or the head is silent: a cluster dies with its head."""
         self.say("ready")
         threading.Thread(target=self._watch, daemon=True).start()
-        while True:
+        while time.monotonic() - self._heard_of_head <= self._settings.ray_lease_s:
+            if not self._server.poll(LOOK_S):
+                continue
             match self._server.recv():
                 case "submit", Order() as order:
                     begun = self._attempts[order.id] = Attempt(order, self._settings, self.say)
@@ -184,6 +187,7 @@ class Bridge:
                         attempt.stop(grace_s)
                 case _:
                     return
+        logger.error("nothing was heard of the cluster's head for %g s", self._settings.ray_lease_s)
 
     def _follow(self, attempt: Attempt) -> None:
         exited = attempt.follow()
@@ -191,12 +195,10 @@ class Bridge:
         self.say("exited", attempt.order.id, exited)
 
     def _watch(self) -> None:
-        """Tells of the cluster every few seconds; ends this process if its head is silent, as clusters die with it."""
-        heard_at = time.monotonic()
-        threading.Thread(target=self._leave_with_head, args=(lambda: heard_at,), daemon=True).start()
+        """Tells of the cluster every few seconds."""
         while True:
             found = nodes(self._settings)
-            heard_at = time.monotonic()
+            self._heard_of_head = time.monotonic()
             at_work = list(self._attempts.values())
             listed = []
             for node in found:
@@ -204,12 +206,6 @@ class Bridge:
                 listed.append(replace(node, runs=len(silences), silent_s=min(silences, default=0.0)))
             self.say("cluster", Cluster(tuple(listed)))
             time.sleep(NODES_S)
-
-    def _leave_with_head(self, heard_at: Callable[[], float]) -> None:
-        while time.monotonic() - heard_at() <= self._settings.ray_lease_s:
-            time.sleep(LOOK_S)
-        logger.error("nothing was heard of the cluster's head for %g s", self._settings.ray_lease_s)
-        os._exit(1)
 
 
 def main(descriptor: int) -> None:

@@ -20,9 +20,8 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Node
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.execution.ray.caretaker import Caretaker
-from risk_sac.execution.ray.node import look
+from risk_sac.execution.ray.node import Versions, differing, look, versions
 from risk_sac.execution.ray.settings import RaySettings, variable
-from risk_sac.execution.ray.versions import Versions, differing, versions
 
 logger = logging.getLogger(__name__)
 

@@ -6,26 +6,33 @@ It works in a folder of its node, which begins with the files of the run's folde
 
 import contextlib
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from risk_sac.config import RunSpec
+from risk_sac.egos.registry import installed
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Exited, Heard, Program
 from risk_sac.execution.local import LocalExecutor
 from risk_sac.execution.ray.caretaker import Caretaker
 from risk_sac.execution.ray.settings import variable
-from risk_sac.execution.ray.versions import Versions, differing, versions
 from risk_sac.run_folder.durable import replace_file
 
 GATHER_S = 0.25  # words within it are handed on at once
 GROWN_S = 2.0  # between two copies of files that only grow
 GROWN_BYTES_PER_S = 1 << 20  # that such copies may take on average
 Files = Mapping[str, bytes]  # by their paths in a folder, the oldest first
+# What results depend on, besides Python and egos: the same on the server's machine and on all nodes.
+PACKAGES = ("risk-sac", "ray", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
+MISSING = "missing"
+
+Versions = Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,6 +192,30 @@ def look(folder: Path) -> tuple[Versions, str | None]:
     except (OSError, ConfigError) as error:
         return versions(), str(error)
     return versions(), None
+
+
+def versions() -> Versions:
+    """Of Python, of packages, and of the egos that are installed, on this machine."""
+    found = {"python": ".".join(map(str, sys.version_info[:3]))}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = MISSING
+    return found | {f"the ego {name}": version for name, version in installed().items()}
+
+
+def differing(found: Versions, expected: Versions) -> str:
+    """Which of those that the server's machine has are of another version here, in words; empty if none is.
+
+    An ego that is installed here alone is no difference: no campaign can name it.
+    """
+    other = [
+        f"{name} is {found.get(name, MISSING)}; wanted {wanted}"
+        for name, wanted in expected.items()
+        if found.get(name, MISSING) != wanted
+    ]
+    return f"{', '.join(other)}, as on the server's machine" if other else ""
 
 
 def _raw(hear: Callable[[bytes], Heard[Any]]) -> Callable[[bytes], Heard[bytes]]:

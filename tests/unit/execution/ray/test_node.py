@@ -1,7 +1,7 @@
 import platform
 
 from risk_sac import __version__
-from risk_sac.execution.ray.versions import differing, versions
+from risk_sac.execution.ray.node import differing, versions
 
 
 def test_python_packages_and_egos_are_told_with_their_versions():
