@@ -92,7 +92,7 @@ def wait_until(holds: Callable[[], object]) -> None:
         ({"RISK_SAC_RAY_ADDRESS": "auto", "RISK_SAC_RAY_JOIN": "1"}, "RISK_SAC_RAY_ADDRESS", "no cluster to join"),
         ({"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1", "RISK_SAC_RAY_JOIN": "1"}, "RISK_SAC_RAY_ADDRESS", "nothing answers"),
         ({"RISK_SAC_RAY_CPUS_PER_RUN": "3"}, "RISK_SAC_RAY_CPUS_PER_RUN", "no node of the cluster has as much"),
-        ({"RISK_SAC_RAY_CPUS_PER_RUN": "none"}, "RISK_SAC_RAY_CPUS_PER_RUN", "got 'none'"),
+        ({"RISK_SAC_RAY_CPUS_PER_RUN": "none"}, "RISK_SAC_RAY_CPUS_PER_RUN", 'got "none"'),
         ({"RISK_SAC_RAY_SCRATCH_DIR": "/proc/runs"}, "RISK_SAC_RAY_SCRATCH_DIR", "cannot write to"),
         ({"RAY_AUTH_TOKEN": "0" * 32}, "RISK_SAC_RAY_ADDRESS", "with its token"),
     ],
