@@ -115,12 +115,6 @@ def test_commands_on_the_page_repeat_a_run_and_the_campaign(get, service, campai
     service.wait(again.json()["id"])
 
 
-def test_spec_is_yaml_by_the_accept_header_too(get):
-    spec = get("/spec", headers={"accept": "application/yaml"})
-    assert spec.headers["content-type"] == "application/yaml"
-    assert spec.text == get("/spec", params={"format": "yaml"}).text
-
-
 def test_figures_asked_for_at_once_are_the_files_of_the_report(get, comparison):
     listed = get("/figures").json()
     assert listed["complete"]
@@ -156,19 +150,6 @@ def test_what_the_client_has_is_not_sent_again(get, part):
         assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag)
         assert again.headers.get("vary") == first.headers.get("vary")
     assert get(part, headers={"if-none-match": 'W/"other"'}).content == first.content
-
-
-def test_every_representation_has_a_tag_of_its_own(get):
-    parts = ["/table", "/table?format=md", "/table?format=csv", "/figures", "/figures/ecr_low.png"]
-    assert len({get(part).headers["etag"] for part in [*parts, "/figures/ecr_low.svg", "/figures/bars_es.svg"]}) == 7
-
-
-@pytest.mark.parametrize("part", ["/table", "/figures", "/figures/ecr_low.png", "/spec"])
-def test_unknown_campaign_is_a_problem(service, part):
-    response = service.client.get(f"/v1/campaigns/c0{part}")
-    assert response.status_code == 404
-    assert response.headers["content-type"] == "application/problem+json"
-    assert response.json()["errors"][0]["field"] == "campaign_id"
 
 
 @pytest.mark.parametrize(
