@@ -1,38 +1,51 @@
-"""The data folder: made where there is none, closed to others, and in use by one process at a time."""
+"""The data folder: private to its owner, and in use by one process at a time."""
 
+import fcntl
 import os
 import stat
 from pathlib import Path
 from typing import IO
 
 from service.errors import StorageError
-from service.host.locks import LOCK, try_lock
-from service.host.private import FOLDER_MODE, OTHERS, make_private
 
+LOCK = ".lock"
 OURS = (LOCK, "keys.lock")  # files by which a data folder is known
-NOBODYS = "lost+found"  # of a new volume
+NEW_VOLUME = {"lost+found"}  # content of a new volume
+OTHERS = 0o077  # permissions of group and others
+FILE_MODE, FOLDER_MODE = 0o600, 0o700
 
 
 def hold_data_folder(folder: Path) -> IO[bytes]:
-    """Lock the data folder; close the returned file to give it back.
+    """Makes and locks the data folder; close the returned file to give it back.
+
+    The kernel gives it back when the process dies.
 
     Raises:
-      StorageError: it is in use, cannot be written, or others may look into it and that cannot be mended.
+      StorageError: it is in use, cannot be written, or others may read it and that cannot be changed.
     """
     try:
         folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
         _close_to_others(folder)
-        return try_lock(folder)
+        handle = (folder / LOCK).open("ab")
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            handle.close()
+            raise StorageError(
+                f"folder {str(folder)!r} is in use by another process; stop it or use another"
+            ) from error
+        return handle
     except OSError as error:
         message = f"data_dir is {str(folder)!r}; wanted a folder that can be written ({error.strerror})"
         raise StorageError(message) from error
 
 
 def _close_to_others(folder: Path) -> None:
-    """Mend the mode of a data folder; never that of a folder which others need, such as /var/lib."""
+    """Makes a data folder private; refuses one that other programs need, such as /var/lib."""
     status = folder.stat()
     mode, able = stat.S_IMODE(status.st_mode), os.geteuid() in (status.st_uid, 0)
-    if mode & OTHERS and able and not _is_ours(folder):
+    names = {path.name for path in folder.iterdir()} - NEW_VOLUME
+    if mode & OTHERS and able and names and names.isdisjoint(OURS):
         raise StorageError(
             f"data_dir is {str(folder)!r}, which others may look into (mode {mode:04o}) and which holds other files; "
             f"wanted a folder of its own, or mode {FOLDER_MODE:04o}"
@@ -40,6 +53,34 @@ def _close_to_others(folder: Path) -> None:
     make_private(folder)
 
 
-def _is_ours(folder: Path) -> bool:
-    names = {path.name for path in folder.iterdir()} - {NOBODYS}
-    return not names or not names.isdisjoint(OURS)
+def create_private(path: Path) -> None:
+    """Makes an empty private file where there is none.
+
+    Raises:
+      StorageError: it cannot be made.
+    """
+    try:
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT, FILE_MODE))
+    except OSError as error:
+        raise StorageError(f"{str(path)!r} cannot be written ({error.strerror})") from error
+
+
+def make_private(path: Path) -> None:
+    """Takes all permissions from group and others; a missing file or folder is left alone.
+
+    Of a file that another user owns the group may keep its permissions: that is how a volume is lent to a user.
+
+    Raises:
+      StorageError: everybody may read it, and it is not ours to change.
+    """
+    try:
+        mode = stat.S_IMODE(path.stat().st_mode)
+        if mode & OTHERS:
+            path.chmod(mode & ~OTHERS)
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        if mode & stat.S_IRWXO:
+            wanted = FOLDER_MODE if path.is_dir() else FILE_MODE
+            wrong = f"{str(path)!r} has mode {mode:04o}, which its owner has to change ({error.strerror})"
+            raise StorageError(f"{wrong}; wanted {wanted:04o}") from error

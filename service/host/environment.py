@@ -1,17 +1,26 @@
-"""The settings as the environment gives them; what is wrong with them is said in one line each."""
+"""Settings from the environment, and their table in service/README.md.
 
+`python -m service.host.environment [FILE]` writes the table.
+"""
+
+import json
 import os
+import sys
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from risk_sac.errors import ConfigError
-from service.host.settings_table import takes
 from service.settings import SECRETS, ServiceSettings
 
 MISUSED = 2  # exit status of a command whose settings are wrong, as of `risk-sac`
 LONGEST_VALUE = 80
+BEGIN = "<!-- settings: written by `make settings` -->"
+END = "<!-- /settings -->"
+BOUNDS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤"}
+TYPES = {"array": "JSON list", "path": "folder", "file-path": "file", "string": "text"}
 
 
 def read_settings() -> ServiceSettings:
@@ -49,3 +58,53 @@ def _line(error: ErrorDetails) -> str:
 
 def _variable(name: str) -> str:
     return f"{ServiceSettings.model_config['env_prefix']}{name.upper()}"
+
+
+def table() -> str:
+    """The settings as a markdown table: variable, what it takes, its default, its meaning."""
+    prefix = ServiceSettings.model_config["env_prefix"]
+    rows = [
+        f"| `{prefix}{name.upper()}` | {takes(field)} | {_default(field)} | {' '.join(field['description'].split())} |"
+        for name, field in sorted(ServiceSettings.model_json_schema()["properties"].items(), key=_of_ray)
+    ]
+    return "\n".join(["| variable | takes | default | meaning |", "|---|---|---|---|", *rows])
+
+
+def _of_ray(setting: tuple[str, dict[str, Any]]) -> bool:
+    """They come last; all others stay in their order."""
+    return setting[0].startswith("ray_")
+
+
+def with_table(text: str) -> str:
+    """The text with the table between its two marks."""
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not end:
+        raise ValueError(f"the text lacks {BEGIN!r} or, behind it, {END!r}; put both where the table belongs")
+    return f"{before}{begin}\n{table()}\n{end}{after}"
+
+
+def takes(field: dict[str, Any]) -> str:
+    """What a setting takes, by its JSON schema."""
+    if "anyOf" in field:  # one of them is null, which is what no variable means
+        return next(takes(each) for each in field["anyOf"] if each["type"] != "null")
+    if "const" in field:
+        return f"`{field['const']}`"
+    if "enum" in field:
+        return " or ".join(f"`{each}`" for each in field["enum"])
+    bounds = ", ".join(f"{sign} {field[name]:g}" for name, sign in BOUNDS.items() if name in field)
+    kind = field.get("format", field["type"])
+    return f"{TYPES.get(kind, kind)} {bounds}".strip()
+
+
+def _default(field: dict[str, Any]) -> str:
+    """As it would be written; a dash where it means none or depends on the machine."""
+    default = field.get("default")
+    if default is None:
+        return "–"
+    return f"`{json.dumps(default) if isinstance(default, list) else default}`"
+
+
+if __name__ == "__main__":
+    readme = Path(sys.argv[1] if len(sys.argv) > 1 else "service/README.md")
+    readme.write_text(with_table(readme.read_text(encoding="utf-8")), encoding="utf-8")

@@ -14,7 +14,7 @@ from pydantic_core import to_json
 from risk_sac.errors import DamagedError
 from risk_sac.run_folder.durable import unseal, write_sealed
 from service.errors import KeysError
-from service.host.private import FILE_MODE, FOLDER_MODE
+from service.host.data_folder import FILE_MODE, FOLDER_MODE
 from service.keys.key import Key, Scope, mint
 
 REMEDY = "restore their file from a copy, or begin anew with `risk-sac keys create --anew`"

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from risk_sac.errors import ConfigError, RiskSacError
 from service.errors import StorageError
-from service.host.data_folder import hold_data_folder
+from service.host.data_folder import create_private, hold_data_folder
 from service.host.environment import MISUSED, read_settings
-from service.host.private import create_private
 from service.settings import ServiceSettings
 from service.store.database import connected, held, present_step, sqlite_file, step_back
 

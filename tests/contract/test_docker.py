@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from risk_sac.config import CampaignSpec
-from service.host.settings_table import BEGIN, END, with_table
+from service.host.environment import BEGIN, END, with_table
 from service.settings import ServiceSettings
 from tests.contract.kuberay import RAY_CLUSTER
 

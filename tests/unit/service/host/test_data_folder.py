@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from service.errors import StorageError
-from service.host.data_folder import hold_data_folder
-from service.host.private import make_private
+from service.host.data_folder import hold_data_folder, make_private
 from service.store.reading import Store
 
 
