@@ -49,9 +49,8 @@ def _show(options: argparse.Namespace) -> int:
 
 def _twin(spec: RunSpec, recording: Recording, name: str) -> Recording:
     """The same scene with what the command line names changed."""
-    from risk_sac.failures.play import check_release, twin_recording
+    from risk_sac.failures.play import twin_recording
 
-    check_release(spec, recording.contact.episode, recording.series)
     return twin_recording(spec, recording, None if name == IDLE else read_ego(name), name)
 
 

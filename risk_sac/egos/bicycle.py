@@ -1,27 +1,23 @@
-"""How an ego's car moves: a kinematic bicycle that does as much of a command as its limits allow. Pure.
+"""Moves an ego's car: a kinematic bicycle that does as much of a command as its limits allow.
 
 Source: Kong et al. 2015, "Kinematic and dynamic vehicle models for autonomous driving control design", Eq. 1.
 """
 
 import math
 
-from risk_sac.egos.seam import Vehicle
+import numpy as np
+
+from risk_sac.egos.road import LEAST_LOOKAHEAD_M, steering_towards
+from risk_sac.egos.seam import Control, Trajectory, Vehicle
 from risk_sac.jit import compiled
 from risk_sac.sim.pilot import Motion
 
 
 def advance(motion: Motion, accel_mps2: float, steering_rad: float, vehicle: Vehicle, step_s: float) -> Motion:
-    """The motion after a step of a command.
+    """Returns the motion after a step of a command.
 
     The steering turns no faster than it can, and no further than the grip bears at this speed. What the curve takes of
     the grip is not there to brake or speed up with. A braking builds up at the brakes' jerk; it ends at once.
-
-    Args:
-      motion: now.
-      accel_mps2: wanted, negative to brake.
-      steering_rad: wanted.
-      vehicle: with the limits.
-      step_s: length of the step.
     """
     v, (x_m, y_m, heading_rad, speed_mps, before_mps2, steered_rad, _) = vehicle, motion
     limits = (v.wheelbase_m, v.accel_mps2, v.brake_mps2, v.brake_jerk_mps3, v.steering_rad, v.steering_rate_rad_s)
@@ -74,3 +70,24 @@ def _advanced(
         steering,
         slip,
     )
+
+
+AHEAD_S = 0.5
+
+
+def track(trajectory: Trajectory, motion: Motion, vehicle: Vehicle) -> Control:
+    """Returns the control that follows a valid trajectory.
+
+    Choice: it aims at the place of `AHEAD_S` from now, but no nearer than `LEAST_LOOKAHEAD_M` where the trajectory goes
+    so far, else straight on: nearer aims make a slow car turn its wheels to and fro.
+    """
+    t = trajectory
+    speed = float(np.interp(AHEAD_S, t.time_s, t.speed_mps))
+    accel = (speed - motion.speed_mps) / AHEAD_S
+    away_m = np.hypot(t.x_m - motion.x_m, t.y_m - motion.y_m)
+    far = np.flatnonzero((t.time_s >= AHEAD_S) & (away_m >= LEAST_LOOKAHEAD_M))
+    if not len(far):
+        return Control(accel, 0.0)
+    aim = float(t.x_m[far[0]]), float(t.y_m[far[0]])
+    steering = steering_towards(motion.x_m, motion.y_m, motion.heading_rad, vehicle.wheelbase_m, *aim)
+    return Control(accel, float(steering))

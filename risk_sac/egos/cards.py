@@ -1,7 +1,4 @@
-"""What is known of a registered ego without running it: the server lists egos and refuses campaigns by their cards.
-
-A Python ego's card is read from its source, so that no code of an ego ever runs in the server.
-"""
+"""Describes registered egos without running them: a Python ego's card is read from its source."""
 
 import ast
 import hashlib
@@ -39,11 +36,7 @@ class EgoCard(Settings):
 
 
 def python_card(point: EntryPoint) -> EgoCard:
-    """The card of the class that an entry point names.
-
-    Raises:
-      ConfigError: there is no such module or class, or it does not declare what it has to.
-    """
+    """Returns the card of the class that an entry point names; a ConfigError if it does not declare all of it."""
     file = _source(point)
     try:
         declared = _declared(file.read_text(encoding="utf-8"), point.attr)

@@ -1,21 +1,22 @@
-"""A dead ego never becomes a good one: whatever is wrong with its answer ends the episode, and nobody drives instead.
+"""Checks every answer of an ego; an answer that is late, malformed or missing makes the episode invalid.
 
-The episode is then *invalid*, with one of these reasons, and no rate counts it. `DEAD_AFTER` of them in a row fail
-the run.
+Nothing drives in the ego's place, and no rate counts the episode. `DEAD_AFTER` such episodes in a row fail the run.
 """
 
 import math
+import signal
+import threading
 import time
 from collections.abc import Callable
+from types import FrameType
 from typing import TypeVar
 
 import numpy as np
 
-from risk_sac.egos import alarm
 from risk_sac.egos.seam import Command, Control, Ego, Episode, Perceived, Trajectory
 from risk_sac.errors import EgoFailed
 
-DEADLINE, MALFORMED, CRASH = "ego_deadline", "ego_malformed", "ego_crash"
+DEADLINE, MALFORMED, CRASH = "ego_deadline", "ego_malformed", "ego_crash"  # reasons of an invalid episode
 DEAD_AFTER = 5
 MOST_POINTS = 1000
 
@@ -27,13 +28,13 @@ class Guarded:
     """An ego whose every answer is checked."""
 
     def __init__(self, ego: Ego, deadline_s: float, *, interrupted: bool = False) -> None:
-        """Wraps it.
+        """Wraps an ego.
 
         Args:
-          ego: who drives.
-          deadline_s: for each answer, of real time.
-          interrupted: whether it is interrupted then, as far as `risk_sac.egos.alarm` can; else it keeps its deadline
-            itself, or is asked to the end and then refused.
+          ego: that drives.
+          deadline_s: real time for each answer.
+          interrupted: whether a late ego is interrupted, as far as a signal can; else it keeps its deadline itself, or
+            is refused after it has answered.
         """
         self._ego, self._deadline_s, self._interrupted = ego, deadline_s, interrupted
         self._alarmed = False
@@ -44,11 +45,11 @@ class Guarded:
         Raises:
           EgoFailed: it crashed, or took too long.
         """
-        self._alarmed = self._interrupted and alarm.ready()
+        self._alarmed = self._interrupted and _ready()
         self._asked(self._ego.reset, episode)
 
     def act(self, perceived: Perceived) -> Command:
-        """Its command, which is sound.
+        """Returns a sound command.
 
         Raises:
           EgoFailed: it crashed, took too long, or answered nonsense.
@@ -64,31 +65,29 @@ class Guarded:
         return command
 
     def close(self) -> None:
-        """Lets go of what it holds."""
+        """Closes the ego."""
         self._ego.close()
 
     def _asked(self, question: Callable[[Told], Answer], told: Told) -> Answer:
         try:
-            return self._in_time(question, told) if self._alarmed else question(told)
+            if not self._alarmed:
+                return question(told)
+            _alarm(self._deadline_s)
+            try:
+                return question(told)
+            finally:
+                _alarm(0.0)
         except EgoFailed:
             raise
-        except alarm.Overdue as overdue:
-            alarm.off()  # it may have rung while it was put off
-            said = f"the ego did not answer within {self._deadline_s:g} s"
-            raise EgoFailed(said, reason=DEADLINE) from overdue
+        except _Overdue as overdue:
+            _alarm(0.0)  # it may have rung before the `finally` above had put it off
+            raise EgoFailed(f"the ego did not answer within {self._deadline_s:g} s", reason=DEADLINE) from overdue
         except Exception as error:
-            raise _crashed(error) from error
-
-    def _in_time(self, question: Callable[[Told], Answer], told: Told) -> Answer:
-        alarm.on(self._deadline_s)
-        try:
-            return question(told)
-        finally:
-            alarm.off()
+            raise EgoFailed(f"the ego crashed: {type(error).__name__}: {error}", reason=CRASH) from error
 
 
 def complaint(command: object) -> str:
-    """What is wrong with an answer; empty if nothing is."""
+    """Returns what is wrong with an answer; empty if nothing is."""
     if isinstance(command, Control):
         try:
             sound = math.isfinite(command.accel_mps2) and math.isfinite(command.steering_rad)
@@ -111,5 +110,34 @@ def complaint(command: object) -> str:
     return ""
 
 
-def _crashed(error: Exception) -> EgoFailed:
-    return EgoFailed(f"the ego crashed: {type(error).__name__}: {error}", reason=CRASH)
+class _Overdue(BaseException):
+    """Raised in the ego's own code, past its handlers of `Exception`."""
+
+
+_armed = False
+
+
+def _ready() -> bool:
+    """Installs the signal handler; False outside the main thread, or if the signal has another use.
+
+    A signal ends loops, sleeping and waiting of Python code, but not compiled code that never returns.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return False
+    if signal.getsignal(signal.SIGALRM) is not _ring:
+        if signal.getsignal(signal.SIGALRM) is not signal.SIG_DFL:
+            return False
+        signal.signal(signal.SIGALRM, _ring)
+    return True
+
+
+def _alarm(after_s: float) -> None:
+    """Raises `_Overdue` after each such time, in s; 0 turns it off."""
+    global _armed
+    _armed = after_s > 0.0
+    signal.setitimer(signal.ITIMER_REAL, after_s, after_s)
+
+
+def _ring(number: int, frame: FrameType | None) -> None:
+    if _armed:
+        raise _Overdue

@@ -5,10 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.egos.bicycle import advance
+from risk_sac.egos.bicycle import advance, track
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.seam import Episode, Perceived, Trajectory, Vehicle
-from risk_sac.egos.tracking import track
 from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import GRAVITY_MPS2

@@ -1,13 +1,7 @@
-"""Which egos there are. The operator registers them, by entry points and by a file; a request can only name one.
+"""Lists the egos that the operator has registered; a request can only name one.
 
-Python egos are entry points of the group `risk_sac.egos`, beside those that are shipped. Remote ones are tables of the
-TOML file that `RISK_SAC_EGOS` names:
-
-    [pilot]                       # what campaigns name
-    address = "127.0.0.1:50051"
-    version = "1.4.0+3f2a"        # which it has to say of itself, or its episodes are invalid
-    response_time_s = 0.3
-    deadline_s = 0.5              # for each answer
+Python egos are entry points of the group `risk_sac.egos`, beside the shipped ones. Remote ones are tables of the TOML
+file that `RISK_SAC_EGOS` names; README.md shows one.
 """
 
 import os
@@ -41,15 +35,11 @@ class RemoteCard(EgoCard):
     kind: Literal["remote"] = "remote"
     deadline_s: Annotated[float, Field(gt=0, le=600)] = 1.0
     address: Annotated[str, Field(min_length=1, max_length=500, exclude=True)]
-    """Of its server, `host:port` or `unix:///path`; the operator's business, and shown to nobody."""
+    """Of its server, `host:port` or `unix:///path`; never shown."""
 
 
 def cards() -> tuple[EgoCard, ...]:
-    """All registered egos, by name.
-
-    Raises:
-      ConfigError: one of them cannot be used, or two have the same name.
-    """
+    """Returns all registered egos by name; a ConfigError if one cannot be used, or two have the same name."""
     points, remotes = _points(), _remotes()
     if twice := points.keys() & remotes.keys():
         raise ConfigError(FILE, f"the names {sorted(twice)}, which entry points have too", "others")
@@ -58,11 +48,7 @@ def cards() -> tuple[EgoCard, ...]:
 
 
 def installed() -> dict[str, str]:
-    """Versions of the Python egos of this machine, by name; where one cannot be used, why.
-
-    Raises:
-      ConfigError: two have the same name.
-    """
+    """Returns the versions of this machine's Python egos by name; for one that cannot be used, the reason."""
     found = {}
     for name, point in _points().items():
         try:
@@ -73,11 +59,7 @@ def installed() -> dict[str, str]:
 
 
 def card_of(name: str) -> EgoCard:
-    """The card of one ego.
-
-    Raises:
-      ConfigError: there is none of this name, or it cannot be used.
-    """
+    """Returns the card of an ego; a ConfigError if it does not exist or cannot be used."""
     points, remotes = _points(), _remotes()
     if name in points:
         return python_card(points[name])
@@ -91,7 +73,7 @@ def card_of(name: str) -> EgoCard:
 
 
 def pinned(ego: EgoConfig) -> EgoConfig:
-    """The ego with the version and the response time of the registered driver that it names.
+    """Returns the ego with version and response time of the registered driver that it names.
 
     Raises:
       ConfigError: there is no such driver, or it has another version than the ego says.
@@ -111,7 +93,7 @@ def pinned(ego: EgoConfig) -> EgoConfig:
 
 
 def load(ego: EgoConfig) -> Guarded | None:
-    """The driver that an ego names, ready to drive; None for SUMO's.
+    """Returns the driver that an ego names, ready to drive; None for SUMO's.
 
     Raises:
       ConfigError: there is no such driver or no such version, or it cannot be loaded.
@@ -127,11 +109,7 @@ def load(ego: EgoConfig) -> Guarded | None:
 
 
 def make(name: str) -> tuple[Callable[[], Ego], EgoCard]:
-    """What makes a registered Python ego, and its card.
-
-    Raises:
-      ConfigError: there is none of this name, or it cannot be loaded.
-    """
+    """Returns the class of a registered Python ego and its card; a ConfigError if it cannot be loaded."""
     card, points = card_of(name), _points()
     if name not in points:
         raise ConfigError("ego.driver", f"the ego {name!r} is no Python ego, but {card.kind}")
@@ -139,15 +117,7 @@ def make(name: str) -> tuple[Callable[[], Ego], EgoCard]:
 
 
 def make_unregistered(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
-    """What makes an ego that no entry point names, and its card.
-
-    Args:
-      source: `module:Class`.
-      name: that it is to have.
-
-    Raises:
-      ConfigError: there is no such class, it does not declare what it has to, or it cannot be loaded.
-    """
+    """Returns the class `module:Class` that no entry point names, and its card under a name."""
     point = EntryPoint(name=name, value=source, group=GROUP)
     return _loaded(point), python_card(point)
 

@@ -1,6 +1,6 @@
-"""`python -m risk_sac.egos.serve my_egos:Follower --address 127.0.0.1:50051`: serve a Python ego to others.
+"""Serves a Python ego: `python -m risk_sac.egos.serve my_egos:Follower --address 127.0.0.1:50051`.
 
-It is the reference of the other end, too: whoever writes an ego in another language does what is done here.
+It is the reference for egos in other languages.
 """
 
 import argparse
@@ -47,15 +47,9 @@ class Session:
 
 
 class Sessions:
-    """The egos that drive at present, each in a session of its own."""
+    """Sessions that are open, each with an ego of its own."""
 
     def __init__(self, make_ego: Callable[[], Ego], version: str) -> None:
-        """Serves nobody yet.
-
-        Args:
-          make_ego: a new ego for each session.
-          version: what it says of itself.
-        """
         self._make, self._version = make_ego, version
         self._sessions: dict[str, Session] = {}
         self._lock = threading.Lock()
@@ -104,7 +98,7 @@ class Sessions:
 
 
 def warm_up(ego: Ego) -> None:
-    """Lets an ego drive one step on a straight road, so that what it compiles or loads at first costs no deadline."""
+    """Lets an ego drive one step on a straight road, so that compiling costs no deadline."""
     ego.reset(Episode(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=STEP_S))
     along, still = np.array([0.0, 50.0, 100.0]), np.zeros(3)
     path = np.array([along, still, along, still, np.full(3, 13.9), np.cos(still), np.sin(still)])
@@ -125,11 +119,7 @@ def warm_up(ego: Ego) -> None:
 
 
 def serve(sessions: Sessions, address: str) -> tuple[grpc.Server, int]:
-    """A server at work, and its port.
-
-    Raises:
-      RuntimeError: the address cannot be listened on.
-    """
+    """Starts a server and returns it with its port; a RuntimeError if it cannot listen on the address."""
     answers = {
         "Start": partial(grpc.unary_unary_rpc_method_handler, sessions.start),
         "Act": partial(grpc.stream_stream_rpc_method_handler, sessions.act),
@@ -150,13 +140,7 @@ def serve(sessions: Sessions, address: str) -> tuple[grpc.Server, int]:
 
 def table(name: str, address: str, card: EgoCard) -> str:
     """What registers an ego that is served, for the file of RISK_SAC_EGOS."""
-    told = {
-        "address": address,
-        "version": card.version,
-        "summary": card.summary,
-        "response_time_s": card.response_time_s,
-        "deadline_s": card.deadline_s,
-    }
+    told = {"address": address} | card.model_dump(include={"version", "summary", "response_time_s", "deadline_s"})
     return "\n".join([f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in told.items())])
 
 

@@ -1,4 +1,4 @@
-"""The failures of a run as bundles, and the policy that found them."""
+"""Makes bundles of the failures of a run, with the policy that found them."""
 
 import logging
 from collections.abc import Iterator, Sequence
@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from risk_sac.agents.learner import Learner
-from risk_sac.config import RunSpec, method_of
+from risk_sac.config import method_of
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import CheckpointError
 from risk_sac.failures.bundle import Bundle, make_bundle
-from risk_sac.failures.play import check_release, repeated
-from risk_sac.failures.recording import Series
+from risk_sac.failures.play import repeated
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.records import EpisodeRecord
 from risk_sac.run import RunState
@@ -26,36 +25,28 @@ logger = logging.getLogger(__name__)
 
 
 def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -> Iterator[Bundle]:
-    """Bundles of contacts of a run, each after it was played again.
+    """Yields bundles of contacts of a run, each after it was played again.
 
     Raises:
       SimulationError: a contact does not repeat.
-      ConfigError: its series is from before there was a release.
       DamagedError, OSError: its series cannot be read.
     """
     spec, policy = results.spec, policy_of(folder, results)
     with closing(RiskSacEnv.of(spec)) as env:
         for episode in episodes:
-            recorded = _series(folder, spec, episode)
+            recorded = read_series(folder / FAILURES / series_name(episode.index))
             yield make_bundle(spec, episode, recorded, repeated(env, spec, episode, recorded).signal_heads, policy)
 
 
 def recorded_bundle(folder: Path, results: Results, episode: EpisodeRecord, policy: FrozenPolicy | None) -> Bundle:
-    """A bundle of a contact as it was recorded, whether or not it repeats; without signal heads.
+    """Returns a bundle of a contact as it was recorded, whether or not it repeats; without signal heads.
 
     By which code it was recorded is known of runs that were verified.
 
-    Args:
-      folder: of the run.
-      results: of the run.
-      episode: with the contact.
-      policy: of the run.
-
     Raises:
-      ConfigError: its series is from before there was a release.
       DamagedError, OSError: its series cannot be read.
     """
-    recorded = _series(folder, results.spec, episode)
+    recorded = read_series(folder / FAILURES / series_name(episode.index))
     made = make_bundle(results.spec, episode, recorded, np.empty((0, 0), dtype=np.uint8), policy)
     verified = read_verified(folder, results.digest or "")
     packages = {name: version for name, version in (results.versions or {}).items() if name in made.manifest.versions}
@@ -63,17 +54,8 @@ def recorded_bundle(folder: Path, results: Results, episode: EpisodeRecord, poli
     return replace(made, manifest=made.manifest.model_copy(update=by))
 
 
-def _series(folder: Path, spec: RunSpec, episode: EpisodeRecord) -> Series:
-    recorded = read_series(folder / FAILURES / series_name(episode.index))
-    check_release(spec, episode, recorded)
-    return recorded
-
-
 def policy_of(folder: Path, results: Results) -> FrozenPolicy | None:
-    """The policy that a run came to.
-
-    None of a method that learns none, of a run that goes on, and where no checkpoint fits.
-    """
+    """Returns a run's final policy; None if it learns none, goes on, or has no checkpoint that fits."""
     spec = results.spec
     if not method_of(spec.method).learns or not results.finished:
         return None

@@ -12,8 +12,7 @@ from risk_sac.failures.roads import roads_of
 from risk_sac.types import Kind, Role
 
 EGO_COLOUR, OTHER_COLOUR, BYSTANDER_COLOUR = "tab:blue", "tab:red", "tab:gray"
-SEEN_COLOUR, CONFLICT_COLOUR, RELEASE_COLOUR = "tab:green", "tab:orange", "tab:purple"  # of instants
-HIDDEN_COLOUR = "0.9"
+CONFLICT_COLOUR = "tab:orange"
 
 
 def legend(axis: Axes, title: str | None = None) -> None:

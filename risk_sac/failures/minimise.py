@@ -1,4 +1,4 @@
-"""The core of a failure: the least that adversaries have to do, in the plainest scene, for the ego to fail as it did.
+"""Minimises a failure: the least that adversaries have to do, in the plainest scene, for the ego to fail as it did.
 
 Source: delta debugging, Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input" (IEEE TSE 28, 2002).
 """
@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,17 +27,14 @@ AMPLITUDES = (0.5, 0.7, 0.85)  # of what is left, the least first
 Unit = TypeVar("Unit")
 Segment = tuple[int, int]  # an adversary, and a segment of its actions
 Channel = tuple[int, int]  # a column of the actions, and a segment
+Cell = tuple[slice, slice | int]  # steps and columns of the actions
 
 
 def minimise(bundle: Bundle, most: int = MOST) -> Bundle:
-    """Takes away what the failure does not need: adversaries, segments of 0.5 s, drive or steer, strength, scene.
+    """Takes away what a failure does not need, by playing at most so many episodes.
 
-    Its `manifest.core` says what is left and how surely it fails. Where nothing can be taken away, it is the failure
+    `manifest.core` says what is left and how surely it fails. Where nothing can be taken away, it is the failure
     itself.
-
-    Args:
-      bundle: of the failure.
-      most: episodes to play.
 
     Raises:
       ConfigError: the bundle holds no valid failure that can be played here.
@@ -45,13 +42,13 @@ def minimise(bundle: Bundle, most: int = MOST) -> Bundle:
     """
     search = _Search(bundle, most)
     with closing(search.stage.env):
-        for reduce in (_adversaries, _columns, _segments, _channels, _amplitude, _scene):
-            reduce(search)
+        _reduce_actions(search)
+        _reduce_scene(search)
         return search.bundle(bundle)
 
 
 class _Search:
-    """What is left of a failure, and what its parts cost."""
+    """What is left of a failure."""
 
     def __init__(self, bundle: Bundle, most: int) -> None:
         self.stage = Stage(bundle)
@@ -60,7 +57,7 @@ class _Search:
 
     @property
     def neutral(self) -> Floats:
-        """The middle of the space; where a parameter stands for one of two categories, that is not touched."""
+        """The middle of the space; parameters that stand for one of two categories stay."""
         space = self.stage.space
         return np.where(self._categories, self.left.scene, (space.low + space.high) / 2)
 
@@ -69,13 +66,11 @@ class _Search:
         return np.array([bool(parameter.categories) for parameter in self.stage.space.parameters])
 
     def take(self, variant: Variant) -> bool:
-        """Goes on with a variant if it fails in the same way and not on a knife's edge."""
+        """Goes on with a variant if it fails in the same way, and so do most of its copies."""
         if self.stage.played + 1 + COPIES > self._most - COPIES - 1:  # as many are counted afresh in the end
             return False
-        found = self.stage.play(variant)
-        if not alike(found, self.stage.collision) or found is None or _grade(found) != _grade(self.stage.collision):
-            return False
-        if not self._holds(variant):
+        found, wanted = self.stage.play(variant), self.stage.collision
+        if found is None or not alike(found, wanted) or _grade(found) != _grade(wanted) or not self._holds(variant):
             return False
         self.left = variant
         return True
@@ -128,54 +123,39 @@ def _grade(collision: Collision) -> Grade | None:
     return collision.judgement.grade if collision.judgement else None
 
 
-def _adversaries(search: _Search) -> None:
-    """Leaves adversaries to SUMO: who struck comes last."""
+def _active_adversaries(search: _Search) -> list[int]:
+    """Returns the adversaries that act, the striker last."""
     names = search.stage.env.problem.family.adversaries
     active = [k for k in range(len(names)) if search.left.actions[:, 2 * k : 2 * k + 2].any()]
-    active.sort(key=lambda k: names[k] == search.stage.collision.other_id)
-
-    def unneeded(chunk: Sequence[int]) -> bool:
-        columns = [column for k in chunk for column in (2 * k, 2 * k + 1)]
-        return search.take(_zeroed(search.left, [(slice(None), column) for column in columns]))
-
-    without(active, unneeded)
+    return sorted(active, key=lambda k: names[k] == search.stage.collision.other_id)
 
 
-def _columns(search: _Search) -> None:
-    """Takes all the drive or all the steering out of an adversary."""
-
-    def unneeded(chunk: Sequence[int]) -> bool:
-        return search.take(_zeroed(search.left, [(slice(None), column) for column in chunk]))
-
-    without(np.flatnonzero(search.left.actions.any(axis=0)).tolist(), unneeded)
+def _active_columns(search: _Search) -> list[int]:
+    return np.flatnonzero(search.left.actions.any(axis=0)).tolist()
 
 
-def _segments(search: _Search) -> None:
-    """Leaves an adversary to SUMO for 0.5 s at a time."""
-
-    def unneeded(chunk: Sequence[Segment]) -> bool:
-        cells = [(_rows(segment), slice(2 * k, 2 * k + 2)) for k, segment in chunk]
-        return search.take(_zeroed(search.left, cells))
-
-    without(_segments_of(search.left), unneeded)
-
-
-def _channels(search: _Search) -> None:
-    """Takes the drive or the steering out of a segment."""
-
-    def unneeded(chunk: Sequence[Channel]) -> bool:
-        return search.take(_zeroed(search.left, [(_rows(segment), column) for column, segment in chunk]))
-
-    without(_channels_of(search.left), unneeded)
+# What the adversaries may not need to do, the coarsest first: units that are there, and the actions of a unit.
+REDUCTIONS: tuple[tuple[Callable[[_Search], list[Any]], Callable[[Any], Cell]], ...] = (
+    (_active_adversaries, lambda k: (slice(None), slice(2 * k, 2 * k + 2))),
+    (_active_columns, lambda column: (slice(None), column)),
+    (lambda search: _segments_of(search.left), lambda unit: (_rows(unit[1]), slice(2 * unit[0], 2 * unit[0] + 2))),
+    (lambda search: _channels_of(search.left), lambda unit: (_rows(unit[1]), unit[0])),
+)
 
 
-def _amplitude(search: _Search) -> None:
-    """Does all of it less, as long as that is possible."""
+def _reduce_actions(search: _Search) -> None:
+    """Leaves adversaries to SUMO: altogether, their drive or steering, or for 0.5 s; then weakens what is left."""
+
+    def unneeded(cell: Callable[[Any], Cell], chunk: Sequence[Any]) -> bool:
+        return search.take(_zeroed(search.left, [cell(unit) for unit in chunk]))
+
+    for units, cell in REDUCTIONS:
+        without(units(search), partial(unneeded, cell))
     while any(search.take(_weaker(search.left, factor)) for factor in AMPLITUDES):
         pass
 
 
-def _scene(search: _Search) -> None:
+def _reduce_scene(search: _Search) -> None:
     """Moves parameters to the middle of their ranges, and those that cannot be moved there half the way."""
 
     def unneeded(share: float, chunk: Sequence[int]) -> bool:
@@ -190,11 +170,9 @@ def _scene(search: _Search) -> None:
 
 
 def without(units: Sequence[Unit], unneeded: Callable[[Sequence[Unit]], bool]) -> None:
-    """Tries to do without units: without all of them, then halves, quarters and so on of what is left, then each.
+    """Tries to do without all units, then halves, quarters and so on of what is left, then each.
 
-    Args:
-      units: that are there.
-      unneeded: tries to do without some, from now on; whether that is possible.
+    `unneeded` tries to do without some from now on, and returns whether that is possible.
     """
     left, size = list(units), len(units)
     while size:
@@ -203,7 +181,7 @@ def without(units: Sequence[Unit], unneeded: Callable[[Sequence[Unit]], bool]) -
         size //= 2
 
 
-def _zeroed(variant: Variant, cells: Sequence[tuple[slice, slice | int]]) -> Variant:
+def _zeroed(variant: Variant, cells: Sequence[Cell]) -> Variant:
     actions = variant.actions.copy()
     for cell in cells:
         actions[cell] = 0.0

@@ -1,4 +1,4 @@
-"""An episode played with given actions: as it was recorded, or as it might have been."""
+"""Plays an episode with given actions: as it was recorded, or as its twin."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -9,20 +9,21 @@ from numpy.typing import NDArray
 
 from risk_sac.config import EgoConfig, RunSpec, method_of
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import ConfigError, SimulationError
+from risk_sac.errors import SimulationError
 from risk_sac.failures.question import TwinPlay
 from risk_sac.failures.recording import Recording, Series, actions_of, trajectory_digest
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, EpisodeRecord
 from risk_sac.types import STEP_S, Floats, Scene, Vector
 
+AFTER_S = 3.0  # how long a twin goes on after the contact that it is compared with
 Policy = Callable[[Vector], Vector]
 """From an observation to an action."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Played:
-    """How an episode went, up to a contact or to where the actions ended."""
+    """A played episode, up to a contact or to the end of its actions."""
 
     series: Series
     signal_heads: NDArray[np.uint8]  # T since the release x heads, SUMO's letters
@@ -32,17 +33,12 @@ class Played:
 
 
 def play(env: RiskSacEnv, scene: Scene, seed: int, actions: Floats, policy: Policy | None = None) -> Played:
-    """Plays an episode, and keeps all of it.
+    """Plays an episode with actions, `T x a`.
 
-    Args:
-      env: of the problem.
-      scene: where it begins.
-      seed: of the traffic.
-      actions: `T x a`.
-      policy: acts once the actions have ended, up to the horizon; without one the episode ends with them.
+    A policy acts once the actions have ended, up to the horizon; without one the episode ends with them.
 
     Raises:
-      InfeasibleScene, SimulationError, SceneError: it does not even begin.
+      InfeasibleScene, SimulationError, SceneError: it does not begin.
     """
     observation, info = env.reset(seed=seed, options={"scene": scene})
     heads, rewards, costs = [env.signal_heads()], [0.0], [0.0]
@@ -63,59 +59,32 @@ def play(env: RiskSacEnv, scene: Scene, seed: int, actions: Floats, policy: Poli
     )
 
 
-def check_release(spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> None:
-    """Refuses what was recorded before there was a release.
-
-    Raises:
-      ConfigError: it was.
-    """
-    if "released_s" not in recorded:
-        message = f"the series of {episode.id_in(spec.id)} is older than the release of adversaries"
-        raise ConfigError("FAILURE", message)
-
-
 def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> Played:
-    """A contact played again, the same to the bit.
-
-    Raises:
-      SimulationError: it does not repeat.
-      ConfigError: its series is from before there was a release.
-    """
-    check_release(spec, episode, recorded)
+    """Plays a contact again; a SimulationError if it is not the same to the bit."""
     played = play(env, Scene(spec.family, episode.scene), episode.seed, actions_of(recorded))
     if trajectory_digest(played.series) != trajectory_digest(recorded):
         raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here")
     return played
 
 
-AFTER_S = 3.0  # how long a twin goes on after the contact that it is compared with
-
-
 def twin_recording(spec: RunSpec, recording: Recording, changed: EgoConfig | None, name: str = "") -> Recording:
-    """The twin of a recorded failure, to be drawn beside it; see `twin`.
-
-    Args:
-      spec: of the run that found it.
-      recording: of the failure.
-      changed: the other ego, or None.
-      name: of the other ego; its profile if not given.
-    """
+    """Returns the twin of a recorded failure, to be drawn beside it under the name of the other ego."""
     played = twin(spec, recording.contact.episode, actions_of(recording.series), changed)
     return replace(recording, series=played.series, twin=TwinPlay.of(changed, played.collision, name).title)
 
 
 def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoConfig | None) -> Played:
-    """Plays a failure's episode once more with another ego, or with nobody who attacks.
+    """Plays a failure's episode with another ego, or without an attack.
 
     Args:
       spec: of the run that found it.
       episode: of the failure.
       actions: since the release, `T x a`.
-      changed: the other ego; None to leave the adversaries to SUMO and to let pedestrians stand.
+      changed: the other ego; None leaves the adversaries to SUMO and lets pedestrians stand.
 
     Raises:
       ConfigError: the other ego poses no problem that can be run.
-      InfeasibleScene: with the other ego, traffic is in danger already when the adversaries are released.
+      InfeasibleScene: with the other ego, traffic is in danger when the adversaries are released.
     """
     if changed is not None:
         spec = spec.model_copy(update={"ego": changed})

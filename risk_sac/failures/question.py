@@ -1,4 +1,4 @@
-"""What can be asked of a failure by whoever must not load the simulator; see `risk_sac.failures.study`."""
+"""Questions of a failure that take the simulator, for processes that must not load it; see `failures.study`."""
 
 import io
 from collections.abc import Mapping
@@ -17,10 +17,11 @@ Twin = Literal["idle", "default", "perfect", "careful"]
 """What may be changed in a scene's twin: nobody attacks, or the profile of another ego."""
 Subject = Literal["bundle", "core", "region", "twin", "export"]
 REFUSED = 3  # exit status; the answer is why, in words
+TOLD = "twin"  # name in a twin's file, beside the arrays of the time series
 
 
 class Question(Record):
-    """What is asked of which failure."""
+    """One question of one failure."""
 
     subject: Subject
     spec: RunSpec
@@ -31,9 +32,6 @@ class Question(Record):
     """The other ego of a twin; null: nobody attacks."""
     format: FormatName | None = None
     """Of an export, which."""
-
-
-TOLD = "twin"  # in the file, beside the arrays of the time series
 
 
 class TwinPlay(Record):
@@ -48,13 +46,7 @@ class TwinPlay(Record):
 
     @classmethod
     def of(cls, ego: EgoConfig | None, collision: Collision | None, name: str = "") -> Self:
-        """A twin in words.
-
-        Args:
-          ego: the other ego, or None: nobody attacked.
-          collision: that it ended in, if it did.
-          name: of the other ego; its driver's or its profile's if not given.
-        """
+        """Describes a twin with another ego, or with None: without an attack."""
         changed = "nobody attacks" if ego is None else f"ego: {name or ego.driver or ego.profile}"
         touches = (
             f"touches {collision.other_id} at {collision.ego_speed_mps:.1f} m/s" if collision else "touches nobody"

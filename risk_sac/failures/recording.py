@@ -50,13 +50,8 @@ class Recording:
     @cached_property
     def time_s(self) -> Floats:
         """`T`, negative before the contact."""
-        time: Floats = self["time_s"] - self._simulator_release_s - self.collision.time_s
+        time: Floats = self["time_s"] - float(self["released_s"]) - self.collision.time_s
         return time
-
-    @property
-    def _simulator_release_s(self) -> float:
-        """The release by the simulator's clock; the first frame, in what was recorded before there was a release."""
-        return float(self["released_s"] if "released_s" in self.series else self["time_s"][0])
 
     @property
     def released_s(self) -> float:

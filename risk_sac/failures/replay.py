@@ -66,7 +66,7 @@ def _tell(file: Path, runs: Prepared) -> None:
         try:
             with closing(env):
                 _say(file, folder, same=_same(folder, results, env))
-        except (RiskSacError, OSError, KeyError) as error:  # a key: of a series from before there was a release
+        except (RiskSacError, OSError) as error:
             _say(file, folder, error=f"{type(error).__name__}: {error}")
 
 

@@ -26,9 +26,8 @@ class Surface:
 
 
 def roads_of(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Surface]:
-    """The surfaces of a scene's net; none for a scene from before its family had all the parameters it has now."""
-    found = family_named(family)
-    return _shipped(found.layout(scene).net) if set(found.space.names) <= scene.keys() else ()
+    """Returns the surfaces of a scene's net."""
+    return _shipped(family_named(family).layout(scene).net)
 
 
 @cache  # there are a few nets, and they stay as they are

@@ -1,7 +1,4 @@
-"""Draws one contact as the paper's Fig. 2 does: both paths from above, and what was measured along the way.
-
-Where the contact was judged, the moment at which the conflict began is marked as well.
-"""
+"""Draws one contact as the paper's Fig. 2 does: both paths from above, and what was measured along the way."""
 
 import textwrap
 from collections.abc import Callable, Iterator
@@ -16,22 +13,20 @@ from matplotlib.patches import Rectangle
 from risk_sac.canvas import canvas, picture
 from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
-from risk_sac.failures.from_above import (
-    CONFLICT_COLOUR,
-    EGO_COLOUR,
-    HIDDEN_COLOUR,
-    OTHER_COLOUR,
-    RELEASE_COLOUR,
-    SEEN_COLOUR,
-    draw_from_above,
-    legend,
-)
+from risk_sac.failures.from_above import CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, draw_from_above, legend
 from risk_sac.failures.recording import Recording
-from risk_sac.records import Collision, Grade
+from risk_sac.records import Grade
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.types import Floats
 
-WIDTH = 120  # characters that the page holds
+CAPTION_WIDTH = 120  # characters
+SEEN_COLOUR, RELEASE_COLOUR, HIDDEN_COLOUR = "tab:green", "tab:purple", "0.9"
+VIEW_S, PANELS_S = 3.0, 8.0  # before the contact: what the view from above holds, and the panels
+MARGIN_M = 5.0
+WIDTH_IN, PANEL_IN, DPI = 11.0, 1.5, 110
+PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
+LABEL_IN = 0.25  # what a label needs on the page
+VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
 PREVENTED = {
     Grade.CAREFUL: "a careful driver would have prevented it",
     Grade.IDEAL: "only full braking at once would have prevented it",
@@ -40,35 +35,25 @@ PREVENTED = {
 
 
 def caption(family: FamilyName, recording: Recording) -> str:
-    """Which contact of which run, what touched what, and what its judgement says; no line is too long for the page."""
-    episode, collision = recording.contact.episode, recording.collision
+    """Returns which contact it is, what touched what, and what its judgement says."""
+    episode, collision, judgement = recording.contact.episode, recording.collision, recording.collision.judgement
     failed = f" · failed rules: {_words(episode.reason)}" if episode.reason else ""
+    seen_s = collision.visible_for_s
+    seen = f"which it had seen for {seen_s:.1f} s" if seen_s > 0 else "which it had not seen"
     lines = [
         f"{family} · episode {recording.contact.id} · {episode.outcome}{failed}",
         f"the ego's {collision.ego_zone}, at {collision.ego_speed_mps:.1f} m/s, touched the {collision.other_zone} of "
-        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {_seen(collision)}",
-        *_judged(collision),
+        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {seen}",
     ]
-    return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
-
-
-def _seen(collision: Collision) -> str:
-    seen_s = collision.visible_for_s
-    return f"which it had seen for {seen_s:.1f} s" if seen_s > 0 else "which it had not seen"
-
-
-def _judged(collision: Collision) -> list[str]:
-    """Lines with its kind, how it began, who would have prevented it, and whether the striker was in the wrong."""
-    judgement = collision.judgement
-    if judgement is None:
-        return []
-    before_s = collision.time_s - judgement.conflict_s
-    grade = "" if judgement.grade is None else f" · grade {judgement.grade}: {PREVENTED[judgement.grade]}"
-    return [
-        judgement.signature,
-        f"the conflict began {before_s:.1f} s before the contact{grade}",
-        f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'}",
-    ]
+    if judgement is not None:
+        before_s = collision.time_s - judgement.conflict_s
+        grade = "" if judgement.grade is None else f" · grade {judgement.grade}: {PREVENTED[judgement.grade]}"
+        lines += [
+            judgement.signature,
+            f"the conflict began {before_s:.1f} s before the contact{grade}",
+            f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'}",
+        ]
+    return "\n".join(textwrap.fill(line, CAPTION_WIDTH) for line in lines)
 
 
 def _words(names: str) -> str:
@@ -119,8 +104,8 @@ def _robustness(axis: Axes, recording: Recording) -> None:
 PANELS: tuple[Callable[[Axes, Recording], None], ...] = (_speeds, _accelerations, _distance, _ttc, _robustness)
 
 
-def mark_instants(axis: Axes, recording: Recording) -> None:
-    """Upright lines at the instants, and grey ground where the ego did not see the other."""
+def _mark_instants(axis: Axes, recording: Recording) -> None:
+    """Draws upright lines at the instants, and grey ground where the ego did not see the other."""
     axis.grid(visible=True, linewidth=0.3)
     for start, end in recording.hidden():
         axis.axvspan(start, end, color=HIDDEN_COLOUR, zorder=0)
@@ -128,8 +113,8 @@ def mark_instants(axis: Axes, recording: Recording) -> None:
         axis.axvline(time_s, color=colour, linewidth=1.0, linestyle="--" if time_s == 0 else ":")
 
 
-def name_instants(axis: Axes, recording: Recording) -> None:
-    """Names above the first panel, each in a row of its own so that they do not cover each other."""
+def _name_instants(axis: Axes, recording: Recording) -> None:
+    """Writes names above the first panel, each in a row of its own so that they do not overlap."""
     for row, (time_s, name, colour) in enumerate(_instants(recording)):
         axis.annotate(
             name,
@@ -146,7 +131,7 @@ def name_instants(axis: Axes, recording: Recording) -> None:
 
 
 def _instants(recording: Recording) -> Iterator[tuple[float, str, str]]:
-    """What there is to mark: when, its name, and its colour."""
+    """Yields time, name and colour of what is marked."""
     yield 0.0, "contact of the failure" if recording.twin else "contact", "black"
     if recording.collision.visible_for_s > 0 and not recording.twin:
         yield recording.time_s[-1] - recording.collision.visible_for_s, "in the ego's view from here", SEEN_COLOUR
@@ -155,27 +140,8 @@ def _instants(recording: Recording) -> Iterator[tuple[float, str, str]]:
         yield recording.conflict_s, "conflict begins", CONFLICT_COLOUR
 
 
-VIEW_S, PANELS_S = 3.0, 8.0  # before the contact: what the view from above holds, and the panels
-MARGIN_M = 5.0
-WIDTH_IN, PANEL_IN, DPI = 11.0, 1.5, 110
-PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
-LABEL_IN = 0.25  # what a label needs on the page
-VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
-
-
 def draw(family: FamilyName, recording: Recording, file: Path, twin: Recording | None = None) -> None:
-    """Draws a contact into a file.
-
-    Args:
-      family: of the run.
-      recording: of the contact.
-      file: its suffix names the format: png, pdf or svg.
-      twin: is drawn beside it.
-
-    Raises:
-      ConfigError: the format is none of these.
-      OSError: the picture cannot be written.
-    """
+    """Draws a contact, and its twin beside it, into a png, pdf or svg file."""
     if file.suffix not in (".png", ".pdf", ".svg"):
         raise ConfigError("out", f"{str(file)!r}", "a name that ends in .png, .pdf or .svg")
     content = recording_bytes(family, recording, file.suffix.removeprefix("."), twin)
@@ -184,17 +150,14 @@ def draw(family: FamilyName, recording: Recording, file: Path, twin: Recording |
 
 
 def recording_bytes(family: FamilyName, recording: Recording, format_: str, twin: Recording | None = None) -> bytes:
-    """The picture of a contact as a file: png, pdf or svg."""
+    """Returns the picture of a contact as a png, pdf or svg."""
     return picture(partial(draw_recording, family, recording, twin), [format_], DPI, {})[0]
 
 
 def draw_recording(family: FamilyName, recording: Recording, twin: Recording | None = None) -> Figure:
-    """The whole figure: the view from above, and one panel per kind of measurement over a common time axis.
+    """Draws the view from above, and one panel per kind of measurement over a common time axis.
 
-    Args:
-      family: of the run.
-      recording: of the contact.
-      twin: is drawn beside it, on the same ground, clock and scales.
+    A twin is drawn beside it, on the same ground, clock and scales.
     """
     columns = [recording] if twin is None else [recording, twin]
     low, high = _extent(recording)
@@ -213,9 +176,9 @@ def draw_recording(family: FamilyName, recording: Recording, twin: Recording | N
             if axis is not first:
                 axis.sharey(first)  # before anything is drawn, so that there is room for both
             panel(axis, each)
-            mark_instants(axis, each)
+            _mark_instants(axis, each)
             axis.label_outer()
-        name_instants(axes[0], each)
+        _name_instants(axes[0], each)
         axes[-1].set_xlabel("time before the contact, s")
     after_s = 0.15 if twin is None else max(0.15, twin.time_s[-1])
     grid[1, 0].set_xlim(max(recording.time_s[0], -PANELS_S), after_s)

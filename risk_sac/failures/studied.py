@@ -95,24 +95,14 @@ class _Note(Studied):
 
 
 def note(folder: Path, digest: str, index: int, studied: Studied) -> None:
-    """Writes down what was told of an episode's failure, a core or a region.
-
-    Args:
-      folder: of the run.
-      digest: of its results.
-      index: of the episode.
-      studied: has one of the two.
-
-    Raises:
-      OSError: the folder cannot be written.
-    """
+    """Writes the core or the region of an episode's failure into a run's folder, with the digest of its results."""
     file = folder / STUDIES / f"{index:06d}-{'region' if studied.core is None else 'core'}.json"
     file.parent.mkdir(exist_ok=True)
     replace_file(file, _Note(digest=digest, **dict(studied)).model_dump_json(indent=2).encode())
 
 
 def edition(folder: Path) -> str:
-    """Another one whenever something is noted; of a folder that is just being removed, any."""
+    """Returns a text that changes whenever something is noted."""
     try:
         return " ".join(sorted(f"{file.name}:{file.stat().st_mtime_ns}" for file in (folder / STUDIES).glob("*.json")))
     except OSError:
@@ -120,7 +110,7 @@ def edition(folder: Path) -> str:
 
 
 def read_studies(folder: Path, digest: str) -> Mapping[int, Studied]:
-    """What was told of the results with this digest, by index of the episode; what is damaged or of others is not."""
+    """Returns what was noted for results with this digest, by index of the episode; damaged files are left out."""
     found: dict[int, Studied] = {}
     for file in sorted((folder / STUDIES).glob("*.json")):
         name = _NAME.fullmatch(file.name)

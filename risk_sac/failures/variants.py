@@ -1,4 +1,4 @@
-"""A failure's episode as it might have been: in another scene, with other actions, in other traffic."""
+"""Plays variants of a failure: in another scene, with other actions, in other traffic; and counts which still fail."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import closing
@@ -16,12 +16,15 @@ from risk_sac.scenario.space import SceneSpace
 from risk_sac.sim.sumo import OFF_ROAD
 from risk_sac.types import STEP_S, Floats, Scene
 
+SCENES, COPIES = (0.01, 0.02, 0.05), 40  # of a region: shares of the scene parameters' ranges, and copies at each
+SEEDS = 10  # of the traffic
+ACTIONS = 0.05
 TAIL_S = 3.0  # that is played on without any action: what is done less, or elsewhere, takes longer to end in a contact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
-    """What an episode is determined by."""
+    """All that determines an episode."""
 
     scene: Floats  # in the order of the space's parameters, d
     actions: Floats  # from the release on, T x two for each adversary; 0 is what SUMO's driver would do anyway
@@ -47,12 +50,7 @@ class Stage:
     """
 
     def __init__(self, bundle: Bundle) -> None:
-        """Plays the failure once more.
-
-        Raises:
-          ConfigError: the bundle holds no valid failure, or one of another net.
-          SimulationError: it does not happen here.
-        """
+        """Plays the failure once more; a SimulationError if it does not happen here."""
         episode = bundle.manifest.episode
         if episode.collision is None or not episode.collision.valid or episode.collision.judgement is None:
             raise ConfigError("BUNDLE", f"{bundle.manifest.id} is no valid failure")
@@ -71,15 +69,11 @@ class Stage:
             raise SimulationError(f"{bundle.manifest.id} does not happen here")
 
     def scene(self, variant: Variant) -> Scene:
-        """As the environment takes it."""
+        """Returns the scene of a variant."""
         return Scene(self.space.family, dict(zip(self.space.names, variant.scene.tolist(), strict=True)))
 
     def play(self, variant: Variant) -> Collision | None:
-        """The contact that a variant ends in; None without one, or if its scene is infeasible.
-
-        Raises:
-          EgoFailed: the ego is dead, which says nothing of the variant.
-        """
+        """Returns the contact of a variant; None without one, or if its scene is infeasible."""
         self.played += 1
         try:
             self.env.reset(seed=variant.seed, options={"scene": self.scene(variant)})
@@ -91,7 +85,7 @@ class Stage:
         except (InfeasibleScene, SimulationError):
             pass
         except EgoFailed as failed:
-            if failed.reason != OFF_ROAD:
+            if failed.reason != OFF_ROAD:  # a dead ego, which says nothing of the variant
                 raise
         return None
 
@@ -100,7 +94,7 @@ class Stage:
         return alike(self.play(variant), self.collision)
 
     def copies(self, variant: Variant, share: float, count: int, seed: int = 0) -> Iterator[Variant]:
-        """Copies whose scene and actions are perturbed by up to a share; the same seed draws the same."""
+        """Yields copies whose scene and actions are perturbed by up to a share."""
         random = np.random.default_rng(seed)
         for _ in range(count):
             yield variant.perturbed(self.space, share, share, random)
@@ -117,11 +111,6 @@ def alike(found: Collision | None, wanted: Collision) -> bool:
 def _with_tail(actions: Floats, horizon_steps: int) -> Floats:
     steps = min(round(TAIL_S / STEP_S), horizon_steps - len(actions))
     return np.vstack((actions, np.zeros((steps, actions.shape[1]), dtype=actions.dtype)))
-
-
-SCENES, COPIES = (0.01, 0.02, 0.05), 40  # shares of the ranges of a scene's parameters, and copies at each
-SEEDS = 10  # of the traffic
-ACTIONS = 0.05
 
 
 def region(bundle: Bundle) -> Region:

@@ -1,7 +1,11 @@
-"""Our end of the protocol: an ego in another process, as one of ours."""
+"""Client of an ego in another process."""
 
+import math
+import threading
+import time
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from queue import SimpleQueue
 from typing import Any
 
 import grpc
@@ -10,7 +14,6 @@ from google.protobuf.message import DecodeError
 from risk_sac.egos.guard import CRASH, DEADLINE, MALFORMED
 from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.remote.messages import METHODS, PROTOCOL, SERVICE, command_of, observation, start_request
-from risk_sac.egos.remote.turns import Late, Turns
 from risk_sac.egos.seam import Command, Episode, Perceived
 from risk_sac.errors import EgoFailed
 from risk_sac.types import Floats
@@ -24,26 +27,26 @@ class RemoteEgo:
     """A session for each episode, over one connection that is made anew when it breaks."""
 
     def __init__(self, name: str, address: str, version: str, deadline_s: float) -> None:
-        """Connects to nobody yet: replays fork after this, and a connection does not survive that.
+        """Does not connect yet: replays fork after this, and a connection does not survive that.
 
         Args:
-          name: by which it is registered. What goes wrong is told with it, and never with the address.
+          name: of the registered ego; errors name it, and never the address.
           address: of its server.
-          version: which it has to say of itself.
+          version: that the ego has to have.
           deadline_s: for each answer.
         """
         self._name, self._address, self._version, self._deadline_s = name, address, version, deadline_s
         self._channel: Any = None
         self._call: Mapping[str, Any] = {}
         self._session = ""
-        self._turns: Turns | None = None
+        self._stream: _Stream | None = None
         self._path: Floats | None = None
 
     def reset(self, episode: Episode) -> None:
         """Opens a session.
 
         Raises:
-          EgoFailed: nobody answers in time, or an ego of another version.
+          EgoFailed: no answer comes in time, or the ego is of another version.
         """
         if self._channel is None:
             self._channel = grpc.insecure_channel(self._address, options=OPTIONS)
@@ -57,18 +60,18 @@ class RemoteEgo:
                 f"the ego {self._name!r} is of version {reply.version!r}; registered is {self._version!r}",
                 reason=VERSION,
             )
-        self._turns = Turns(self._channel.stream_stream(f"/{SERVICE}/Act"), self._deadline_s)
+        self._stream = _Stream(self._channel.stream_stream(f"/{SERVICE}/Act"), self._deadline_s)
 
     def act(self, perceived: Perceived) -> Command:
-        """Tells what is perceived and returns what is commanded.
+        """Sends what is perceived and returns the command.
 
         Raises:
-          EgoFailed: it does not answer in time, or with nothing, or to something else.
+          EgoFailed: it answers late, with no command, or to another observation.
         """
-        assert self._turns is not None
+        assert self._stream is not None
         message = observation(perceived, self._session, new_path=perceived.path is not self._path)
         self._path = perceived.path
-        reply = self._asked("Act", message, self._turns.ask)
+        reply = self._asked("Act", message, self._stream.ask)
         command = command_of(reply)
         if command is None:
             raise EgoFailed("the ego answered neither a control nor a trajectory", reason=MALFORMED)
@@ -78,20 +81,20 @@ class RemoteEgo:
         return command
 
     def close(self) -> None:
-        """Ends the session and hangs up."""
+        """Ends the session and closes the connection."""
         self._end()
         if self._channel is not None:
             self._channel.close()
             self._channel = None
 
     def _end(self) -> None:
-        if self._turns is not None:
-            self._turns.close()
-            self._turns = None
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
         if self._session:
             session, self._session = self._session, ""
             request = ego_pb2.CloseRequest(session=session).SerializeToString()
-            self._call["Close"].future(request, timeout=self._deadline_s)  # nobody waits
+            self._call["Close"].future(request, timeout=self._deadline_s)  # no need to wait
 
     def _asked(self, name: str, message: Any, ask: Callable[[bytes], bytes]) -> Any:
         _, reply = METHODS[name]
@@ -101,7 +104,7 @@ class RemoteEgo:
             raise EgoFailed(f"the ego {self._name!r} answered {error}", reason=MALFORMED) from error
         except StopIteration as error:
             raise EgoFailed(f"the ego {self._name!r} ended the session unasked", reason=CRASH) from error
-        except Late as error:
+        except _Late as error:
             raise self._late() from error
         except grpc.RpcError as error:
             code = error.code()
@@ -116,3 +119,56 @@ class RemoteEgo:
 
     def _late(self) -> EgoFailed:
         return EgoFailed(f"the ego {self._name!r} did not answer within {self._deadline_s:g} s", reason=DEADLINE)
+
+
+class _Late(Exception):
+    """No answer came in time."""
+
+
+class _Stream:
+    """A stream of questions and answers in turn, with a deadline for each answer.
+
+    gRPC has a deadline for a whole stream only. Here a thread that sleeps most of the time cancels the stream when an
+    answer is due, so that a question sets no timer and wakes no thread.
+    """
+
+    def __init__(self, method: Callable[[Iterator[bytes]], Any], deadline_s: float) -> None:
+        self._deadline_s, self._due_s, self._was_late = deadline_s, math.inf, False
+        self._questions: SimpleQueue[bytes | None] = SimpleQueue()
+        self._answers = method(iter(self._questions.get, None))
+        self._over = threading.Event()
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def ask(self, question: bytes) -> bytes:
+        """Returns the answer to a question.
+
+        Raises:
+          _Late: it does not come in time.
+          StopIteration: the stream ends without one.
+          grpc.RpcError: the stream breaks.
+        """
+        self._due_s = time.monotonic() + self._deadline_s
+        self._questions.put(question)
+        try:
+            answer: bytes = next(self._answers)
+        except grpc.RpcError as error:
+            if self._was_late:
+                raise _Late from error
+            raise
+        self._due_s = math.inf
+        return answer
+
+    def close(self) -> None:
+        """Ends the stream."""
+        self._over.set()
+        self._questions.put(None)
+
+    def _watch(self) -> None:
+        wait_s = self._deadline_s
+        while not self._over.wait(wait_s):
+            left_s = self._due_s - time.monotonic()
+            if left_s <= 0.0:
+                self._was_late = True
+                self._answers.cancel()
+                return
+            wait_s = min(left_s, self._deadline_s)

@@ -1,7 +1,4 @@
-"""Egos that speak ASAM OSI 3: they are told an `osi3.GroundTruth` and answer an `osi3.MotionRequest`, both as bytes.
-
-Our side needs no OSI package: the ego reads and writes the bytes with its own, as `osi3.GroundTruth.FromString(told)`
-and `request.SerializeToString()`. The truth is the ego's: it holds the actors that the ego perceives, and no other.
+"""Converts perceptions and commands to ASAM OSI 3: `osi3.GroundTruth` and `osi3.MotionRequest`, as bytes.
 
 Source: ASAM OSI 3.8, osi_groundtruth.proto and osi_motionrequest.proto.
 """
@@ -32,15 +29,16 @@ SIGNAL_ID = 1 << 32  # of the one signal ahead; beyond the ids of actors
 
 
 class OsiEgo(ABC):
-    """What an ego of one's own derives from; `version` and `response_time_s` are its own, as of any other."""
+    """Base of egos that speak OSI; they declare `version` and `response_time_s` as any other."""
 
     @abstractmethod
     def drive(self, ground_truth: bytes) -> bytes:
-        """One step.
+        """Answers one step.
 
         Args:
-          ground_truth: `osi3.GroundTruth` of whom it perceives: its own car, which is `host_vehicle_id`, and others as
-            `moving_object`; the signal ahead as a `traffic_light` at its stop line; its way as the `reference_line`.
+          ground_truth: `osi3.GroundTruth` of what it perceives and of nothing else: its own car, `host_vehicle_id`, and
+            others as `moving_object`; the signal ahead as a `traffic_light` at its stop line; its way as the
+            `reference_line`.
 
         Returns:
           `osi3.MotionRequest` with a desired trajectory, or a desired state, of the middle of the rear axle.
@@ -52,11 +50,7 @@ class OsiEgo(ABC):
         self._numbers: dict[str, int] = {}
 
     def act(self, perceived: Perceived) -> Trajectory:
-        """One step, in OSI.
-
-        Raises:
-          ValueError: the answer is no motion request.
-        """
+        """Answers one step in OSI; a ValueError if the answer is no motion request."""
         request = self.drive(ground_truth(perceived, self._numbers))
         return trajectory_of(request, perceived, self._vehicle.wheelbase_m / 2)
 
@@ -65,12 +59,7 @@ class OsiEgo(ABC):
 
 
 def ground_truth(perceived: Perceived, numbers: dict[str, int]) -> bytes:
-    """Whom an ego perceives, as `osi3.GroundTruth`.
-
-    Args:
-      perceived: by it.
-      numbers: of the actors, whose ids are texts with us; who comes anew is added.
-    """
+    """Returns what an ego perceives as `osi3.GroundTruth`; new actors are added to the numbers by id."""
     p = perceived
     for id_ in p.ids:
         numbers.setdefault(id_, len(numbers) + 1)
@@ -89,15 +78,15 @@ def ground_truth(perceived: Perceived, numbers: dict[str, int]) -> bytes:
 
 
 def trajectory_of(request: bytes, perceived: Perceived, rear_axle_m: float) -> Trajectory:
-    """What an `osi3.MotionRequest` commands.
+    """Returns the trajectory that an `osi3.MotionRequest` commands, in the simulation's time.
 
     Args:
-      request: its bytes. Times are those of the simulation.
+      request: its bytes.
       perceived: what it answers.
-      rear_axle_m: how far behind the middle of the body the axle is whose middle OSI means.
+      rear_axle_m: from the middle of the body back to the axle, whose middle OSI means.
 
     Raises:
-      ValueError: these bytes are no motion request, or it lacks what it has to say.
+      ValueError: these bytes are no complete motion request.
     """
     try:
         asked = osi_pb2.MotionRequest.FromString(request)

@@ -1,7 +1,4 @@
-"""MCAP with foxglove schemas: what was there, what was measured, and the moments that matter, on one clock.
-
-Such a file carries everything, so that nothing lies beside it: the JSON of the other formats is attached.
-"""
+"""MCAP with foxglove schemas: actors, measures and moments on one clock, and `beside.json` as an attachment."""
 
 import io
 import json
@@ -12,31 +9,8 @@ from typing import Any
 import foxglove
 import numpy as np
 from foxglove import Channel, Context, Schema
+from foxglove import messages as fox
 from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
-from foxglove.messages import (
-    Color,
-    CubePrimitive,
-    CylinderPrimitive,
-    FrameTransform,
-    FrameTransforms,
-    KeyValuePair,
-    LinePrimitive,
-    LinePrimitiveLineType,
-    Log,
-    LogLevel,
-    Point3,
-    Pose,
-    Quaternion,
-    SceneEntity,
-    SceneEntityDeletion,
-    SceneEntityDeletionType,
-    SceneUpdate,
-    SpherePrimitive,
-    TextPrimitive,
-    Timestamp,
-    TriangleListPrimitive,
-    Vector3,
-)
 
 from risk_sac.failures.export.formats import Files
 from risk_sac.failures.export.net import Lane, boundaries
@@ -48,18 +22,14 @@ from risk_sac.types import Floats
 MAP, EGO = "map", "ego"  # frames of reference
 BLUE, ORANGE, GREY, WHITE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5, 0.5), (0.9, 0.9, 0.9)
 UNSEEN_ALPHA = 0.35  # of a body that the ego does not know of
-GROUND = {
-    "road": (0.25, 0.25, 0.27),
-    "inside": (0.25, 0.25, 0.27),
-    "sidewalk": (0.55, 0.55, 0.55),
-    "crossing": (0.8, 0.8, 0.8),
-}
-LIGHTS = {
+ASPHALT = (0.25, 0.25, 0.27)
+GROUND = {"road": ASPHALT, "inside": ASPHALT, "sidewalk": (0.55, 0.55, 0.55), "crossing": (0.8, 0.8, 0.8)}
+LIGHTS: dict[str, tuple[float, float, float]] = {
     "red": (1, 0, 0),
     "red_yellow": (1, 0.5, 0),
     "yellow": (1, 0.9, 0),
     "green": (0, 0.8, 0),
-    "off": (0.2, 0.2, 0.2),
+    "off": (0.2,) * 3,
 }
 HEIGHTS_M = {True: 1.75, False: 1.5}  # of pedestrians, and of vehicles
 MEASURES = "risk_sac.Measures"
@@ -71,10 +41,8 @@ def files(failure: Recorded) -> Files:
     options = foxglove.mcap.MCAPWriteOptions(compression_threads=0)
     with foxglove.open_mcap(content, context=context, writer_options=options) as writer:
         SceneUpdateChannel("/roads", context=context).log(_roads(failure), log_time=0)
-        actors, signals = (
-            SceneUpdateChannel("/actors", context=context),
-            SceneUpdateChannel("/signals", context=context),
-        )
+        actors = SceneUpdateChannel("/actors", context=context)
+        signals = SceneUpdateChannel("/signals", context=context)
         frames, measures = FrameTransformsChannel("/tf", context=context), _measures_channel(failure, context)
         moments = LogChannel("/moments", context=context)
         said = dict(_moments(failure))
@@ -86,118 +54,109 @@ def files(failure: Recorded) -> Files:
             if failure.heads:
                 signals.log(_signals(failure, frame), log_time=at)
             if frame in said:
-                moments.log(
-                    Log(timestamp=_stamp(failure, frame), level=LogLevel.Info, message=said[frame], name="risk-sac"),
-                    log_time=at,
-                )
-        manifest = failure.manifest
-        writer.write_metadata(
-            "failure", {"id": failure.name, "digest": manifest.digest, "code": manifest.code, "beside": BESIDE}
-        )
+                stamp = _stamp(failure, frame)
+                moment = fox.Log(timestamp=stamp, level=fox.LogLevel.Info, message=said[frame], name="risk-sac")
+                moments.log(moment, log_time=at)
+        told = {"id": failure.name, "digest": failure.manifest.digest, "code": failure.manifest.code, "beside": BESIDE}
+        writer.write_metadata("failure", told)
         writer.attach(log_time=0, create_time=0, name=BESIDE, media_type="application/json", data=beside(failure, ()))
     return {f"{failure.name}.mcap": content.getvalue()}
 
 
-def _stamp(failure: Recorded, frame: int) -> Timestamp:
-    return Timestamp.from_epoch_secs(float(failure.time_s[frame]))
+def _stamp(failure: Recorded, frame: int) -> fox.Timestamp:
+    return fox.Timestamp.from_epoch_secs(float(failure.time_s[frame]))
 
 
-def _paint(tone: tuple[float, float, float], alpha: float = 1.0) -> Color:
+def _paint(tone: tuple[float, float, float], alpha: float = 1.0) -> fox.Color:
     red, green, blue = tone
-    return Color(r=red, g=green, b=blue, a=alpha)
+    return fox.Color(r=red, g=green, b=blue, a=alpha)
 
 
-def _turned(heading_rad: float) -> Quaternion:
-    return Quaternion(x=0, y=0, z=math.sin(heading_rad / 2), w=math.cos(heading_rad / 2))
+def _turned(heading_rad: float) -> fox.Quaternion:
+    return fox.Quaternion(x=0, y=0, z=math.sin(heading_rad / 2), w=math.cos(heading_rad / 2))
 
 
-def _roads(failure: Recorded) -> SceneUpdate:
-    return SceneUpdate(entities=[_surface(lane) for lane in failure.net.lanes.values()])
+def _roads(failure: Recorded) -> fox.SceneUpdate:
+    return fox.SceneUpdate(entities=[_surface(lane) for lane in failure.net.lanes.values()])
 
 
-def _surface(lane: Lane) -> SceneEntity:
+def _surface(lane: Lane) -> fox.SceneEntity:
     """A lane as a strip of triangles, with lines along a road's edges."""
     left, right = boundaries(lane.centre, lane.width_m)
     strip = np.stack((left, right), axis=1).reshape(-1, 2)
     height = {"road": 0.0, "inside": 0.01, "sidewalk": 0.0, "crossing": 0.02}[lane.use]
     corners = [strip[k + step] for k in range(len(strip) - 2) for step in (0, 1, 2)]
     lines = [] if lane.use != "road" else [_line(left), _line(right)]
-    return SceneEntity(
-        frame_id=MAP,
-        id=lane.id,
-        triangles=[TriangleListPrimitive(points=_points(np.array(corners), height), color=_paint(GROUND[lane.use]))],
-        lines=lines,
+    area = fox.TriangleListPrimitive(points=_points(np.array(corners), height), color=_paint(GROUND[lane.use]))
+    return fox.SceneEntity(frame_id=MAP, id=lane.id, triangles=[area], lines=lines)
+
+
+def _line(points: Floats) -> fox.LinePrimitive:
+    return fox.LinePrimitive(
+        type=fox.LinePrimitiveLineType.LineStrip, points=_points(points, 0.03), thickness=0.12, color=_paint(WHITE)
     )
 
 
-def _line(points: Floats) -> LinePrimitive:
-    return LinePrimitive(
-        type=LinePrimitiveLineType.LineStrip, points=_points(points, 0.03), thickness=0.12, color=_paint(WHITE)
-    )
+def _points(points: Floats, height_m: float) -> list[fox.Point3]:
+    return [fox.Point3(x=float(x), y=float(y), z=height_m) for x, y in points]
 
 
-def _points(points: Floats, height_m: float) -> list[Point3]:
-    return [Point3(x=float(x), y=float(y), z=height_m) for x, y in points]
-
-
-def _actors(failure: Recorded, frame: int) -> SceneUpdate:
+def _actors(failure: Recorded, frame: int) -> fox.SceneUpdate:
     here = [actor for actor in failure.actors if frame < len(actor.time_s)]
     gone = [actor for actor in failure.actors if frame == len(actor.time_s)]
-    deletions = [SceneEntityDeletion(type=SceneEntityDeletionType.MatchingId, id=actor.id) for actor in gone]
-    return SceneUpdate(entities=[_body(failure, actor, frame) for actor in here], deletions=deletions)
+    deletions = [fox.SceneEntityDeletion(type=fox.SceneEntityDeletionType.MatchingId, id=actor.id) for actor in gone]
+    return fox.SceneUpdate(entities=[_body(failure, actor, frame) for actor in here], deletions=deletions)
 
 
-def _body(failure: Recorded, actor: Actor, frame: int) -> SceneEntity:
+def _body(failure: Recorded, actor: Actor, frame: int) -> fox.SceneEntity:
     column = failure.actors.index(actor)
     seen = column == 0 or bool(failure.series["visible"][frame, column])
     tone = BLUE if column == 0 else ORANGE if actor.id == failure.collision.other_id else GREY
     paint = _paint(tone, 1.0 if seen else UNSEEN_ALPHA)
     height = HEIGHTS_M[actor.pedestrian]
     x, y, heading = (float(values[frame]) for values in (actor.x_m, actor.y_m, actor.heading_rad))
-    pose = Pose(position=Vector3(x=x, y=y, z=height / 2), orientation=_turned(heading))
-    size = Vector3(x=actor.length_m, y=actor.width_m, z=height)
-    above = Pose(position=Vector3(x=x, y=y, z=height + 0.8), orientation=_turned(0.0))
-    return SceneEntity(
+    pose = fox.Pose(position=fox.Vector3(x=x, y=y, z=height / 2), orientation=_turned(heading))
+    size = fox.Vector3(x=actor.length_m, y=actor.width_m, z=height)
+    above = fox.Pose(position=fox.Vector3(x=x, y=y, z=height + 0.8), orientation=_turned(0.0))
+    speed = f"{actor.speed_mps[frame]:.3f}"
+    told = {"role": actor.role.name.lower(), "speed_mps": speed, "seen_by_ego": str(seen).lower()}
+    cube = fox.CubePrimitive(pose=pose, size=size, color=paint)
+    cylinder = fox.CylinderPrimitive(pose=pose, size=size, bottom_scale=1, top_scale=1, color=paint)
+    return fox.SceneEntity(
         timestamp=_stamp(failure, frame),
         frame_id=MAP,
         id=actor.id,
-        metadata=[
-            KeyValuePair(key="role", value=actor.role.name.lower()),
-            KeyValuePair(key="speed_mps", value=f"{actor.speed_mps[frame]:.3f}"),
-            KeyValuePair(key="seen_by_ego", value=str(seen).lower()),
-        ],
-        cubes=[] if actor.pedestrian else [CubePrimitive(pose=pose, size=size, color=paint)],
-        cylinders=[CylinderPrimitive(pose=pose, size=size, bottom_scale=1, top_scale=1, color=paint)]
-        if actor.pedestrian
-        else [],
-        texts=[TextPrimitive(pose=above, billboard=True, font_size=0.8, text=actor.id, color=paint)],
+        metadata=[fox.KeyValuePair(key=key, value=value) for key, value in told.items()],
+        cubes=[] if actor.pedestrian else [cube],
+        cylinders=[cylinder] if actor.pedestrian else [],
+        texts=[fox.TextPrimitive(pose=above, billboard=True, font_size=0.8, text=actor.id, color=paint)],
     )
 
 
-def _signals(failure: Recorded, frame: int) -> SceneUpdate:
+def _signals(failure: Recorded, frame: int) -> fox.SceneUpdate:
     """A ball over the end of each lane for each of its heads."""
     entities = []
     for lane in failure.net.lanes.values():
         for place, head in enumerate(lane.heads):
             shown = colour(chr(failure.heads[head.signal][frame, head.index]))
             x, y = (float(value) for value in lane.centre[-1])
-            pose = Pose(position=Vector3(x=x, y=y, z=4.0 + 0.7 * place), orientation=_turned(0.0))
-            ball = SpherePrimitive(pose=pose, size=Vector3(x=0.6, y=0.6, z=0.6), color=_paint(LIGHTS[shown]))
+            pose = fox.Pose(position=fox.Vector3(x=x, y=y, z=4.0 + 0.7 * place), orientation=_turned(0.0))
+            ball = fox.SpherePrimitive(pose=pose, size=fox.Vector3(x=0.6, y=0.6, z=0.6), color=_paint(LIGHTS[shown]))
             name = f"{head.signal}_{head.index}"
-            entities.append(SceneEntity(timestamp=_stamp(failure, frame), frame_id=MAP, id=name, spheres=[ball]))
-    return SceneUpdate(entities=entities)
+            entities.append(fox.SceneEntity(timestamp=_stamp(failure, frame), frame_id=MAP, id=name, spheres=[ball]))
+    return fox.SceneUpdate(entities=entities)
 
 
-def _ego_frame(failure: Recorded, frame: int) -> FrameTransforms:
+def _ego_frame(failure: Recorded, frame: int) -> fox.FrameTransforms:
     ego = failure.ego
-    moved = FrameTransform(
+    moved = fox.FrameTransform(
         timestamp=_stamp(failure, frame),
         parent_frame_id=MAP,
         child_frame_id=EGO,
-        translation=Vector3(x=float(ego.x_m[frame]), y=float(ego.y_m[frame]), z=0),
+        translation=fox.Vector3(x=float(ego.x_m[frame]), y=float(ego.y_m[frame]), z=0),
         rotation=_turned(float(ego.heading_rad[frame])),
     )
-    return FrameTransforms(transforms=[moved])
+    return fox.FrameTransforms(transforms=[moved])
 
 
 def _measures_channel(failure: Recorded, context: Context) -> Channel:
@@ -229,7 +188,7 @@ def _measured(failure: Recorded, frame: int) -> dict[str, object]:
 
 
 def _number(value: float) -> float | None:
-    """As JSON has it: null for what is not finite."""
+    """Returns null for what is not finite."""
     return float(value) if np.isfinite(value) else None
 
 

@@ -170,4 +170,4 @@ def test_thirty_sessions_are_served_at_a_time_and_end_with_their_streams() -> No
         for _ in egos:
             assert closed.acquire(timeout=PATIENT_S)
         for ego in egos[20:]:
-            ego._turns.close()
+            ego._stream.close()

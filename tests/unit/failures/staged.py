@@ -56,6 +56,7 @@ def synthetic_series() -> dict[str, NDArray[np.generic]]:
     zero, gone = np.zeros_like(t), np.where(t < 1.0, 0.0, np.nan)
     return {
         "time_s": t + 0.1,
+        "released_s": np.array(0.1),
         "ids": np.array(["ego", "pedestrian", "bystander"]),
         "kind": np.array([0, 1, 0], dtype=np.int8),
         "role": np.array([0, 1, 2], dtype=np.int8),
@@ -83,12 +84,12 @@ def synthetic_series() -> dict[str, NDArray[np.generic]]:
 def with_release() -> dict[str, NDArray[np.generic]]:
     """The same with 1.5 s before the release, in which the ego drives as it does after and all others stand."""
     series, early = synthetic_series(), 15
-    rows = len(series["time_s"])
+    count = len(series["time_s"])
+    per_frame = {name: values for name, values in series.items() if values.ndim and len(values) == rows}
     longer = {
-        name: np.concatenate((np.repeat(values[:1], early, axis=0), values)) if len(values) == rows else values
-        for name, values in series.items()
+        name: np.concatenate((np.repeat(values[:1], early, axis=0), values)) for name, values in per_frame.items()
     }
-    t = np.arange(early + rows) * 0.1 - 1.5
+    t = np.arange(early + count) * 0.1 - 1.5
     x_m = longer["x_m"].copy()
     x_m[:, 0] = 280 + 10 * t
-    return longer | {"time_s": t + 1.6, "x_m": x_m, "released_s": np.array(1.6)}
+    return series | longer | {"time_s": t + 1.6, "x_m": x_m, "released_s": np.array(1.6)}

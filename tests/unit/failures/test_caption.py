@@ -1,7 +1,7 @@
 from dataclasses import replace
 
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.show import WIDTH, caption
+from risk_sac.failures.show import CAPTION_WIDTH, caption
 from risk_sac.records import Grade, Outcome
 from tests.unit.failures.staged import JUDGED, synthetic_contact, with_release
 
@@ -34,5 +34,5 @@ def test_rules_that_the_contact_failed_are_named_in_full_on_lines_that_the_page_
     rules = "conflict_after_release, inside_limits, inside_grip, solid_bodies, ego_model_saw, ego_moving, no_sideswipe"
     failed = contact.episode.model_copy(update={"outcome": Outcome.DEGENERATE, "reason": rules})
     title = caption("mixed", Recording(replace(contact, episode=failed), with_release()))
-    assert max(map(len, title.splitlines())) <= WIDTH
+    assert max(map(len, title.splitlines())) <= CAPTION_WIDTH
     assert rules.replace("_", " ") in title.replace("\n", " ")

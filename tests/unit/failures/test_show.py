@@ -1,5 +1,4 @@
 import struct
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -64,14 +63,6 @@ def test_earlier_places_of_a_body_that_stands_are_labelled_together() -> None:
 def test_the_ground_on_which_the_other_is_hidden_is_explained() -> None:
     _, speeds, *_ = draw_recording("mixed", Recording(synthetic_contact(), synthetic_series())).axes
     assert [text.get_text() for text in speeds.get_legend().get_texts()] == ["ego", "pedestrian", "hidden from the ego"]
-
-
-def test_a_scene_from_before_its_family_had_all_parameters_is_drawn_without_roads() -> None:
-    contact = synthetic_contact()
-    older = replace(contact, episode=contact.episode.model_copy(update={"scene": {"ego_speed_mps": 10.0}}))
-    roads = draw_recording("mixed", Recording(contact, synthetic_series())).axes[0].patches
-    none = draw_recording("mixed", Recording(older, synthetic_series())).axes[0].patches
-    assert len(none) < len(roads)
 
 
 def test_a_contact_that_nobody_judged_is_drawn_without_a_conflict() -> None:
