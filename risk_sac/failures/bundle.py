@@ -1,8 +1,7 @@
-"""A failure in one file that stands alone: what is needed to play it again anywhere, and to see what it was.
+"""Reads and writes bundles: a failure in one file, with all that it takes to play it again anywhere.
 
-The file is an .npz: the arrays of the episode's series, the letters of all signal heads, and `manifest`, a JSON text;
-of a failure on somebody's map also the place, with the piece of net around it. Nothing in it is executed, and its
-reader believes nothing that it says of itself.
+The file is an .npz: the arrays of the episode's series, the letters of all signal heads, `manifest` as a JSON text, and
+for a failure on a map of the user's the place with its piece of net. Nothing in it is executed or trusted.
 """
 
 import hashlib
@@ -79,7 +78,7 @@ def make_bundle(
     policy: FrozenPolicy | None,
     core: Core | None = None,
 ) -> Bundle:
-    """A bundle of what was just played here; a policy that would make it too large to be read stays out."""
+    """Returns a bundle of what was just played here; a policy that is too large is left out."""
     if policy is not None and sum(layer.nbytes for layer in policy.layers) > MOST_POLICY_BYTES:
         policy = None
     manifest = Manifest(
@@ -97,12 +96,12 @@ def make_bundle(
 
 
 def versions() -> dict[str, str]:
-    """Of the packages that decide how an episode goes, as they are installed."""
+    """Returns the installed versions of the packages that decide how an episode goes."""
     return {name: version(name) for name in PACKAGES}
 
 
 def code_digest() -> str:
-    """SHA-256 over the sources of the method."""
+    """Returns the SHA-256 over the sources of the method."""
     digest = hashlib.sha256()
     for source in sorted(Path(str(files(CODE))).rglob("*.py")):
         digest.update(source.read_bytes())
@@ -110,11 +109,7 @@ def code_digest() -> str:
 
 
 def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
-    """The files that SUMO reads for an episode, with their SHA-256, as they are here.
-
-    Raises:
-      ConfigError: one of them is gone.
-    """
+    """Returns the SHA-256 of the files that SUMO reads for an episode; a ConfigError if one is gone."""
     net = Problem.from_spec(spec).family.layout(episode.scene).net
     found = {}
     for name in (net, "vtypes.add.xml"):
@@ -128,16 +123,12 @@ def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
 
 
 def _portable(name: str, spec: RunSpec) -> str:
-    """A file's name on any machine: below `sumo_nets/`, or below the library of places."""
+    """Returns a file's name below `sumo_nets/`, or below the library of places."""
     return f"{spec.family}/{Path(name).name}" if Path(name).is_absolute() else name
 
 
 def bundle_bytes(bundle: Bundle) -> bytes:
-    """The content of its file.
-
-    Raises:
-      ConfigError: its place is gone.
-    """
+    """Returns the content of a bundle's file; a ConfigError if its place is gone."""
     content = io.BytesIO()
     arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
     arrays |= carried(bundle.manifest.spec.family)
@@ -148,31 +139,23 @@ def bundle_bytes(bundle: Bundle) -> bytes:
 
 
 def check_world(manifest: Manifest) -> None:
-    """Refuses a failure that was found on another net, or with other vehicle types.
-
-    Raises:
-      ConfigError: naming the file, also where it is gone.
-    """
+    """Raises a ConfigError for a failure that was found on another net, or with other vehicle types."""
     for name, digest in world_of(manifest.spec, manifest.episode).items():
         if manifest.world.get(name) != digest:
             raise ConfigError("BUNDLE", f"{manifest.id} was found on another {name}, so it cannot be replayed")
 
 
 def write_bundle(file: Path, bundle: Bundle) -> None:
-    """Writes the whole file or none.
-
-    Raises:
-      OSError: the disk refuses it.
-    """
+    """Writes the whole file, or none."""
     file.parent.mkdir(parents=True, exist_ok=True)
     replace_file(file, bundle_bytes(bundle))
 
 
 def read_bundle(file: Path) -> Bundle:
-    """Reads what may come from anybody.
+    """Reads a file that may come from anywhere.
 
     Raises:
-      ConfigError: it is no bundle, one of another version, damaged, too large, or holds no episode that can be played.
+      ConfigError: it is no bundle, of another version, damaged, too large, or holds no episode that can be played.
       OSError: it cannot be read, or the place that it carries cannot be kept.
     """
     content = _read(file)
@@ -233,7 +216,7 @@ def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
 
 
 def _array(content: bytes) -> NDArray[Any]:
-    """One array, whose header must not promise more than follows: numpy makes room for it before it reads."""
+    """Reads one array, whose header must not promise more than follows: numpy allocates it before it reads."""
     stream = io.BytesIO(content)
     major, _ = np.lib.format.read_magic(stream)
     header = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0

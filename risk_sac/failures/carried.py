@@ -1,7 +1,7 @@
-"""The place that a bundle carries, so that it can be played where nobody has the map.
+"""Packs and unpacks the place that a bundle carries, so that it can be played without the map.
 
-What may come from anybody reaches the simulator only if it is what `risk_sac.scenario.maps.cut` writes: a net's
-elements and nothing else. SUMO writes files that a parameter of a signal names, and reads those that XML includes.
+It reaches the simulator only if it has the elements that `risk_sac.scenario.maps.cut` writes and no others: SUMO writes
+files that a parameter of a signal names, and reads those that XML includes.
 """
 
 from collections.abc import MutableMapping
@@ -23,11 +23,7 @@ ELEMENTS |= {"junction", "request", "connection", "roundabout"}
 
 
 def carried(family: FamilyName) -> dict[str, NDArray[np.uint8]]:
-    """The arrays of a family's place; none of a shipped one.
-
-    Raises:
-      ConfigError: the library does not have it.
-    """
+    """Returns the arrays of a family's place; none for a shipped one."""
     if family in SHIPPED:
         return {}
     place, net = library.files_of(family)
@@ -35,12 +31,7 @@ def carried(family: FamilyName) -> dict[str, NDArray[np.uint8]]:
 
 
 def unpack(family: FamilyName, arrays: MutableMapping[str, NDArray[Any]]) -> None:
-    """Takes the arrays of a place out of a bundle's, and puts it into the library of this machine.
-
-    Raises:
-      ValueError: they are no place that could be played at, or another one.
-      OSError: the library cannot be written.
-    """
+    """Moves the arrays of a place into the library of this machine; a ValueError if they are no such place."""
     text, net = arrays.pop(PLACE, None), arrays.pop(NET, None)
     if text is None or net is None or family in SHIPPED:
         return
@@ -53,12 +44,7 @@ def unpack(family: FamilyName, arrays: MutableMapping[str, NDArray[Any]]) -> Non
 
 
 def check_net(net: bytes) -> None:
-    """Refuses a net that has more than a piece of a map.
-
-    Raises:
-      ValueError: it names what else it has.
-      ExpatError: it is no XML.
-    """
+    """Raises a ValueError, or an ExpatError, for a net that has more than a piece of a map."""
 
     def begun(name: str, attributes: dict[str, str]) -> None:
         if name not in ELEMENTS:

@@ -1,4 +1,4 @@
-"""Many failures for somebody who has little time: which different ones there are, and one of each to look at."""
+"""Sorts failures into clusters by signature, and names one of each to look at first."""
 
 import math
 from collections import defaultdict
@@ -42,11 +42,7 @@ class Overview(Record):
 
 
 def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:
-    """Sorts failures into clusters.
-
-    Args:
-      episodes: with their ids; those without a valid contact that was judged are left out.
-    """
+    """Sorts failures into clusters; episodes without a valid, judged contact are left out."""
     found: defaultdict[str, list[tuple[str, EpisodeRecord, Collision]]] = defaultdict(list)
     kinds = set()
     for name, episode in episodes:
@@ -55,19 +51,14 @@ def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:
             continue
         found[signature_of(collision)].append((name, episode, collision))
         kinds.add(kind_of(collision, collision.judgement))
-    distinct = {name: _distinct([collision for *_, collision in members]) for name, members in found.items()}
+    distinct = {}
+    for name, members in found.items():
+        collisions = [collision for *_, collision in members]
+        distinct[name] = [collisions[position] for position in distinct_failures(collisions)]
     clusters = [_cluster(name, members, len(distinct[name])) for name, members in found.items()]
     clusters.sort(key=lambda cluster: (-cluster.preventable, -cluster.failures, cluster.name))
-    return Overview(
-        clusters=tuple(clusters),
-        vendi=vendi(list(distinct.values())),
-        covered=len(kinds),
-        cells=CELLS,
-    )
-
-
-def _distinct(collisions: Sequence[Collision]) -> list[Collision]:
-    return [collisions[position] for position in distinct_failures(collisions)]
+    score = vendi(list(distinct.values()))
+    return Overview(clusters=tuple(clusters), vendi=score, covered=len(kinds), cells=CELLS)
 
 
 def _cluster(name: str, members: Sequence[tuple[str, EpisodeRecord, Collision]], distinct: int) -> Cluster:
@@ -83,7 +74,7 @@ def _cluster(name: str, members: Sequence[tuple[str, EpisodeRecord, Collision]],
 
 
 def _rank(episode: EpisodeRecord, collision: Collision) -> tuple[int, float, int]:
-    """The less, the rather it is looked at: its grade, how fast the careful driver would have touched, its length."""
+    """Returns what orders failures: grade, impact speed of the careful driver, length."""
     assert collision.judgement is not None
     judged = collision.judgement
     grade = list(Grade).index(judged.grade) if judged.grade else len(Grade)
@@ -92,9 +83,9 @@ def _rank(episode: EpisodeRecord, collision: Collision) -> tuple[int, float, int
 
 
 def vendi(clusters: Sequence[Sequence[Collision]]) -> float:
-    """The Vendi score of failures of which those in different clusters have nothing in common.
+    """Returns the Vendi score of failures; those in different clusters have nothing in common.
 
-    Within one, they are the less alike the farther apart their outcome features are.
+    Within a cluster, similarity falls with the distance of their outcome features.
 
     Source: Friedman and Dieng, "The Vendi Score" (arXiv 2210.02410): exp of the entropy of the eigenvalues of K / n.
     """

@@ -1,4 +1,4 @@
-"""The view from above: the roads, both paths, and the bodies at the contact and before it."""
+"""Draws the view from above: the roads, both paths, and the bodies at the contact and before it."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ CONFLICT_COLOUR = "tab:orange"
 
 
 def legend(axis: Axes, title: str | None = None) -> None:
-    """Beside the axes, so that it covers nothing."""
+    """Draws the legend beside the axes, so that it covers nothing."""
     axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, frameon=False, title=title, title_fontsize=7)
 
 
@@ -27,14 +27,7 @@ CONFLICT: dict[str, Any] = {"facecolor": "none", "edgecolor": CONFLICT_COLOUR, "
 
 
 def draw_from_above(axis: Axes, family: FamilyName, recording: Recording, apart_m: float) -> None:
-    """Draws everything on the ground; who calls it chooses what part of the ground is seen.
-
-    Args:
-      axis: to draw on.
-      family: of the scene.
-      recording: of the contact.
-      apart_m: earlier places of a body that are nearer to each other are drawn as one.
-    """
+    """Draws everything on the ground; earlier places of a body that are nearer than `apart_m` are drawn as one."""
     for surface in roads_of(family, recording.contact.episode.scene):
         colour = SURFACE_COLOURS[surface.use]
         axis.add_patch(Polygon(surface.outline, facecolor=colour, edgecolor="0.7", linewidth=0.5))
@@ -58,7 +51,7 @@ def draw_from_above(axis: Axes, family: FamilyName, recording: Recording, apart_
 
 
 def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float]]:
-    """The times of `GHOSTS_S` that were recorded, together where the body was in about the same place."""
+    """Groups the recorded times of `GHOSTS_S` in which the body was in about the same place."""
     groups: list[list[float]] = []
     for before_s in GHOSTS_S:
         if -before_s < recording.time_s[0]:
@@ -72,7 +65,7 @@ def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float
 
 
 def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, *, involved: bool = False) -> None:
-    """Path, and body at the contact."""
+    """Draws the path, and the body at the contact."""
     name = str(recording.series["ids"][actor])
     driver = Role(int(recording.series["role"][actor])).name.lower()
     x, y = recording["x_m"][:, actor], recording["y_m"][:, actor]
@@ -100,7 +93,7 @@ def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **st
 
 
 def _label_body(axis: Axes, recording: Recording, actor: int, times_s: list[float], colour: str) -> None:
-    """The times beside a body, on the side that faces away from the other one."""
+    """Writes the times beside a body, on the side that faces away from the other one."""
     x, y, heading = recording.pose(actor, -times_s[0])
     partner_x, partner_y, _ = recording.pose(recording.other if actor == 0 else 0, -times_s[0])
     left = np.array((-np.sin(heading), np.cos(heading)))
@@ -128,7 +121,7 @@ def _draw_contact_point(axis: Axes, recording: Recording) -> None:
 
 
 def _draw_conflict(axis: Axes, recording: Recording) -> None:
-    """Both bodies when the conflict began, and where the striker was then."""
+    """Draws both bodies when the conflict began, and where the striker was then."""
     judgement, begin_s = recording.collision.judgement, recording.conflict_s
     if judgement is None or begin_s is None:
         return

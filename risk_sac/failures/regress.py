@@ -1,9 +1,8 @@
-"""Old failures against another ego: which are fixed, and which are not.
+"""Plays old failures against another ego: which are fixed, and which are not.
 
-Each is first played with its own ego, so that nothing counts as fixed that would not have failed here anyway. Then the
-other ego meets the recorded actions; after them the policy that found the failure acts on, where there is one, or else
-nobody: a contact that was put off is none that was avoided. Where scripts found it, they are followed once more as
-well: they go by where the ego is, and recorded actions miss one that drives a little faster or slower.
+Each is first played with its own ego, so that nothing counts as fixed that would not fail here anyway. Then the other
+ego meets the recorded actions, and after them the policy that found the failure, if there is one: a contact that is
+only delayed is not avoided. Scripts that found it are followed as well, since they react to where the ego is.
 """
 
 from collections.abc import Iterator
@@ -36,7 +35,7 @@ BLIND = "seen_before"  # the rule that an ego breaks by seeing nothing: no way t
 
 
 class _Ending(NamedTuple):
-    """How one attack on the other ego went."""
+    """Outcome of one attack on the other ego."""
 
     verdict: Verdict
     reason: str
@@ -45,19 +44,14 @@ class _Ending(NamedTuple):
 
 
 class Regressed(NamedTuple):
-    """What became of an old failure."""
+    """Outcome of an old failure."""
 
     case: Case
     bundle: Bundle  # of the contact that the other ego has now; where it has none that can be compared, the old failure
 
 
 def regress(bundle: Bundle, ego: EgoConfig) -> Regressed:
-    """Plays one failure against another ego.
-
-    Args:
-      bundle: of the failure; its policy, if it has one, acts once the recorded actions have ended.
-      ego: the other one.
-    """
+    """Plays one failure against another ego."""
     manifest = bundle.manifest
     collision = manifest.episode.collision
     ending = _judge(bundle, collision, ego)
@@ -74,7 +68,7 @@ def regress(bundle: Bundle, ego: EgoConfig) -> Regressed:
 
 
 def _as_played(bundle: Bundle, ego: EgoConfig, played: Played) -> Bundle:
-    """The contact that another ego has in the scene of a failure, as a bundle of its own."""
+    """Returns a bundle of the contact that another ego has in the scene of a failure."""
     assert played.collision is not None  # else there is nothing to show
     changes = {
         "collision": played.collision,
@@ -158,7 +152,7 @@ def _compared(found: Collision | None, wanted: Collision) -> _Ending:
 
 
 def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:
-    """The recorded actions, and the rest of the horizon."""
+    """Plays the recorded actions, and the rest of the horizon."""
     with closing(RiskSacEnv.of(spec)) as env:
         actions = actions_of(bundle.series)
         if policy is None:
@@ -170,7 +164,7 @@ def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:
 
 
 def _follow(spec: RunSpec, bundle: Bundle) -> Played:
-    """The scripts that found the failure, from the release on."""
+    """Plays the scripts that found the failure, from the release on."""
     with closing(RiskSacEnv.of(spec)) as env:
         follower = ScriptFollower(env.problem.family)
         follower.begin(np.array(bundle.manifest.episode.script))

@@ -1,4 +1,4 @@
-"""What happens in a failure, in one sentence: where the striker was, what it did, and what the ego did about it."""
+"""Describes a failure in one sentence: where the striker was, what it did, and how the ego responded."""
 
 import math
 
@@ -18,12 +18,7 @@ ACTS_MPS2 = 1.5
 
 
 def sentence(series: Series, collision: Collision) -> str:
-    """Such as "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.5 s late".
-
-    Args:
-      series: of the episode, up to the contact.
-      collision: that it ended in, judged.
-    """
+    """Returns, e.g., "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.5 s late"."""
     assert collision.judgement is not None
     since = series["time_s"] - series["released_s"]
     striker = [str(name) for name in series["ids"]].index(collision.other_id)
@@ -37,7 +32,7 @@ def sentence(series: Series, collision: Collision) -> str:
 
 
 def _who(series: Series, striker: int, at: int) -> str:
-    """Who and where it is in the ego's frame."""
+    """Returns name and place of the striker in the ego's frame."""
     x, y = (series[name][at, striker] - series[name][at, 0] for name in ("x_m", "y_m"))
     heading = series["heading_rad"][at, 0]
     turn = series["heading_rad"][at, striker] - heading
@@ -57,7 +52,7 @@ def _who(series: Series, striker: int, at: int) -> str:
 
 
 def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
-    """Since which frame, and what, a striker does of its own; None if it drives or walks on as it did."""
+    """Returns what a striker does of its own, and since which frame; None if it goes on as it did."""
     parts: list[tuple[int, str]] = []
     accel, across = series["accel_mps2"][begins:, striker], series["lateral_mps"][begins:, striker]
     if series["kind"][striker] == Kind.VEHICLE:
@@ -79,7 +74,7 @@ def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
 
 
 def _lasting(values: Floats, limit: float) -> list[int]:
-    """The last stretch of frames above a limit that lasts two frames or more."""
+    """Returns the last stretch of two frames or more above a limit."""
     frames: list[int] = []
     for t in range(len(values) - 1, -1, -1):
         if values[t] > limit:

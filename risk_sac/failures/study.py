@@ -1,7 +1,4 @@
-"""`python -m risk_sac.failures.study QUESTION ANSWER`: answers what needs the simulator to say of a failure.
-
-Both are files. For processes that must not load the simulator.
-"""
+"""Answers a question that takes the simulator: `python -m risk_sac.failures.study QUESTION ANSWER`, both files."""
 
 import sys
 from contextlib import closing
@@ -24,12 +21,7 @@ from risk_sac.run_folder.series import read_series
 
 
 def answer(question: Question) -> bytes:
-    """A bundle, a core or an export as files, a region as JSON, a twin with its time series.
-
-    Raises:
-      RiskSacError: the failure does not repeat, or cannot be played.
-      ValueError: it is no contact that was judged.
-    """
+    """Returns a bundle, a core or an export as files, a region as JSON, a twin with its time series."""
     if question.subject == "twin":
         return _twin(question)
     bundle = _bundle(question)

@@ -1,6 +1,6 @@
-"""A contact as a small drawing from above: what it came about on, both paths, and both bodies as they touch.
+"""Draws a contact as a small SVG from above: roads, both paths, and both bodies as they touch.
 
-Written out by hand: a screen shows dozens of them, and matplotlib takes a second for each.
+It is written by hand, because a screen shows dozens of them and matplotlib takes a second for each.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,18 +27,14 @@ GROUND = {
 
 
 def thumbnail(recording: Recording, roads: Sequence[Surface]) -> str:
-    """An SVG with a transparent ground.
-
-    Args:
-      recording: of the contact.
-      roads: of its scene.
-    """
+    """Returns an SVG with a transparent ground."""
     view, ends = _View(recording), [(recording.other, STRIKER), (0, EGO)]
     if recording.series["kind"][recording.other] == Kind.PEDESTRIAN:
         ends.reverse()  # a small body lies over a large one
+    others = (actor for actor in range(1, len(recording.series["ids"])) if actor != recording.other)
     shapes = [
         *(shape for surface in roads if view.shows(surface) for shape in _ground(view, surface)),
-        *_others(view, recording),
+        *(shape for actor in others for shape in _body(view, recording, actor, f'fill="{GREY}" fill-opacity=".6"')),
         *(shape for actor, colour in ends for shape in _actor(view, recording, actor, colour)),
     ]
     size = f'width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}"'
@@ -46,7 +42,7 @@ def thumbnail(recording: Recording, roads: Sequence[Surface]) -> str:
 
 
 class _View:
-    """The piece of ground that is seen: the end of both paths, in its middle where there is room for all of it."""
+    """Visible piece of ground: the end of both paths, in the middle if all of it fits."""
 
     def __init__(self, recording: Recording) -> None:
         paths = np.concatenate([_path(recording, actor) for actor in (0, recording.other)])
@@ -69,7 +65,7 @@ class _View:
 
 
 def _path(recording: Recording, actor: int) -> Floats:
-    """`k x 2`, m: where an actor was in the end, without frames in which it was absent."""
+    """Returns an actor's last places, `k x 2`, m, without frames in which it was absent."""
     places = np.column_stack((recording["x_m"][:, actor], recording["y_m"][:, actor]))
     return places[(recording.time_s >= -VIEW_S) & np.isfinite(places).all(axis=1)]
 
@@ -85,20 +81,13 @@ def _ground(view: _View, surface: Surface) -> Iterator[str]:
     )
 
 
-def _others(view: _View, recording: Recording) -> Iterator[str]:
-    """Whoever else is there at the contact: a body that hid the striker belongs to the story."""
-    for actor in range(1, len(recording.series["ids"])):
-        if actor != recording.other:
-            yield from _body(view, recording, actor, f'fill="{GREY}" fill-opacity=".6"')
-
-
 def _actor(view: _View, recording: Recording, actor: int, colour: str) -> Iterator[str]:
     yield _line(view(_path(recording, actor)), colour, 2.2, ' stroke-opacity=".9" stroke-linejoin="round"')
     yield from _body(view, recording, actor, f'fill="{colour}" stroke="#fff" stroke-width=".8"')
 
 
 def _body(view: _View, recording: Recording, actor: int, style: str) -> Iterator[str]:
-    """A body at the contact, that of a vehicle with an arrow head to the front."""
+    """Draws a body at the contact, that of a vehicle with an arrow head to the front."""
     x, y, heading = recording.pose(actor, 0.0)
     if not np.isfinite((x, y, heading)).all():
         return

@@ -1,4 +1,4 @@
-"""The table of formats. Cheap to import: a format's module, and the packages that it needs, load when it is made."""
+"""Table of the export formats. A format's module, and the packages that it needs, are imported when it is made."""
 
 import os
 import sys
@@ -23,7 +23,7 @@ Files = Mapping[str, bytes]
 
 
 class FormatName(StrEnum):
-    """How a format is called: on the command line, over REST, and in the table."""
+    """Name of a format on the command line and over REST."""
 
     SUMO = "sumo"
     OPENSCENARIO = "openscenario"
@@ -118,39 +118,31 @@ FORMATS: Mapping[FormatName, Format] = {
 
 
 def of_failure(name: FormatName, failure: "Recorded") -> Files:
-    """A failure in a format.
+    """Exports a failure.
 
     Raises:
-      ConfigError: the format holds no single failure, or a package is missing, or the failure cannot be told in it.
-      SimulationError: of a format for which it is played again: it does not repeat here.
+      ConfigError: the format holds no single failure, lacks a package, or cannot hold this failure.
+      SimulationError: the format plays it again, and it does not repeat here.
     """
     return cast("Callable[[Recorded], Files]", _maker(name, "failure"))(failure)
 
 
 def of_episodes(name: FormatName, runs: Sequence[Path]) -> Files:
-    """All episodes of runs in a format.
-
-    Args:
-      name: of the format.
-      runs: their folders.
+    """Exports all episodes of the runs in some folders.
 
     Raises:
-      ConfigError: the format holds one failure alone, or a package is missing, or a folder holds no run.
+      ConfigError: the format holds one failure alone or lacks a package, or a folder holds no run.
     """
     return cast("Callable[[Sequence[Path]], Files]", _maker(name, "episodes"))(runs)
 
 
 def names(of: Literal["failure", "episodes"]) -> list[FormatName]:
-    """Those that hold one failure, or all episodes."""
+    """Returns the formats that hold one failure, or all episodes."""
     return [name for name, format_ in FORMATS.items() if format_.of == of]
 
 
 def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
-    """Refuses a format that cannot hold what it is asked to, or that lacks a package.
-
-    Raises:
-      ConfigError: naming those that can, or what is missing.
-    """
+    """Raises a ConfigError for a format that cannot hold this, or that lacks a package."""
     format_ = FORMATS[name]
     if format_.of != of:
         lacks = "no single failure" if of == "failure" else "no episodes of runs"

@@ -1,6 +1,6 @@
-"""A GIF of the last seconds, seen from above: for a mail or a ticket, where nothing else can be opened.
+"""Draws a GIF of the last seconds, seen from above.
 
-The ego is blue and its striker orange, as on the page; whom the ego does not know of is only outlined.
+The ego is blue and its striker orange; a body that the ego does not know of is only outlined.
 """
 
 import io
@@ -36,6 +36,8 @@ def files(failure: Recorded) -> Files:
     palette = _palette()
     flat = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     step_ms = round(STEP_S * 1000)
+    collision = failure.collision
+    story = sentence(failure.series, collision) if collision.judgement else f"contact with {collision.other_id}"
     content = io.BytesIO()
     flat[0].save(
         content,
@@ -44,13 +46,13 @@ def files(failure: Recorded) -> Files:
         append_images=flat[1:],
         duration=[step_ms] * (len(flat) - 1) + [HOLD_MS],
         loop=0,
-        comment=f"{failure.name}: {_story(failure)}".replace("²", "2").encode("ascii", "replace"),
+        comment=f"{failure.name}: {story}".replace("²", "2").encode("ascii", "replace"),
     )
     return {f"{failure.name}.gif": content.getvalue()}
 
 
 def _palette() -> Image.Image:
-    """All colours, and mixtures of each with each ground: chosen by how often they are seen, small bodies' are lost."""
+    """Returns all colours and their mixtures with each ground: a palette by frequency loses small bodies."""
     tones = np.array(
         [ImageColor.getrgb(tone) for tone in (EGO, STRIKER, OTHER, INK, "#ffffff", EDGE, *LIGHTS.values())]
     )
@@ -63,13 +65,8 @@ def _palette() -> Image.Image:
     return palette
 
 
-def _story(failure: Recorded) -> str:
-    collision = failure.collision
-    return sentence(failure.series, collision) if collision.judgement else f"contact with {collision.other_id}"
-
-
 def _middles(failure: Recorded, first: int) -> list[Floats]:
-    """What each picture's middle shows: in the end the contact, before it what the ego had around it."""
+    """Returns the middle of each picture: at last the contact, before it the ego's surroundings."""
     path = np.column_stack((failure.ego.x_m, failure.ego.y_m))
     middle = path[-1]
     found: list[Floats] = []
@@ -109,7 +106,7 @@ def _picture(failure: Recorded, surfaces: list[Surface], frame: int, middle: Flo
 
 
 def _body(pen: ImageDraw.ImageDraw, placed: Placed, actor: Actor, frame: int, tone: str, *, known: bool) -> None:
-    """A body, that of a vehicle with a light patch to the front; whom the ego does not know of is outlined."""
+    """Draws a body, that of a vehicle with a light patch to the front."""
     cos, sin = np.cos(actor.heading_rad[frame]), np.sin(actor.heading_rad[frame])
     turn, half = np.array([(cos, sin), (-sin, cos)]), np.array((actor.length_m, actor.width_m)) / 2
     middle = np.array((actor.x_m[frame], actor.y_m[frame]))

@@ -24,13 +24,7 @@ BLUE, ORANGE, GREY, WHITE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5,
 UNSEEN_ALPHA = 0.35  # of a body that the ego does not know of
 ASPHALT = (0.25, 0.25, 0.27)
 GROUND = {"road": ASPHALT, "inside": ASPHALT, "sidewalk": (0.55, 0.55, 0.55), "crossing": (0.8, 0.8, 0.8)}
-LIGHTS: dict[str, tuple[float, float, float]] = {
-    "red": (1, 0, 0),
-    "red_yellow": (1, 0.5, 0),
-    "yellow": (1, 0.9, 0),
-    "green": (0, 0.8, 0),
-    "off": (0.2,) * 3,
-}
+LIGHTS = {"red": (1, 0, 0), "red_yellow": (1, 0.5, 0), "yellow": (1, 0.9, 0), "green": (0, 0.8, 0), "off": (0.2,) * 3}
 HEIGHTS_M = {True: 1.75, False: 1.5}  # of pedestrians, and of vehicles
 MEASURES = "risk_sac.Measures"
 

@@ -1,4 +1,4 @@
-"""What the formats need of a SUMO net: lanes with their neighbours and successors, and the signals' programs."""
+"""Reads of a SUMO net what the formats need: lanes with neighbours and successors, and the signals' programs."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
@@ -48,11 +48,11 @@ class Program:
 
     @property
     def cycle_s(self) -> float:
-        """Until it begins anew."""
+        """Length of the cycle."""
         return sum(duration for duration, _ in self.phases)
 
     def letters(self, time_s: float) -> str:
-        """What it shows a moment before this time since the start of its cycle, as SUMO's own step has it then."""
+        """Returns the letters a moment before a time since the start of the cycle, as in SUMO's own step."""
         left = (time_s - 1e-6 - self.offset_s) % self.cycle_s
         for duration, letters in self.phases:
             if left < duration:
@@ -75,7 +75,7 @@ class Net:
 
 
 def read_net(file: Path) -> Net:
-    """Reads a net that SUMO has read before: one of ours, or one that was checked when it was uploaded."""
+    """Reads a net of ours, or one that was checked when it was uploaded."""
     root = ET.parse(file).getroot()
     lanes = {lane.id: lane for edge in root.iter("edge") for lane in _lanes(edge)}
     for connection in root.iter("connection"):
@@ -134,10 +134,7 @@ def _connect(lanes: Mapping[str, Lane], connection: ET.Element) -> None:
 
 
 def boundaries(centre: Floats, width_m: float) -> tuple[Floats, Floats]:
-    """The left and the right edge of a lane, `k x 2` each.
-
-    Each point is moved across the bisector of the sides that meet there, as far as keeps both sides at half the width.
-    """
+    """Returns the left and the right edge of a lane, `k x 2` each, mitred where sides meet."""
     sides = np.diff(centre, axis=0)
     sides /= np.linalg.norm(sides, axis=1, keepdims=True)
     normals = np.column_stack((-sides[:, 1], sides[:, 0]))

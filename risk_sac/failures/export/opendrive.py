@@ -1,4 +1,4 @@
-"""OpenDRIVE: what netconvert makes of the net, as version 1.7 of the standard has it."""
+"""Writes OpenDRIVE 1.7: what netconvert makes of the net, with turns laid along SUMO's lanes."""
 
 import subprocess
 import sys
@@ -18,16 +18,7 @@ WALL_S = 120.0  # a second suffices
 
 
 def opendrive(file: Path, net: Net, name: str) -> bytes:
-    """The roads of a net.
-
-    Args:
-      file: of SUMO's net.
-      net: what is in it.
-      name: of the map.
-
-    Raises:
-      ConfigError: netconvert cannot tell this net in OpenDRIVE.
-    """
+    """Returns the roads of a net under the map's name; a ConfigError if netconvert cannot write them."""
     with tempfile.TemporaryDirectory() as folder:
         made = Path(folder) / "roads.xodr"
         _netconvert("--sumo-net-file", str(file), "--opendrive-output", str(made))
@@ -41,7 +32,7 @@ def opendrive(file: Path, net: Net, name: str) -> bytes:
 
 
 def _netconvert(*options: str) -> None:
-    """Through its Python entry, which finds the binary wherever the wheel put it."""
+    """Runs netconvert through its Python entry, which finds the wheel's binary."""
     command = [sys.executable, "-c", "import sys, sumo; sys.exit(sumo.netconvert())", *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=WALL_S)
     if done.returncode:
@@ -50,7 +41,7 @@ def _netconvert(*options: str) -> None:
 
 
 def _as_of_1_7(root: ET.Element, name: str) -> ET.Element:
-    """What netconvert calls 1.4 has some of what came later, and no version's schema takes it as it stands."""
+    """Completes what netconvert calls 1.4, which fits no version's schema."""
     header = root.find("header")
     assert header is not None
     header.attrib |= {"revMinor": "7", "name": name}
@@ -62,8 +53,8 @@ def _as_of_1_7(root: ET.Element, name: str) -> ET.Element:
 
 
 def _turning(road: ET.Element, net: Net) -> tuple[Floats, float] | None:
-    """Middle and width of the leftmost lane of a road that bends inside a junction; it is called as SUMO's edge is."""
-    edge = road.get("name", "")
+    """Returns middle and width of the leftmost lane of a road that bends inside a junction."""
+    edge = road.get("name", "")  # as SUMO's
     lanes = [lane for lane in net.lanes.values() if lane.edge == edge and lane.use == "inside"]
     if not lanes or road.find("planView/geometry/paramPoly3") is None:
         return None
@@ -111,7 +102,7 @@ def _ends(geometry: ET.Element) -> tuple[Floats, Floats]:
 
 
 def _measure(road: ET.Element) -> None:
-    """Lengths of curves as they are: netconvert tells that of the polyline through some of their points."""
+    """Corrects the lengths of curves: netconvert writes that of a polyline."""
     begins_m = 0.0
     for geometry in road.iter("geometry"):
         curve = geometry.find("paramPoly3")

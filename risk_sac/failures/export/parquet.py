@@ -1,7 +1,6 @@
-"""Parquet: a row for every episode of runs, whatever its outcome; the columns are the fields of the records.
+"""Writes Parquet: a row for every episode of runs; the columns are the fields of the records.
 
-A record within a record is a struct, and names with values are a map, so that a field that is declared once is a column
-of its own type here too.
+A record within a record is a struct, and a mapping is a map.
 """
 
 import io
@@ -29,15 +28,7 @@ SCALARS: Mapping[Any, pa.DataType] = {bool: pa.bool_(), int: pa.int64(), float: 
 
 
 def files(runs: Sequence[Path]) -> Files:
-    """One file, with a row group for each run.
-
-    Args:
-      runs: their folders; one that is still at work is told as far as it has come.
-
-    Raises:
-      ConfigError: a folder holds no run, or episodes of something else.
-      OSError: it cannot be read.
-    """
+    """Returns one file, with a row group for each run's folder; a ConfigError if one holds no run."""
     results = {folder: read_results(folder) for folder in runs}
     specs = ", ".join(f'"{each.spec.id}": {each.spec.model_dump_json()}' for each in results.values())
     schema = pa.schema([*OF_THE_RUN, SEED, *_type(EpisodeRecord)], metadata={SPECS: f"{{{specs}}}".encode()})
@@ -50,7 +41,7 @@ def files(runs: Sequence[Path]) -> Files:
 
 
 def _rows(folder: Path, results: Results) -> list[dict[str, Any]]:
-    """Of one run; failures that were found not to repeat are refused, as everywhere."""
+    """Returns the rows of one run; failures that did not repeat are refused."""
     try:
         records = tuple(records_from_lines((folder / EPISODES).read_bytes()))
     except ValueError as error:
@@ -92,7 +83,7 @@ def _type(annotation: Any) -> pa.DataType:
 
 
 def _plain(value: Any) -> Any:
-    """As pyarrow takes it: texts in place of enums."""
+    """Replaces enums by their texts."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -1,9 +1,10 @@
-"""A failure as the formats tell it: who was there, where everybody was in each frame, and what the signals showed."""
+"""A failure as the formats need it: actors, their motion in each frame, and what the signals showed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -20,11 +21,14 @@ from risk_sac.types import STEP_S, Floats, Kind, Role
 
 PER_FRAME = ("x_m", "y_m", "heading_rad", "vx_mps", "vy_mps", "speed_mps", "accel_mps2", "visible")
 PER_ACTOR = ("kind", "role", "length_m", "width_m")
+BEYOND_M = 60.0  # into the last road, where a free ego has been through what the failure is about
+COLOURS = {"r": "red", "u": "red_yellow", "y": "yellow", "g": "green", "o": "off", "s": "green"}
+"""SUMO's letter of a signal, in lower case → colour."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actor:
-    """One of those who are there. All arrays have a row for each of the first frames, until it left the net."""
+    """A road user; its arrays have a row for each frame until it left the net."""
 
     id: str
     kind: Kind
@@ -57,11 +61,7 @@ class Recorded:
 
     @classmethod
     def of(cls, bundle: Bundle) -> "Recorded":
-        """Of a bundle, which may come from anybody.
-
-        Raises:
-          ConfigError: its net is gone or another one, or it lacks an array that every recording has.
-        """
+        """Reads a bundle; a ConfigError if its net is gone or another one, or an array is missing."""
         manifest = bundle.manifest
         check_world(manifest)
         _check(manifest, bundle.series)
@@ -71,22 +71,22 @@ class Recorded:
 
     @property
     def manifest(self) -> Manifest:
-        """What the bundle says of it."""
+        """The bundle's manifest."""
         return self.bundle.manifest
 
     @property
     def series(self) -> Series:
-        """All arrays."""
+        """The bundle's arrays."""
         return self.bundle.series
 
     @property
     def name(self) -> str:
-        """Its id, which makes the name of a file too."""
+        """Its id, also used in file names."""
         return self.manifest.id
 
     @property
     def collision(self) -> Collision:
-        """That it ends in."""
+        """The contact that it ends in."""
         collision = self.manifest.episode.collision
         if collision is None:
             raise ConfigError("BUNDLE", f"{self.name} ends without a contact, so that there is no failure in it")
@@ -109,12 +109,12 @@ class Recorded:
 
     @property
     def frames(self) -> int:
-        """How many there are, one every 0.1 s."""
+        """Number of frames, one every 0.1 s."""
         return len(self.series["time_s"])
 
     @property
     def time_s(self) -> Floats:
-        """Of each frame, since the first."""
+        """Time of each frame since the first."""
         return np.arange(self.frames, dtype=np.float64) * STEP_S
 
     @property
@@ -129,7 +129,7 @@ class Recorded:
 
     @cached_property
     def heads(self) -> Mapping[str, NDArray[np.uint8]]:
-        """Of each signal, SUMO's letters, `frames x links`.
+        """SUMO's letters of each signal, `frames x links`.
 
         Recorded since the release; before it, and where nothing was recorded, from the signal's fixed program.
         """
@@ -181,14 +181,8 @@ def _check(manifest: Manifest, series: Series) -> None:
         raise ConfigError("BUNDLE", f"{manifest.id} does not begin with everybody in place")
 
 
-BEYOND_M = 60.0  # into the last road, where a free ego has been through what the failure is about
-
-
 def goal(failure: Recorded) -> tuple[Lane, Floats]:
-    """The lane on the ego's last road that its own lane leads to, and a place on it: x, y and heading.
-
-    On the only road of its route, its own lane, and that lane's end.
-    """
+    """Returns where a free ego is to go: a lane of its last road, and x, y and heading of a place on it."""
     start = failure.layout.ego
     lanes, last = failure.net.lanes, start.route[-1]
     reached, ahead = None, [lanes[f"{start.route[0]}_{start.lane}"]]
@@ -217,32 +211,19 @@ def _place(line: Floats, along_m: float) -> Floats:
     return np.array([x, y, np.arctan2(sides[side, 1], sides[side, 0])])
 
 
-COLOURS = {"r": "red", "u": "red_yellow", "y": "yellow", "g": "green", "o": "off", "s": "green"}
-"""SUMO's letter, in lower case → colour; o and O are a signal that is off."""
-
-
 def cycle(failure: Recorded, signal: str) -> list[tuple[int, str]]:
-    """Steps and letters of a signal's phases from the first frame on.
+    """Returns steps and letters of a signal's phases from the first frame on.
 
-    Its program, which begins where it was then; where something else was recorded, that, which then ends the list.
+    These are of its program, or of the recording where that differs.
     """
     shown = [bytes(row).decode() for row in failure.heads[signal]]
     program = failure.net.signals[signal]
     steps = round(program.cycle_s / STEP_S)
     turning = [program.letters(failure.offset_s(signal, frame)) for frame in range(max(steps, len(shown)))]
-    return _runs(turning[:steps] if turning[: len(shown)] == shown else shown)
-
-
-def _runs(letters: list[str]) -> list[tuple[int, str]]:
-    runs: list[tuple[int, str]] = []
-    for each in letters:
-        if runs and runs[-1][1] == each:
-            runs[-1] = (runs[-1][0] + 1, each)
-        else:
-            runs.append((1, each))
-    return runs
+    letters = turning[:steps] if turning[: len(shown)] == shown else shown
+    return [(len(list(run)), each) for each, run in groupby(letters)]
 
 
 def colour(letter: str) -> str:
-    """Of one of SUMO's letters."""
+    """Returns the colour of one of SUMO's letters."""
     return COLOURS.get(letter.lower(), "off")

@@ -4,7 +4,7 @@ import json
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from importlib.resources import files as resources
 from pathlib import Path
 from typing import Any
@@ -21,43 +21,32 @@ from risk_sac.failures.play import repeated
 from risk_sac.types import STEP_S
 
 DOMAINS = ("route", "trafficlight", "vehicle", "vehicletype")  # in which `risk_sac.sim` gives commands
-QUESTIONS = ("get", "is", "subscribe")  # what tells, and changes nothing
-
+QUESTIONS = ("get", "is", "subscribe")  # beginnings of functions that change nothing
+LACKS = ("pedestrians as persons of SUMO: they are points of their own dynamics", "what the ego sees", "requirements")
+NET, TYPES, CONFIGURATION, FCD = "net.net.xml", "vtypes.add.xml", "failure.sumocfg", "fcd.xml"
+ZOOM = 2500.0  # of sumo-gui, in which some 30 m are seen
+LONG = {"-n": "net-file", "-a": "additional-files"}
+HERE = {"net-file": NET, "additional-files": TYPES}  # where they lie in the export
 Call = tuple[str, str, list[Any], dict[str, Any]]
 """Domain, function, arguments, keyword arguments."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleState:
-    """A vehicle after a step, in SUMO's own terms: the front bumper, and degrees from north, clockwise."""
-
-    id: str
-    x: float
-    y: float
-    angle: float
-    speed: float
-    acceleration: float
-    type: str
-    lane: str
-    pos: float
+VehicleState = dict[str, Any]
+"""A vehicle after a step, in SUMO's own terms: the front bumper, and degrees from north, clockwise."""
 
 
 @dataclass(slots=True)
 class Heard:
-    """An episode: how SUMO was started, the commands before each step, and the vehicles after it."""
+    """Options that SUMO was started with, the commands before each step, and the vehicles after it."""
 
     options: list[str] = field(default_factory=list)
     calls: list[list[Call]] = field(default_factory=lambda: [[]])
     states: list[list[VehicleState]] = field(default_factory=list)
 
-    def first(self, steps: int) -> "Heard":
-        """Without what comes after so many steps."""
-        return Heard(self.options, self.calls[:steps], self.states[:steps])
-
 
 @contextmanager
-def tapped() -> Iterator[Heard]:
-    """Hears what libsumo is told by this process, until it ends; one simulation, from its start."""
+def _tapped() -> Iterator[Heard]:
+    """Records what this process tells libsumo; `risk_sac.sim` calls it as a module, so that no command is missed."""
     heard, own_start, own_step = Heard(), libsumo.start, libsumo.simulationStep
     taps: list[tuple[type, str, Any]] = []
 
@@ -97,36 +86,25 @@ def _tap(heard: Heard, domain: str, name: str, function: Any) -> Any:
 def _state(id_: str) -> VehicleState:
     get = libsumo.vehicle
     x, y = get.getPosition(id_)
-    return VehicleState(
-        id=id_,
-        x=x,
-        y=y,
-        angle=get.getAngle(id_),
-        speed=get.getSpeed(id_),
-        acceleration=get.getAcceleration(id_),
-        type=get.getTypeID(id_),
-        lane=get.getLaneID(id_),
-        pos=get.getLanePosition(id_),
-    )
-
-
-LACKS = ("pedestrians as persons of SUMO: they are points of their own dynamics", "what the ego sees", "requirements")
-NET, TYPES, CONFIGURATION, FCD = "net.net.xml", "vtypes.add.xml", "failure.sumocfg", "fcd.xml"
-ZOOM = 2500.0  # of sumo-gui, in which some 30 m are seen
-LONG = {"-n": "net-file", "-a": "additional-files"}
-HERE = {"net-file": NET, "additional-files": TYPES}  # where they lie in the export
+    return {
+        "id": id_,
+        "x": x,
+        "y": y,
+        "angle": get.getAngle(id_),
+        "speed": get.getSpeed(id_),
+        "acceleration": get.getAcceleration(id_),
+        "type": get.getTypeID(id_),
+        "lane": get.getLaneID(id_),
+        "pos": get.getLanePosition(id_),
+    }
 
 
 def files(failure: Recorded) -> Files:
-    """The files, once the failure was played again and every call heard.
-
-    Raises:
-      SimulationError: it does not repeat here.
-    """
+    """Plays the failure again, and returns its files; a SimulationError if it does not repeat here."""
     manifest = failure.manifest
-    with tapped() as heard, closing(RiskSacEnv.of(manifest.spec)) as env:
+    with _tapped() as heard, closing(RiskSacEnv.of(manifest.spec)) as env:
         repeated(env, manifest.spec, manifest.episode, failure.series)
-    heard = heard.first(failure.frames)
+    heard = Heard(heard.options, heard.calls[: failure.frames], heard.states[: failure.frames])
     if len(heard.states) != failure.frames:
         raise SimulationError(f"{failure.name} took {len(heard.states)} steps; wanted {failure.frames}")
     types = Path(str(resources("sumo_nets") / TYPES))
@@ -142,7 +120,7 @@ def files(failure: Recorded) -> Files:
 
 
 def _configuration(failure: Recorded, heard: Heard) -> bytes:
-    """The options that it was played with; sumo-gui opens it too."""
+    """Returns the options that it was played with; sumo-gui opens them too."""
     root = ET.Element("configuration")
     root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot say of it, replay.py plays it "))
     options = ET.SubElement(root, "options")
@@ -152,7 +130,7 @@ def _configuration(failure: Recorded, heard: Heard) -> bytes:
 
 
 def _pairs(words: Sequence[str]) -> list[tuple[str, str]]:
-    """Names and values of a command line's options; that of a flag is true."""
+    """Returns names and values of a command line's options; that of a flag is true."""
     pairs: list[tuple[str, str]] = []
     for word in words:
         if word.startswith("-") and not word.lstrip("-")[:1].isdigit():
@@ -163,28 +141,24 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def _commands(failure: Recorded, heard: Heard) -> bytes:
-    """What is told before each step, a line each."""
+    """Returns the commands before each step, a line each."""
     head = {"failure": failure.name, "ego": failure.ego.id, "striker": failure.collision.other_id, "zoom": ZOOM}
     told = ",\n".join(json.dumps(calls) for calls in heard.calls)
     return f'{json.dumps(head)[:-1]}, "commands": [\n{told}\n]}}\n'.encode()
 
 
 def _fcd(failure: Recorded, heard: Heard) -> bytes:
-    """Floating car data, as SUMO's own output has it, but in full precision."""
+    """Returns floating car data as SUMO's own output has it, but in full precision."""
     root = ET.Element("fcd-export")
     root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot say of it "))
     walkers = [actor for actor in failure.actors if actor.pedestrian]
     for frame, states in enumerate(heard.states):
         step = ET.SubElement(root, "timestep", time=f"{(frame + 1) * STEP_S:.2f}")
-        _vehicles(step, states)
+        for state in states:
+            ET.SubElement(step, "vehicle", {name: str(value) for name, value in state.items()})
         for walker in walkers:
             _person(step, walker, frame)
     return document(root)
-
-
-def _vehicles(step: ET.Element, states: Sequence[VehicleState]) -> None:
-    for state in states:
-        ET.SubElement(step, "vehicle", {name: str(value) for name, value in asdict(state).items()})
 
 
 def _person(step: ET.Element, walker: Actor, frame: int) -> None:

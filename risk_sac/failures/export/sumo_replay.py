@@ -40,7 +40,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--gui", action="store_true", help="in a window")
     parser.add_argument("--sumo", help="the binary (default: sumo, or sumo-gui, from the PATH)")
-    parser.add_argument("--picture", help="with --gui: save a picture of the last step there")
     options = parser.parse_args()
     name = "sumo-gui" if options.gui else "sumo"
     homes = [str(Path(home) / "bin") for home in (os.environ.get("SUMO_HOME"), Path(sys.executable).parents[1]) if home]
@@ -52,7 +51,7 @@ def main() -> int:
     command = [binary, "--configuration-file", str(HERE / "failure.sumocfg")]
     traci.start([*command, "--start", "--quit-on-end"] if options.gui else command)
     try:
-        difference, missed = replay(told, steps, options)
+        difference, missed = replay(told, steps, options.gui)
     finally:
         traci.close()
     compared = sum(len(step.findall("vehicle")) for step in steps)
@@ -61,7 +60,7 @@ def main() -> int:
     return int(difference > 0 or missed > 0)
 
 
-def replay(told: Told, steps: list[ET.Element], options: argparse.Namespace) -> tuple[float, int]:
+def replay(told: Told, steps: list[ET.Element], gui: bool) -> tuple[float, int]:
     """The largest difference of any number, and how many vehicles were elsewhere than in the recording."""
     difference, missed = 0.0, 0
     for commands, recorded in zip(told["commands"], steps, strict=True):
@@ -74,11 +73,8 @@ def replay(told: Told, steps: list[ET.Element], options: argparse.Namespace) -> 
             missed += traci.vehicle.getLaneID(id_) != wanted[id_].get("lane")
             off = (abs(get(id_) - float(wanted[id_].attrib[name])) for name, get in GETTERS.items())
             difference = max(difference, *off)
-        if options.gui:
+        if gui:
             show(told, recorded)
-            if options.picture and recorded is steps[-1]:
-                traci.gui.screenshot("View #0", options.picture)
-                traci.simulationStep()
     return difference, missed
 
 

@@ -1,4 +1,4 @@
-"""An export as one file or one folder, whole or not there."""
+"""Writes exports: XML, the JSON beside them, and one file or one folder, whole or not at all."""
 
 import io
 import json
@@ -15,25 +15,20 @@ from risk_sac.failures.export.formats import ZIP, Files, Format
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.run_folder.durable import replace_file
 
+BESIDE = "beside.json"  # its name, which the files that it lies beside have in them
+PER_OTHER = ("visible", "distance_m", "ttc_s", "rss_longitudinal_m", "rss_lateral_m")
+BEGINNING = (1980, 1, 1, 0, 0, 0)  # of a zip's calendar: the same export is the same file
+
 
 def document(root: ET.Element) -> bytes:
-    """The whole text, indented; the same element gives the same bytes."""
+    """Returns the whole text, indented; the same element gives the same bytes."""
     ET.indent(root)
     content: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
     return content + b"\n"
 
 
-BESIDE = "beside.json"  # its name, which the files that it lies beside have in them
-PER_OTHER = ("visible", "distance_m", "ttc_s", "rss_longitudinal_m", "rss_lateral_m")
-
-
 def beside(failure: Recorded, lacks: tuple[str, ...]) -> bytes:
-    """The file.
-
-    Args:
-      failure: that is exported.
-      lacks: what the format cannot carry, in words.
-    """
+    """Returns the JSON of what the format cannot carry, which `lacks` says in words."""
     manifest, series = failure.manifest, failure.series
     ids = [actor.id for actor in failure.actors]
     told = {
@@ -63,7 +58,7 @@ def beside(failure: Recorded, lacks: tuple[str, ...]) -> bytes:
 
 
 def _plain(value: Any) -> Any:
-    """As JSON has it; a number that is not finite is null, which the README of this room explains."""
+    """Converts to JSON's types; a number that is not finite is null."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -75,11 +70,8 @@ def _plain(value: Any) -> Any:
     return value
 
 
-BEGINNING = (1980, 1, 1, 0, 0, 0)  # of a zip's calendar: the same export is the same file
-
-
 def packed(format_: Format, files: Files) -> bytes:
-    """What is downloaded: the one file, or a zip of several."""
+    """Returns what is downloaded: the one file, or a zip of several."""
     if format_.media_type != ZIP:
         (content,) = files.values()
         return content

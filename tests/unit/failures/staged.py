@@ -85,10 +85,8 @@ def with_release() -> dict[str, NDArray[np.generic]]:
     """The same with 1.5 s before the release, in which the ego drives as it does after and all others stand."""
     series, early = synthetic_series(), 15
     count = len(series["time_s"])
-    per_frame = {name: values for name, values in series.items() if values.ndim and len(values) == rows}
-    longer = {
-        name: np.concatenate((np.repeat(values[:1], early, axis=0), values)) for name, values in per_frame.items()
-    }
+    rows = {name: values for name, values in series.items() if values.ndim and len(values) == count}
+    longer = {name: np.concatenate((np.repeat(values[:1], early, axis=0), values)) for name, values in rows.items()}
     t = np.arange(early + count) * 0.1 - 1.5
     x_m = longer["x_m"].copy()
     x_m[:, 0] = 280 + 10 * t

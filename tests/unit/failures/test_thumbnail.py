@@ -71,7 +71,8 @@ def test_north_is_up_and_an_arrow_head_points_to_where_a_car_heads() -> None:
 
 def test_a_path_has_the_last_seconds_alone_and_the_frames_in_which_its_actor_was_there() -> None:
     series = synthetic_series()
-    long = {name: np.concatenate([array[:1]] * 80 + [array]) for name, array in series.items() if len(array) == 21}
+    rows = {name: array for name, array in series.items() if array.shape[:1] == (21,)}
+    long = {name: np.concatenate([array[:1]] * 80 + [array]) for name, array in rows.items()}
     long |= {"time_s": np.arange(101) * 0.1 + 0.1 - 8.0, "released_s": np.array(0.1)}
     absent = series | {
         "x_m": np.where(np.arange(3) == 1, np.where(np.arange(21) < 8, np.nan, 300.0)[:, None], series["x_m"])
