@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from risk_sac.failures.export.commonroad import ACTORS, LANELETS
+from risk_sac.failures.export.commonroad import ACTORS, LANELETS, STATES
 from risk_sac.failures.export.formats import FORMATS, FormatName, commonroad_python
 from risk_sac.failures.export.recorded import Recorded, colour
 from tests.exports.conftest import CHECKERS, CM, ask, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
 
 NAMES = {"failure.xml": 1, "failure-as-recorded.xml": 0}
-STATES = {"red": "red", "red_yellow": "redYellow", "yellow": "yellow", "green": "green", "off": "inactive"}
 installed = pytest.mark.skipif(bool(FORMATS[FormatName.COMMONROAD].missing), reason="no commonroad-io: `make install`")
 
 

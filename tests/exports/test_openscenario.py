@@ -68,7 +68,7 @@ def test_the_ego_is_free_and_knows_where_to_go_and_nobody_else_is(
 ) -> None:
     root = etree.parse(exported(family, FormatName.OPENSCENARIO) / "failure.xosc").getroot()
     follow = {each.get("entityRef") for each in root.iter("EntityRef") if each.getparent().tag == "Actors"}
-    assert follow == {actor.id for actor in failure(family).others}
+    assert follow == {actor.id for actor in failure(family).actors[1:]}
     (asked,) = root.iter("AcquirePositionAction")
     assert next(asked.iterancestors("Private")).get("entityRef") == "ego"
     assert "beside.json" in root.find("FileHeader").get("description")

@@ -32,6 +32,10 @@ WRITER = Path(__file__).with_name("commonroad_writer.py")
 WRITES_S = 120.0  # until the writer has long ended
 MADE = "2000-01-01"  # a date is required; with a true one the same failure would be another file
 TRUCK_FROM_M = 6.0
+# Values of commonroad-io's enumerations.
+LANELET_TYPES = {"road": "urban", "inside": "intersection", "sidewalk": "sidewalk", "crossing": "crosswalk"}
+DIRECTIONS = {"s": "straight", "l": "left", "r": "right"}
+STATES = {"red": "red", "red_yellow": "redYellow", "yellow": "yellow", "green": "green", "off": "inactive"}
 LAST_STEPS = 200  # that a free ego may take after the recording
 LANELETS, LIGHTS, ACTORS, PROBLEM = 1, 100_001, 200_001, 300_001  # where numbers begin
 
@@ -98,13 +102,14 @@ def _lights(failure: Recorded) -> dict[Head, dict[str, Any]]:
 def _light(failure: Recorded, lane: Lane, head: Head, number: int) -> dict[str, Any]:
     phases: list[tuple[int, str]] = []
     for steps, letters in cycle(failure, head.signal):
-        shown = colour(letters[head.index])
+        shown = STATES[colour(letters[head.index])]
         if phases and phases[-1][1] == shown:
             phases[-1] = (phases[-1][0] + steps, shown)
         else:
             phases.append((steps, shown))
     position = boundaries(lane.centre, lane.width_m)[1][-1]
-    return {"number": number, "position": position.tolist(), "cycle": phases, "turn": head.turn}
+    direction = DIRECTIONS.get(head.turn, "all")
+    return {"number": number, "position": position.tolist(), "cycle": phases, "direction": direction}
 
 
 def _lanelets(failure: Recorded, numbers: dict[str, int], lights: dict[Head, dict[str, Any]]) -> list[dict[str, Any]]:
@@ -120,7 +125,7 @@ def _lanelets(failure: Recorded, numbers: dict[str, int], lights: dict[Head, dic
         described.append(
             {
                 "number": numbers[lane.id],
-                "use": lane.use,
+                "type": LANELET_TYPES[lane.use],
                 "left": left.tolist(),
                 "centre": lane.centre.tolist(),
                 "right": right.tolist(),
@@ -147,4 +152,4 @@ def _actor(actor: Actor, number: int) -> dict[str, Any]:
         }
         for frame in range(len(actor.time_s))
     ]
-    return {"number": number, "kind": kind, "length_m": actor.length_m, "width_m": actor.width_m, "states": states}
+    return {"number": number, "type": kind, "length_m": actor.length_m, "width_m": actor.width_m, "states": states}

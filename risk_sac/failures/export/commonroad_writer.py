@@ -33,25 +33,6 @@ from commonroad.scenario.traffic_light import (
 from commonroad.scenario.trajectory import Trajectory
 
 DECIMALS = 6  # µm
-USES = {
-    "road": LaneletType.URBAN,
-    "inside": LaneletType.INTERSECTION,
-    "sidewalk": LaneletType.SIDEWALK,
-    "crossing": LaneletType.CROSSWALK,
-}
-TURNS = {
-    "s": TrafficLightDirection.STRAIGHT,
-    "l": TrafficLightDirection.LEFT,
-    "r": TrafficLightDirection.RIGHT,
-}
-STATES = {
-    "red": TrafficLightState.RED,
-    "red_yellow": TrafficLightState.RED_YELLOW,
-    "yellow": TrafficLightState.YELLOW,
-    "green": TrafficLightState.GREEN,
-    "off": TrafficLightState.INACTIVE,
-}
-KINDS = {"pedestrian": ObstacleType.PEDESTRIAN, "truck": ObstacleType.TRUCK, "car": ObstacleType.CAR}
 
 
 def write(told: dict[str, Any], file: Path, actors: list[int]) -> None:
@@ -87,15 +68,15 @@ def write(told: dict[str, Any], file: Path, actors: list[int]) -> None:
 
 def light(told: dict[str, Any]) -> TrafficLight:
     """Returns a traffic light with its cycle."""
-    elements = [TrafficLightCycleElement(STATES[colour], steps) for steps, colour in told["cycle"]]
-    direction = TURNS.get(told["turn"], TrafficLightDirection.ALL)
-    return TrafficLight(told["number"], np.array(told["position"]), TrafficLightCycle(elements, 0), direction=direction)
+    elements = [TrafficLightCycleElement(TrafficLightState(colour), steps) for steps, colour in told["cycle"]]
+    position, direction = np.array(told["position"]), TrafficLightDirection(told["direction"])
+    return TrafficLight(told["number"], position, TrafficLightCycle(elements, 0), direction=direction)
 
 
 def lanelet(told: dict[str, Any]) -> Lanelet:
     """Returns a lanelet."""
     left, centre, right = (np.array(told[line]) for line in ("left", "centre", "right"))
-    walks, lights = told["use"] in ("sidewalk", "crossing"), set(told["lights"])
+    walks, lights = told["type"] in ("sidewalk", "crosswalk"), set(told["lights"])
     stop = None
     if lights and not walks:
         stop = StopLine(left[-1], right[-1], LineMarking.SOLID, traffic_light_ref=lights)
@@ -111,7 +92,7 @@ def lanelet(told: dict[str, Any]) -> Lanelet:
         adjacent_right=told["adjacent_right"],
         adjacent_right_same_direction=told["adjacent_right"] and True,
         stop_line=stop,
-        lanelet_type={USES[told["use"]]},
+        lanelet_type={LaneletType(told["type"])},
         user_one_way=set() if walks else {RoadUser.VEHICLE},
         user_bidirectional={RoadUser.PEDESTRIAN} if walks else set(),
         traffic_lights=lights,
@@ -124,7 +105,7 @@ def obstacle(told: dict[str, Any]) -> DynamicObstacle:
     first, *later = told["states"]
     trajectory = Trajectory(1, [ExtendedPMState(**state(each)) for each in later])
     prediction = TrajectoryPrediction(trajectory, shape)
-    return DynamicObstacle(told["number"], KINDS[told["kind"]], shape, initial(first), prediction)
+    return DynamicObstacle(told["number"], ObstacleType(told["type"]), shape, initial(first), prediction)
 
 
 def state(told: dict[str, Any]) -> dict[str, Any]:

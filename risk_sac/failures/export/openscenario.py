@@ -1,8 +1,7 @@
-"""ASAM OpenSCENARIO XML 1.2 on an OpenDRIVE road.
+"""Writes ASAM OpenSCENARIO XML 1.2 on an OpenDRIVE road.
 
-A vehicle's place is that of its rear axle's middle on the ground, as the standard has it; its box says where the body
-is from there. Everybody but the ego follows its trajectory by the clock; the ego is free, and is asked to drive where
-it was going. The other file has the ego follow its own trajectory too.
+A vehicle's place is that of its rear axle's middle on the ground. All actors but the ego follow their trajectory by the
+clock; the ego is free, and is asked to drive where it was going. In the other file the ego follows its trajectory too.
 """
 
 import xml.etree.ElementTree as ET
@@ -55,7 +54,7 @@ def _scenario(failure: Recorded, roads: bytes, *, free: bool) -> bytes:
         x, y, heading = goal(failure)[1]
         init.add_init_action(failure.ego.id, xosc.AcquirePositionAction(xosc.WorldPosition(x, y, 0, heading, 0, 0)))
     act = xosc.Act("recorded", _at("begins", 0.0))
-    for actor in failure.others if free else failure.actors:
+    for actor in failure.actors[1:] if free else failure.actors:
         act.add_maneuver_group(_group(actor, leaves=len(actor.time_s) < failure.frames))
     board = xosc.StoryBoard(init, _at("ends", end_s, "stop"))
     board.add_act(act)
@@ -112,7 +111,7 @@ def _body(actor: Actor) -> xosc.Vehicle | xosc.Pedestrian:
 
 
 def _place(actor: Actor, frame: int) -> xosc.WorldPosition:
-    """Of the rear axle's middle; of a pedestrian, its own."""
+    """Returns the place of the rear axle's middle; of a pedestrian, its own."""
     heading = float(actor.heading_rad[frame])
     back_m = 0.0 if actor.pedestrian else REAR_AXLE * actor.length_m
     x, y = actor.x_m[frame] - back_m * np.cos(heading), actor.y_m[frame] - back_m * np.sin(heading)
@@ -150,6 +149,6 @@ def _event(name: str, action: object, from_s: float) -> xosc.Event:
 
 
 def _at(name: str, time_s: float, point: str = "start") -> xosc.ValueTrigger:
-    """From a moment of the scenario's clock on."""
+    """Returns the trigger at a moment of the scenario's clock."""
     condition = xosc.SimulationTimeCondition(time_s, xosc.Rule.greaterOrEqual)
     return xosc.ValueTrigger(name, 0, xosc.ConditionEdge.none, condition, triggeringpoint=point)

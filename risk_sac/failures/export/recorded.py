@@ -50,34 +50,47 @@ class Actor:
         return self.kind is Kind.PEDESTRIAN
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Recorded:
     """A failure from its first frame, 1.5 s before the adversaries' release, to the contact."""
 
-    bundle: Bundle
+    manifest: Manifest
+    series: Series
+    signal_heads: NDArray[np.uint8]  # of the bundle
+    collision: Collision
     problem: Problem
     layout: Layout
     net_file: Path
+    net: Net
+    actors: tuple[Actor, ...]  # the ego first
 
     @classmethod
     def of(cls, bundle: Bundle) -> "Recorded":
-        """Reads a bundle; a ConfigError if its net is gone or another one, or an array is missing."""
-        manifest = bundle.manifest
+        """Reads a bundle.
+
+        Raises:
+          ConfigError: its net is gone or another one, or it lacks an array or a contact.
+        """
+        manifest, series = bundle.manifest, bundle.series
         check_world(manifest)
-        _check(manifest, bundle.series)
+        _check(manifest, series)
+        collision = manifest.episode.collision
+        if collision is None:
+            raise ConfigError("BUNDLE", f"{manifest.id} ends without a contact, so that there is no failure in it")
         problem = Problem.from_spec(manifest.spec)
         layout = problem.family.layout(manifest.episode.scene)
-        return cls(bundle, problem, layout, Path(str(files(WORLD))) / layout.net)
-
-    @property
-    def manifest(self) -> Manifest:
-        """The bundle's manifest."""
-        return self.bundle.manifest
-
-    @property
-    def series(self) -> Series:
-        """The bundle's arrays."""
-        return self.bundle.series
+        net_file = Path(str(files(WORLD))) / layout.net
+        return cls(
+            manifest=manifest,
+            series=series,
+            signal_heads=bundle.signal_heads,
+            collision=collision,
+            problem=problem,
+            layout=layout,
+            net_file=net_file,
+            net=read_net(net_file),
+            actors=tuple(_actor(series, column) for column in range(len(series["ids"]))),
+        )
 
     @property
     def name(self) -> str:
@@ -85,27 +98,9 @@ class Recorded:
         return self.manifest.id
 
     @property
-    def collision(self) -> Collision:
-        """The contact that it ends in."""
-        collision = self.manifest.episode.collision
-        if collision is None:
-            raise ConfigError("BUNDLE", f"{self.name} ends without a contact, so that there is no failure in it")
-        return collision
-
-    @cached_property
-    def actors(self) -> tuple[Actor, ...]:
-        """The ego first."""
-        return tuple(self._actor(column) for column in range(len(self.series["ids"])))
-
-    @property
     def ego(self) -> Actor:
         """The vehicle under test."""
         return self.actors[0]
-
-    @property
-    def others(self) -> tuple[Actor, ...]:
-        """Everybody else."""
-        return self.actors[1:]
 
     @property
     def frames(self) -> int:
@@ -123,18 +118,13 @@ class Recorded:
         return float(self.series["released_s"] - self.series["time_s"][0])
 
     @cached_property
-    def net(self) -> Net:
-        """The roads."""
-        return read_net(self.net_file)
-
-    @cached_property
     def heads(self) -> Mapping[str, NDArray[np.uint8]]:
         """SUMO's letters of each signal, `frames x links`.
 
         Recorded since the release; before it, and where nothing was recorded, from the signal's fixed program.
         """
         letters: dict[str, NDArray[np.uint8]] = {}
-        recorded, column = self.bundle.signal_heads, 0
+        recorded, column = self.signal_heads, 0
         for id_, program in sorted(self.net.signals.items()):
             shown = [program.letters(self.offset_s(id_, frame)) for frame in range(self.frames)]
             rows = np.array([list(text.encode()) for text in shown], dtype=np.uint8)
@@ -150,23 +140,21 @@ class Recorded:
         begins_s = self.layout.signal_offset_s if signal == self.layout.signal else 0.0
         return begins_s + float(self.series["time_s"][0]) + frame * STEP_S
 
-    def _actor(self, column: int) -> Actor:
-        series = self.series
-        there = np.flatnonzero(np.isfinite(series["x_m"][:, column]))
-        last = int(there[-1]) + 1
-        per_frame = {
-            name: np.asarray(series[name][:last, column], dtype=np.float64) for name in PER_FRAME if name != "visible"
-        }
-        per_frame["heading_rad"] = np.unwrap(per_frame["heading_rad"])
-        return Actor(
-            id=str(series["ids"][column]),
-            kind=Kind(int(series["kind"][column])),
-            role=Role(int(series["role"][column])),
-            length_m=float(series["length_m"][column]),
-            width_m=float(series["width_m"][column]),
-            time_s=self.time_s[:last],
-            **per_frame,
-        )
+
+def _actor(series: Series, column: int) -> Actor:
+    last = int(np.flatnonzero(np.isfinite(series["x_m"][:, column]))[-1]) + 1
+    per_frame = {name: np.asarray(series[name][:last, column], dtype=np.float64) for name in PER_FRAME}
+    del per_frame["visible"]
+    per_frame["heading_rad"] = np.unwrap(per_frame["heading_rad"])
+    return Actor(
+        id=str(series["ids"][column]),
+        kind=Kind(int(series["kind"][column])),
+        role=Role(int(series["role"][column])),
+        length_m=float(series["length_m"][column]),
+        width_m=float(series["width_m"][column]),
+        time_s=np.arange(last, dtype=np.float64) * STEP_S,
+        **per_frame,
+    )
 
 
 def _check(manifest: Manifest, series: Series) -> None:
