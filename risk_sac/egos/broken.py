@@ -1,4 +1,4 @@
-"""An ego that is wrong on purpose, late and short-sighted: what finds nothing against it finds nothing at all."""
+"""An ego that is wrong on purpose, late and short-sighted: a check that a search finds failures at all."""
 
 from collections import deque
 

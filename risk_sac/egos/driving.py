@@ -1,4 +1,4 @@
-"""What the shipped egos share: whom to look out for, how fast to go, when to stop at a signal."""
+"""Shared by the shipped egos: what to look out for, how fast to go, when to stop at a signal."""
 
 import math
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from risk_sac.sim.lookout import targets
 from risk_sac.types import SPEED, Kind, Signal
 
 VEHICLE = int(Kind.VEHICLE)
-COMFORT_MPS2 = 2.0  # braking that nobody minds
+COMFORT_MPS2 = 2.0  # comfortable braking
 SIDEWAYS_MPS2 = 3.0  # in a bend
 STANDSTILL_M = 2.5
 SETTLE_S = 0.5
@@ -20,7 +20,7 @@ LAST_STOP_MPS2 = 4.5  # a yellow signal that takes more braking than that is pas
 
 
 class Ahead(NamedTuple):
-    """Somebody, or something, to follow or to stop for."""
+    """Something to follow or to stop for."""
 
     gap_m: float  # from the front bumper
     speed_mps: float  # at which it leads, 0 for what stands or crosses
@@ -35,7 +35,7 @@ class Lookout:
         self._speeds: dict[str, float] = {}
 
     def ahead(self, perceived: Perceived) -> list[Ahead]:
-        """Who is on a collision course if everybody keeps their velocity, see `risk_sac.sim.lookout`, and who leads."""
+        """Returns what is on a collision course at constant velocity, see `risk_sac.sim.lookout`, and what leads."""
         p, everybody = perceived, np.ones(len(perceived.ids), dtype=np.bool_)
         found = targets(
             p.path, p.station_m, p.offset_m, 0, self._vehicle.accel_mps2, p.state, p.kind == VEHICLE, everybody
@@ -50,7 +50,7 @@ class Lookout:
 
 
 def stop_at_signal(perceived: Perceived) -> list[Ahead]:
-    """The stop line of a red signal, or of a yellow one before which it can still stop."""
+    """Returns the stop line of a red signal, or of a yellow one before which it can still stop."""
     p = perceived
     gap_m = p.stop_line_m - STOP_LINE_M
     if not math.isfinite(gap_m) or p.stop_line_m < 0.0 or p.signal not in (Signal.RED, Signal.YELLOW):
@@ -62,12 +62,11 @@ def stop_at_signal(perceived: Perceived) -> list[Ahead]:
 
 
 def idm(perceived: Perceived, vehicle: Vehicle, ahead: list[Ahead], headway_s: float) -> float:
-    """Acceleration of the intelligent driver model behind the nearest of those ahead, m/s².
+    """Returns the acceleration of the intelligent driver model behind the nearest of those ahead, m/s².
 
     a = a_max [1 − (v / v₀)⁴ − (s* / s)²],  s* = s₀ + v T + v Δv / (2 √(a_max b))
 
-    Choice: who is faster than the road allows comes down to its speed within `SETTLE_S`; the model's own way is slower
-    than the bends of a junction come.
+    Choice: an ego that is too fast slows down within `SETTLE_S`; the model's own way is too slow for junctions' bends.
 
     Source: Treiber, Hennecke, Helbing 2000, "Congested traffic states in empirical observations and microscopic
     simulations".
@@ -84,13 +83,13 @@ def idm(perceived: Perceived, vehicle: Vehicle, ahead: list[Ahead], headway_s: f
 
 
 def time_to_collision(speed_mps: float, ahead: list[Ahead]) -> float:
-    """Until the nearest in time of those ahead is reached at the present speeds, s; inf if none is."""
+    """Returns the time until the first of those ahead is reached at the present speeds, s; inf if none is."""
     closing = ((each.gap_m, speed_mps - each.speed_mps) for each in ahead)
     return min((gap_m / closing_mps for gap_m, closing_mps in closing if closing_mps > 1e-6), default=math.inf)
 
 
 def needed_braking(speed_mps: float, ahead: list[Ahead]) -> float:
-    """Braking that just avoids all of those ahead, if they go on as they do, m/s²."""
+    """Returns the braking that just avoids all of those ahead, if they go on as they do, m/s²."""
     return max((_needed(speed_mps, each) for each in ahead), default=0.0)
 
 

@@ -1,4 +1,4 @@
-"""An ego at the wheel: it is shown what it perceives, and its car does what it commands."""
+"""Drives an ego: shows it what it perceives, and moves its car by its commands."""
 
 import math
 
@@ -20,7 +20,7 @@ BRAKE_MPS2 = 9.0  # as SUMO's driver can, on dry asphalt
 
 
 class View:
-    """Makes of a frame what the ego is shown; one for each episode."""
+    """Makes the ego's perception of a frame; one for each episode."""
 
     def __init__(self) -> None:
         self._of: tuple[tuple[str, ...], bytes] = ((), b"")
@@ -28,24 +28,15 @@ class View:
         self._kind: NDArray[np.int8] = np.empty(0, dtype=np.int8)
 
     def perceived(self, frame: Frame, belief: Belief, along: Along) -> Perceived:
-        """Those it knows of, as far as its sensor and its memory tell of them."""
+        """Returns the actors that it knows of by its sensor and its memory."""
         known = belief.known
         of = frame.ids, known.tobytes()
         if of != self._of:  # seldom
             self._of, self._kind = of, frame.kind[known]
             self._ids = tuple(id_ for id_, is_known in zip(frame.ids, known.tolist(), strict=True) if is_known)
         path, station_m, offset_m = along
-        return Perceived(
-            frame.time_s,
-            self._ids,
-            self._kind,
-            shown(belief.state, known),
-            path.points,
-            station_m,
-            offset_m,
-            frame.signal,
-            frame.stop_line_m,
-        )
+        place, ahead = (path.points, station_m, offset_m), (frame.signal, frame.stop_line_m)
+        return Perceived(frame.time_s, self._ids, self._kind, shown(belief.state, known), *place, *ahead)
 
 
 class EgoPilot:
@@ -67,9 +58,8 @@ class EgoPilot:
             float(row[0]) for row in (frame.x_m, frame.y_m, frame.heading_rad, frame.speed_mps, frame.accel_mps2)
         )
         self._motion, self._view = Motion(x, y, heading, speed, accel), View()
-        self._ego.reset(
-            Episode(seed=seed, net=layout.net, route=layout.ego.route, vehicle=self._vehicle, step_s=STEP_S)
-        )
+        route, vehicle = layout.ego.route, self._vehicle
+        self._ego.reset(Episode(seed=seed, net=layout.net, route=route, vehicle=vehicle, step_s=STEP_S))
         return self._motion
 
     def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
@@ -81,13 +71,13 @@ class EgoPilot:
         return self._motion
 
     def close(self) -> None:
-        """Lets the ego go."""
+        """Closes the ego."""
         self._ego.close()
 
 
 @compiled
 def shown(state: Floats, known: Bools) -> Floats:
-    """The columns of those that are known; of the others' rows, those that a sensor tells."""
+    """Returns the columns of known actors, with the rows that a sensor measures."""
     found = np.empty((state.shape[0], int(known.sum())))
     column = 0
     for i in range(state.shape[1]):

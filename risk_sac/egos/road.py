@@ -22,7 +22,7 @@ ASIDE_M = 0.3  # beside the ego's body: who is in there is in its way
 
 @compiled
 def point_at(path: Floats, station_m: float) -> tuple[float, float]:
-    """Where a path is at a station; its ends go on straight."""
+    """Returns the place on a path at a station; its ends go on straight."""
     stations = path[STATION]
     i = 0
     while i < len(stations) - 2 and stations[i + 1] <= station_m:
@@ -35,7 +35,7 @@ def point_at(path: Floats, station_m: float) -> tuple[float, float]:
 def steering_towards(
     x_m: float, y_m: float, heading_rad: float, wheelbase_m: float, aim_x_m: float, aim_y_m: float
 ) -> float:
-    """Steering of the arc that takes the rear axle to a point (pure pursuit), rad.
+    """Returns the steering of the arc that takes the rear axle to a point (pure pursuit), rad.
 
     Source: Coulter 1992, "Implementation of the Pure Pursuit Path Tracking Algorithm".
     """
@@ -46,7 +46,7 @@ def steering_towards(
 
 
 def lane_keeping(perceived: Perceived, vehicle: Vehicle) -> float:
-    """Steering that brings the ego to the middle of its lane and along its path, rad."""
+    """Returns the steering that keeps the ego in the middle of its lane, rad."""
     p = perceived
     return _lane_keeping(p.path, p.station_m - vehicle.length_m / 2, p.state, vehicle.wheelbase_m)
 
@@ -60,7 +60,7 @@ def _lane_keeping(path: Floats, middle_m: float, state: Floats, wheelbase_m: flo
 
 @compiled
 def bend(path: Floats, point: int) -> float:
-    """Curvature of the path around a point, over `BEND_M`, 1/m: corners of the drawn line are no bends."""
+    """Returns the curvature of the path around a point, over `BEND_M`, 1/m."""
     stations, headings, last = path[STATION], path[PATH_HEADING], path.shape[1] - 1
     first = point
     while first > 0 and stations[point] - stations[first] < BEND_M / 2:
@@ -76,14 +76,7 @@ def bend(path: Floats, point: int) -> float:
 
 @compiled
 def cruise_speed(path: Floats, station_m: float, comfort_mps2: float, sideways_mps2: float) -> float:
-    """The fastest that limits and bends, here and ahead, allow, m/s.
-
-    Args:
-      path: rows x `p`.
-      station_m: of the front bumper.
-      comfort_mps2: braking for slower stretches ahead.
-      sideways_mps2: acceleration in a bend.
-    """
+    """Returns the fastest that limits and bends, here and ahead of the front bumper, allow, m/s."""
     stations, limits = path[STATION], path[LIMIT]
     fastest = math.inf
     for i in range(len(stations)):
@@ -97,7 +90,7 @@ def cruise_speed(path: Floats, station_m: float, comfort_mps2: float, sideways_m
 
 @compiled
 def leaders(path: Floats, station_m: float, offset_m: float, state: Floats, vehicle: Bools) -> Floats:
-    """The vehicles ahead that are in the ego's way along its path right now.
+    """Returns the vehicles that are in the ego's way along its path now.
 
     Returns:
       `leaders x 3`: column, distance from the front bumper to the body, m, and speed along the path, m/s.

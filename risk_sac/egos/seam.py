@@ -1,10 +1,8 @@
-"""The seam between us and an ego that drives itself: what it is told, and what it may answer.
+"""Interface of an ego that drives itself: what it perceives, and what it may command.
 
-Who perceives what stays ours: an ego gets what the line-of-sight sensor and its memory have. How it moves is ours too:
-a bicycle with limits (`risk_sac.egos.bicycle`) does as much of a command as a car can.
-
-Everything is metric and mathematical: x east, y north, heading 0 = east, counter-clockwise, radians, and a position is
-the centre of a body.
+An ego gets what the line-of-sight sensor and its memory have, and a bicycle with limits (`risk_sac.egos.bicycle`) does
+as much of a command as a car can. Units are metric: x east, y north, heading 0 = east, counter-clockwise, radians; a
+position is the centre of a body.
 """
 
 from dataclasses import dataclass
@@ -33,7 +31,7 @@ class Vehicle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Episode:
-    """What an ego is told before it drives."""
+    """What an ego gets before it drives."""
 
     seed: int  # of all chance in the ego: the same seed and the same perceived frames have to give the same commands
     net: str  # the road network's file
@@ -45,9 +43,8 @@ class Episode:
 class Perceived(NamedTuple):
     """What an ego knows at one moment. Every array has `n` columns, of which the first is the ego itself.
 
-    Rows of `state` are those of `risk_sac.types`. Of others it has X, Y, HEADING, VX, VY, SPEED, LENGTH and WIDTH;
-    LATERAL, ACCEL and OFFSET, which no sensor tells, are NaN. Who is out of sight, but remembered, is where the ego
-    expects it.
+    Rows of `state` are those of `risk_sac.types`; LATERAL, ACCEL and OFFSET of others, which no sensor measures, are
+    NaN. An actor that is out of sight, but remembered, is where the ego expects it.
     """
 
     time_s: float  # since the simulation began
@@ -81,18 +78,18 @@ Command = Control | Trajectory
 
 
 class Ego(Protocol):
-    """Who drives, in lock-step: one command for each perceived frame, which holds for one step.
+    """Driver in lock-step: one command for each perceived frame, which holds for one step.
 
-    The class says three things of itself as plain literals, which are read without running it: `version`,
-    `response_time_s` (the time within which it responds to a danger, from which its requirements follow) and, if it is
-    not 60, `deadline_s` for each of its answers. The first line of its docstring is its summary.
+    The class declares as literals, which are read without running it: `version`, `response_time_s` (within which it
+    responds to a danger, from which its requirements follow) and, if it is not 60, `deadline_s` for each answer. The
+    first line of its docstring is its summary.
     """
 
     def reset(self, episode: Episode) -> None:
-        """Begins an episode; it is about to drive."""
+        """Begins an episode."""
 
     def act(self, perceived: Perceived) -> Command:
-        """What to do in the next step."""
+        """Returns the command for the next step."""
 
     def close(self) -> None:
-        """Lets go of what it holds; nothing comes afterwards."""
+        """Releases what it holds."""

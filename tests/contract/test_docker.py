@@ -4,14 +4,12 @@ import subprocess
 import tomllib
 from pathlib import Path
 
-import jsonschema_rs
 import pytest
 import yaml
 
 from risk_sac.config import CampaignSpec
 from service.host.environment import BEGIN, END, with_table
 from service.settings import ServiceSettings
-from tests.contract.kuberay import RAY_CLUSTER
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "service" / "README.md").read_text(encoding="utf-8")
@@ -105,8 +103,7 @@ def manifest():
     return {each["kind"]: each for each in yaml.safe_load_all(KUBERAY)}
 
 
-def test_manifest_for_kuberay_is_what_its_operator_takes(manifest):
-    jsonschema_rs.validator_for(RAY_CLUSTER).validate(manifest["RayCluster"])
+def test_manifest_for_kuberay_has_the_version_of_ray_that_the_image_installs(manifest):
     spec = manifest["RayCluster"]["spec"]
     (extra,) = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["ray"]
     assert extra == f"ray=={spec['rayVersion'].rpartition('.')[0]}.*"

@@ -5,14 +5,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.show import draw, draw_recording
-from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
-from risk_sac.run_folder.results import Contact
-from risk_sac.run_folder.series import read_series
-from risk_sac.train import train
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 
 
@@ -119,25 +114,3 @@ def test_drawing_writes_a_picture_of_sensible_size(tmp_path: Path) -> None:
 def test_picture_of_an_unknown_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"contact.doc'; wanted a name that ends in .png"):
         draw("mixed", Recording(synthetic_contact(), synthetic_series()), tmp_path / "contact.doc")
-
-
-class UntilContact:
-    contact: Contact | None = None
-
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
-        if record.collision is not None:
-            self.contact = Contact.of("low-random-0", record)
-            assert series is not None
-            assert self.contact.series == f"failures/{series.name}"
-
-    def should_stop(self) -> bool:
-        return self.contact is not None
-
-
-def test_contact_of_a_real_run_can_be_drawn(tmp_path: Path) -> None:
-    observer = UntilContact()
-    train(RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=200)), tmp_path, observer)
-    assert observer.contact is not None
-    series = read_series(tmp_path / observer.contact.series)
-    draw("low", Recording(observer.contact, series), tmp_path / "contact.png")
-    assert min(png_size(tmp_path / "contact.png")) >= 800
