@@ -28,7 +28,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
 
 
 def test_a_format_that_cannot_hold_it_names_those_that_can(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "gif holds one failure" in refused(capsys, tmp_path, "--format", "gif", "--out", tmp_path / "x.gif")
+    assert "since gif holds one" in refused(capsys, tmp_path, "--format", "gif", "--out", tmp_path / "x.gif")
     assert "got 2 bundles" in refused(capsys, BUNDLE, BUNDLE, "--format", "gif", "--out", tmp_path / "x.gif")
     assert not list(tmp_path.iterdir())
     with pytest.raises(
