@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from risk_sac.config import FamilyName
-from risk_sac.failures.recording import Recording
+from risk_sac.failures.recording import BOX, Recording, on_body
 from risk_sac.failures.roads import roads_of
 from risk_sac.types import Kind, Role
 
@@ -80,15 +80,10 @@ def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, *, in
 
 
 def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **style: object) -> None:
-    x, y, heading = recording.pose(actor, time_s)
-    half_length, half_width = recording["length_m"][actor] / 2, recording["width_m"][actor] / 2
-    cos, sin = np.cos(heading), np.sin(heading)
-    corners = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)]) * (half_length, half_width)
-    outline = corners @ np.array([(cos, sin), (-sin, cos)]) + (x, y)
-    axis.add_patch(Polygon(outline, **style))  # type: ignore[arg-type]
-    front = np.array([(0.45, 1), (1, 0), (0.45, -1)]) * (half_length, half_width)  # an arrow head tells where it heads
+    pose, size = recording.pose(actor, time_s), (recording["length_m"][actor], recording["width_m"][actor])
+    axis.add_patch(Polygon(on_body(pose, size, BOX), **style))  # type: ignore[arg-type]
     if recording.series["kind"][actor] == Kind.VEHICLE:
-        arrow = front @ np.array([(cos, sin), (-sin, cos)]) + (x, y)
+        arrow = on_body(pose, size, [(0.45, 1), (1, 0), (0.45, -1)])
         axis.plot(arrow[:, 0], arrow[:, 1], color=str(style["edgecolor"]), linewidth=0.6)
 
 

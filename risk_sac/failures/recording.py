@@ -1,7 +1,7 @@
 """A contact and its time series, with time counted from the contact."""
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,6 +14,15 @@ from risk_sac.run_folder.results import Contact
 from risk_sac.types import Floats
 
 Series = Mapping[str, NDArray[Any]]
+BOX = [(1, 1), (-1, 1), (-1, -1), (1, -1)]  # corners of a body
+
+
+def on_body(pose: Sequence[float], size_m: tuple[float, float], corners: Sequence[tuple[float, float]]) -> Floats:
+    """Returns places on a body; its corners are in half lengths ahead and half widths to the left."""
+    x, y, heading = pose
+    cos, sin = np.cos(heading), np.sin(heading)
+    placed: Floats = np.array(corners) * (np.array(size_m) / 2) @ np.array([(cos, sin), (-sin, cos)]) + (x, y)
+    return placed
 
 
 def actions_of(series: Series) -> Floats:

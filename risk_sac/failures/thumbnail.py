@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from risk_sac.failures.recording import Recording
+from risk_sac.failures.recording import BOX, Recording, on_body
 from risk_sac.failures.roads import Surface
 from risk_sac.types import Floats, Kind
 
@@ -88,22 +88,17 @@ def _actor(view: _View, recording: Recording, actor: int, colour: str) -> Iterat
 
 def _body(view: _View, recording: Recording, actor: int, style: str) -> Iterator[str]:
     """Draws a body at the contact, that of a vehicle with an arrow head to the front."""
-    x, y, heading = recording.pose(actor, 0.0)
-    if not np.isfinite((x, y, heading)).all():
+    pose, size = recording.pose(actor, 0.0), (recording["length_m"][actor], recording["width_m"][actor])
+    if not np.isfinite(pose).all():
         return
-    half = np.array((recording["length_m"][actor], recording["width_m"][actor])) / 2
     if recording.series["kind"][actor] == Kind.PEDESTRIAN:
-        ((left, top),) = view(np.array([(x, y)]))
-        yield f'<circle {style} cx="{left:.1f}" cy="{top:.1f}" r="{max(half.max() * view.scale, LEAST_RADIUS):.1f}"/>'
+        ((left, top),) = view(np.array([pose[:2]]))
+        radius = max(max(size) / 2 * view.scale, LEAST_RADIUS)
+        yield f'<circle {style} cx="{left:.1f}" cy="{top:.1f}" r="{radius:.1f}"/>'
         return
-    cos, sin = np.cos(heading), np.sin(heading)
-
-    def placed(corners: list[tuple[float, float]]) -> str:
-        """Of `corners` in half lengths ahead and half widths to the left."""
-        return _text(view(corners * half @ np.array([(cos, sin), (-sin, cos)]) + (x, y)))
-
-    yield f'<polygon {style} points="{placed([(1, 1), (-1, 1), (-1, -1), (1, -1)])}"/>'
-    yield f'<polygon fill="#fff" fill-opacity=".75" points="{placed([(0.2, 0.7), (0.75, 0), (0.2, -0.7)])}"/>'
+    yield f'<polygon {style} points="{_text(view(on_body(pose, size, BOX)))}"/>'
+    head = _text(view(on_body(pose, size, [(0.2, 0.7), (0.75, 0), (0.2, -0.7)])))
+    yield f'<polygon fill="#fff" fill-opacity=".75" points="{head}"/>'
 
 
 def _line(points: Floats, colour: str, width: float, style: str) -> str:

@@ -8,7 +8,7 @@ from enum import StrEnum
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 from risk_sac.errors import ConfigError
 
@@ -124,7 +124,7 @@ def of_failure(name: FormatName, failure: "Recorded") -> Files:
       ConfigError: the format holds no single failure, lacks a package, or cannot hold this failure.
       SimulationError: the format plays it again, and it does not repeat here.
     """
-    return cast("Callable[[Recorded], Files]", _maker(name, "failure"))(failure)
+    return _maker(name, "failure")(failure)
 
 
 def of_episodes(name: FormatName, runs: Sequence[Path]) -> Files:
@@ -133,7 +133,7 @@ def of_episodes(name: FormatName, runs: Sequence[Path]) -> Files:
     Raises:
       ConfigError: the format holds one failure alone or lacks a package, or a folder holds no run.
     """
-    return cast("Callable[[Sequence[Path]], Files]", _maker(name, "episodes"))(runs)
+    return _maker(name, "episodes")(runs)
 
 
 def names(of: Literal["failure", "episodes"]) -> list[FormatName]:
@@ -153,6 +153,7 @@ def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
         raise ConfigError("format", got, remedy=format_.remedy)
 
 
-def _maker(name: FormatName, of: Literal["failure", "episodes"]) -> object:
+def _maker(name: FormatName, of: Literal["failure", "episodes"]) -> Callable[[Any], Files]:
     check_carries(name, of)
-    return import_module(f"risk_sac.failures.export.{FORMATS[name].module}").files
+    maker: Callable[[Any], Files] = import_module(f"risk_sac.failures.export.{FORMATS[name].module}").files
+    return maker

@@ -11,6 +11,7 @@ from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from risk_sac.failures.export.formats import Files
 from risk_sac.failures.export.recorded import Actor, Recorded, colour
+from risk_sac.failures.recording import BOX, on_body
 from risk_sac.failures.roads import Surface, read_surfaces
 from risk_sac.failures.sentence import sentence
 from risk_sac.types import STEP_S, Floats
@@ -107,22 +108,16 @@ def _picture(failure: Recorded, surfaces: list[Surface], frame: int, middle: Flo
 
 def _body(pen: ImageDraw.ImageDraw, placed: Placed, actor: Actor, frame: int, tone: str, *, known: bool) -> None:
     """Draws a body, that of a vehicle with a light patch to the front."""
-    cos, sin = np.cos(actor.heading_rad[frame]), np.sin(actor.heading_rad[frame])
-    turn, half = np.array([(cos, sin), (-sin, cos)]), np.array((actor.length_m, actor.width_m)) / 2
-    middle = np.array((actor.x_m[frame], actor.y_m[frame]))
-
-    def part(*corners: tuple[float, float]) -> list[tuple[float, float]]:
-        return placed(np.array(corners) * half @ turn + middle)
-
+    pose, size = (actor.x_m[frame], actor.y_m[frame], actor.heading_rad[frame]), (actor.length_m, actor.width_m)
     fill = tone if known else None
     if actor.pedestrian:
         ring = np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
-        pen.polygon(
-            placed(middle + 0.45 * np.column_stack((np.cos(ring), np.sin(ring)))), fill=fill, outline=tone, width=3
-        )
+        circle = pose[:2] + 0.45 * np.column_stack((np.cos(ring), np.sin(ring)))
+        pen.polygon(placed(circle), fill=fill, outline=tone, width=3)
         return
-    pen.polygon(part((1, 1), (-1, 1), (-1, -1), (1, -1)), fill=fill, outline=tone, width=3)
-    pen.polygon(part((0.25, 0.7), (0.75, 0), (0.25, -0.7)), fill="#ffffff" if known else tone)
+    pen.polygon(placed(on_body(pose, size, BOX)), fill=fill, outline=tone, width=3)
+    head = on_body(pose, size, [(0.25, 0.7), (0.75, 0), (0.25, -0.7)])
+    pen.polygon(placed(head), fill="#ffffff" if known else tone)
 
 
 def _caption(pen: ImageDraw.ImageDraw, failure: Recorded, frame: int) -> None:
