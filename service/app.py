@@ -76,6 +76,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
         version=__version__,
         lifespan=lifespan,
         redirect_slashes=False,
+        generate_unique_id_function=lambda route: route.name,
         docs_url=None,  # the routes have pages that need no network
         redoc_url=None,
     )

@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -9,10 +10,27 @@ from service.api.description import openapi
 from service.app import create_app
 from service.settings import ServiceSettings
 
+LONGEST = 200  # characters of what stands on one line
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes short mappings and lists of plain values on one line."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        return True
+
+    def represent_mapping(self, tag: str, mapping: Any, flow_style: bool | None = None) -> yaml.MappingNode:
+        return super().represent_mapping(tag, mapping, flow_style=len(str(mapping)) <= LONGEST)
+
+    def represent_sequence(self, tag: str, sequence: Any, flow_style: bool | None = None) -> yaml.SequenceNode:
+        plain = not any(isinstance(each, dict | list) for each in sequence)
+        return super().represent_sequence(tag, sequence, flow_style=plain or len(str(sequence)) <= LONGEST)
+
 
 def document() -> str:
     """The OpenAPI document as YAML, in the order in which the routes are declared."""
-    return yaml.safe_dump(openapi(create_app(ServiceSettings())), sort_keys=False, allow_unicode=True, width=120)
+    content = openapi(create_app(ServiceSettings()))
+    return yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=LONGEST)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,17 @@
 """The API's description, as OpenAPI."""
 
+import itertools
+import json
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
+from risk_sac.config import FamilyName, MethodName
+from risk_sac.config.methods import RunMethod
 from risk_sac.records import StateChange
 from service.api.guards.gate import HEALTH, PUBLIC
 from service.api.posted import input_schemas
@@ -29,9 +35,8 @@ _WAIT = {"Retry-After": {"description": "Seconds until asking again pays.", "sch
 _SCHEME = {"WWW-Authenticate": {"description": "`Bearer`", "schema": {"type": "string"}}}
 _Answers = dict[str, tuple[str, dict[str, Any]]]
 _FULL = "too many connections are open"
+_BODY: _Answers = {"408": ("The body comes too slowly", {}), "413": ("The body is too large", {})}
 _ALL: _Answers = {
-    "408": ("The body comes too slowly", {}),
-    "413": ("The body is too large", {}),
     "421": ("The Host header names no address of this service", {}),
     "503": (_FULL.capitalize(), _WAIT),
 }
@@ -40,6 +45,11 @@ _GUARDED: _Answers = {
     "401": ("The API key is missing, wrong or revoked", _SCHEME),
     "403": ("The API key does not reach so far, or the request comes from a foreign page", {}),
     "503": (f"The API keys are lost or damaged, as `detail` says, or {_FULL}", _WAIT),
+}
+_CHOICES: dict[str, dict[str, Any]] = {
+    "FamilyName": TypeAdapter(FamilyName).json_schema(),
+    "MethodName": TypeAdapter(MethodName).json_schema(),
+    "RunMethod": TypeAdapter(RunMethod).json_schema(),
 }
 
 
@@ -52,16 +62,17 @@ def openapi(app: FastAPI) -> dict[str, Any]:
 
 def _document(app: FastAPI) -> dict[str, Any]:
     document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
-    document["components"]["schemas"] |= campaign_schemas()
-    for posted in (PostedRegression, PostedTriage):
-        document["components"]["schemas"] |= input_schemas(posted)
-    document["components"]["schemas"] |= _event_schemas()
+    schemas = document["components"]["schemas"]
+    schemas |= campaign_schemas() | input_schemas(PostedRegression) | input_schemas(PostedTriage) | _event_schemas()
     for operations in document["paths"].values():
         for operation in operations.values():
             for status, response in operation["responses"].items():
                 if int(status) >= 400:
                     response["content"] = {"application/problem+json": response["content"]["application/json"]}
     _describe_guards(document)
+    document["components"]["schemas"] = _simplified(schemas) | _CHOICES
+    document["paths"] = _simplified(document["paths"])
+    _share(document)
     return document
 
 
@@ -75,12 +86,17 @@ def _event_schemas() -> dict[str, Any]:
 def _describe_guards(document: dict[str, Any]) -> None:
     """Adds the key, and to each operation what the guards may answer; what a route declares itself goes first."""
     document["components"]["securitySchemes"] = _SECURITY
+    # Either of them: whether a key is needed depends on the address and the keys of the server.
+    document["security"] = [{"ApiKey": []}, {}]
     for path, operations in document["paths"].items():
         answers = _ALL | ({} if path in HEALTH else _COUNTED) | ({} if path in PUBLIC else _GUARDED)
         for operation in operations.values():
-            # Either of them: whether a key is needed depends on the address and the keys of the server.
-            operation["security"] = [] if path in PUBLIC else [{"ApiKey": []}, {}]
-            for status, (description, headers) in answers.items():
+            if path in PUBLIC:
+                operation["security"] = []
+            if "\n" not in operation["description"]:
+                operation["summary"] = operation.pop("description")  # in place of the function's name
+            body = _BODY if "requestBody" in operation else {}
+            for status, (description, headers) in (body | answers).items():
                 operation["responses"].setdefault(status, _problem(description, headers))
             operation["responses"] = dict(sorted(operation["responses"].items()))
 
@@ -88,3 +104,53 @@ def _describe_guards(document: dict[str, Any]) -> None:
 def _problem(description: str, headers: dict[str, Any]) -> dict[str, Any]:
     content = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
     return {"description": description, **({"headers": headers} if headers else {}), "content": content}
+
+
+def _simplified(node: Any) -> Any:
+    """Drops the titles that pydantic makes of names, and says the same in fewer words."""
+    if isinstance(node, list):
+        return [_simplified(child) for child in node]
+    if not isinstance(node, dict):
+        return node
+    node = {key: _simplified(child) for key, child in node.items()}
+    if isinstance(node.get("title"), str):
+        del node["title"]
+    if "in" in node and "schema" in node:  # a parameter, whose description FastAPI repeats
+        node["schema"].pop("description", None)
+    if "$ref" in node and isinstance(node.get("default"), dict):  # which the fields of the model tell
+        del node["default"]
+    match node.get("anyOf"):
+        case [{"type": str(kind)} as only, {"type": "null"}] if "enum" not in only:
+            node.pop("anyOf")
+            node |= only | {"type": [kind, "null"]}
+    for name, choice in _CHOICES.items():
+        if choice.items() <= node.items():
+            reference = {"$ref": f"#/components/schemas/{name}"}
+            return reference | {key: child for key, child in node.items() if key not in choice}
+    return node
+
+
+def _share(document: dict[str, Any]) -> None:
+    """Moves parameters, headers and responses that occur more than once to the components."""
+    operations = [operation for path in document["paths"].values() for operation in path.values()]
+    responses = [operation["responses"] for operation in operations]
+    headers = [response["headers"] for each in responses for response in each.values() if "headers" in response]
+    components = document["components"]
+    components["parameters"] = _shared("parameters", [operation.get("parameters", []) for operation in operations])
+    components["headers"] = _shared("headers", headers)
+    components["responses"] = _shared("responses", responses)
+
+
+def _shared(kind: str, places: Sequence[Any]) -> dict[str, Any]:
+    """Replaces what occurs more than once in dictionaries or lists by references; returns what they refer to."""
+    found = [(each, key) for each in places for key in (each if isinstance(each, dict) else range(len(each)))]
+    counts = Counter(json.dumps(each[key]) for each, key in found)
+    shared: dict[str, Any] = {}
+    for each, key in found:
+        item = each[key]
+        if counts[json.dumps(item)] > 1:
+            base = item.get("name") or str(key)
+            names = itertools.chain([base], (f"{base}-{number}" for number in itertools.count(2)))
+            name = next(name for name in names if shared.setdefault(name, item) == item)
+            each[key] = {"$ref": f"#/components/{kind}/{name}"}
+    return shared

@@ -13,7 +13,7 @@ from service.api.answers.problems import ProblemError
 from service.schemas.problems import Reason
 
 MOST_MISTAKES = 50  # that a refusal names one by one
-REFERENCE = "#/components/schemas/{model}-Input"
+REFERENCE = "#/components/schemas/{model}"
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -62,8 +62,8 @@ def documented(model: type[BaseModel]) -> dict[str, Any]:
 def input_schemas(model: type[BaseModel]) -> dict[str, Any]:
     """JSON schemas of the body and its parts, as components of the API's description."""
     schema = model.model_json_schema(ref_template=REFERENCE)
-    parts = schema.pop("$defs", {}) | {model.__name__: schema}
-    return {f"{name}-Input": part for name, part in parts.items()}
+    parts: dict[str, Any] = schema.pop("$defs", {})
+    return parts | {model.__name__: schema}
 
 
 def _without_repeats(pairs: list[tuple[str, Any]]) -> None:

@@ -64,9 +64,14 @@ def documented_campaign() -> dict[str, Any]:
 def campaign_schemas() -> dict[str, Any]:
     """JSON schemas of both kinds, as components of the API's description."""
     schemas = input_schemas(CampaignSpec)
-    plain, ground = schemas[f"{CampaignSpec.__name__}-Input"], input_schemas(Ground)[f"{Ground.__name__}-Input"]
-    fields = {name: field for name, field in plain["properties"].items() if name != "families"}
-    schemas[f"{ON_MAP}-Input"] = plain | {
+    plain, ground = schemas[CampaignSpec.__name__], input_schemas(Ground)[Ground.__name__]
+    reference = f"{REFERENCE}/properties/{{name}}"
+    fields = {
+        name: {"$ref": reference.format(model=CampaignSpec.__name__, name=name)}
+        for name in plain["properties"]
+        if name != "families"
+    }
+    schemas[ON_MAP] = plain | {
         "title": ON_MAP,
         "description": "A pattern at places of an uploaded network × methods × seeds on one equal budget.",
         "properties": ground["properties"] | fields,

@@ -298,7 +298,7 @@ def test_an_admin_stops_and_removes_what_any_project_has_begun(world):
 def test_what_an_admin_may_is_documented(world):
     paths = json.loads(ask(world, "GET", "/openapi.json").text)["paths"]
     for path, method in ((f"{CAMPAIGN}/cancel", "post"), (CAMPAIGN, "delete"), (NETWORK, "delete")):
-        assert "With an `admin` key any project's." in paths[path][method]["description"]
+        assert "With an `admin` key any project's." in paths[path][method]["summary"]
 
 
 def test_a_cursor_tells_nothing_of_other_projects_and_is_no_use_to_them(world):
