@@ -18,14 +18,7 @@ BUDGET = ("episodes", "evaluation_episodes", "cpu_s", "least_episodes")
 
 
 def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, methods: str, seeds: int) -> None:
-    """Adds the flags.
-
-    Args:
-      parser: of the command.
-      families: what the help says about its default.
-      methods: the same.
-      seeds: how many there are by default.
-    """
+    """Add the flags of a campaign; the help names the defaults that are given here."""
     parser.add_argument("--families", nargs="+", metavar="low|mixed|dense", help=f"(default: {families})")
     parser.add_argument("--methods", nargs="+", metavar="NAME", help=f"of {', '.join(METHODS)} (default: {methods})")
     parser.add_argument("--seeds", type=int, metavar="N", help=f"how many (default: {seeds})")
@@ -63,20 +56,12 @@ def add_ego_flag(parser: argparse.ArgumentParser) -> None:
 
 
 def ego_flag(options: argparse.Namespace) -> dict[str, Any]:
-    """The field of a run or a campaign; None where the flag was not given.
-
-    Raises:
-      ConfigError: it names no ego.
-    """
+    """The ego of a run or a campaign; None where the flag was not given."""
     return {"ego": None if options.ego is None else read_ego(options.ego).model_dump(mode="json")}
 
 
 def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:
-    """Fields of a campaign; None where a flag was not given.
-
-    Raises:
-      ConfigError: so many seeds are too many.
-    """
+    """Fields of a campaign; None where a flag was not given."""
     flags = {"families": options.families, "methods": options.methods} | budget_flags(options)
     return flags | {"seeds": _seeds(options, seeds), "iid": _iid(options)}
 
@@ -103,12 +88,7 @@ MAP_HELP = "a SUMO net, an OSM extract or OpenDRIVE, also gzipped"
 
 
 def add_map_flags(parser: argparse.ArgumentParser, *, several: bool) -> None:
-    """Adds the flags.
-
-    Args:
-      parser: of the command.
-      several: whether all places of a pattern can be asked for.
-    """
+    """Add the flags of a place; `several`: all places of a pattern can be asked for."""
     parser.add_argument("--network", type=Path, metavar="MAP", help=f"in place of a family: {MAP_HELP}")
     parser.add_argument("--pattern", choices=list(FINDERS), help="what is played on the map")
     parser.add_argument("--place", metavar="ID", help="where; `risk-sac places MAP` lists them")

@@ -45,14 +45,7 @@ class Board:
         self._tasks: dict[str, TaskID] = {}
 
     def show(self, done: int, total: int, found: str, at_work: Mapping[str, tuple[int, int]]) -> None:
-        """Draws the present state.
-
-        Args:
-          done: episodes of all runs.
-          total: the same, once they have ended.
-          found: said beside them.
-          at_work: done and total of each run at work, by its name.
-        """
+        """Draw the present state; `at_work` has done and total of each run at work, by its name."""
         self._bar.update(self._all, completed=done, total=total, found=found)
         for name in self._tasks.keys() - at_work.keys():
             self._bar.remove_task(self._tasks.pop(name))

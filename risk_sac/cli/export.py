@@ -54,11 +54,7 @@ def _failure(name: FormatName, bundle: Path) -> Files:
 
 
 def _runs(folders: list[Path]) -> Iterator[Path]:
-    """The folders of runs among some, and right below them.
-
-    Raises:
-      ConfigError: one holds none.
-    """
+    """The folders of runs among some, and right below them."""
     for folder in folders:
         found = [folder] if (folder / RESULTS).exists() else sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
         if not found:

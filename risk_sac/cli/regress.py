@@ -130,11 +130,7 @@ def _cases(paths: list[Path], ego: EgoConfig) -> Iterator["Regressed"]:
 
 
 def read_baseline(file: Path, flag: str = "--baseline") -> Regression:
-    """The cases that `--out` wrote.
-
-    Raises:
-      ConfigError: of the flag; there are none.
-    """
+    """Read the cases that `--out` wrote."""
     try:
         return Regression.model_validate_json(file.read_bytes())
     except FileNotFoundError as error:

@@ -60,11 +60,7 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def format_of(file: Path) -> Format:
-    """What a report is written as, by the name of its file.
-
-    Raises:
-      ConfigError: by none of the names there are.
-    """
+    """What a report is written as, by the name of its file."""
     if file.suffix not in FORMATS:
         raise ConfigError("--out", f"{file.name!r}", f"a name that ends in {', '.join(FORMATS)}")
     return FORMATS[file.suffix]

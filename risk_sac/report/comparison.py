@@ -178,7 +178,7 @@ def _headline(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[
             method: {run.spec.seed: _paid(run) for run in of_method}
             for method, of_method in _by_method(family, methods, runs).items()
         }
-        yield from corrected(paired_tests(family, "search", PAID_FOR, first, values))
+        yield from corrected(list(paired_tests(family, "search", PAID_FOR, first, values)))
 
 
 def _paid(run: FinishedRun) -> float | None:

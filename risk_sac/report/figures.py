@@ -14,7 +14,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.metrics import METRICS, WINDOW, Metric, preventable
 from risk_sac.records import EpisodeRecord, Outcome, Phase
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.runs import FinishedRun, cpu_s
+from risk_sac.report.runs import FinishedRun, Found, cpu_s
 from risk_sac.types import Floats
 
 Format = Literal["png", "svg"]
@@ -23,14 +23,14 @@ SETTLED = 10  # episodes before which a windowed rate is mostly noise
 TIMED_S, TIMES = 30.0, 121  # processor time that is drawn, and at how many points of it
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Curve:
     """A figure over the episodes of the search, or over the processor time it took."""
 
     name: str
     label: str
     values: Callable[[FinishedRun], Floats]  # one per search episode
-    methods: Callable[[MethodName], bool]
+    methods: Callable[[MethodName], bool] = lambda method: True  # which have one
     log: bool = False
     top: float | None = None
     first: int = 1  # episode at which it begins
@@ -69,47 +69,29 @@ def _window_rate(run: FinishedRun, counted: Callable[[EpisodeRecord], bool]) -> 
     return rates
 
 
+def _over_search(value: Callable[[EpisodeRecord], float]) -> Callable[[FinishedRun], Floats]:
+    return lambda run: np.array([value(record) for record in run.phase("search")])
+
+
+def _found(count: Callable[[Found], int]) -> Callable[[FinishedRun], Floats]:
+    return lambda run: np.array([float(count(found)) for found in run.found])
+
+
 CURVES = (
+    Curve("ecr", f"ECR, newest {WINDOW} episodes", window_ecr, top=1.0, first=SETTLED),
+    Curve("pcr", f"PCR, newest {WINDOW} episodes", window_pcr, top=1.0, first=SETTLED),
+    Curve("preventable_found", "distinct preventable failures", _found(lambda found: found.preventable), timed=True),
+    Curve("distinct_found", "distinct failures", _found(lambda found: found.distinct), timed=True),
     Curve(
-        name="ecr",
-        label=f"ECR, newest {WINDOW} episodes",
-        values=window_ecr,
-        methods=lambda method: True,
-        top=1.0,
-        first=SETTLED,
-    ),
-    Curve(
-        name="pcr",
-        label=f"PCR, newest {WINDOW} episodes",
-        values=window_pcr,
-        methods=lambda method: True,
-        top=1.0,
-        first=SETTLED,
-    ),
-    Curve(
-        name="preventable_found",
-        label="distinct preventable failures",
-        values=lambda run: np.array([float(found.preventable) for found in run.found]),
-        methods=lambda method: True,
-        timed=True,
-    ),
-    Curve(
-        name="distinct_found",
-        label="distinct failures",
-        values=lambda run: np.array([float(found.distinct) for found in run.found]),
-        methods=lambda method: True,
-        timed=True,
-    ),
-    Curve(
-        name="lambda",
-        label="dual variable λ",
-        values=lambda run: np.array([record.dual_variable for record in run.phase("search")]),
+        "lambda",
+        "dual variable λ",
+        _over_search(lambda record: record.dual_variable),
         methods=lambda method: METHODS[method].lagrangian,
     ),
     Curve(
-        name="alpha",
-        label="temperature α",
-        values=lambda run: np.array([record.temperature for record in run.phase("search")]),
+        "alpha",
+        "temperature α",
+        _over_search(lambda record: record.temperature),
         methods=lambda method: METHODS[method].stochastic,
         log=True,
     ),
@@ -151,11 +133,7 @@ def figure_bytes(comparison: Comparison, name: str, format_: Format) -> bytes:
 
 
 def figure_files(comparison: Comparison, name: str, formats: Sequence[Format] = FORMATS) -> list[bytes]:
-    """One figure as a file of each format; the same comparison gives the same bytes.
-
-    Raises:
-        ConfigError: there is no such figure.
-    """
+    """One figure as a file of each format; the same comparison gives the same bytes."""
     from risk_sac.report.drawing import draw  # here, because it loads matplotlib
 
     figures = _figures(comparison)

@@ -92,11 +92,7 @@ class Table(Record):
 
 
 def write_report(comparison: Comparison, folder: Path) -> None:
-    """Replaces `table.json`, `table.md`, `table.csv` and `figures/` in a folder.
-
-    Raises:
-        OSError: it cannot be written.
-    """
+    """Replace `table.json`, `table.md`, `table.csv` and `figures/` in a folder."""
     files = {
         "table.json": table_json(comparison).encode(),
         "table.md": table_markdown(comparison).encode(),

@@ -56,43 +56,30 @@ Values = Mapping[int, float | None]
 
 def paired_tests(
     family: FamilyName, phase: Phase, metric: MetricName, reference: MethodName, values: Mapping[MethodName, Values]
-) -> list[PairedTest]:
-    """The reference against every other method in one metric; not corrected."""
-    return [
-        _paired_test(family, phase, metric, (reference, values[reference]), (method, values[method]))
-        for method in values
-        if method != reference
-    ]
-
-
-def _paired_test(
-    family: FamilyName,
-    phase: Phase,
-    metric: MetricName,
-    ours: tuple[MethodName, Values],
-    theirs: tuple[MethodName, Values],
-) -> PairedTest:
-    pairs = []
-    for seed in sorted(ours[1].keys() & theirs[1].keys()):
-        one, other = ours[1][seed], theirs[1][seed]
-        if one is not None and other is not None:
-            pairs.append((one, other))
-    differences = [one - other for one, other in pairs]
-    low, high = bootstrap_interval(differences, RESAMPLING_SEED) if len(pairs) > 1 else (None, None)
-    return PairedTest(
-        family=family,
-        phase=phase,
-        metric=metric,
-        reference=ours[0],
-        method=theirs[0],
-        pairs=len(pairs),
-        difference=sum(differences) / len(pairs) if pairs else None,
-        low=low,
-        high=high,
-        p=wilcoxon_p(differences) if len(pairs) > 1 else None,
-        p_holm=None,
-        a12=vargha_delaney(*zip(*pairs, strict=True)) if pairs else None,
-    )
+) -> Iterator[PairedTest]:
+    """Test the reference against every other method in one metric; not corrected."""
+    ours = values[reference]
+    for method, theirs in values.items():
+        if method == reference:
+            continue
+        both = [(ours[seed], theirs[seed]) for seed in sorted(ours.keys() & theirs.keys())]
+        pairs = [(one, other) for one, other in both if one is not None and other is not None]
+        differences = [one - other for one, other in pairs]
+        low, high = bootstrap_interval(differences, RESAMPLING_SEED) if len(pairs) > 1 else (None, None)
+        yield PairedTest(
+            family=family,
+            phase=phase,
+            metric=metric,
+            reference=reference,
+            method=method,
+            pairs=len(pairs),
+            difference=sum(differences) / len(pairs) if pairs else None,
+            low=low,
+            high=high,
+            p=wilcoxon_p(differences) if len(pairs) > 1 else None,
+            p_holm=None,
+            a12=vargha_delaney(*zip(*pairs, strict=True)) if pairs else None,
+        )
 
 
 def corrected(tests: Sequence[PairedTest]) -> Iterator[PairedTest]:
@@ -163,13 +150,6 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 def vargha_delaney(first: Sequence[float], second: Sequence[float]) -> float:
     """A12: the chance that a value of the first is larger than one of the second, ties counted half.
-
-    Args:
-        first: at least one.
-        second: at least one.
-
-    Returns:
-        In [0, 1]; 0.5 means no difference.
 
     Source: Vargha & Delaney 2000, A critique and improvement of the CL common language effect size statistics.
     """

@@ -105,12 +105,7 @@ def read_run(folder: Path) -> FinishedRun:
 
 
 def read_records(file: Path) -> tuple[EpisodeRecord, ...]:
-    """Read a file of episodes, one JSON object per line.
-
-    Raises:
-        ConfigError: a line is something else.
-        OSError: it cannot be read.
-    """
+    """Read a file of episodes, one JSON object per line."""
     content = file.read_bytes()
     try:
         return tuple(records_from_lines(content))

@@ -126,12 +126,7 @@ def excesses(total: Total, bounds: Bounds) -> Iterator[str]:
 
 
 def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
-    """The exit status, and why.
-
-    Args:
-      results: of a campaign, which counts as measured once it has succeeded.
-      bounds: on the rates of every family and method.
-    """
+    """Judge a campaign, which counts as measured once it has succeeded: the exit status, and why."""
     if results.complete and results.state != "succeeded":
         return COULD_NOT_RUN, f"the campaign {_WORDS.get(results.state, results.state)}: not all of it was measured"
     if not bounds:

@@ -18,16 +18,9 @@ from risk_sac.client import Episode, Results, RunMetrics, RunResult, Total
 def junit(
     results: Results, service_url: str, url: str, bounds: Bounds, failures: Mapping[str, Sequence[Episode]]
 ) -> JUnitXml:
-    """The report of a campaign.
+    """Write the report of a campaign; `failures` has the first failures of a run by its id.
 
     A run is an error where it failed or was cancelled, and names its failures whatever the bounds are.
-
-    Args:
-      results: of the campaign.
-      service_url: where the service is.
-      url: of the campaign, for whoever reads the report.
-      bounds: on the rates of each family and method.
-      failures: the first failures of a run, by its id.
     """
     named = {
         run.id: _named(run, service_url, url, results.campaign_id, failures.get(run.id, ())) for run in results.runs

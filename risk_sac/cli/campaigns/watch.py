@@ -46,12 +46,7 @@ def add_watch_flags(parser: argparse.ArgumentParser) -> None:
 
 
 def prepare(options: argparse.Namespace) -> None:
-    """Checks the bounds and makes the folder of the report, so that nothing is waited for in vain.
-
-    Raises:
-      ConfigError: nothing could keep the bounds.
-      OSError: the folder cannot be made.
-    """
+    """Check the bounds and make the report's folder, so that nothing is waited for in vain."""
     Bounds.of(options)
     if options.junit is not None:
         options.junit.parent.mkdir(parents=True, exist_ok=True)

@@ -150,13 +150,7 @@ def axis_of(parameter: Parameter, whole: Parameter, bins: int) -> Axis:
 
 
 def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Coverage:
-    """Count what these episodes looked at.
-
-    Args:
-      family: of their scenes.
-      odd: the campaign's, which narrows the family's.
-      records: episodes; those from before the family had all its parameters are left out.
-    """
+    """Count what these episodes looked at; those from before the family had all its parameters are left out."""
     whole = intersect(family.odd, odd)
     space = narrow(family.space, whole)
     known = [record for record in records if set(space.names) <= record.scene.keys()]

@@ -66,11 +66,7 @@ class Evidence(Record):
 
 
 def gathered(comparison: Comparison) -> Evidence:
-    """Gather the evidence of the runs that have finished.
-
-    Raises:
-      ConfigError: a run of the i.i.d. phase holds other episodes.
-    """
+    """Gather the evidence of the runs that have finished."""
     spec = comparison.spec
     found: dict[FamilyName, FamilyCoverage] = {}
     for family in spec.families:

@@ -51,15 +51,7 @@ class Drawing(NamedTuple):
 
 
 def draw(run: FinishedRun, folder: Path | None, index: int) -> Drawing:
-    """The failure of an episode, from above.
-
-    What is lost leaves no hole in a report: it says in the picture's place what is missing.
-
-    Args:
-      run: that found it.
-      folder: of the run; None where nobody knows it.
-      index: of the episode.
-    """
+    """Draw the failure of an episode from above, or say what is missing; `folder`: of its run."""
     if folder is None:
         return Drawing(None, "the folder of its run is not there")
     record = next(each for each in run.records if each.index == index)

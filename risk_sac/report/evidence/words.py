@@ -56,10 +56,7 @@ def _sight(ego: EgoConfig) -> Iterator[str]:
 
 
 def odd_in_words(family: Family, odd: Odd) -> Iterator[tuple[str, str]]:
-    """The fields of the ODD that a family and a campaign allow together, and what each allows.
-
-    A field that has been added since has no words yet, and stands under its own name.
-    """
+    """The fields of the ODD that a family and a campaign allow together, and what each allows."""
     whole = intersect(family.odd, odd)
     for branch in type(whole).model_fields:
         for name in type(getattr(whole, branch)).model_fields:

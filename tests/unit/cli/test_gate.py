@@ -39,7 +39,6 @@ TOTAL = {
     "contacts_by_second": [],
 }
 FEW = {"episodes": 60, "failures": 3, "ecr": 0.05, "ecr_low": 0.017, "ecr_high": 0.137}
-MANY = {"method": "random", "failures": 200, "ecr": 0.2, "ecr_high": 0.226}
 HINT = "\nMore episodes narrow an interval; --judge-by rate ignores it."
 
 
