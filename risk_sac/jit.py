@@ -5,6 +5,7 @@ keep the measures from costing several times the simulation.
 """
 
 import hashlib
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -14,35 +15,34 @@ import numba
 Function = TypeVar("Function", bound=Callable[..., Any])
 SETTINGS = vars(numba.config)
 HERE = Path(__file__).parent
-COMPILED = (  # where compiled functions are, and the constants that are compiled into them
-    "geometry.py",
-    "jit.py",
-    "observation.py",
-    "observation_layout.py",
-    "types.py",
-    "agents/normalisation.py",
-    "agents/priority.py",
-    "agents/sum_tree.py",
-    "egos/bicycle.py",
-    "egos/pilot.py",
-    "egos/road.py",
-    "risk/*.py",
-    "scenario/layout.py",
-    "scenario/limits.py",
-    "sim/*.py",
-    "verdicts/*.py",
-)
+IMPORT = re.compile(r"^ *from risk_sac\.([\w.]+) import", re.MULTILINE)
+
+
+def _sources() -> dict[Path, str]:
+    """The files with compiled functions, and all that these import: functions and constants are compiled into them."""
+    texts = {path: path.read_text() for path in HERE.rglob("*.py")}
+    found: dict[Path, str] = {}
+    pending = [path for path, text in texts.items() if "@compiled" in text]
+    while pending:
+        path = pending.pop()
+        if path in found or path not in texts:
+            continue
+        found[path] = texts[path]
+        for name in IMPORT.findall(texts[path]):
+            module = HERE.joinpath(*name.split("."))
+            pending += [module.with_suffix(".py"), module / "__init__.py"]
+    return found
 
 
 def _cache_folder() -> str:
-    """A folder for what these sources compile to.
+    """A folder for what the sources of today compile to.
 
     numba looks at a function's own file only: after a change in a file whose functions it calls, the function would be
     taken from disk with the old ones in it.
     """
     digest = hashlib.sha256()
-    for source in sorted(path for pattern in COMPILED for path in HERE.glob(pattern)):
-        digest.update(source.read_bytes())
+    for _, text in sorted(_sources().items()):
+        digest.update(text.encode())
     return str(Path(SETTINGS["CACHE_DIR"] or HERE / "__pycache__") / digest.hexdigest()[:16])
 
 
