@@ -28,8 +28,7 @@ from risk_sac.risk.realism import adversaries_cost, broken_hard_rule
 from risk_sac.risk.reward import risk_reward
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.family import LEAD_IN_S
-from risk_sac.scenario.layout import Layout
+from risk_sac.scenario.layout import LEAD_IN_S, Layout
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries

@@ -7,8 +7,7 @@ import numpy as np
 
 from risk_sac.agents.replay import Transition
 from risk_sac.scenario.family import Family
-from risk_sac.scripts.motions import SIZE, Genes, act, cue, is_over
-from risk_sac.scripts.seen import Seen, adversaries_seen
+from risk_sac.scripts.motions import SIZE, Genes, Seen, act, adversaries_seen, cue, is_over
 from risk_sac.types import STEP_S, Floats, Vector
 
 PASSIVE = 0.4  # an adversary whose gene `active` is smaller does nothing, unless it is the largest of all

@@ -11,8 +11,7 @@ from risk_sac.config import METHODS
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.maps.convert import present_net
-from risk_sac.scenario.maps.finder import FINDERS
-from risk_sac.scenario.maps.keep import Map
+from risk_sac.scenario.maps.finder import FINDERS, Map
 
 BUDGET = ("episodes", "evaluation_episodes", "cpu_s", "least_episodes")
 

@@ -15,9 +15,8 @@ from rich.table import Table
 from risk_sac.cli.campaign_flags import MAP_HELP
 from risk_sac.cli.console import FAILED, OK, Commands, console, counted
 from risk_sac.scenario.maps.convert import present_net
-from risk_sac.scenario.maps.finder import FINDERS, survey
+from risk_sac.scenario.maps.finder import FINDERS, Map, survey
 from risk_sac.scenario.maps.found import TITLES, Fit, Misfit, Pattern, Survey
-from risk_sac.scenario.maps.keep import Map
 from risk_sac.scenario.maps.net import read_net
 
 SHOWN = 20

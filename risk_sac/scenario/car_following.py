@@ -6,10 +6,9 @@ Source: RISK-SAC, Sec. IV-A.2.
 from collections.abc import Mapping
 
 from risk_sac.scenario.family import EGO, Family, at_most, friction, initial_speed, offset_of, road_odd
-from risk_sac.scenario.layout import CAR_LENGTH_M, Layout, VehicleStart
+from risk_sac.scenario.layout import CAR_LENGTH_M, Layout, VehicleStart, surroundings, vehicle
 from risk_sac.scenario.place import Stretch, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.scenario.starting import surroundings, vehicle
 from risk_sac.types import Role
 
 BEHIND_M, AHEAD_M = 15.0, 25.0  # of the neighbours' fronts from the ego's

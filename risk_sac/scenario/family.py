@@ -9,7 +9,6 @@ from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.place import Signal
 from risk_sac.scenario.space import Parameter, SceneSpace
 
-LEAD_IN_S = 1.5  # in which SUMO drives everybody, before the adversaries are released to the policy
 EGO = "ego"
 WALK_OFFSET_M = 1.9  # of a pedestrian from the middle of its way, along the road, at most
 

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from risk_sac.config import CrossingType, SignalType
 from risk_sac.scenario.family import (
     EGO,
-    LEAD_IN_S,
     Family,
     at_most,
     friction,
@@ -22,10 +21,18 @@ from risk_sac.scenario.family import (
     top_speed,
     walking,
 )
-from risk_sac.scenario.layout import TRUCK_LENGTH_M, Body, Layout, VehicleStart
+from risk_sac.scenario.layout import (
+    LEAD_IN_S,
+    TRUCK_LENGTH_M,
+    Body,
+    Layout,
+    VehicleStart,
+    pedestrian,
+    surroundings,
+    vehicle,
+)
 from risk_sac.scenario.place import CrossingPlace, Site
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.scenario.starting import pedestrian, surroundings, vehicle
 from risk_sac.types import Role
 
 NEAREST_M, FARTHEST_M = 25.0, 90.0  # the ego from the crossing

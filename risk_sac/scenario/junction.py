@@ -6,7 +6,6 @@ Source: RISK-SAC, Sec. IV-A.2.
 from collections.abc import Mapping
 
 from risk_sac.scenario.family import (
-    LEAD_IN_S,
     Family,
     at_most,
     friction,
@@ -16,10 +15,9 @@ from risk_sac.scenario.family import (
     top_speed,
     walking,
 )
-from risk_sac.scenario.layout import CAR_LENGTH_M, Layout, VehicleStart
+from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S, Layout, VehicleStart, pedestrian, surroundings, vehicle
 from risk_sac.scenario.place import JunctionPlace, Leg
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.scenario.starting import pedestrian, surroundings, vehicle
 from risk_sac.types import Role
 
 NEAREST_M, FARTHEST_M = 10.0, 90.0  # whoever attacks, and the ego, from the stop line

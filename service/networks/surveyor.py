@@ -14,9 +14,8 @@ from pathlib import Path
 from risk_sac.errors import ConfigError
 from risk_sac.failures.map_picture import map_png
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.scenario.maps.finder import FINDERS, survey
+from risk_sac.scenario.maps.finder import FINDERS, Map, survey
 from risk_sac.scenario.maps.found import Fit, Misfit, Pattern
-from risk_sac.scenario.maps.keep import Map
 from service.networks.limits import MAX_PLACES, SURVEY_MEMORY_BYTES
 from service.networks.report import PICTURE, PLACES
 

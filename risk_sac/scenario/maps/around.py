@@ -2,15 +2,14 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 
 import numpy as np
 
 from risk_sac.scenario.family import WALK_OFFSET_M
 from risk_sac.scenario.ground import Point, ribbon, triangles
 from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M
+from risk_sac.scenario.maps.clearance import is_near, outlines
 from risk_sac.scenario.maps.net import Crossing, Lane, Net
-from risk_sac.scenario.maps.swept import outlines
 from risk_sac.scenario.place import Ground, Signal, Walk
 
 CROSSINGS_M = 60.0  # so far from a place a crossing is told of
@@ -88,17 +87,6 @@ def signal_of(net: Net, ids: Iterable[str | None]) -> Signal | None:
 def _roadway(lanes: Sequence[Lane], x_m: float, y_m: float) -> list[list[Point]]:
     quads = (quad for lane in lanes for quad in ribbon(lane.line, lane.width_m))
     return [quad for quad in quads if is_near((*quad, quad[0]), x_m, y_m, WALKED_M)]
-
-
-def is_near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> bool:
-    """Whether a line comes so near to a point."""
-    for (ax, ay), (bx, by) in pairwise(line):
-        dx, dy = bx - ax, by - ay
-        square = dx * dx + dy * dy
-        share = 0.0 if square == 0.0 else min(max(((x_m - ax) * dx + (y_m - ay) * dy) / square, 0.0), 1.0)
-        if math.hypot(ax + share * dx - x_m, ay + share * dy - y_m) <= within_m:
-            return True
-    return False
 
 
 def _rounded(polygons: Iterable[Sequence[Point]]) -> tuple[tuple[Point, ...], ...]:

@@ -8,11 +8,11 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
-from risk_sac.scenario.family import LEAD_IN_S, top_speed
+from risk_sac.scenario.family import top_speed
 from risk_sac.scenario.hidden_pedestrian import OCCLUDER_M, room_beyond_m, room_wanted_m
-from risk_sac.scenario.layout import TRUCK_LENGTH_M
-from risk_sac.scenario.maps.abreast import truck_reaches
+from risk_sac.scenario.layout import LEAD_IN_S, TRUCK_LENGTH_M
 from risk_sac.scenario.maps.around import signal_of, walk_over
+from risk_sac.scenario.maps.clearance import truck_reaches
 from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot

@@ -8,12 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from risk_sac.scenario import junction
-from risk_sac.scenario.maps.abreast import ROOM_M, too_near
 from risk_sac.scenario.maps.around import signal_of, walk_over
+from risk_sac.scenario.maps.clearance import ROOM_M, too_near, waits_in_the_way
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot
 from risk_sac.scenario.maps.net import Edge, Link, Net, wrapped
-from risk_sac.scenario.maps.waiting import waits_in_the_way
 from risk_sac.scenario.maps.ways import AFTER_S, Way, track, way_on
 from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
 

@@ -1,13 +1,17 @@
-"""Finds the places of a map."""
+"""Finds the places of a map, and keeps them as families."""
 
-from collections.abc import Collection, Iterator
+import xml.etree.ElementTree as ET
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
 from types import ModuleType
 
 from risk_sac.errors import MapError
+from risk_sac.scenario import library
 from risk_sac.scenario.maps import find_crossing, find_junction, find_stretch
 from risk_sac.scenario.maps.around import ground_around
+from risk_sac.scenario.maps.cut import cut, read_tree
 from risk_sac.scenario.maps.found import Fit, Misfit, NoFit, Pattern, Spot, Survey
-from risk_sac.scenario.maps.net import Net
+from risk_sac.scenario.maps.net import Net, read_net
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace
 
 FINDERS: dict[Pattern, ModuleType] = {
@@ -65,3 +69,34 @@ def _nowhere(net: Net, pattern: Pattern, id_: str) -> str:
         "junction": "a road to a junction that another one leads to as well",
     }
     return f"{pattern} does not fit at {id_!r}: wanted {what[pattern]}"
+
+
+class Map:
+    """A net, read once."""
+
+    def __init__(self, file: Path) -> None:
+        """Reads it.
+
+        Raises:
+          MapError: no pattern could be placed on it; the message says why.
+          OSError: it cannot be read.
+        """
+        self.net: Net = read_net(file)
+        self._root: ET.Element = read_tree(file)
+
+    def fits(self, pattern: Pattern, place: str | None) -> Sequence[Fit]:
+        """One place, or all at which a pattern fits.
+
+        Raises:
+          MapError: it does not fit there.
+        """
+        return [place_at(self.net, pattern, place)] if place is not None else survey(self.net, (pattern,)).fits
+
+    def keep(self, fit: Fit) -> str:
+        """Puts a place into the library; returns the name of the family that it is.
+
+        Raises:
+          OSError: the library cannot be written.
+        """
+        fit = with_ground(self.net, fit)
+        return library.keep(fit.place, cut(self.net, self._root, fit))

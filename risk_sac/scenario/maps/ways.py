@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from risk_sac.scenario.maps.abreast import too_near
+from risk_sac.scenario.maps.clearance import too_near
 from risk_sac.scenario.maps.net import Lane, Link, Net
 from risk_sac.scenario.place import Piece, Track
 

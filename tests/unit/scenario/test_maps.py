@@ -14,14 +14,12 @@ from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, MapError
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, SHIPPED, family_at, family_named
-from risk_sac.scenario.maps.abreast import too_near, truck_reaches
 from risk_sac.scenario.maps.around import walk_over
+from risk_sac.scenario.maps.clearance import too_near, truck_reaches, waits_in_the_way
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.find_junction import turn
-from risk_sac.scenario.maps.finder import place_at, survey
-from risk_sac.scenario.maps.keep import Map
+from risk_sac.scenario.maps.finder import Map, place_at, survey
 from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net, read_net
-from risk_sac.scenario.maps.waiting import waits_in_the_way
 from risk_sac.scenario.maps.ways import Way, way_back, way_on
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch, Track
 from risk_sac.sim.sumo import SumoSimulation

@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
-from risk_sac.scripts.motions import SIZE, Genes, act, cue, is_over
-from risk_sac.scripts.seen import Act, Seen, adversaries_seen
+from risk_sac.scripts.motions import SIZE, Act, Genes, Seen, act, adversaries_seen, cue, is_over
 
 MIDDLE = Genes(*[0.5] * SIZE)
 unit = st.floats(0, 1)

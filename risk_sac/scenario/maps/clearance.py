@@ -1,0 +1,138 @@
+"""Whether vehicles that drive or wait in a junction leave each other room.
+
+A vehicle lies along the chord from its front to where its rear comes by. Round a bend the chord is shorter than the
+way, so its tail swings out; and between the two the chord cuts the corner.
+
+Ways from lanes beside each other are no foes of one another where they do not cross: SUMO's drivers ignore each other
+there. Where netconvert bends both sharply, they come nearer to each other than cars are wide.
+
+SUMO lets a turning driver wait where the middle of its front comes to the edge of the lane that it is to cross. A car
+that stands askew there has a corner in that lane, and a driver with the right of way does not see it. A driver that
+crosses its way before that place, or joins it, is told of it by SUMO.
+"""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from risk_sac.scenario.ground import Point
+from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, TRUCK_LENGTH_M, TRUCK_WIDTH_M
+from risk_sac.scenario.maps.net import Lane, Link, Net
+from risk_sac.types import Floats
+
+SAMPLED_M = 0.5
+ALONG = 9  # points on each side of it
+ROOM_M = CAR_WIDTH_M + 0.15  # between the middles of the ways of two cars
+CLEAR_M = CAR_WIDTH_M / 2 + 0.1  # of the box of who waits from the middle of a lane that others drive on
+
+
+def outlines(link: Link, length_m: float, width_m: float) -> Floats:
+    """Points on both sides of a vehicle, wherever it is on its way; x and y in rows, m."""
+    line = np.array([*link.source.line, *inside(link), *link.target.line])
+    station_m = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    stop_m = station_m[len(link.source.line) - 1]
+    entry_m = station_m[len(link.source.line) + len(inside(link))]
+    front_m = np.arange(stop_m, min(entry_m + length_m, station_m[-1]), SAMPLED_M)
+
+    def at(stations_m: Floats) -> Floats:
+        return np.array([np.interp(stations_m, station_m, each) for each in line.T])
+
+    front, rear = at(front_m), at(np.maximum(front_m - length_m, 0.0))
+    (dx, dy), chord_m = front - rear, np.hypot(*(front - rear))
+    forward, left = np.array([dx, dy]) / chord_m, np.array([-dy, dx]) / chord_m
+    middle = front[:, :, None] - forward[:, :, None] * np.linspace(0.0, length_m, ALONG)
+    sides = [middle + side * width_m / 2 * left[:, :, None] for side in (1.0, -1.0)]
+    return np.concatenate([each.reshape(2, -1) for each in sides], axis=1)
+
+
+def inside(link: Link) -> list[Point]:
+    """Its way between the roads."""
+    return [point for lane in link.inside for point in lane.line]
+
+
+def is_near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> bool:
+    """Whether a line comes so near to a point."""
+    for (ax, ay), (bx, by) in pairwise(line):
+        dx, dy = bx - ax, by - ay
+        square = dx * dx + dy * dy
+        share = 0.0 if square == 0.0 else min(max(((x_m - ax) * dx + (y_m - ay) * dy) / square, 0.0), 1.0)
+        if math.hypot(ax + share * dx - x_m, ay + share * dy - y_m) <= within_m:
+            return True
+    return False
+
+
+def too_near(net: Net, link: Link) -> Link | None:
+    """The way beside one across a junction that leaves two cars no room, if there is one."""
+    line, lanes = inside(link), net.edges[link.source.edge].lanes
+    for lane in lanes[max(link.source.index - 1, 0) : link.source.index + 2]:
+        for other in net.onward.get(lane.id, ()):
+            beside = lane is not link.source and other.target.edge == link.target.edge
+            if beside and other.target is not link.target and _come_near(line, inside(other)):
+                return other
+    return None
+
+
+def truck_reaches(net: Net, beside: Link, own: Link) -> bool:
+    """Whether a truck that drives one way across a junction reaches into a car on the way beside it.
+
+    Where their lanes fork into several of the next road, SUMO's drivers may take any of them.
+    """
+    ways = [[*each.source.line, *inside(each), *each.target.line] for each in _forks(net, own)]
+    points = np.concatenate([outlines(each, TRUCK_LENGTH_M, TRUCK_WIDTH_M) for each in _forks(net, beside)], axis=1)
+    return any(is_near(way, x, y, CAR_WIDTH_M / 2) for way in ways for x, y in points.T.tolist())
+
+
+def _forks(net: Net, link: Link) -> list[Link]:
+    return [other for other in net.onward[link.source.id] if other.target.edge == link.target.edge]
+
+
+def _come_near(line: Sequence[Point], other: Sequence[Point]) -> bool:
+    return any(is_near(other, *point, ROOM_M) for point in line) or any(
+        is_near(line, *point, ROOM_M) for point in other
+    )
+
+
+def waits_in_the_way(net: Net, link: Link) -> Lane | None:
+    """A lane of those who have the right of way, which a car that waits for them reaches into; None if it is clear."""
+    for before, behind in pairwise(link.inside):
+        for lane in net.waits_for.get(behind.id, ()):
+            joins = lane.line[-1] == link.inside[-1].line[-1]
+            if not joins and not _cross(before.line, lane.line) and _off_m(before, lane) < CLEAR_M:
+                return lane
+    return None
+
+
+def _off_m(waiting: Lane, other: Lane) -> float:
+    """How far a lane comes from a car whose front is at the end of another; 0 if it comes within it."""
+    (x, y), heading = waiting.line[-1], waiting.way_out_rad
+    cos, sin = math.cos(heading), math.sin(heading)
+    least_m = math.inf
+    for px, py in _sampled(other):
+        ahead_m = (px - x) * cos + (py - y) * sin
+        aside_m = abs((py - y) * cos - (px - x) * sin)
+        off_m = math.hypot(max(ahead_m, -CAR_LENGTH_M - ahead_m, 0.0), max(aside_m - CAR_WIDTH_M / 2, 0.0))
+        least_m = min(least_m, off_m)
+    return least_m
+
+
+def _sampled(lane: Lane) -> list[Point]:
+    found = []
+    for (ax, ay), (bx, by) in pairwise(lane.line):
+        steps = max(math.ceil(math.hypot(bx - ax, by - ay) / SAMPLED_M), 1)
+        found += [(ax + i / steps * (bx - ax), ay + i / steps * (by - ay)) for i in range(steps + 1)]
+    return found
+
+
+def _cross(line: Sequence[Point], other: Sequence[Point]) -> bool:
+    return any(_segments_cross(*a, *b) for a in pairwise(line) for b in pairwise(other))
+
+
+def _segments_cross(a: Point, b: Point, c: Point, d: Point) -> bool:
+    return _side(a, b, c) * _side(a, b, d) < 0.0 and _side(c, d, a) * _side(c, d, b) < 0.0
+
+
+def _side(a: Point, b: Point, c: Point) -> float:
+    """Above 0 where a point is to the left of a line."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
