@@ -82,11 +82,12 @@ def readings(data: Path) -> dict[str, object]:
         read(f"{campaign.id} events", lambda id_=campaign.id: store.events(id_, limit=10_000).items)
         episodes = read(f"{campaign.id} episodes", lambda id_=campaign.id: store.episodes(id_, limit=1000).items)
         for episode in () if isinstance(episodes, Exception) else episodes:
-            if episode.series is not None:
-                body = failure_body(campaign.id, episode, None, settings)
-                found[f"{campaign.id} {episode.id}"] = (
-                    StorageError(body.series_problem) if body.series_problem else body
-                )
+            if episode.collision is not None:
+                name = f"{campaign.id} {episode.id}"
+                contact = read(name, lambda id_=campaign.id, of=episode.id: store.failure(id_, of))
+                if not isinstance(contact, Exception):
+                    body = failure_body(campaign.id, contact, None, settings)
+                    found[name] = StorageError(body.series_problem) if body.series_problem else body
         if campaign.state is State.SUCCEEDED:
             report = Reports(settings).report(campaign)
             found[f"{campaign.id} table"] = report.comparison if report.lasting else StorageError("runs are lost")
@@ -101,8 +102,10 @@ def told_files(data: Path) -> list[Path]:
     found = []
     for campaign in store.campaigns(limit=10).items:
         for episode in store.episodes(campaign.id, limit=1000).items:
-            if episode.series is not None:
-                found.append(settings.run_folder(campaign.id, episode.run_id) / FAILURES / episode.series)
+            if episode.collision is not None:
+                series = store.failure(campaign.id, episode.id).series
+                assert series is not None
+                found.append(settings.run_folder(campaign.id, episode.run_id) / FAILURES / series)
         if campaign.state is State.SUCCEEDED:
             found += [settings.run_folder(campaign.id, run.id) / RESULTS for run in campaign.runs]
     store.close()
