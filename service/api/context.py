@@ -8,6 +8,7 @@ from fastapi import Depends, Request
 from prometheus_client import CollectorRegistry
 
 from service.api.answers.pages import Cursors
+from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
 from service.api.stream import Streams
 from service.keys.key import Scope
@@ -15,7 +16,6 @@ from service.networks.shelf import Shelf
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager
 from service.runs.regressions import Regressions
-from service.schemas.problems import Reason
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.views.on_demand import OnDemandCache

@@ -16,7 +16,8 @@ from risk_sac.records import StateChange
 from service.api.guards.gate import HEALTH, PUBLIC
 from service.api.posted import input_schemas
 from service.api.posted_campaign import campaign_schemas
-from service.schemas.posted import PostedRegression, PostedTriage
+from service.api.routes.episodes import PostedTriage
+from service.api.routes.regressions import PostedRegression
 
 DESCRIPTION = """Finds scenarios in which an automated driving system fails.
 

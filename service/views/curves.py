@@ -9,15 +9,47 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.config import FamilyName, MethodName
 from risk_sac.metrics import WINDOW
-from risk_sac.records import RECORDED, Grade, Outcome
+from risk_sac.records import RECORDED, Grade, Outcome, Real, Record, State
 from risk_sac.types import Floats
-from service.schemas.curves import Curves, RunCurves
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
 from service.views.failure_table import Kinds, Plain
 
 SEARCH = RECORDED["search"]
 Counts = NDArray[np.int64]
+
+
+class RunCurves(Record):
+    """The search of one run: each list has an entry per point. Failures that were refused since do not count."""
+
+    run_id: str
+    family: FamilyName
+    method: MethodName
+    seed: int
+    state: State
+    episodes: list[int]
+    """How many episodes of the search there were; evenly spread, the newest included."""
+    window_ecr: list[Real]
+    """ECR over the newest 100 episodes by then."""
+    window_pcr: list[Real]
+    """PCR over the newest 100 episodes by then."""
+    distinct: list[int]
+    """Distinct failures so far."""
+    preventable: list[int]
+    """Failures so far that the careful driver would have prevented, repetitions included."""
+    distinct_preventable: list[int]
+    """The distinct ones among them."""
+    dual_variable: list[Real]
+    """λ after the last episode."""
+    mean_cost: list[Real]
+    """Realism cost per step of the episodes since the point before; null where none of them was simulated."""
+
+
+class Curves(Record):
+    """Curves of all runs of a campaign, in the order they are queued."""
+
+    runs: list[RunCurves]
 
 
 def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: int) -> Curves:

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 from risk_sac import __version__
 from risk_sac.failures.question import Twin, read_twin
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.roads import roads_of
+from risk_sac.failures.roads import Use, roads_of
 from risk_sac.failures.thumbnail import thumbnail
-from risk_sac.records import Episode
+from risk_sac.records import Collision, Episode, Record
 from risk_sac.run_folder.results import Contact
-from service.schemas.failures import Roads, Surface, TwinPlay
+from risk_sac.series import Series
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign, StoredContact, StoredRun
 from service.views.bodies import series_file
@@ -82,6 +82,34 @@ def pictures(settings: ServiceSettings) -> OnDemandCache[Picture]:
         return recording_bytes(picture.contact.run.family, recording, "png", twin)
 
     return OnDemandCache(draw, "pictures")
+
+
+class Surface(Record):
+    """A piece of ground that one drives or walks on."""
+
+    use: Use
+    outline: list[tuple[float, float]]
+    """Its corners, m, on the map that the series is on; the last one is joined to the first."""
+
+
+class Roads(Record):
+    """The ground on which a contact came about."""
+
+    surfaces: list[Surface]
+    """In the order in which they are to be drawn; none where the scene's family had other roads then."""
+
+
+class TwinPlay(Record):
+    """The scene of a contact, played with one thing changed."""
+
+    twin: Twin
+    """`idle`: nobody attacks; else the profile of another ego."""
+    outcome: str
+    """In words, such as "touches nobody"."""
+    collision: Collision | None
+    """Null if the ego touches nobody."""
+    series: Series
+    """From the same start as the contact's own, up to 3 s after it, or until the ego touches somebody."""
 
 
 def roads_body(contact: ContactOfARun) -> Roads:

@@ -16,8 +16,8 @@ from starlette.routing import compile_path
 
 from risk_sac.config.invalid import LONGEST_VALUE, causes, field_error, shown
 from risk_sac.errors import ConfigError
+from service.api.answers.problem_body import FieldProblem, Problem, Reason
 from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError, UploadError
-from service.schemas.problems import FieldProblem, Problem, Reason
 
 logger = logging.getLogger(__name__)
 

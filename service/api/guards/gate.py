@@ -11,6 +11,7 @@ from http import HTTPStatus
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError, problem_response
 from service.api.context import CALLER, LOCAL, Caller, check_scope
 from service.errors import KeysError
@@ -19,7 +20,6 @@ from service.keys.file import REMEDY
 from service.keys.key import Scope as KeyScope
 from service.keys.made import KeysMade
 from service.keys.ring import KeyRing
-from service.schemas.problems import Reason
 from service.settings import ServiceSettings
 
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # methods that change nothing

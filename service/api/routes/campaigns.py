@@ -29,12 +29,10 @@ from service.api.context import Caller, Context, CurrentCaller, Service
 from service.api.posted_campaign import PostedCampaign, documented_campaign
 from service.errors import NotFoundError
 from service.runs.manager import LOG
-from service.schemas.curves import Curves
-from service.schemas.failure_table import FailureTable
 from service.store.stored import StoredCampaign
 from service.views.bodies import campaign_body, summary_body
-from service.views.curves import curves
-from service.views.failure_table import failure_table
+from service.views.curves import Curves, curves
+from service.views.failure_table import FailureTable, failure_table
 from service.views.logs import log_tail
 from service.views.progress import retry_after_s
 from service.views.totals import results

@@ -3,7 +3,7 @@
 from collections.abc import Awaitable, Callable
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from fastapi import APIRouter, Request, Response
 from fastapi.openapi.docs import get_swagger_ui_html
@@ -13,8 +13,22 @@ from starlette.staticfiles import StaticFiles
 
 import service
 from risk_sac import __version__
+from risk_sac.records import Record
 from service.api.answers.representations import accepted
-from service.schemas.operations import Entrance
+
+
+class Entrance(Record):
+    """Paths of this service."""
+
+    name: Literal["RISK-SAC"] = "RISK-SAC"
+    version: str
+    docs: Literal["/docs"] = "/docs"
+    """A page that describes and calls all routes."""
+    openapi: Literal["/openapi.json"] = "/openapi.json"
+    """The same for programs."""
+    health: Literal["/healthz"] = "/healthz"
+    campaigns: Literal["/v1/campaigns"] = "/v1/campaigns"
+
 
 ASSETS = Path(str(files("fastapi_offline"))) / "static"
 SCRIPT, STYLE, ICON = "swagger-ui-bundle.js", "swagger-ui.css", "favicon.png"

@@ -3,17 +3,31 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request, Response
+from pydantic import Field
 
-from risk_sac.records import Episode, EpisodePage, Failure, Grade, Outcome, Triage
+from risk_sac.config.base import Settings
+from risk_sac.records import Episode, EpisodePage, Failure, Grade, Outcome, Triage, TriageState
 from service.api.answers.pages import TIERS, Cursor, Limit, Tier
 from service.api.answers.representations import as_json
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN
 from service.api.context import CurrentCaller, Service
 from service.api.posted import documented, read_posted
-from service.schemas.posted import PostedTriage
 from service.store.finding import Judged
 from service.store.stored import StoredPage
 from service.views.bodies import failure_body
+
+# Text of any language, with tabs and new lines; other control characters could hide or reorder what is shown.
+TEXT = r"^[^\x00-\x08\x0b\x0c\x0e-\x1f\x7f]*$"
+
+
+class PostedTriage(Settings):
+    """What to note of a failure."""
+
+    state: TriageState
+    """new: nobody has decided; confirmed: the ego is to be mended; dismissed: it is not; fixed: it has been."""
+    comment: Annotated[str, Field(max_length=2000, pattern=TEXT)] = ""
+    """Why; plain text, which is shown as it is."""
+
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
 

@@ -7,11 +7,11 @@ from fastapi import APIRouter, Depends, Response
 from starlette.concurrency import run_in_threadpool
 
 from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names
+from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, header, problem
 from service.api.context import CurrentCaller, Service
 from service.errors import ConflictError
-from service.schemas.problems import Reason
 from service.store.stored import StoredCampaign
 from service.views.tables import Table
 

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from service.api.answers.pages import Cursor, Limit
+from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, header, problem
 from service.api.context import CurrentCaller, Service
@@ -15,7 +16,6 @@ from service.api.posted import media_type
 from service.networks.limits import MAX_EDGES, MAX_EXPANDED_BYTES, MAX_FILES, WALL_S
 from service.networks.packaging import MEDIA_TYPES, Packaging
 from service.networks.schemas import Network, NetworkPage, Places
-from service.schemas.problems import Reason
 
 LISTED = "networks"
 RECEIVE_S = 60  # a sender that is slower would keep others out

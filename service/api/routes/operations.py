@@ -1,16 +1,30 @@
 """What those who run the service ask it: is it alive, can it work, and how it does."""
 
 from http import HTTPStatus
+from typing import Literal
 
 from fastapi import APIRouter, Depends, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
+from risk_sac.records import Record
+from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import STOPPED, UNREADY, Responses
 from service.api.context import Service, require_admin
-from service.schemas.operations import Health, Ready
-from service.schemas.problems import Reason
 from service.store.statistics import check_readable
+
+
+class Health(Record):
+    """The server is alive."""
+
+    status: Literal["ok"] = "ok"
+
+
+class Ready(Record):
+    """Campaigns can be posted and make progress."""
+
+    status: Literal["ready"] = "ready"
+
 
 EXAMPLE = 'risk_sac_episodes_total{family="low",method="risk-sac"} 4711.0\n…'
 METRICS: Responses = {200: {"content": {"text/plain": {"schema": {"type": "string"}, "example": EXAMPLE}}}}

@@ -11,15 +11,14 @@ from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries,
 from risk_sac.failures.question import Twin
 from risk_sac.failures.studied import Region
 from risk_sac.records import wire
+from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
 from service.api.answers.representations import Representation, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, Responses, problem
 from service.api.context import Context, CurrentCaller, Service
 from service.api.routes.exports import CROWDED, LACKING, check_installed
 from service.errors import StorageError
-from service.schemas.failures import Roads, TwinPlay
-from service.schemas.problems import Reason
-from service.views.pictures import ContactOfARun, Picture, roads_body, thumbnail_of, twin_body
+from service.views.pictures import ContactOfARun, Picture, Roads, TwinPlay, roads_body, thumbnail_of, twin_body
 from service.views.studies import CannotBePlayed, Study
 
 PNG, SVG, JSON, NPZ = "image/png", "image/svg+xml", "application/json", "application/zip"

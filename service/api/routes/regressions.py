@@ -4,13 +4,25 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response
 from fastapi.concurrency import run_in_threadpool
+from pydantic import Field
 
+from risk_sac.config import EgoConfig
+from risk_sac.config.base import Settings
 from risk_sac.failures.cases import CampaignRegression
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses, header, problem
 from service.api.context import CurrentCaller, Service
 from service.api.posted import documented, read_posted
 from service.runs.regressions import campaign_of
-from service.schemas.posted import PostedRegression
+
+
+class PostedRegression(Settings):
+    """What to play against what."""
+
+    campaign_id: Annotated[str, Field(max_length=100, pattern=r"^[A-Za-z0-9]+$")]
+    """Whose distinct failures; it has ended."""
+    ego: EgoConfig
+    """The other ego, such as `{"profile": "careful"}`."""
+
 
 POSTING: Responses = (
     {202: {"headers": {"Location": header("Where to follow it.")}}}

@@ -4,23 +4,63 @@ Sync routes, so that statistics and drawing take place in FastAPI's thread pool.
 """
 
 import shlex
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
+from pydantic import Field
 
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, FamilyName
 from risk_sac.config.spec_file import campaign_yaml
+from risk_sac.failures.clusters import Overview
+from risk_sac.records import Record
 from risk_sac.report import Comparison, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
 from service.api.answers.representations import accepted_format, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses
 from service.api.context import Context, CurrentCaller, Service
-from service.schemas.reports import Clusters, Figure, FigureFile, Figures
 from service.store.stored import StoredCampaign
 from service.views.reports import CampaignReport
+
+
+class Clusters(Record):
+    """The failures of the finished runs, sorted into kinds; flaky ones are left out."""
+
+    complete: bool
+    """Whether all runs are in them."""
+    families: Mapping[FamilyName, Overview]
+    """Those with a finished run."""
+
+
+class FigureFile(Record):
+    """A figure in one format."""
+
+    format: Literal["png", "svg"]
+    media_type: Annotated[str, Field(examples=["image/svg+xml"])]
+    href: Annotated[str, Field(examples=["/v1/campaigns/ca39e56a9cd896b07/figures/ecr_low.svg"])]
+    """Where it is."""
+
+
+class Figure(Record):
+    """A figure of the report."""
+
+    name: Annotated[str, Field(examples=["ecr_low", "bars_rho_c_evaluation"])]
+    """With a family: `ecr_`, `pcr_`, `lambda_` and `alpha_`, curves over the search; `preventable_found_` and
+    `distinct_found_`, what was found over processor time; `times_`, histograms of the time
+    from the adversaries' release to conflict and contact. `bars_` with a metric: all families."""
+    files: list[FigureFile]
+
+
+class Figures(Record):
+    """The figures that the finished runs allow."""
+
+    complete: bool
+    """Whether all runs are in them."""
+    items: list[Figure]
+    """None before a run has finished."""
+
 
 TableFormat = Literal["json", "md", "csv"]
 SpecFormat = Literal["json", "yaml"]
