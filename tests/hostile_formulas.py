@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Iterator
-from random import Random
 
 from risk_sac.risk.signals import SIGNALS
 
@@ -48,7 +47,7 @@ INJECTIONS = (
 
 def formulas() -> list[str]:
     """All of them, each once."""
-    parts = (_texts, _numbers, _bounds, _words, _nested, _unbalanced, _windows, _sums, _repeated, _random)
+    parts = (_texts, _numbers, _bounds, _words, _nested, _unbalanced, _windows, _sums, _repeated)
     return list(dict.fromkeys(itertools.chain.from_iterable(part() for part in parts)))
 
 
@@ -180,29 +179,3 @@ def _repeated() -> Iterator[str]:
             yield operator.join([timed] * count)
         yield "not " * count + timed
         yield f"H[0,1]({timed}) and " * count + timed
-
-
-def _random() -> Iterator[str]:
-    """Words in any order, and trees of operators in good order."""
-    chance = Random(7)
-    others = "historically once[0,1] since S[0,2] prev not and or -> abs ( ) [0,1] >= < + - * / 1 0 1e9 0.5 ,"
-    words = (*SIGNALS, *others.split(" "))
-    for _ in range(60):
-        yield " ".join(chance.choices(words, k=chance.randint(2, 40)))[:LONGEST]
-    for _ in range(60):
-        yield _tree(chance, chance.randint(2, 7))
-
-
-def _tree(chance: Random, depth: int) -> str:
-    if depth == 0:
-        return f"{chance.choice(list(SIGNALS))}{chance.choice(['>', '<='])}{chance.randint(0, 30)}"
-    window = f"[{chance.randint(0, 5) / 10},{chance.randint(5, 30) / 10}]"
-    match chance.randint(0, 3):
-        case 0:
-            return f"{chance.choice(['H', 'O'])}{window}({_tree(chance, depth - 1)})"
-        case 1:
-            return f"({_tree(chance, depth - 1)}) S{window} ({_tree(chance, max(0, depth - 3))})"
-        case 2:
-            operator = chance.choice(["and", "or", "->"])
-            return f"({_tree(chance, depth - 1)}) {operator} ({_tree(chance, max(0, depth - 2))})"
-    return f"not ({_tree(chance, depth - 1)})"

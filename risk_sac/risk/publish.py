@@ -36,11 +36,11 @@ class LeastMargins(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """What one frame says about risk; each array has an entry for each of the `n` actors other than the ego."""
+    """Risk measures of one frame, for each of the `n` actors other than the ego."""
 
     others: Floats  # the rows above x n
     least: LeastMargins
-    touched: bool  # whether the ego touches anybody
+    touched: bool  # whether the ego touches another actor
 
     @property
     def gap_m(self) -> Floats:
@@ -50,27 +50,9 @@ class Assessment(NamedTuple):
 
     @property
     def seen(self) -> Bools:
-        """Who is in the ego's sight."""
+        """Which of them are in the ego's sight."""
         seen: Bools = self.others[SEEN] != 0.0
         return seen
-
-    @property
-    def ttc_s(self) -> Floats:
-        """Time to collision."""
-        ttc: Floats = self.others[TTC]
-        return ttc
-
-    @property
-    def rss_longitudinal_m(self) -> Floats:
-        """See `risk_sac.risk.rss.Margins`."""
-        margin: Floats = self.others[RSS_LONGITUDINAL]
-        return margin
-
-    @property
-    def rss_lateral_m(self) -> Floats:
-        """See `risk_sac.risk.rss.Margins`."""
-        margin: Floats = self.others[RSS_LATERAL]
-        return margin
 
 
 def assess(frame: Frame, rss: RssParameters, seen: Bools) -> Assessment:
@@ -106,10 +88,9 @@ def _assess(
 
 @compiled
 def in_charge(view: RelativeView) -> Bools:
-    """The actors the ego answers for, `n`: ahead of it or alongside.
+    """Which actors the ego answers for, `n`: those ahead of it or alongside.
 
-    Choice: whoever comes from behind must keep the distance (RSS, rule 1), so TTC and RSS do not count
-    them; otherwise tailgating the ego would look like a risk the ego takes.
+    Choice: an actor from behind must keep the distance (RSS, rule 1), so TTC and RSS do not count it.
     """
     return view.x > -view.ego_half_length
 
@@ -132,8 +113,8 @@ def least_margins(others: Floats, kind: NDArray[np.int8]) -> tuple[float, float,
 
 
 def worst_rss_margin(assessment: Assessment) -> float:
-    """Smallest RSS margin: of each actor the ego answers for, the larger of the two, since it takes both, m."""
-    margin = np.maximum(assessment.rss_longitudinal_m, assessment.rss_lateral_m)
+    """Smallest over the actors the ego answers for of the larger of the two RSS margins, m."""
+    margin = np.maximum(assessment.others[RSS_LONGITUDINAL], assessment.others[RSS_LATERAL])
     return float(margin.min(where=assessment.others[CHARGED] != 0.0, initial=LONGITUDINAL_CAP_M))
 
 

@@ -1,11 +1,11 @@
-"""The full time series of one episode, kept while it runs and written only if the ego touched something."""
+"""Time series of an episode: collected while it runs, written if the ego touched something."""
 
 import hashlib
 import io
 import math
 import zipfile
 import zlib
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,27 +15,27 @@ from numpy.typing import NDArray
 from risk_sac.errors import DamagedError
 from risk_sac.records import SeriesFile
 from risk_sac.risk.measures import Measures
-from risk_sac.risk.publish import AHEAD, ENCOUNTER, SEEN, Assessment
+from risk_sac.risk.publish import AHEAD, ENCOUNTER, GAP, RSS_LATERAL, RSS_LONGITUDINAL, SEEN, TTC
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.types import Bools, Floats, Frame
+from risk_sac.types import Frame
 from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
 
 PER_ACTOR = (*MOTION, "link")
 ON_THE_MOVE_MPS = 1.0
 
 
-PER_OTHER: dict[str, Callable[[Assessment], Floats | Bools]] = {
-    "distance_m": lambda assessment: assessment.gap_m,
-    "ttc_s": lambda assessment: assessment.ttc_s,
-    "rss_longitudinal_m": lambda assessment: assessment.rss_longitudinal_m,
-    "rss_lateral_m": lambda assessment: assessment.rss_lateral_m,
-    "visible": lambda assessment: assessment.seen,
+PER_OTHER = {  # rows of an assessment
+    "distance_m": GAP,
+    "ttc_s": TTC,
+    "rss_longitudinal_m": RSS_LONGITUDINAL,
+    "rss_lateral_m": RSS_LATERAL,
+    "visible": SEEN,
 }
 
 
 @dataclass(slots=True)
 class Trace:
-    """What every step appends; arrays are built only by `series`."""
+    """Frames, measures and actions of an episode; `series` builds the arrays."""
 
     requirements: tuple[str, ...]
     frames: list[Frame] = field(default_factory=list)
@@ -109,10 +109,10 @@ class Trace:
             for t, frame in enumerate(self.frames):
                 values[t, columns[t]] = getattr(frame, name)
             result[name] = values
-        for name, of in PER_OTHER.items():
+        for name, row in PER_OTHER.items():
             values = np.full((steps, n), np.nan)
             for t, measures in enumerate(self.measures):
-                values[t, columns[t][1:]] = of(measures.assessment)
+                values[t, columns[t][1:]] = measures.assessment.others[row]
             result[name] = values
         size = len(self.actions[0]) if self.actions else 0
         none = np.full((self.released + 1, size), np.nan, dtype=np.float32)

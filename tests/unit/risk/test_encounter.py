@@ -65,10 +65,6 @@ def test_a_cut_in_is_seen_as_soon_as_it_begins(side: int) -> None:
     assert drifting == pytest.approx(1.2)  # and so before the gap has shrunk at all
 
 
-def test_touching_bodies_have_no_time_left() -> None:
-    assert encounter(10.0, (3.0, 0.5, 0.3, 5, 0)) == 0.0
-
-
 def test_who_comes_from_behind_fades_out() -> None:
     beside, behind, farther = (encounter(10.0, (x, 3.2, 0, 10, 0)) for x in (-2.0, -2.5, -4.0))
     assert beside == pytest.approx(4.0)

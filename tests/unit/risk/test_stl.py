@@ -14,7 +14,7 @@ from risk_sac.errors import FormulaError, NotFinite
 from risk_sac.risk.formula import parse
 from risk_sac.risk.measures import soft_min
 from risk_sac.risk.signals import SIGNALS
-from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor, check_requirements
+from risk_sac.risk.stl import Monitor, check_requirements
 from risk_sac.scenario.odd import requirements_from_odd
 
 STEP_S, HORIZON = 0.1, 150
@@ -265,12 +265,6 @@ def test_reset_forgets_everything() -> None:
     np.testing.assert_array_equal(watched.update(at_rest()), fresh.update(at_rest()))
 
 
-def test_two_monitors_share_nothing() -> None:
-    one, other = monitor("historically(ttc_s >= 1)"), monitor("historically(ttc_s >= 1)")
-    one.update(at_rest() | {"ttc_s": 0.0})
-    assert other.update(at_rest())[0] == ROBUSTNESS_CLIP
-
-
 def test_equal_sub_formulas_of_two_requirements_are_both_right() -> None:
     watched = monitor("once[0,0.2](ttc_s <= 1)", "not once[0,0.2](ttc_s <= 1)")
     for ttc_s, expected in ((0.5, 0.5), (2.0, 0.5), (2.0, 0.5), (2.0, -1.0)):
@@ -311,68 +305,45 @@ def test_no_requirements_give_no_robustness() -> None:
 GAP, TTC = "vehicle_gap_m >= 1", "ttc_s >= 1"
 BAD: list[tuple[str, int | None, str]] = [  # formula, position, reason
     ("always(ttc_s >= 1)", 0, "'always', which looks into the future.*wanted the past-time operator 'historically'"),
-    ("G[0,1](ttc_s >= 1)", 0, "'G'.*'historically'"),
     ("not eventually[0,1](ttc_s >= 1)", 4, "'eventually'.*'once'"),
-    ("F(ttc_s >= 1)", 0, "'F'.*'once'"),
     (f"{TTC} until[0,1] {GAP}", 11, "'until'.*'since'"),
-    (f"{TTC} U {GAP}", 11, "'U'.*'since'"),
-    (f"{TTC} unless[0,1] {GAP}", 11, "'unless'.*'since'"),
     ("next(ttc_s >= 1)", 0, "'next'.*'prev'"),
-    ("X ttc_s >= 1", 0, "'X'.*'prev'"),
-    ("s_next(ttc_s >= 1)", 0, "'s_next'.*'prev'"),
     (f"{TTC} iff {GAP}", 11, r"'iff' is not supported; use \(p implies q\) and \(q implies p\)"),
-    (f"{TTC} <-> {GAP}", 11, "'<->' is not supported"),
-    (f"{TTC} xor {GAP}", 11, "'xor' is not supported"),
     ("ttc_s == 1", 6, r"use abs\(x - c\) <= tolerance"),
     ("ttc_s != 1", 6, "'!=' is not supported"),
-    ("x = ttc_s >= 1", 2, "'=' is not supported"),
     ("rise(ttc_s >= 1)", 0, "'rise' is not supported; use p and not prev p"),
-    ("sqrt(ttc_s) >= 1", 0, "'sqrt' is not supported"),
     ("true and ttc_s >= 1", 0, "'true' is not supported; use a comparison"),
     ("tcc_s >= 1", 0, "unknown signal 'tcc_s'; wanted one of ttc_s, encounter_s"),
     ("ego.speed >= 1", 3, "unknown character '.'"),
     ("ttc_s ≥ 1", 6, "unknown character '≥'"),
-    ("ttc_s >= 1; import os", 10, "unknown character ';'"),
-    ("ttc_s >= 1 $", 11, "unknown character '\\$'"),
     ("(ttc_s >= 1", 11, r"got 'the end'; wanted '\)'"),
     ("ttc_s >= 1)", 10, r"got '\)'; wanted the end"),
     (f"{TTC} {GAP}", 11, "got 'vehicle_gap_m'; wanted an operator or the end"),
     ("ttc_s >=", 8, "got 'the end'; wanted a signal, a number"),
-    ("   ", 3, "got 'the end'; wanted a signal, a number"),
     (f"{TTC} and and {GAP}", 15, "got 'and'; wanted a signal"),
-    ("historically", 12, "got 'the end'"),
     ("ttc_s", 0, "got a number; wanted a comparison such as ttc_s >= 1.5"),
     ("historically ttc_s", 13, "got a number; wanted a comparison"),
-    ("not (ttc_s + 1)", 5, "got a number; wanted a comparison"),
     ("(ttc_s >= 1) + 2 >= 3", 1, r"got a formula; wanted numbers around '\+'"),
     ("abs(ttc_s >= 1) >= 2", 10, r"got '>='; wanted '\)'"),
     ("1 <= ttc_s <= 3", 11, "cannot be chained; write a <= x and x <= b"),
     ("vehicle_gap_m / ego_speed_mps >= 1", 16, "only a number other than 0 can divide; multiply the inequality out"),
-    ("ttc_s / 0 >= 1", 8, "only a number other than 0 can divide"),
     ("historically[0,1.55](ttc_s >= 1)", 15, "1.55 s is no multiple of the 0.1 s step"),
     ("historically[1,0.5](ttc_s >= 1)", 12, "ends before it begins"),
     ("historically[0,1", 16, r"got 'the end'; wanted '\]'"),
     ("historically[0 1](ttc_s >= 1)", 15, "got '1'; wanted ',' or ':'"),
     ("historically[-1,1](ttc_s >= 1)", 13, "got '-'; wanted a window bound in seconds"),
     ("historically[0,1e999999999](ttc_s >= 1)", 15, "got '1e999999999'; wanted a window bound"),
-    ("historically[0,1000000000](ttc_s >= 1)", 15, "wanted a window bound"),
     ("historically[0,inf](ttc_s >= 1)", 15, "got 'inf'; wanted a window bound"),
     ("historically[0,5ns](ttc_s >= 1)", 16, r"got 'ns'; wanted '\]'"),
     ("not[0,1](ttc_s >= 1)", 3, r"got '\['"),
-    ("prev[0,1](ttc_s >= 1)", 4, r"got '\['"),
     ("historically[0,20](ttc_s >= 1)", 0, "reach 20 s back; wanted at most the 15 s of an episode"),
-    ("historically[0,999999](ttc_s >= 1)", 0, "reach 999999 s back"),
     ("once[0,8] once[0,8] ttc_s >= 1", 0, "reach 16 s back; wanted at most the 15 s of an episode"),
     (f"({TTC}) since[0,12] ({GAP})", 1, "need 7260 comparisons per step; wanted at most 4000"),
     ("ttc_s * 1e300 >= 1", 8, r"may reach 1e\+300"),
     ("ttc_s >= 1e999", 9, "may reach inf"),
     ("*".join(["vehicle_gap_m"] * 8) + " >= 1", None, "wanted at most 1e\\+09"),
-    ("ttc_s / 1e-300 >= 1", 6, r"may reach 1e\+301"),
-    ("-" * 400 + "ttc_s >= 1", None, "more than 40 nested operators"),
-    ("abs(" * 90 + "ttc_s" + ")" * 90 + " >= 1", None, "more than 40 nested operators"),
     ("!" * 400 + TTC, None, "more than 40 nested operators"),
     ("+".join("1" * 200) + ">= ttc_s", None, "more than 40 nested operators"),
-    ("->".join(["1>0"] * 80), None, "more than 40 nested operators"),
 ]
 
 
@@ -394,10 +365,6 @@ def test_no_text_gets_through_as_anything_but_a_formula_or_a_formula_error(text:
 @pytest.mark.parametrize("formula", ["+".join(["ttc_s"] * 39) + ">=1", "!" * 38 + TTC, " and ".join([TTC] * 33)])
 def test_deep_formulas_are_monitored_without_exponential_work(formula: str) -> None:
     assert np.isfinite(monitor(formula).update({"ttc_s": 0.5})).all()
-
-
-def test_good_requirements_pass_the_check() -> None:
-    check_requirements([*SHIPPED, *(requirement(formula) for formula in FORMULAS)], STEP_S, HORIZON)
 
 
 def test_soft_min_is_equation_7() -> None:

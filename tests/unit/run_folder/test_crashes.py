@@ -1,4 +1,3 @@
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -59,12 +58,6 @@ def test_a_run_that_was_killed_from_outside_has_not_crashed(tmp_path: Path) -> N
     assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
 
 
-def test_a_run_that_went_well_leaves_nothing_to_count(tmp_path: Path) -> None:
-    for _ in range(PATIENCE):
-        assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
-    assert not (tmp_path / COUNTS).exists()
-
-
 def test_a_crash_counts_once_and_its_traceback_goes_to_the_log(tmp_path, caplog) -> None:
     play(tmp_path)
     assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
@@ -103,10 +96,3 @@ def test_damage_leaves_out_no_other_episode(crashed: Path, caplog, name: str) ->
             assert str(crashed / COUNTS) in caplog.text
         else:
             assert set(left) >= {0, 1, 2, 4, 5}
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root writes anywhere")
-def test_a_folder_that_cannot_be_written_is_an_os_error(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(PermissionError):
-        CrashGuard(tmp_path)

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import Limits, limits_from_odd
 from risk_sac.sim.paths import Path
-from risk_sac.sim.vehicle_control import BODY_M, CAP, GRID_M, HERE, SOON, bends, index
-from tests.roads import STRAIGHT_M, arc_m, road
+from risk_sac.sim.vehicle_control import BODY_M, CAP, GRID_M, HERE, SOON, bends
+from tests.roads import arc_m, road
 
 LIMITS = limits_from_odd(FAMILIES["dense"].odd, friction=0.8)
 radii = st.floats(6, 60)
@@ -81,11 +81,3 @@ def test_left_and_right_bends_ask_the_same(radius: float, turn: float, piece: fl
 def test_a_heading_that_passes_pi_is_no_bend() -> None:
     got = bends(with_headings(math.pi - 0.01, -math.pi + 0.01, -math.pi + 0.01), LIMITS)
     assert max(got[HERE]) == pytest.approx(0.02 / BODY_M)
-
-
-@settings(max_examples=30)
-@given(st.floats(-50, 500))
-def test_stations_off_the_path_mean_its_ends(station: float) -> None:
-    got = bends(road(10.0), LIMITS)
-    assert 0 <= index(got, station) < len(got[CAP])
-    assert index(got, STRAIGHT_M) == STRAIGHT_M / GRID_M

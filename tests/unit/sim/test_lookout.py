@@ -82,11 +82,6 @@ def test_a_driver_that_has_stopped_waits_until_the_pedestrian_has_left_its_corri
 
 
 @sides
-def test_who_walks_away_is_no_target(side: int) -> None:
-    assert target(walker(50.0, side * 2.0, side * 1.4)) == NOBODY
-
-
-@sides
 @pytest.mark.parametrize("step_m", [0.0, 0.01, -0.01, 0.35, -0.35])
 def test_who_walks_in_where_one_lane_leads_to_another_is_seen_from_either_side(step_m: float, side: int) -> None:
     """The second lane begins a little beside the first: a path across the road, to whoever is near it."""

@@ -209,7 +209,7 @@ def test_loopback_needs_no_key(tmp_path: Path, host: str) -> None:
 def test_other_addresses_need_a_key_that_counts(tmp_path: Path, host: str) -> None:
     settings = ServiceSettings(data_dir=tmp_path, host=host)
     file = KeyFile(settings.keys_file)
-    with pytest.raises(ConfigError, match=r"wanted a loopback address, or API keys: create one with `risk-sac keys cr"):
+    with pytest.raises(ConfigError, match="wanted a loopback address, or API keys; create one with `risk-sac keys cr"):
         check_exposure(settings)
     key, _ = file.create("maps", "", Scope.READ)
     check_exposure(settings)
