@@ -36,7 +36,7 @@ from service.api.stream import Streams
 from service.host.data_folder import hold_data_folder
 from service.keys.exposure import check_exposure
 from service.keys.file import KeyFile
-from service.keys.made import KeysMade
+from service.keys.made import AuthEnabledFlag
 from service.networks.shelf import Shelf
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager, worker_program
@@ -58,7 +58,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
       settings: the environment's settings.
       executor: where runs execute; by default as the settings say.
     """
-    latencies, made = request_latencies(), KeysMade()
+    latencies, made = request_latencies(), AuthEnabledFlag()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -92,7 +92,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
 
 @contextmanager
 def opened(
-    settings: ServiceSettings, executor: Executor[Event], latencies: Histogram, made: KeysMade
+    settings: ServiceSettings, executor: Executor[Event], latencies: Histogram, made: AuthEnabledFlag
 ) -> Iterator[Context]:
     """The data folder, held exclusively, with its database open and its queue at work.
 

@@ -13,14 +13,14 @@ from service.api.answers.representations import takes
 from service.api.guards.connections import BodyLimit
 from service.api.guards.gate import Gate
 from service.api.observe import Observe
-from service.keys.made import KeysMade
+from service.keys.made import AuthEnabledFlag
 from service.settings import ServiceSettings
 
 LEAST_BYTES = 2000  # of what is packed
 GZIP_LEVEL = 4  # of 9; those above take several times as long for a few hundredths less
 
 
-def add_middleware(app: FastAPI, settings: ServiceSettings, made: KeysMade, latencies: Histogram) -> None:
+def add_middleware(app: FastAPI, settings: ServiceSettings, made: AuthEnabledFlag, latencies: Histogram) -> None:
     """Puts the middleware in place; the last one sees a request first."""
     app.add_middleware(AnswerCache)
     app.add_middleware(Compression, minimum_size=LEAST_BYTES, compresslevel=GZIP_LEVEL)

@@ -23,7 +23,7 @@ logger = logging.getLogger(__name__)
 LOOK_S = 1.0  # between two looks at the database and the file while no key is known of
 
 
-class KeysMade:
+class AuthEnabledFlag:
     """What a running server knows of it.
 
     Attributes:

@@ -8,7 +8,7 @@ from pathlib import Path
 from service.errors import KeysError
 from service.keys.file import Document, KeyFile, missing
 from service.keys.key import Key, split
-from service.keys.made import KeysMade
+from service.keys.made import AuthEnabledFlag
 
 logger = logging.getLogger(__name__)
 
@@ -22,7 +22,7 @@ class KeyRing:
     without keys, nor one that is missing for one that never was: each look raises until it is whole again.
     """
 
-    def __init__(self, path: Path, made: KeysMade) -> None:
+    def __init__(self, path: Path, made: AuthEnabledFlag) -> None:
         self._path = path
         self._made = made
         self._signature: _Signature | None = None

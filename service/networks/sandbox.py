@@ -1,7 +1,9 @@
-"""Starting the checker, and what becomes of it. The server's side: it reads reports, never uploads."""
+"""Receives uploads and starts the checker on them; this side reads reports, never uploads."""
 
+import hashlib
 import logging
 import os
+import shutil
 import signal
 from pathlib import Path
 
@@ -10,8 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from risk_sac.execution.helper import ANSWER, run_helper
 from service.errors import StorageError, UploadError
 from service.networks.limits import LOG_BYTES, WALL_S
-from service.networks.packaging import Packaging
-from service.networks.report import CheckReport
+from service.networks.report import SNIFFED_BYTES, CheckReport, Packaging, sniff
 
 logger = logging.getLogger(__name__)
 
@@ -20,6 +21,52 @@ UPLOAD, LOG = "upload", "log"
 _GRACE_S = 0.5  # for starting; the checker ends itself after WALL_S
 _TOO_SLOW = (signal.SIGALRM, signal.SIGXCPU, signal.SIGKILL)
 _REPORTS = TypeAdapter(CheckReport)
+
+
+class Incoming:
+    """Writes an upload down as it comes; closing it is for whoever opened it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.bytes = 0
+        self._start = b""
+        self._hash = hashlib.sha256()
+        self._file = (folder / UPLOAD).open("wb")
+
+    def write(self, chunk: bytes) -> None:
+        """One more piece of the upload.
+
+        Raises:
+          StorageError: the disk refuses.
+        """
+        self.bytes += len(chunk)
+        self._start += chunk[: SNIFFED_BYTES - len(self._start)]
+        self._hash.update(chunk)
+        try:
+            self._file.write(chunk)
+        except OSError as error:
+            raise StorageError(f"an upload cannot be received ({error.strerror})") from error
+
+    def complete(self, packaging: Packaging) -> str:
+        """SHA-256 of the upload, now that it is there.
+
+        Raises:
+          UploadError: it is not what it is called.
+          OSError: the disk refuses.
+        """
+        self._file.close()
+        sniff(self._start, packaging)
+        return self._hash.hexdigest()
+
+    def strip(self) -> None:
+        """Leave only what the checker wrote anew."""
+        for name in (UPLOAD, LOG):
+            (self.folder / name).unlink()
+
+    def discard(self) -> None:
+        """Remove whatever is still there."""
+        self._file.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def inspect(folder: Path, packaging: Packaging, checker: str = CHECKER, wall_s: float = WALL_S) -> CheckReport:

@@ -21,10 +21,8 @@ from pathlib import Path
 from risk_sac.errors import DamagedError
 from risk_sac.run_folder.durable import read_sealed, seal, sync_folder
 from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError
-from service.networks.incoming import Incoming
-from service.networks.packaging import Packaging
-from service.networks.report import CheckReport
-from service.networks.sandbox import inspect
+from service.networks.report import CheckReport, Packaging
+from service.networks.sandbox import Incoming, inspect
 from service.networks.schemas import BoundingBox, Network, StoredNetwork
 from service.store.stored import StoredPage
 

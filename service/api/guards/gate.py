@@ -18,7 +18,7 @@ from service.errors import KeysError
 from service.keys.exposure import is_loopback
 from service.keys.file import REMEDY
 from service.keys.key import Scope as KeyScope
-from service.keys.made import KeysMade
+from service.keys.made import AuthEnabledFlag
 from service.keys.ring import KeyRing
 from service.settings import ServiceSettings
 
@@ -35,7 +35,7 @@ RequestHeaders = Mapping[bytes, bytes]
 class Gate:
     """ASGI middleware: host, origin, key, rate and scope, in this order."""
 
-    def __init__(self, app: ASGIApp, settings: ServiceSettings, made: KeysMade) -> None:
+    def __init__(self, app: ASGIApp, settings: ServiceSettings, made: AuthEnabledFlag) -> None:
         self._app = app
         self._hosts = allowed_hosts([*settings.allowed_hosts, settings.host])
         self._origins = frozenset(origin.lower() for origin in settings.cors_origins)

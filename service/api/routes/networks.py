@@ -14,7 +14,7 @@ from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, 
 from service.api.context import CurrentCaller, Service
 from service.api.posted import media_type
 from service.networks.limits import MAX_EDGES, MAX_EXPANDED_BYTES, MAX_FILES, WALL_S
-from service.networks.packaging import MEDIA_TYPES, Packaging
+from service.networks.report import MEDIA_TYPES, Packaging
 from service.networks.schemas import Network, NetworkPage, Places
 
 LISTED = "networks"

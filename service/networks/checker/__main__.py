@@ -13,10 +13,9 @@ from pathlib import Path
 
 from service.errors import UploadError
 from service.networks import limits
-from service.networks.checker.bounds import bind
 from service.networks.checker.check import check
-from service.networks.packaging import Packaging
-from service.networks.report import CheckReport
+from service.networks.checker.simulator import bind
+from service.networks.report import CheckReport, Packaging
 
 UPLOAD = Path("upload")
 

@@ -17,7 +17,7 @@ from typing import IO
 
 from service.errors import UploadError
 from service.networks.limits import MAX_EXPANDED_BYTES, MAX_FILES, MAX_NAME, MAX_RATIO, RATIO_FREE_BYTES
-from service.networks.packaging import Packaging
+from service.networks.report import Packaging
 
 _CHUNK = 1 << 16
 _ENCRYPTED = 0x1

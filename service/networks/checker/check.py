@@ -8,11 +8,9 @@ from pathlib import Path
 from service.errors import UploadError
 from service.networks.checker import simulator
 from service.networks.checker.archive import documents
-from service.networks.checker.bounds import bind_simulator
 from service.networks.checker.document import Observer, read, root_of
 from service.networks.checker.roads import Demand, Net
-from service.networks.packaging import Packaging
-from service.networks.report import CheckReport, Kind, NetworkFile, Summary
+from service.networks.report import CheckReport, Kind, NetworkFile, Packaging, Summary
 
 FOREIGN = ("osm", "OpenDRIVE")  # roots of maps that are converted
 MOST_WARNINGS = 20
@@ -26,7 +24,7 @@ def check(upload: Path, packaging: Packaging) -> CheckReport:
     """
     found, remarks = _converted(documents(upload, packaging))
     files, summary, more = rewrite(found)
-    bind_simulator()
+    simulator.bind_simulator()
     names = {kind: [file.name for file in files if file.kind is kind] for kind in Kind}
     warnings = simulator.load(names[Kind.NET][0], names[Kind.ADDITIONAL], names[Kind.ROUTES])
     return CheckReport(summary=summary, files=tuple(files), warnings=(*more, *remarks, *warnings)[:MOST_WARNINGS])

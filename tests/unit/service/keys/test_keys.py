@@ -14,7 +14,7 @@ from service.keys.__main__ import main
 from service.keys.exposure import check_exposure, is_loopback
 from service.keys.file import KeyFile
 from service.keys.key import Scope
-from service.keys.made import KeysMade
+from service.keys.made import AuthEnabledFlag
 from service.keys.ring import KeyRing
 from service.settings import ServiceSettings
 
@@ -26,7 +26,7 @@ def file(tmp_path: Path) -> KeyFile:
 
 @pytest.fixture
 def ring(file: KeyFile) -> KeyRing:
-    return KeyRing(file.path, KeysMade())
+    return KeyRing(file.path, AuthEnabledFlag())
 
 
 def test_of_a_key_only_the_hash_of_its_secret_is_kept(file: KeyFile) -> None:
@@ -227,7 +227,7 @@ def test_no_address_is_served_with_damaged_keys(tmp_path: Path) -> None:
 
 def test_command_creates_lists_and_revokes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = ["--data-dir", str(tmp_path)]
-    ring = KeyRing(tmp_path / "keys.json", KeysMade())
+    ring = KeyRing(tmp_path / "keys.json", AuthEnabledFlag())
     assert main(["create", *folder, "--project", "maps", "--name", "Ann [b]", "--scope", "read"]) == 0
     token = capsys.readouterr().out.strip()
     key = ring.find(token)

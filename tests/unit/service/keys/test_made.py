@@ -13,7 +13,7 @@ from service.host.data_folder import hold_data_folder
 from service.keys.__main__ import main
 from service.keys.file import Document, KeyFile
 from service.keys.key import Scope
-from service.keys.made import KeysMade, ever_made, noting
+from service.keys.made import AuthEnabledFlag, ever_made, noting
 from service.keys.ring import KeyRing
 from service.settings import ServiceSettings
 from service.store.reading import Store
@@ -112,10 +112,10 @@ def test_a_server_notes_keys_that_it_sees_and_heeds_what_is_noted(
     file: KeyFile, store: Store, caplog: pytest.LogCaptureFixture
 ) -> None:
     _, token = file.create("maps", "", Scope.RUN)
-    with KeysMade().kept(store.engine, file):
+    with AuthEnabledFlag().kept(store.engine, file):
         assert keys_were_made(store.engine)
     file.path.unlink()
-    made = KeysMade()
+    made = AuthEnabledFlag()
     with made.kept(store.engine, file):
         ring = KeyRing(file.path, made)
         for _ in range(3):
@@ -131,7 +131,7 @@ def test_a_server_notes_keys_that_it_sees_and_heeds_what_is_noted(
 
 
 def test_a_server_notes_keys_that_are_made_while_nobody_asks(file: KeyFile, store: Store) -> None:
-    made, pause = KeysMade(), threading.Event()
+    made, pause = AuthEnabledFlag(), threading.Event()
     with made.kept(store.engine, file):
         assert not made.known
         assert KeyRing(file.path, made).open
@@ -144,7 +144,7 @@ def test_a_server_notes_keys_that_are_made_while_nobody_asks(file: KeyFile, stor
 
 
 def test_keys_that_a_request_saw_are_known_of_at_once(file: KeyFile) -> None:
-    made = KeysMade()
+    made = AuthEnabledFlag()
     ring = KeyRing(file.path, made)
     assert ring.open
     file.create("maps", "", Scope.RUN)
@@ -155,7 +155,7 @@ def test_keys_that_a_request_saw_are_known_of_at_once(file: KeyFile) -> None:
 
 
 def test_open_is_what_an_administrator_has_said(file: KeyFile) -> None:
-    ring = KeyRing(file.path, KeysMade())
+    ring = KeyRing(file.path, AuthEnabledFlag())
     _, token = file.create("maps", "", Scope.RUN)
     file.open_all()
     assert ring.open
@@ -170,7 +170,7 @@ def test_open_is_what_an_administrator_has_said(file: KeyFile) -> None:
 
 
 def test_a_file_that_is_replaced_is_never_missing_nor_open(file: KeyFile) -> None:
-    made = KeysMade()
+    made = AuthEnabledFlag()
     ring = KeyRing(file.path, made)
     _, token = file.create("maps", "", Scope.RUN)
     with ThreadPoolExecutor(2) as pool:
@@ -183,7 +183,7 @@ def test_a_file_that_is_replaced_is_never_missing_nor_open(file: KeyFile) -> Non
 
 
 def test_the_first_key_is_never_missing(settings: ServiceSettings, file: KeyFile, store: Store) -> None:
-    made = KeysMade()
+    made = AuthEnabledFlag()
     with made.kept(store.engine, file), ThreadPoolExecutor(1) as pool:
         ring = KeyRing(file.path, made)
         change = pool.submit(main, CREATE)

@@ -9,12 +9,12 @@ import pytest
 
 from service.errors import StorageError, UploadError
 from service.networks import limits
-from service.networks.packaging import Packaging
+from service.networks.report import Packaging
 from service.networks.sandbox import inspect
 from tests.hostile_networks import NET, ROUTES, zipped
 from tests.server import LONG_S
 
-BOUND = "import os, sys; from service.networks.checker.bounds import bind; bind();"
+BOUND = "import os, sys; from service.networks.checker.simulator import bind; bind();"
 
 
 def python(code: str) -> Sequence[str]:
@@ -122,7 +122,7 @@ def test_the_simulator_may_write_little_whatever_it_is_told(tmp_path: Path) -> N
     (tmp_path / "net.xml").write_text(NET)
     (tmp_path / "log").touch()
     code = (
-        "from service.networks.checker.bounds import bind_simulator; import libsumo; os.chdir(sys.argv[1]);"
+        "from service.networks.checker.simulator import bind_simulator; import libsumo; os.chdir(sys.argv[1]);"
         "bind_simulator();"
         "libsumo.start(['sumo', '-n', 'net.xml', '--fcd-output', 'out.xml', '--netstate-dump', 'dump.xml']);"
         "[libsumo.simulationStep() for _ in range(20000)]; os._exit(0)"

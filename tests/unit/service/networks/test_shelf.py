@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError, UploadError
-from service.networks.packaging import Packaging
+from service.networks.report import Packaging
 from service.networks.schemas import Network
 from service.networks.shelf import INCOMING, RECORD, Shelf
 from tests.hostile_networks import NET

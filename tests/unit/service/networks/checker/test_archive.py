@@ -8,7 +8,7 @@ import pytest
 from service.errors import UploadError
 from service.networks.checker import archive
 from service.networks.checker.archive import documents
-from service.networks.packaging import Packaging, sniff
+from service.networks.report import Packaging, sniff
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
 
 PACKED = {
