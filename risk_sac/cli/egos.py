@@ -29,8 +29,8 @@ COLUMNS = (
 )
 
 
-def add_egos(commands: Commands) -> None:
-    """Adds the commands."""
+def add(commands: Commands) -> None:
+    """Add the command."""
     egos = commands.add_parser("egos", help="who can drive, and how they compare").add_subparsers(
         required=True, metavar="COMMAND"
     )

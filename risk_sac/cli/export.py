@@ -10,8 +10,8 @@ from risk_sac.failures.export.formats import FORMATS, Files, FormatName, check_c
 from risk_sac.run_folder.results import RESULTS
 
 
-def add_export(commands: Commands) -> None:
-    """Adds the command."""
+def add(commands: Commands) -> None:
+    """Add the command."""
     formats = "\n".join(f"  {name:13}{format_.what}" for name, format_ in FORMATS.items())
     export = commands.add_parser(
         "export",

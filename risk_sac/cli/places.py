@@ -22,8 +22,8 @@ from risk_sac.scenario.maps.net import read_net
 SHOWN = 20
 
 
-def add_places(commands: Commands) -> None:
-    """Adds the command."""
+def add(commands: Commands) -> None:
+    """Add the command."""
     places = commands.add_parser("places", help="where the patterns fit on a map of yours")
     places.set_defaults(command=_places)
     places.add_argument("network", type=Path, metavar="MAP", help=MAP_HELP)

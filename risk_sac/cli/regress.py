@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from risk_sac.failures.regress import Regressed
 
 
-def add_regress(commands: Commands) -> None:
-    """Adds the command."""
+def add(commands: Commands) -> None:
+    """Add the command."""
     regress = commands.add_parser(
         "regress", help="play old failures against another ego; exit status 1 if one is not fixed"
     )

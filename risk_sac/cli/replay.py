@@ -12,8 +12,8 @@ from risk_sac.run_folder.verified import TIMES, distinct_failures
 from risk_sac.types import Scene
 
 
-def add_bundle(commands: Commands) -> None:
-    """Adds the command."""
+def add(commands: Commands) -> None:
+    """Add the commands."""
     bundle = commands.add_parser("bundle", help="write failures into files that stand alone")
     bundle.set_defaults(command=_bundle)
     bundle.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
@@ -23,12 +23,15 @@ def add_bundle(commands: Commands) -> None:
     out = "the bundle; of every distinct failure: the folder for them"
     bundle.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
 
-
-def add_replay(commands: Commands) -> None:
-    """Adds the command."""
     replay = commands.add_parser("replay", help="play the failure in a bundle again")
     replay.set_defaults(command=_replay)
     replay.add_argument("bundle", type=Path, metavar="BUNDLE", help="what `risk-sac bundle` wrote")
+
+    verify = commands.add_parser("verify", help="replay the distinct failures of runs in fresh processes")
+    verify.set_defaults(command=_verify)
+    verify.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a finished run")
+    times = f"how often each is replayed (default: {TIMES})"
+    verify.add_argument("--times", type=int, default=TIMES, metavar="N", help=times)
 
 
 def _bundle(options: argparse.Namespace) -> int:
@@ -71,15 +74,6 @@ def _replay(options: argparse.Namespace) -> int:
     outcome = "every array is as recorded" if same else "not as recorded"
     console.print(printable(f"{manifest.id}: the ego {struck}; {outcome}"), markup=False, soft_wrap=True)
     return OK if same else FAILED
-
-
-def add_verify(commands: Commands) -> None:
-    """Adds the command."""
-    verify = commands.add_parser("verify", help="replay the distinct failures of runs in fresh processes")
-    verify.set_defaults(command=_verify)
-    verify.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a finished run")
-    times = f"how often each is replayed (default: {TIMES})"
-    verify.add_argument("--times", type=int, default=TIMES, metavar="N", help=times)
 
 
 def _verify(options: argparse.Namespace) -> int:

@@ -18,8 +18,8 @@ Format = Literal["html", "md", "json"]
 FORMATS: dict[str, Format] = {".html": "html", ".md": "md", ".json": "json"}
 
 
-def add_report(commands: Commands) -> None:
-    """Adds the command."""
+def add(commands: Commands) -> None:
+    """Add the command."""
     parser = commands.add_parser("report", help="one file on what runs found, with bounds, coverage and limits")
     parser.set_defaults(command=_report)
     parser.add_argument(

@@ -39,8 +39,8 @@ from risk_sac.run_folder.results import Results
 from risk_sac.run_folder.verified import TIMES
 
 
-def add_run(commands: Commands) -> None:
-    """Adds the command."""
+def add(commands: Commands) -> None:
+    """Add the commands."""
     run = commands.add_parser("run", help="one run without a server; the same command again goes on with it")
     run.set_defaults(command=_run)
     run.add_argument("--family", metavar="low|mixed|dense", help="scenario family")
@@ -51,6 +51,34 @@ def add_run(commands: Commands) -> None:
     run.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
     run.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags go first")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
+
+    evaluate = commands.add_parser(
+        "evaluate", help="compare methods over seeds, with tables and figures; the same command again goes on with it"
+    )
+    evaluate.set_defaults(command=_evaluate)
+    add_map_flags(evaluate, several=True)
+    add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
+    add_ego_flag(evaluate)
+    evaluate.add_argument(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help="runs at a time (default: one per core, or what a cluster has room for)",
+    )
+    evaluate.add_argument(
+        "--executor",
+        default=os.environ.get("RISK_SAC_EXECUTOR", "local"),
+        metavar="NAME",
+        help="where runs execute: `local` or, on a cluster, `ray` (default: RISK_SAC_EXECUTOR or local)",
+    )
+    evaluate.add_argument(
+        "--verify",
+        type=int,
+        default=TIMES,
+        metavar="N",
+        help=f"how often each distinct failure is replayed (default: {TIMES})",
+    )
+    evaluate.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of runs, tables and figures")
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -128,37 +156,6 @@ if TYPE_CHECKING:
     from risk_sac.execution.jobs import Job
 
 SEEDS = 5  # of a comparison that names none
-
-
-def add_evaluate(commands: Commands) -> None:
-    """Adds the command."""
-    evaluate = commands.add_parser(
-        "evaluate", help="compare methods over seeds, with tables and figures; the same command again goes on with it"
-    )
-    evaluate.set_defaults(command=_evaluate)
-    add_map_flags(evaluate, several=True)
-    add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
-    add_ego_flag(evaluate)
-    evaluate.add_argument(
-        "--jobs",
-        type=int,
-        metavar="N",
-        help="runs at a time (default: one per core, or what a cluster has room for)",
-    )
-    evaluate.add_argument(
-        "--executor",
-        default=os.environ.get("RISK_SAC_EXECUTOR", "local"),
-        metavar="NAME",
-        help="where runs execute: `local` or, on a cluster, `ray` (default: RISK_SAC_EXECUTOR or local)",
-    )
-    evaluate.add_argument(
-        "--verify",
-        type=int,
-        default=TIMES,
-        metavar="N",
-        help=f"how often each distinct failure is replayed (default: {TIMES})",
-    )
-    evaluate.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of runs, tables and figures")
 
 
 def _evaluate(options: argparse.Namespace) -> int:

@@ -10,13 +10,19 @@ from risk_sac.cli.console import Commands
 ARENAS = {"MALLOC_ARENA_MAX": "2"}  # glibc gives each thread an arena otherwise, and the server's memory grows
 
 
-def add_serve(commands: Commands) -> None:
-    """Adds the command."""
+def add(commands: Commands) -> None:
+    """Add the commands."""
     serve = commands.add_parser("serve", help="run the service in the foreground")
     serve.set_defaults(command=_serve)
     serve.add_argument("--host", metavar="ADDRESS", help="(default: 127.0.0.1)")
     serve.add_argument("--port", type=int, help="(default: 8000)")
     serve.add_argument("--data-dir", type=Path, metavar="DIR", help="(default: data)")
+
+    keys = commands.add_parser(
+        "keys", help="create, list and revoke the service's API keys", add_help=False, prefix_chars="\0"
+    )
+    keys.set_defaults(command=_keys)
+    keys.add_argument("rest", nargs="*")
 
 
 def _serve(options: argparse.Namespace) -> int:
@@ -24,15 +30,6 @@ def _serve(options: argparse.Namespace) -> int:
     given = {"HOST": options.host, "PORT": options.port, "DATA_DIR": options.data_dir}
     settings = {f"RISK_SAC_{name}": str(value) for name, value in given.items() if value is not None}
     os.execve(sys.executable, [sys.executable, "-m", "service"], ARENAS | os.environ | settings)
-
-
-def add_keys(commands: Commands) -> None:
-    """Adds the command; what follows it, flags too, is for the service's own parser."""
-    keys = commands.add_parser(
-        "keys", help="create, list and revoke the service's API keys", add_help=False, prefix_chars="\0"
-    )
-    keys.set_defaults(command=_keys)
-    keys.add_argument("rest", nargs="*")
 
 
 def _keys(options: argparse.Namespace) -> int:

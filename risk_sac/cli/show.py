@@ -16,8 +16,8 @@ from risk_sac.run_folder.results import Results, read_results
 from risk_sac.run_folder.series import read_series
 
 
-def add_show(commands: Commands) -> None:
-    """Adds the command."""
+def add(commands: Commands) -> None:
+    """Add the command."""
     show = commands.add_parser("show", help="list a run's contacts, or draw one")
     show.set_defaults(command=_show)
     show.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")

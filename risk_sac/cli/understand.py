@@ -22,24 +22,18 @@ if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle
 
 
-def add_minimise(commands: Commands) -> None:
-    """Adds the command."""
+def add(commands: Commands) -> None:
+    """Add the commands."""
     minimise = commands.add_parser("minimise", help="find the core of a failure: the least that makes the ego fail")
     minimise.set_defaults(command=_minimise)
     _add_failure(minimise)
     minimise.add_argument("--out", type=Path, metavar="FILE", help="write the core there, a bundle too")
 
-
-def add_region(commands: Commands) -> None:
-    """Adds the command."""
     region = commands.add_parser("region", help="how many of the neighbours of a failure fail too")
     region.set_defaults(command=_region)
     _add_failure(region)
     region.add_argument("--out", type=Path, metavar="FILE.json", help="write the shares there too")
 
-
-def add_clusters(commands: Commands) -> None:
-    """Adds the command."""
     clusters = commands.add_parser("clusters", help="which different failures runs have found, and one of each")
     clusters.set_defaults(command=_clusters)
     clusters.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a run, or its results.json")

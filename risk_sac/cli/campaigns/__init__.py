@@ -2,22 +2,9 @@
 
 import argparse
 
-from risk_sac.cli.campaigns.failures import add_bundle_failure, add_list_failures, add_show_failure
-from risk_sac.cli.campaigns.manage import add_cancel, add_delete, add_list, add_regress_campaign, add_report_campaign
-from risk_sac.cli.campaigns.watch import add_results, add_submit, add_watch
+from risk_sac.cli.campaigns import failures, manage, watch
 from risk_sac.cli.console import COULD_NOT_RUN, Commands
 
-COMMANDS = (
-    add_submit,
-    add_list,
-    add_watch,
-    add_results,
-    add_report_campaign,
-    add_regress_campaign,
-    add_cancel,
-    add_delete,
-)
-OF_FAILURES = (add_list_failures, add_show_failure, add_bundle_failure)
 EPILOG = """exit status:
   0    fine
   1    the ECR of a family and method is not shown to be within --max-ecr, or its PCR within --max-pcr: the upper end of
@@ -36,18 +23,17 @@ environment:
 Results go to standard output, with --json as one JSON document; progress and errors go to standard error."""
 
 
-def add_campaigns(commands: Commands) -> None:
+def add(commands: Commands) -> None:
     """Adds the group of commands."""
     group = commands.add_parser("campaigns", help="campaigns of a running service")
     campaigns = group.add_subparsers(required=True, metavar="COMMAND")
-    for add in COMMANDS:
-        add(campaigns)
+    watch.add(campaigns)
+    manage.add(campaigns)
     leaves = list(campaigns.choices.values())
     of_failures = campaigns.add_parser("failures", help="what a campaign found, one by one")
-    failures = of_failures.add_subparsers(required=True, metavar="COMMAND")
-    for add_one in OF_FAILURES:
-        add_one(failures)
-    leaves += failures.choices.values()
+    each = of_failures.add_subparsers(required=True, metavar="COMMAND")
+    failures.add(each)
+    leaves += each.choices.values()
     for parser in (group, of_failures, *leaves):
         parser.epilog, parser.formatter_class = EPILOG, argparse.RawDescriptionHelpFormatter
     for parser in leaves:

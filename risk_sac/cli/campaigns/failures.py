@@ -26,9 +26,9 @@ FILTERS = {
 }
 
 
-def add_list_failures(failures: Commands) -> None:
-    """Adds the command."""
-    parser = failures.add_parser("list", help="a campaign's failures, in the order they were found")
+def add(commands: Commands) -> None:
+    """Add the commands."""
+    parser = commands.add_parser("list", help="a campaign's failures, in the order they were found")
     parser.set_defaults(command=_list)
     parser.add_argument("id", metavar="ID", help="of the campaign")
     parser.add_argument(
@@ -39,10 +39,7 @@ def add_list_failures(failures: Commands) -> None:
     parser.add_argument("--raw", action="store_true", help="contacts too that a rule refused")
     parser.add_argument("--limit", type=at_least_one, default=LISTED, metavar="N", help=f"at most (default: {LISTED})")
 
-
-def add_show_failure(failures: Commands) -> None:
-    """Adds the command."""
-    parser = failures.add_parser("show", help="one failure in words and as a picture")
+    parser = commands.add_parser("show", help="one failure in words and as a picture")
     parser.set_defaults(command=_show)
     parser.add_argument("id", metavar="ID", help="of the campaign")
     parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
@@ -50,10 +47,7 @@ def add_show_failure(failures: Commands) -> None:
     parser.add_argument("--twin", choices=get_args(Twin), help=twin)
     parser.add_argument("--out", type=Path, metavar="FILE.png", help="the picture (default: FAILURE.png)")
 
-
-def add_bundle_failure(failures: Commands) -> None:
-    """Adds the command."""
-    parser = failures.add_parser("bundle", help="fetch one failure as a file that stands alone")
+    parser = commands.add_parser("bundle", help="fetch one failure as a file that stands alone")
     parser.set_defaults(command=_bundle)
     parser.add_argument("id", metavar="ID", help="of the campaign")
     parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")

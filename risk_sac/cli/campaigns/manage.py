@@ -20,28 +20,36 @@ LISTED = 20
 FILTERS = ("state", "family", "method", "label")
 
 
-def add_list(campaigns: Commands) -> None:
-    """Adds the command."""
-    parser = campaigns.add_parser("list", help="campaigns, newest first")
+def add(commands: Commands) -> None:
+    """Add the commands."""
+    parser = commands.add_parser("list", help="campaigns, newest first")
     parser.set_defaults(command=_list)
     for name in FILTERS:
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only with this {name}")
     parser.add_argument("--limit", type=at_least_one, default=LISTED, metavar="N", help=f"at most (default: {LISTED})")
 
-
-def add_cancel(campaigns: Commands) -> None:
-    """Adds the command."""
-    parser = campaigns.add_parser("cancel", help="stop a campaign; what it found stays")
+    parser = commands.add_parser("cancel", help="stop a campaign; what it found stays")
     parser.set_defaults(command=_cancel)
     parser.add_argument("id", metavar="ID", help="of the campaign")
     parser.add_argument("--wait", action="store_true", help="until it has ended")
 
-
-def add_delete(campaigns: Commands) -> None:
-    """Adds the command."""
-    parser = campaigns.add_parser("delete", help="delete a campaign that has ended, and all it found")
+    parser = commands.add_parser("delete", help="delete a campaign that has ended, and all it found")
     parser.set_defaults(command=_delete)
     parser.add_argument("id", metavar="ID", help="of the campaign")
+
+    parser = commands.add_parser("report", help="one file on what a campaign found, with bounds, coverage and limits")
+    parser.set_defaults(command=_report)
+    parser.add_argument("id", metavar="ID", help="of the campaign")
+    parser.add_argument("--regression", metavar="ID", help="of a regression of it, to be told of in the report")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="report.html, report.md, or its data as report.json"
+    )
+
+    parser = commands.add_parser("regress", help="play a campaign's distinct failures against another ego")
+    parser.set_defaults(command=_regress)
+    parser.add_argument("id", metavar="ID", help="of the campaign, which has ended")
+    parser.add_argument("--ego", required=True, metavar="EGO", help=EGO)
+    parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="report for CI: a case per failure, named")
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -69,17 +77,6 @@ def _delete(options: argparse.Namespace) -> int:
     return OK
 
 
-def add_report_campaign(campaigns: Commands) -> None:
-    """Adds the command."""
-    parser = campaigns.add_parser("report", help="one file on what a campaign found, with bounds, coverage and limits")
-    parser.set_defaults(command=_report)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
-    parser.add_argument("--regression", metavar="ID", help="of a regression of it, to be told of in the report")
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="report.html, report.md, or its data as report.json"
-    )
-
-
 def _report(options: argparse.Namespace) -> int:
     format_ = format_of(options.out)
     with Client.from_environment(options.url) as client:
@@ -91,15 +88,6 @@ def _report(options: argparse.Namespace) -> int:
 
 
 POLL_S = 0.5
-
-
-def add_regress_campaign(campaigns: Commands) -> None:
-    """Adds the command."""
-    parser = campaigns.add_parser("regress", help="play a campaign's distinct failures against another ego")
-    parser.set_defaults(command=_regress)
-    parser.add_argument("id", metavar="ID", help="of the campaign, which has ended")
-    parser.add_argument("--ego", required=True, metavar="EGO", help=EGO)
-    parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="report for CI: a case per failure, named")
 
 
 def _regress(options: argparse.Namespace) -> int:

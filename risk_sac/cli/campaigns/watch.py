@@ -23,17 +23,25 @@ from risk_sac.records import Grade
 NAMED_FAILURES = 5  # of a run, in a JUnit report
 
 
-def add_watch(campaigns: Commands) -> None:
-    """Adds the command."""
-    parser = campaigns.add_parser("watch", help="follow a campaign to its end, then show its results")
+def add(commands: Commands) -> None:
+    """Add the commands."""
+    parser = commands.add_parser("submit", help="queue a campaign")
+    parser.set_defaults(command=_submit)
+    add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
+    add_ego_flag(parser)
+    parser.add_argument("--label", metavar="TEXT", help="to find it by")
+    parser.add_argument(
+        "--idempotency-key", metavar="KEY", help="the same key gives the same campaign, however often it is submitted"
+    )
+    parser.add_argument("--watch", action="store_true", help="go on as `watch` does, with its flags:")
+    add_watch_flags(parser)
+
+    parser = commands.add_parser("watch", help="follow a campaign to its end, then show its results")
     parser.set_defaults(command=_watch)
     parser.add_argument("id", metavar="ID", help="of the campaign")
     add_watch_flags(parser)
 
-
-def add_results(campaigns: Commands) -> None:
-    """Adds the command."""
-    parser = campaigns.add_parser("results", help="what a campaign has found so far")
+    parser = commands.add_parser("results", help="what a campaign has found so far")
     parser.set_defaults(command=_results)
     parser.add_argument("id", metavar="ID", help="of the campaign")
     _add_gate_flags(parser)
@@ -194,20 +202,6 @@ class _Lines:
 
 
 SEEDS = 1  # where none are named
-
-
-def add_submit(campaigns: Commands) -> None:
-    """Adds the command."""
-    parser = campaigns.add_parser("submit", help="queue a campaign")
-    parser.set_defaults(command=_submit)
-    add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
-    add_ego_flag(parser)
-    parser.add_argument("--label", metavar="TEXT", help="to find it by")
-    parser.add_argument(
-        "--idempotency-key", metavar="KEY", help="the same key gives the same campaign, however often it is submitted"
-    )
-    parser.add_argument("--watch", action="store_true", help="go on as `watch` does, with its flags:")
-    add_watch_flags(parser)
 
 
 def _submit(options: argparse.Namespace) -> int:
