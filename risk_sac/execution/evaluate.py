@@ -29,7 +29,7 @@ SPEC, RUNS, LOCK = "spec.yaml", "runs", ".lock"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evaluation:
-    """What came of a campaign."""
+    """Outcome of a campaign."""
 
     comparison: Comparison
     failed: tuple[Job, ...]

@@ -1,4 +1,4 @@
-"""Where runs execute: the seam between the scheduler and the machines."""
+"""The seam between the scheduler and the machines on which runs execute."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -18,8 +18,8 @@ WORDS = "RISK_SAC_WORDS"
 class Cause(StrEnum):
     """Why a worker is gone."""
 
-    ENDED = "ended"  # it said its last word, or was told to stop
-    KILLED = "killed"  # by somebody else: the kernel for want of memory, an operator
+    ENDED = "ended"  # it said its last word or was asked to stop
+    KILLED = "killed"  # by the kernel for want of memory, or by an operator
     STOPPED = "stopped"  # it gave no sign of life or finished nothing, and was killed for that
     CRASHED = "crashed"  # by itself, without a last word
     LOST = "lost"  # with the whole cluster that it ran on, which says nothing about the run
@@ -36,7 +36,7 @@ class Exited:
 
 @dataclass(frozen=True, slots=True)
 class Heard(Generic[Word]):
-    """What a line of a worker's output comes to."""
+    """A line of a worker, understood."""
 
     word: Word | None  # to be passed on; None for a mere sign of life
     progress: bool = False  # it has finished an episode
@@ -45,7 +45,7 @@ class Heard(Generic[Word]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program(Generic[Word]):
-    """How a worker is started, what it says, and what patience it is met with."""
+    """How a worker is started, what it says, and when it is killed."""
 
     arguments: Callable[[RunSpec, Path], Sequence[str]]
     """For the Python interpreter, given a run and its folder."""
@@ -55,7 +55,7 @@ class Program(Generic[Word]):
     """Reads a line of the worker's words; a ValueError refuses it. A worker gets its run as a line of JSON on its
     standard input, whose end tells it that its words are not read any more."""
     environment: Mapping[str, str] = field(default_factory=dict)
-    """Variables that it finds beside those of whoever starts it."""
+    """Variables that it has besides those of its starter."""
     lease_s: float = math.inf
     """It is killed once it neither says anything nor uses its processor for so long, s."""
     stall_s: float = math.inf
@@ -73,12 +73,12 @@ class Node:
     alive: bool
     slots: int  # runs that it has room for
     runs: int = 0  # of this server's, at work on it
-    silent_s: float = 0.0  # since the last report of the one that was heard last; 0 without any
+    silent_s: float = 0.0  # since the last report of any of them; 0 without any
 
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """What the cluster looks like, told every few seconds."""
+    """The machines of a cluster, as they were a few seconds ago."""
 
     nodes: tuple[Node, ...] = ()
 
@@ -89,14 +89,14 @@ class Cluster:
 
 
 class Executor(Protocol[Word]):
-    """Executes attempts at runs elsewhere and tells what becomes of them; any thread may call it.
+    """Executes attempts at runs and reports what becomes of them; any thread may call it.
 
-    A run is known by a number. Each attempt at it has a higher number than the one before, and only the latest is
-    heard: what an older one still says, its end too, is dropped.
+    A run has a number. Each attempt at it has a higher number than the one before. Messages of all but the latest
+    attempt are dropped, their ends too.
     """
 
     def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
-        """Start an attempt at a run, whose files go to `folder`; an older attempt that is still there is killed.
+        """Starts an attempt at a run, whose files go to `folder`; kills an older attempt.
 
         Raises:
           OSError: it cannot be started.
@@ -104,30 +104,30 @@ class Executor(Protocol[Word]):
         """
 
     def events(self, timeout_s: float) -> list[tuple[int, Word | Exited]]:
-        """What happened since the last call, by run, waiting up to `timeout_s` for something.
+        """Returns messages since the last call, by run, waiting up to `timeout_s` for one.
 
-        The last message of every attempt that was not overtaken by another is `Exited`.
+        The last message of each latest attempt is `Exited`.
         """
 
     def cancel(self, number: int, grace_s: float) -> None:
-        """Ask a run to stop, and make it stop if it has not after `grace_s`; unknown runs are ignored.
+        """Asks a run to stop, and kills it after `grace_s`; ignores unknown runs.
 
-        Of several calls the one with the earliest end counts.
+        Of several calls the earliest deadline counts.
         """
 
     def wake(self) -> None:
-        """Let a waiting `events` return early."""
+        """Lets a waiting `events` return early."""
 
     @property
     def slots(self) -> float:
-        """How many attempts it has room for at present; infinite where whoever submits has to know."""
+        """Attempts that it has room for at present; infinite if it does not know."""
 
     @property
     def cluster(self) -> Cluster | None:
-        """The machines that it has, as they were a few seconds ago; None if there is but this one."""
+        """Its machines; None if it has this one only."""
 
     def close(self) -> None:
-        """Lets go of what it holds, when nothing is at work any more."""
+        """Releases what it holds, once nothing is at work."""
 
 
 ExecutorName = Literal["local", "ray"]
@@ -135,13 +135,13 @@ MakeExecutor = Callable[[Program[Any]], Executor[Any]]
 
 
 def executor_named(name: str) -> MakeExecutor:
-    """Returns what makes the executor of this name for one kind of worker.
+    """Returns the factory of an executor.
 
     Raises:
       ConfigError: there is none of this name.
     """
     if name == "local":
-        from risk_sac.execution.local import LocalExecutor
+        from risk_sac.execution.local import LocalExecutor  # here, since it imports this module
 
         return LocalExecutor
     if name == "ray":

@@ -26,7 +26,7 @@ POLL_S = 0.05
 
 @dataclass(frozen=True, slots=True)
 class HelperResult:
-    """What became of a helper process.
+    """Outcome of a helper process.
 
     Attributes:
       status: exit status; negative for a signal.

@@ -31,7 +31,7 @@ class Signs:
 
 
 class Lease:
-    """How long a worker may be silent, or busy without a result, before it counts as lost.
+    """Limits how long a worker may be silent, or busy without a result.
 
     A worker sends heartbeats. One whose interpreter is held up, by a long compilation say, cannot, but it uses its
     processor; one that was stopped does neither. Only time during which this process watched counts.
@@ -47,7 +47,7 @@ class Lease:
         """Counts the time since the last call; returns the reason why the worker is lost, if it is.
 
         Args:
-          watched_s: how much of that time somebody watched, s.
+          watched_s: how much of that time this process watched, s.
           signs: what there are now.
         """
         before, self._signs = self._signs, signs
@@ -61,9 +61,9 @@ class Lease:
 
 
 class LocalExecutor(Generic[Word]):
-    """One subprocess per attempt, and one thread that listens to it, so that one that dies is noticed at once.
+    """Executes each attempt in a subprocess, with a thread that reads its words and notices its end at once.
 
-    The thread also looks after it five times a second, for workers that do not die but overstay or fall silent.
+    The thread checks five times a second whether the worker overstays or has fallen silent.
     """
 
     def __init__(self, program: Program[Word]) -> None:
@@ -98,7 +98,7 @@ class LocalExecutor(Generic[Word]):
 
     @property
     def slots(self) -> float:
-        """As many as there is patience for: whoever submits knows this machine."""
+        """Infinite: the caller knows this machine."""
         return math.inf
 
     @property
@@ -109,7 +109,7 @@ class LocalExecutor(Generic[Word]):
         """Holds nothing."""
 
     def pid(self, number: int) -> int | None:
-        """Of the process at work on a run, which leads a group of its own; None if there is none."""
+        """Process at work on a run, which leads a group of its own; None if there is none."""
         with self._lock:
             worker = self._workers.get(number)
             return None if worker is None else worker.process.pid
@@ -159,7 +159,7 @@ class _Worker(Generic[Word]):
             self.process.terminate()
 
     def words(self, timeout_s: float) -> list[Word]:
-        """What it says up to its last word, waiting up to `timeout_s` for something."""
+        """Reads its words up to the last, waiting up to `timeout_s` for one."""
         words = []
         for line in self.process.lines(timeout_s):
             try:
@@ -181,7 +181,7 @@ class _Worker(Generic[Word]):
         return words
 
     def look(self, now: float) -> None:
-        """Kill it if it overstays or has fallen silent."""
+        """Kills it if it overstays or has fallen silent."""
         if now >= min(self._stop_by, self._leave_by):
             self.process.kill()
         elif now >= self._looked_at + LOOK_S and self._leave_by == math.inf and self._given_up is None:
@@ -198,6 +198,6 @@ class _Worker(Generic[Word]):
         self.process.kill()
 
     def exited(self, status: int) -> Exited:
-        """What became of it."""
+        """Describes its end."""
         done = self._last or self._told_to_stop
         return exited(status, self.process.log, done=done, given_up=self._given_up)

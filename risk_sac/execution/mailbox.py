@@ -1,4 +1,4 @@
-"""What workers say, in the order of its arrival, fenced by attempt; executors share it."""
+"""Queue of messages that drops those of overtaken attempts; executors share it."""
 
 import contextlib
 import queue
@@ -9,32 +9,32 @@ from risk_sac.execution.executor import Exited, Word
 
 
 class Mailbox(Generic[Word]):
-    """Many threads bring messages, one takes them; an attempt that was overtaken or has ended is not heard."""
+    """Queue from many threads to one; messages of an attempt that was overtaken or has ended are dropped."""
 
     def __init__(self) -> None:
         self._messages: queue.SimpleQueue[tuple[int, int, Word | Exited] | None] = queue.SimpleQueue()
-        self._heard: dict[int, int] = {}  # the one attempt at each run
+        self._latest: dict[int, int] = {}  # attempt at each run
         self._lock = threading.Lock()
 
     def admit(self, number: int, attempt: int) -> None:
-        """From here on this attempt at the run is heard and no other, not even what waits here of an earlier one.
+        """Accepts messages of this attempt at the run only, and drops what waits of an earlier one.
 
         Raises:
-          ValueError: this attempt or a later one is heard.
+          ValueError: this attempt or a later one is accepted already.
         """
         with self._lock:
-            heard = self._heard.get(number)
+            heard = self._latest.get(number)
             if heard is not None and attempt <= heard:
                 raise ValueError(f"attempt is {attempt}; run {number} is at attempt {heard}, so wanted a later one")
-            self._heard[number] = attempt
+            self._latest[number] = attempt
 
     def dismiss(self, number: int) -> None:
-        """Nothing of this run is heard."""
+        """Drops messages of this run."""
         with self._lock:
-            self._heard.pop(number, None)
+            self._latest.pop(number, None)
 
     def put(self, number: int, attempt: int, message: Word | Exited) -> None:
-        """Brings a message."""
+        """Adds a message."""
         self._messages.put((number, attempt, message))
 
     def wake(self) -> None:
@@ -42,7 +42,7 @@ class Mailbox(Generic[Word]):
         self._messages.put(None)
 
     def take(self, timeout_s: float) -> list[tuple[int, Word | Exited]]:
-        """What has come since the last call, waiting up to `timeout_s` for something."""
+        """Returns messages since the last call, waiting up to `timeout_s` for one."""
         messages = []
         with contextlib.suppress(queue.Empty):
             brought = self._messages.get(timeout=timeout_s)
@@ -54,7 +54,7 @@ class Mailbox(Generic[Word]):
 
     def _passes(self, number: int, attempt: int, message: Word | Exited) -> bool:
         with self._lock:
-            passes = self._heard.get(number) == attempt
+            passes = self._latest.get(number) == attempt
             if passes and isinstance(message, Exited):
-                del self._heard[number]
+                del self._latest[number]
             return passes

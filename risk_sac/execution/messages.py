@@ -1,4 +1,4 @@
-"""What a worker tells the scheduler: one JSON object per line, over a pipe of its own.
+"""Messages of a worker: one JSON object per line, over a pipe of its own.
 
 Every line is strict JSON from which nothing is lost: words are written as `risk_sac.records.Record` writes them.
 """
@@ -16,7 +16,7 @@ FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,199}$")]
 
 
 class Message(Record):
-    """What all events share."""
+    """Base of all messages."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -87,7 +87,7 @@ def encode(word: Event | Heartbeat) -> bytes:
 
 
 def decode(line: bytes) -> Event | Heartbeat:
-    """What one line says.
+    """Parses one line.
 
     Raises:
       pydantic.ValidationError: it says nothing that a worker may say.
@@ -96,7 +96,7 @@ def decode(line: bytes) -> Event | Heartbeat:
 
 
 def hear(line: bytes) -> Heard[Event]:
-    """What one line of a worker means to an executor.
+    """Parses one line of a worker for an executor.
 
     Raises:
       pydantic.ValidationError: it says nothing that a worker may say; it is a ValueError.

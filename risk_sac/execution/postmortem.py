@@ -1,4 +1,4 @@
-"""Why a worker is gone, told from its exit status, its last word and its log."""
+"""Finds out why a worker is gone, from its exit status, its last word and its log."""
 
 import os
 import re
@@ -19,7 +19,7 @@ _OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
 
 @dataclass(frozen=True, slots=True)
 class WorkerLog:
-    """What one worker printed; its run's earlier workers wrote to the same file."""
+    """The part of a run's log that one worker wrote."""
 
     path: Path
     start: int  # byte at which it begins
@@ -38,12 +38,12 @@ class WorkerLog:
 
 
 def exited(status: int, log: WorkerLog, *, done: bool, given_up: Exited | None) -> Exited:
-    """What became of a worker.
+    """Describes the end of a worker.
 
     Args:
       status: of its process, negative for a signal.
       log: what it printed.
-      done: whether it had said its last word, or was told to stop.
+      done: whether it had said its last word or was asked to stop.
       given_up: what its executor killed it for, if it did.
     """
     reason = _reason(status, log)
@@ -56,7 +56,7 @@ def exited(status: int, log: WorkerLog, *, done: bool, given_up: Exited | None) 
 
 
 def without_folders(text: str, own: Path | None = None) -> str:
-    """A text that anybody may read: of each file it has the name, but not where on this machine it lies.
+    """Removes the folders from all paths in a text, so that any user may read it.
 
     Args:
       text: as it was meant for the log.
@@ -68,7 +68,7 @@ def without_folders(text: str, own: Path | None = None) -> str:
 
 
 def signal_name(number: int) -> str:
-    """As a user knows it."""
+    """Name of a signal."""
     return _SIGNAL_NAMES.get(number, f"signal {number}")
 
 

@@ -51,7 +51,7 @@ class Subprocess:
                     env={**os.environ, **THREADS, **program.environment, WORDS: str(words)},
                     pass_fds=(words,),
                     bufsize=0,
-                    start_new_session=True,  # Ctrl-C is for whoever started us; the worker hears of it from us
+                    start_new_session=True,  # Ctrl-C is for our starter; we ask the worker to stop
                 )
             except BaseException:
                 os.close(self._words)
@@ -77,7 +77,7 @@ class Subprocess:
         return self._process.poll()
 
     def lines(self, timeout_s: float) -> list[bytes]:
-        """What it has said, waiting up to `timeout_s` for something, or for its end if it cannot be heard.
+        """Reads lines, waiting up to `timeout_s` for one, or for its end if it says no more.
 
         A line longer than `LONGEST_LINE` comes in pieces, and what its end cuts off is no line.
         """

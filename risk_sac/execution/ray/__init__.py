@@ -1,1 +1,1 @@
-"""Runs as tasks of a Ray cluster; README.md says how. Nothing outside this room imports Ray or needs it."""
+"""Runs on a Ray cluster, see README.md. No other package imports Ray."""

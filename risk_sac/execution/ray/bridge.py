@@ -133,7 +133,7 @@ class Attempt:
                 return report.exited
 
     def _answer(self, reference: Any) -> Any:
-        """What a call of the actor returns; it is patient until the worker has begun, since it may wait for room."""
+        """Waits for a call of the actor; without a limit until the worker has begun, since it may wait for room."""
         looked_at = time.monotonic()
         while not ray.wait([reference], timeout=LOOK_S)[0]:
             now = time.monotonic()
