@@ -211,6 +211,7 @@ class Bridge:
 def main(descriptor: int) -> None:
     """Connects, checks the cluster, and carries orders until the server has gone."""
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
+    os.dup2(2, 1)  # what Ray prints is not the output of a command
     server = Connection(descriptor)
     try:
         settings = read_settings()
