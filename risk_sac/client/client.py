@@ -89,9 +89,6 @@ class Client:
     def from_environment(cls, url: str | None = None) -> Self:
         """The client that RISK_SAC_URL and RISK_SAC_API_KEY, or the file RISK_SAC_API_KEY_FILE, describe.
 
-        Args:
-          url: instead of RISK_SAC_URL.
-
         Raises:
           ConfigError: one of them cannot be used.
         """
@@ -168,13 +165,7 @@ class Client:
         return self._get(Failure, f"{_path(campaign_id)}/failures/{_part(failure_id)}")
 
     def picture(self, campaign_id: str, failure_id: str, twin: str | None = None) -> bytes:
-        """One collision as a picture, PNG: both paths from above, and what was measured along the way.
-
-        Args:
-          campaign_id: of the campaign.
-          failure_id: of the collision.
-          twin: draws beside it the same scene with nobody attacking (idle), or with this ego.
-        """
+        """One collision as a PNG; `twin` draws beside it the undisturbed scene (idle), or the one with that ego."""
         return self._made(campaign_id, failure_id, "picture.png" if twin is None else f"twins/{_part(twin)}.png", PNG)
 
     def bundle(self, campaign_id: str, failure_id: str, *, core: bool = False) -> bytes:
@@ -207,13 +198,7 @@ class Client:
     def report(
         self, campaign_id: str, format_: Literal["json", "md", "html"] = "md", regression_id: str | None = None
     ) -> str:
-        """What was found, how often it happens where nobody searched, and where nobody looked.
-
-        Args:
-          campaign_id: of the campaign.
-          format_: a page, Markdown, or bounds and coverage alone as JSON.
-          regression_id: of a regression of the campaign, to be told of in it.
-        """
+        """The report as a page or Markdown, with a regression if one is named; JSON has bounds and coverage alone."""
         query = {"format": format_} | ({} if regression_id is None else {"regression": regression_id})
         path = f"{_path(campaign_id)}/report"
         return self._transport.ask("GET", path, patience_s=self._patience_s, query=query).text
@@ -230,12 +215,12 @@ class Client:
     def events(self, campaign_id: str, last_event_id: str | None = None, *, away_s: float = AWAY_S) -> Iterator[Event]:
         """Finished episodes, failures and changes of state, until the campaign has ended.
 
-        A stream that breaks is taken up after the last event that was heard.
+        A stream that breaks continues after the last event that arrived.
 
         Args:
-          campaign_id: whose events.
-          last_event_id: the `id` of an event, to go on after it.
-          away_s: how long the service may be away in between, as when it is restarted.
+          campaign_id: of the campaign.
+          last_event_id: `id` of an event; the stream starts after it.
+          away_s: how long the service may be unreachable in between.
         """
         path, patience_s = f"{_path(campaign_id)}/events", self._patience_s
         while True:
@@ -256,13 +241,7 @@ class Client:
             time.sleep(RECONNECT_S)
 
     def follow(self, campaign_id: str, *, timeout_s: float | None = None, away_s: float = AWAY_S) -> Iterator[Campaign]:
-        """A campaign now, and whenever it has changed, until it has ended.
-
-        Args:
-          campaign_id: which one.
-          timeout_s: `Overdue` is raised after it.
-          away_s: how long the service may be away in between, as when it is restarted.
-        """
+        """A campaign now, and whenever it has changed, until it has ended; `Overdue` is raised after `timeout_s`."""
         return Follower(
             self._transport, _path(campaign_id), timeout_s=timeout_s, patience_s=self._patience_s, away_s=away_s
         ).changes()

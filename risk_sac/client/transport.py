@@ -65,16 +65,16 @@ class Transport:
         body: str | None = None,
         repeatable: bool = True,
     ) -> httpx.Response:
-        """The answer to a request, once there is one: what was asked for, or 304.
+        """The answer to a request, or 304.
 
         Args:
-          method: of HTTP.
+          method: HTTP method.
           path: below the service's URL.
-          patience_s: after this time no further attempt begins.
-          query: None stands for what is not given.
+          patience_s: no further attempt begins after this time.
+          query: parameters; None leaves one out.
           headers: of the request.
           body: JSON.
-          repeatable: whether to have it done twice does no harm.
+          repeatable: whether the request may be sent twice.
 
         Raises:
           ClientError: the last attempt's.
@@ -94,12 +94,12 @@ class Transport:
 
         Args:
           path: of the stream.
-          last_event_id: where an earlier stream stopped.
-          silence_s: a stream without even a sign of life for so long is lost.
+          last_event_id: of an earlier stream; this one starts after it.
+          silence_s: the stream is lost after so long without a byte.
           patience_s: within this time it has to begin.
 
         Raises:
-          StreamLost: the connection broke; what was heard so far holds.
+          StreamLost: the connection broke; earlier events remain valid.
           ClientError: there is no such stream.
         """
         headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}

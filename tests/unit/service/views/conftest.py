@@ -1,0 +1,9 @@
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture
+def database_url(tmp_path: Path) -> str:
+    """SQLite alone: views read what the store hands out, whichever database it is in."""
+    return f"sqlite:///{tmp_path}/test.db"
