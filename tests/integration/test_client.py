@@ -67,14 +67,6 @@ def test_the_events_tell_of_every_episode_and_of_the_end(workers: int, serve: Ca
         assert list(client.events(campaign.id, events[-1].id)) == []
 
 
-def test_the_same_key_gives_the_same_campaign_and_never_another_one(client: Client) -> None:
-    first, second = client.submit(SPEC, "nightly-17"), client.submit(SPEC, "nightly-17")
-    assert first.id == second.id
-    with pytest.raises(Refused) as caught:
-        client.submit(SPEC.model_copy(update={"label": "b"}), "nightly-17")
-    assert (caught.value.status, caught.value.reason) == (409, "idempotency_key_reused")
-
-
 def test_lists_are_filtered_by_the_service(client: Client) -> None:
     other = client.submit(SPEC.model_copy(update={"label": "rare", "families": ("dense",)}))
     client.submit(SPEC)
