@@ -30,8 +30,7 @@ from risk_sac.errors import RiskSacError
 from risk_sac.execution.executor import WORDS
 from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
 from risk_sac.execution.postmortem import without_folders
-from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
-from risk_sac.rules import REPEATS
+from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer

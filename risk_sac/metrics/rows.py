@@ -12,7 +12,7 @@ from risk_sac.metrics.counts import Counts
 from risk_sac.metrics.features import FEATURES
 from risk_sac.metrics.metric import Derived, Kept, Metric, Ratio
 from risk_sac.metrics.tally import WINDOW, Tally
-from risk_sac.rules import ARTEFACT_RULES
+from risk_sac.records import ARTEFACT_RULES
 
 PER_STEPS = 1000  # environment steps over which the rate of distinct failures is taken
 

@@ -15,7 +15,9 @@ from risk_sac.records.campaign import (
     Total,
 )
 from risk_sac.records.episode import (
+    ARTEFACT_RULES,
     RECORDED,
+    REPEATS,
     Collision,
     ConflictType,
     Episode,
@@ -35,8 +37,10 @@ from risk_sac.records.episode import (
 from risk_sac.records.run import FINAL, Funnel, Run, RunMetrics, RunResult, RunSummary, State
 
 __all__ = [
+    "ARTEFACT_RULES",
     "FINAL",
     "RECORDED",
+    "REPEATS",
     "Campaign",
     "CampaignHead",
     "CampaignPage",

@@ -10,8 +10,22 @@ from pydantic import AliasChoices, Field
 
 from risk_sac.records.base import Least, Page, Real, Record
 from risk_sac.records.run import Funnel
-from risk_sac.rules import ARTEFACT_RULES
 from risk_sac.series import Series
+
+REPEATS = "repeats"  # rule that a contact fails if its replay goes another way; asked of nothing else
+# Rules among a collision's verdicts that are about the simulator or the control, not about fault.
+ARTEFACT_RULES = frozenset(
+    {
+        REPEATS,
+        "no_teleport",
+        "no_spawn_overlap",
+        "conflict_after_release",
+        "inside_limits",
+        "inside_grip",
+        "solid_bodies",
+        "ego_model_saw",
+    }
+)
 
 
 class Outcome(StrEnum):

@@ -7,8 +7,7 @@ from pathlib import Path
 from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
-from risk_sac.records import EpisodeRecord, Outcome, Repetition
-from risk_sac.rules import REPEATS
+from risk_sac.records import REPEATS, EpisodeRecord, Outcome, Repetition
 from risk_sac.run_folder.durable import read_sealed, write_sealed
 from risk_sac.run_folder.results import Results
 from risk_sac.verdicts.distinct import DistinctFailures, niche_of

@@ -10,8 +10,7 @@ from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import EpisodeDone, Finished
-from risk_sac.records import EpisodeRecord, Outcome, State, Triage, TriageState, stored
-from risk_sac.rules import REPEATS
+from risk_sac.records import REPEATS, EpisodeRecord, Outcome, State, Triage, TriageState, stored
 from service.errors import ConflictError
 from service.store.counting import add_usage, count, fill, fill_record, tally
 from service.store.database import WRITING, storage_errors

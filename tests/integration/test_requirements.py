@@ -16,9 +16,8 @@ from risk_sac.agents.scripted import ScriptedAgent
 from risk_sac.config import FamilyName, RunSpec
 from risk_sac.env import Observation, RiskSacEnv
 from risk_sac.problem import Problem
-from risk_sac.records import Collision
+from risk_sac.records import ARTEFACT_RULES, Collision
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
-from risk_sac.rules import ARTEFACT_RULES
 from risk_sac.run_folder.series import Trace
 from risk_sac.types import STEP_S, Floats, Scene
 

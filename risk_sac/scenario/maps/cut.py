@@ -8,27 +8,13 @@ programme, also those that would count vehicles: an episode sets where in its cy
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Set
-from pathlib import Path
 
-from risk_sac.errors import MapError
 from risk_sac.scenario.maps.found import Fit
 from risk_sac.scenario.maps.net import Net
 from risk_sac.scenario.maps.ways import edges_on
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace, Place, Stretch, Track
 
 AROUND_M = 100.0  # so far from a place roads stay although nobody drives there: a picture shows them
-
-
-def read_tree(path: Path) -> ET.Element:
-    """The net's file, for `cut`.
-
-    Raises:
-      MapError: it is no XML.
-    """
-    try:
-        return ET.parse(path).getroot()
-    except ET.ParseError as error:
-        raise MapError("network", f"{path.name} is no XML: {error}") from error
 
 
 def cut(net: Net, root: ET.Element, fit: Fit) -> bytes:

@@ -1,6 +1,5 @@
 """Finds the places of a map, and keeps them as families."""
 
-import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -9,9 +8,9 @@ from risk_sac.errors import MapError
 from risk_sac.scenario import library
 from risk_sac.scenario.maps import find_crossing, find_junction, find_stretch
 from risk_sac.scenario.maps.around import ground_around
-from risk_sac.scenario.maps.cut import cut, read_tree
+from risk_sac.scenario.maps.cut import cut
 from risk_sac.scenario.maps.found import Fit, Misfit, NoFit, Pattern, Spot, Survey
-from risk_sac.scenario.maps.net import Net, read_net
+from risk_sac.scenario.maps.net import Net, read_net, read_tree
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace
 
 FINDERS: dict[Pattern, ModuleType] = {
@@ -81,8 +80,8 @@ class Map:
           MapError: no pattern could be placed on it; the message says why.
           OSError: it cannot be read.
         """
-        self.net: Net = read_net(file)
-        self._root: ET.Element = read_tree(file)
+        self._root = read_tree(file)
+        self.net: Net = read_net(file, self._root)
 
     def fits(self, pattern: Pattern, place: str | None) -> Sequence[Fit]:
         """One place, or all at which a pattern fits.

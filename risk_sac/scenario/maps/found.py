@@ -1,11 +1,9 @@
 """What a search of a map comes to."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from risk_sac.scenario.maps.net import Net
 from risk_sac.scenario.place import Place
 
 Pattern = Literal["car_following", "crossing", "junction"]
@@ -57,6 +55,3 @@ class Survey:
     def counts(self) -> Counter[str]:
         """Places by pattern."""
         return Counter(fit.spot.pattern for fit in self.fits)
-
-
-Placer = Callable[[Net, Spot], Place]

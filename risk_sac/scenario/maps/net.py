@@ -150,17 +150,31 @@ class Net:
         return self.edges[edge].lanes[int(index)]
 
 
-def read_net(path: Path) -> Net:
+def read_tree(path: Path) -> ET.Element:
+    """Reads the XML of a net that we, the sandbox or netconvert have written.
+
+    Raises:
+      MapError: it is no XML.
+      OSError: it cannot be read.
+    """
+    try:
+        return ET.parse(path).getroot()
+    except ET.ParseError as error:
+        raise MapError("network", f"{path.name} is no XML: {error}") from error
+
+
+def read_net(path: Path, root: ET.Element | None = None) -> Net:
     """Reads a net.
+
+    Args:
+      path: its file.
+      root: its XML, if that is read already.
 
     Raises:
       MapError: it is no net on which anything could be found; the message says why.
       OSError: it cannot be read.
     """
-    try:
-        root = ET.parse(path).getroot()  # a net that we, the sandbox or netconvert have written
-    except ET.ParseError as error:
-        raise MapError("network", f"{path.name} is no XML: {error}") from error
+    root = read_tree(path) if root is None else root
     if root.tag != "net":
         raise MapError("network", f"{path.name} with the root <{root.tag}>", "<net>", "convert it first")
     if root.get("lefthand", "false").lower() in ("true", "1"):

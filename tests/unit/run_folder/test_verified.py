@@ -1,7 +1,6 @@
 """Which failures are refused because one of them does not repeat."""
 
-from risk_sac.records import EpisodeRecord, Grade, Outcome, Repetition
-from risk_sac.rules import REPEATS
+from risk_sac.records import REPEATS, EpisodeRecord, Grade, Outcome, Repetition
 from risk_sac.run_folder.verified import Verified
 from tests.builders import collision, episode_record, judgement
 

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from risk_sac.rules import ARTEFACT_RULES, REPEATS
+from risk_sac.records import ARTEFACT_RULES, REPEATS
 from risk_sac.verdicts.artefact import Handling, artefact_verdicts
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence

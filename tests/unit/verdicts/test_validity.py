@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from risk_sac.rules import ARTEFACT_RULES
+from risk_sac.records import ARTEFACT_RULES
 from risk_sac.types import Frame
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.validity import validity_verdicts
