@@ -111,12 +111,6 @@ def test_measuring_does_not_act(family: FamilyName, monkeypatch: pytest.MonkeyPa
 
 
 @each_family
-def test_another_seed_gives_another_episode(family: FamilyName) -> None:
-    with closing(make_default(family)) as env:
-        assert not same(episode(env, 3), episode(env, 5))
-
-
-@each_family
 def test_one_scene_under_two_seeds_starts_alike_and_then_differs(family: FamilyName) -> None:
     starts, episodes = [], []
     with closing(make_default(family)) as env:

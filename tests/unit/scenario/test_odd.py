@@ -39,11 +39,8 @@ SPACE = SceneSpace(
 )
 
 
-def test_an_empty_odd_is_the_default() -> None:
-    assert intersect(DEFAULT, Odd()) == DEFAULT
-
-
 def test_intersection_narrows_the_given_fields_and_keeps_the_rest() -> None:
+    assert intersect(DEFAULT, Odd()) == DEFAULT
     user = Odd(scenery=Scenery(signal_types=("none",)), dynamic=DynamicElements(vehicle_speed_mps=interval(10, 30)))
     both = intersect(DEFAULT, user)
     assert both.dynamic.vehicle_speed_mps == interval(10, 20)
@@ -96,6 +93,16 @@ def test_intersection_is_the_set_of_common_values(bounds: list[float]) -> None:
             "odd.dynamic.pedestrian_accel_mps2",
             "low <= -0.1 and high >= 0.1",
         ),
+        (
+            Odd(dynamic=DynamicElements(vehicle_lateral_speed_mps=interval(0, 1.9))),
+            "odd.dynamic.vehicle_lateral_speed_mps",
+            r"bounds within \[0, 1.8\]",
+        ),
+        (
+            Odd(dynamic=DynamicElements(vehicle_lateral_accel_mps2=interval(0, 0))),
+            "odd.dynamic.vehicle_lateral_accel_mps2",
+            "a high of at least 0.1",
+        ),
     ],
 )
 def test_a_bad_odd_is_refused_by_field_with_got_and_wanted(user: Odd, field: str, message: str) -> None:
@@ -109,13 +116,6 @@ def test_the_odd_narrows_the_parameters_that_name_one_of_its_fields() -> None:
     speed, gap = narrow(SPACE, odd).parameters
     assert (speed.low, speed.high) == (10, 12)
     assert (gap.low, gap.high) == (5, 40)
-
-
-def test_an_odd_that_empties_the_space_names_the_parameter() -> None:
-    odd = intersect(DEFAULT, Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(19, 20))))
-    with pytest.raises(OddError, match=r"\[19, 20\]; wanted an overlap with \[5, 18\].*'lead_speed_mps'") as caught:
-        narrow(SPACE, odd)
-    assert caught.value.field == "odd.dynamic.vehicle_speed_mps"
 
 
 CROSSING = Parameter("crossing", "1", 0, 1, "", "scenery.crossing_types", ("zebra", "signalised"))
@@ -135,10 +135,14 @@ def test_a_set_in_the_odd_narrows_a_category(allowed: tuple[str, ...], low: floa
     assert (crossing.low, crossing.high) == (low, high)
 
 
-def test_a_set_that_leaves_no_category_names_the_parameter() -> None:
+def test_an_odd_that_empties_the_space_names_the_parameter() -> None:
     odd = Odd(scenery=Scenery(crossing_types=("none",)))
     with pytest.raises(OddError, match=r"got \{none\}; wanted an overlap with \{zebra, signalised\}.*'crossing'"):
         narrow(SceneSpace("mixed", (CROSSING,)), odd)
+    odd = intersect(DEFAULT, Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(19, 20))))
+    with pytest.raises(OddError, match=r"\[19, 20\]; wanted an overlap with \[5, 18\].*'lead_speed_mps'") as caught:
+        narrow(SPACE, odd)
+    assert caught.value.field == "odd.dynamic.vehicle_speed_mps"
 
 
 def test_requirements_follow_the_odd() -> None:
@@ -181,19 +185,6 @@ def test_a_user_may_widen_what_is_only_usual_up_to_the_extreme() -> None:
     assert both.vehicle_lateral_speed_mps == interval(0, 1.8)
     assert both.pedestrian_speed_mps == interval(0, 3)  # running, and no more
     assert both.vehicle_speed_mps == usual.dynamic.vehicle_speed_mps
-
-
-@pytest.mark.parametrize(
-    ("dynamic", "wanted"),
-    [
-        (DynamicElements(vehicle_lateral_speed_mps=interval(0, 1.9)), r"bounds within \[0, 1.8\]"),
-        (DynamicElements(vehicle_lateral_speed_mps=interval(-1, 1)), r"bounds within \[0, 1.8\]"),
-        (DynamicElements(vehicle_lateral_accel_mps2=interval(0, 0)), "a high of at least 0.1"),
-    ],
-)
-def test_a_senseless_lateral_limit_is_refused(dynamic: DynamicElements, wanted: str) -> None:
-    with pytest.raises(OddError, match=wanted):
-        intersect(DEFAULT, Odd(dynamic=dynamic))
 
 
 def test_what_is_flat_until_it_breaks_is_monitored_and_no_part_of_the_potential() -> None:

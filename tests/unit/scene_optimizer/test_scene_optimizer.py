@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+import scipy.stats
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,6 +14,7 @@ from risk_sac.errors import CheckpointError, NotFinite, SceneError
 from risk_sac.scene_optimizer import (
     ArchiveOptimizer,
     BotorchOptimizer,
+    IidSampler,
     SceneOptimizer,
     SobolOptimizer,
     surrogate,
@@ -21,7 +23,8 @@ from risk_sac.scene_optimizer.base import RunningMaximum, objective
 from risk_sac.types import Floats
 
 QUICK = SceneOptimizerConfig(initial_scenes=6, window=24, refit_every=5, candidates=64)
-KINDS = (SobolOptimizer, BotorchOptimizer, ArchiveOptimizer)
+SCORING = (SobolOptimizer, BotorchOptimizer, ArchiveOptimizer)
+KINDS = (*SCORING, IidSampler)
 returns = st.floats(-100, 100)
 
 
@@ -57,11 +60,6 @@ def bowl(episode: int, u: Floats) -> float | None:
 )
 def test_objective_literals(mean_return, maximum, expected):
     assert objective(mean_return, maximum) == pytest.approx(expected, rel=1e-12)
-
-
-def test_objective_is_elementwise():
-    scores = objective(np.array([0.5, 2.0, np.nan]), 2.0)
-    np.testing.assert_allclose(scores, [1.5 / 2.001, 0.0, np.nan])
 
 
 @settings(deadline=None)
@@ -134,7 +132,7 @@ def test_global_generators_and_dtype_are_neither_moved_nor_read(kind):
     np.testing.assert_array_equal(drive(kind(3, QUICK, 2), 20, bowl), asked)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SCORING)
 def test_tell_returns_the_objective_and_none_for_a_rejected_scene(kind):
     optimizer = kind(2, QUICK, 0)
     u = optimizer.ask()
@@ -170,6 +168,19 @@ def test_state_of_another_optimiser_is_refused(kind):
         kind(2, QUICK, 1).load(state)
     with pytest.raises(CheckpointError, match="kind"):
         KINDS[kind is SobolOptimizer](2, QUICK, 0).load(state)
+
+
+def test_independent_scenes_are_uniform_have_no_score_and_do_not_depend_on_returns():
+    sampler, untold = (IidSampler(3, QUICK, 2**31 + 5) for _ in range(2))
+    points = drive(sampler, 2000, lambda episode, u: [None, 3.0][episode % 2])
+    assert sampler.tell(points[0], 3.0) is None
+    np.testing.assert_array_equal(points[:5], [untold.ask() for _ in range(5)])
+    for axis in points.T:
+        assert scipy.stats.kstest(axis, "uniform").pvalue > 0.001
+        assert abs(np.corrcoef(axis[1:], axis[:-1])[0, 1]) < 0.08
+    # A Sobol sequence would put nearly as many into each cell of a grid; chance does not.
+    cells = np.histogramdd(points, bins=5)[0]
+    assert 0.7 < cells.var() / cells.mean() < 1.4
 
 
 # What the Bayesian optimiser adds
