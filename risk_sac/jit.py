@@ -51,16 +51,7 @@ SETTINGS["CACHE_DIR"] = _cache_folder()
 
 def compiled(function: Function) -> Function:
     """Compiles on first call; the result is kept on disk for the next process where there is a place for it."""
-    return _compiled(function, set())
-
-
-def compiled_in_any_order(function: Function) -> Function:
-    """As `compiled`, but for sums that may be added up in any order: several at a time, as the processor does it."""
-    return _compiled(function, {"reassoc", "contract"})
-
-
-def _compiled(function: Function, fastmath: set[str]) -> Function:
     try:
-        return cast(Function, numba.njit(cache=True, fastmath=fastmath)(function))
+        return cast(Function, numba.njit(cache=True)(function))
     except RuntimeError:  # a read-only installation without a cache folder
-        return cast(Function, numba.njit(fastmath=fastmath)(function))
+        return cast(Function, numba.njit(function))

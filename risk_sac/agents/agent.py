@@ -1,12 +1,15 @@
-"""What the learner needs of an actor-critic agent, whichever algorithm it runs."""
+"""Interface of the actor-critic agents, and what their implementations share."""
 
+import copy
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from torch import Tensor
+import torch
+from torch import Tensor, nn
+from torch.optim import Adam
 
 from risk_sac.agents.replay import Batch
 from risk_sac.errors import CheckpointError, NotFinite
@@ -14,15 +17,15 @@ from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.types import Floats, Vector
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class UpdateResult:
-    """What one update of all networks found out."""
+    """Figures of one update of all networks."""
 
     td_errors: Floats  # batch; |δ|, mean over the critics
     critic_loss: float
     actor_loss: float
-    temperature: float  # α after the update; 0 for an agent without
-    entropy: float  # of the policy over the batch, nats; 0 for a deterministic one
+    temperature: float = 0.0  # α after the update; 0 for an agent without
+    entropy: float = 0.0  # of the policy over the batch, nats; 0 for a deterministic one
 
 
 class Agent(Protocol):
@@ -41,7 +44,7 @@ class Agent(Protocol):
         """
 
     def frozen(self) -> FrozenPolicy:
-        """What acts as this agent does without exploring, and learns no more."""
+        """A copy of the policy that acts without exploring and no longer learns."""
 
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """|δ| of transitions, `batch`, mean over the critics; arguments as for `update`."""
@@ -64,8 +67,41 @@ class Agent(Protocol):
         """Continue from `state()`.
 
         Raises:
-          CheckpointError: the state is of other networks; the agent is not to be used any further.
+          CheckpointError: the state is of other networks; the agent must not be used any further.
         """
+
+
+def td_target(reward: Tensor, terminated: Tensor, next_value: Tensor, discount: float) -> Tensor:
+    """Target of the critics.
+
+    y = r + γ (1 - terminated) V(s')
+
+    Args:
+      reward: `batch`, the reward to be maximised.
+      terminated: `batch`, 1 where s' is terminal; 0 where only the time limit was reached.
+      next_value: `batch`, V(s') by the target networks.
+      discount: γ.
+
+    Returns:
+      `batch`.
+
+    Source: Haarnoja et al. 2018, Eq. 2; Lillicrap et al. 2016, Alg. 1.
+    """
+    return reward + discount * (1.0 - terminated) * next_value
+
+
+def critic_loss(td_errors: Tensor, weight: Tensor) -> Tensor:
+    """Importance-weighted squared error of all critics.
+
+    J_Q = Σ_i E[w · ½ (y - Q_ψi(s, a))²]
+
+    Args:
+      td_errors: `critics x batch`, y - Q_ψi.
+      weight: `batch`, importance weights of (10).
+
+    Source: Haarnoja et al. 2018, Eq. 5, times w of RISK-SAC, Eq. 10.
+    """
+    return 0.5 * (weight * td_errors.square()).mean(dim=1).sum()
 
 
 def mean_magnitude(td_errors: Tensor) -> Floats:
@@ -74,7 +110,7 @@ def mean_magnitude(td_errors: Tensor) -> Floats:
 
 
 def all_finite(figures: list[float]) -> list[float]:
-    """The figures of an update, once they have been found sound.
+    """Returns the figures of an update if all are finite.
 
     Raises:
       NotFinite: one is NaN or infinite.
@@ -87,9 +123,38 @@ def all_finite(figures: list[float]) -> list[float]:
     return figures
 
 
+def minimise(loss: Tensor, optimizer: Adam) -> None:
+    """One optimiser step on a loss; only the optimiser's parameters receive a gradient."""
+    parameters = [each for group in optimizer.param_groups for each in group["params"]]
+    for parameter, gradient in zip(parameters, torch.autograd.grad(loss, parameters), strict=True):
+        parameter.grad = gradient
+    optimizer.step()
+
+
+@torch.no_grad()
+def follow(targets: nn.Module, networks: nn.Module, rate: float) -> None:
+    """Moves target networks towards the learned ones: ψ̄ ← ψ̄ + τ (ψ - ψ̄)."""
+    torch._foreach_lerp_(list(targets.parameters()), list(networks.parameters()), rate)
+
+
+def saved(parts: Mapping[str, nn.Module | Adam], generator: torch.Generator) -> dict[str, Any]:
+    """Copies the state of an agent's networks, optimisers and generator."""
+    states = {name: part.state_dict() for name, part in parts.items()}
+    return copy.deepcopy(states | {"generator": generator.get_state()})
+
+
+def restore(parts: Mapping[str, nn.Module | Adam], generator: torch.Generator, state: dict[str, Any]) -> None:
+    """Continues from `saved`; raises CheckpointError if the networks have other shapes."""
+    state = copy.deepcopy(state)  # an optimiser would share its tensors
+    with loading():
+        for name, part in parts.items():
+            part.load_state_dict(state[name])
+        generator.set_state(state["generator"])
+
+
 @contextmanager
 def loading() -> Iterator[None]:
-    """Turns what torch says of a state that does not fit into a CheckpointError."""
+    """Turns torch's errors about a state that does not fit into a CheckpointError."""
     try:
         yield
     except (KeyError, RuntimeError, ValueError) as error:

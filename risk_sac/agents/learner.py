@@ -11,17 +11,18 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import torch
 from torch import Tensor
 
 from risk_sac.agents.agent import Agent, UpdateResult
 from risk_sac.agents.ddpg import DdpgAgent
 from risk_sac.agents.decisions import Decision, Held
-from risk_sac.agents.device import choose_device, random_batch
 from risk_sac.agents.lagrangian import DualVariable
 from risk_sac.agents.replay import Batch, Replay, RiskPrioritizedReplay, Transition, UniformReplay
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
+from risk_sac.errors import ConfigError
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.problem import check_installed
 from risk_sac.risk.reward import TrainingReward
@@ -53,12 +54,8 @@ class Learner:
         self._config = config  # with the γ of a decision
         self._reward = TrainingReward(method, config)
         self._action_size = action_size
-        make = {"sac": self._sac, "ddpg": self._ddpg, "sb3": self._sb3}[method.agent]
-        self._make = partial(make, observation_size, action_size, seed)
-        trial = random_batch(observation_size, action_size, config.agent.batch_size)
-        wanted = config.agent.device if method.agent != "sb3" else "cpu"
-        self.device = choose_device(wanted, self._make, trial)
-        self._agent = self._make(self.device)
+        self.device = _device(config.agent.device if method.agent != "sb3" else "cpu")
+        self._agent = self._make_agent(observation_size, action_size, seed)
         replay = RiskPrioritizedReplay if method.replay == "rper" else UniformReplay
         self._replay: Replay = replay(observation_size, action_size, config.replay)
         self._dual = DualVariable(config.lagrangian, enabled=method.lagrangian)
@@ -126,7 +123,6 @@ class Learner:
     def state(self) -> dict[str, Any]:
         """Everything the next episode depends on, generators included; tensors, arrays and plain values."""
         return {
-            "device": self.device,
             "agent": self._agent.state(),
             "replay": self._replay.state(),
             "dual_variable": self._dual.value,
@@ -137,14 +133,11 @@ class Learner:
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`, as if never interrupted, on the device of old.
+        """Continue from `state()`, as if never interrupted.
 
         Raises:
           CheckpointError: the state is of another shape.
         """
-        if state["device"] != self.device:
-            self.device = state["device"]
-            self._agent = self._make(self.device)
         self._replay.load(state["replay"])
         self._agent.load(state["agent"])
         self._dual.value = state["dual_variable"]
@@ -156,17 +149,16 @@ class Learner:
             return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
         return self._agent.act(observation, explore)  # Alg. 1, l. 7
 
-    def _sac(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
-        return SacAgent(observation_size, action_size, self._config.agent, self._config.sac, seed, device)
-
-    def _ddpg(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
-        return DdpgAgent(observation_size, action_size, self._config.agent, self._config.ddpg, seed, device)
-
-    def _sb3(self, observation_size: int, action_size: int, seed: int, device: str) -> Agent:
+    def _make_agent(self, observation_size: int, action_size: int, seed: int) -> Agent:
+        sizes, config = (observation_size, action_size), self._config
+        if self._method.agent == "ddpg":
+            return DdpgAgent(*sizes, config.agent, config.ddpg, seed, self.device)
+        if self._method.agent == "sac":
+            return SacAgent(*sizes, config.agent, config.sac, seed, self.device)
         check_installed("sb3-sac")
         from risk_sac.agents.sb3 import Sb3Agent  # here, because it is an extra
 
-        return Sb3Agent(observation_size, action_size, self._config.agent, self._config.sac, seed)
+        return Sb3Agent(*sizes, config.agent, config.sac, seed)
 
     def _update_once(self) -> UpdateResult:
         batch_size = self._config.agent.batch_size
@@ -191,3 +183,16 @@ class Learner:
             batch.terminated,
             self._dual.value,
         )
+
+
+def _device(wanted: str) -> str:
+    """Returns where the networks live: the CPU unless the user asks for CUDA.
+
+    Raises:
+      ConfigError: `cuda` is wanted and there is none.
+    """
+    if wanted != "cuda":
+        return "cpu"
+    if not torch.cuda.is_available():
+        raise ConfigError("learner.agent.device", "'cuda', and torch sees no CUDA device here", "'auto' or 'cpu'")
+    return wanted

@@ -34,8 +34,8 @@ class AgentConfig(Settings):
     updates_per_step: Annotated[float, Field(ge=0, le=20)] = 1.0
     """Updates in an environment step. One costs as much as two or three steps."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
-    """Where the networks live; `auto` takes the GPU where there is one that updates them faster than the processor.
-    Results are reproducible on equal devices only."""
+    """Where the networks live; `auto` is the CPU, which is faster for networks this small. Results are reproducible on
+    equal devices only."""
 
 
 class SacConfig(Settings):

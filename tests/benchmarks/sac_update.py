@@ -1,21 +1,17 @@
-"""One learner update beside Stable-Baselines3's and beside its matrix products alone; a program of its own, because
-torch's threads are fixed at the start of a process.
+"""One learner update beside Stable-Baselines3's; a program of its own, because torch's threads are fixed at the start
+of a process.
 
 Run: OMP_NUM_THREADS=1 python -m tests.benchmarks.sac_update 256 256; prints the times as JSON.
 """
 
 import json
 import sys
-from collections.abc import Callable
-from itertools import pairwise
 
 import gymnasium as gym
 import numpy as np
-import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
 
-from risk_sac.agents import networks
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.replay import Transition
 from risk_sac.config import METHODS, LearnerConfig
@@ -68,36 +64,10 @@ def fill(model: SAC, learner: Learner) -> None:
         )
 
 
-def products(width: int, batch: int) -> Callable[[], None]:
-    """All matrix products that an update of SAC consists of, by whatever computes them fastest, and nothing else."""
-    policy, critic = (OBSERVATIONS, width, width, 2 * ACTIONS), (OBSERVATIONS + ACTIONS, width, width, 1)
-
-    def forward(sizes: tuple[int, ...], rows: int) -> list[tuple[int, int, int]]:
-        return [(rows, fan_in, out) for fan_in, out in pairwise(sizes)]
-
-    def through(sizes: tuple[int, ...]) -> list[tuple[int, int, int]]:
-        return [(batch, out, fan_in) for fan_in, out in pairwise(sizes[1:])]
-
-    def weights(sizes: tuple[int, ...]) -> list[tuple[int, int, int]]:
-        return [(fan_in, batch, out) for fan_in, out in pairwise(sizes)]
-
-    fit = forward(critic, batch) + through(critic) + weights(critic)
-    slope = [*forward(critic, batch), *through(critic), (batch, width, ACTIONS)]  # of Q in the action
-    shapes = forward(policy, 2 * batch) + through(policy) + weights(policy)
-    shapes += 2 * (forward(critic, batch) + fit + slope)  # twin critics, their targets first
-    factors = [(torch.randn(rows, inner), torch.randn(inner, columns)) for rows, inner, columns in shapes]
-
-    def multiply() -> None:
-        for left, right in factors:
-            networks._product(left, right)
-
-    return multiply
-
-
 def main(width: int, batch: int) -> None:
     model, learner = sb3(width, batch), ours(width, batch)
     fill(model, learner)
-    calls = (lambda: model.train(1, batch), learner.update, products(width, batch))
+    calls = (lambda: model.train(1, batch), learner.update)
     interleaved(*calls, rounds=WARM_UP)
     times = interleaved(*calls, rounds=ROUNDS)
     json.dump({"wall_s": times.wall_s.tolist(), "cpu_s": times.cpu_s.tolist()}, sys.stdout)

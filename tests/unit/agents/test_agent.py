@@ -1,6 +1,5 @@
 """What every agent must do, whichever algorithm it runs."""
 
-import dataclasses
 import io
 from collections.abc import Callable
 
@@ -11,12 +10,12 @@ from torch import Tensor
 
 from risk_sac.agents.agent import Agent
 from risk_sac.agents.ddpg import DdpgAgent
+from risk_sac.agents.learner import Learner
 from risk_sac.agents.replay import Batch
 from risk_sac.agents.sac import SacAgent
-from risk_sac.config import AgentConfig, DdpgConfig, SacConfig
+from risk_sac.config import METHODS, AgentConfig, DdpgConfig, LearnerConfig, SacConfig
 from risk_sac.config.learner import MOST_TEMPERATURE
-from risk_sac.errors import CheckpointError, NotFinite
-from tests.unit.agents.plain import PlainDdpg, PlainMlp, PlainSac
+from risk_sac.errors import CheckpointError, ConfigError, NotFinite
 
 OBSERVATIONS, ACTIONS, ROWS = 5, 2, 16
 CONFIG = AgentConfig(hidden_sizes=(16, 16), batch_size=ROWS, critic_learning_rate=1e-3, target_rate=0.01)
@@ -95,19 +94,46 @@ def test_td_errors_are_those_of_an_update_at_equal_noise(make: Make) -> None:
     agent = make()
     state = agent.state()
     batch = random_batch(np.random.default_rng(0))
-    # Of one transition, since an update draws the noise of the policy's own step together with that of the targets.
-    single = dataclasses.replace(
-        batch,
-        observation=batch.observation[:1],
-        action=batch.action[:1],
-        next_observation=batch.next_observation[:1],
-        terminated=torch.zeros(1),
-        weight=torch.ones(1),
-    )
-    measured = agent.td_errors(single, torch.tensor([0.5]))
-    assert measured.shape == (1,)
+    measured = agent.td_errors(batch, batch.risk_reward)
+    assert measured.shape == (ROWS,)
     agent.load(state)
-    assert agent.update(single, torch.tensor([0.5])).td_errors == pytest.approx(measured, rel=1e-6)
+    assert agent.update(batch, batch.risk_reward).td_errors == pytest.approx(measured, rel=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@both
+def test_learns_what_is_rewarded(make: Make, sign: float) -> None:
+    agent = make(CONFIG.model_copy(update={"discount": 0.01, "actor_learning_rate": 3e-3}))
+    batch = random_batch(np.random.default_rng(0), 64)
+    losses = [agent.update(batch, sign * batch.action.sum(dim=1)).critic_loss for _ in range(200)]
+    assert losses[-1] < losses[0] / 2
+    actions = np.array([agent.act(each.numpy(), explore=False) for each in batch.observation])
+    assert sign * actions.mean() > 0.5
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU here")
+def test_the_cpu_is_taken_unless_a_gpu_is_asked_for_and_a_missing_one_is_refused() -> None:
+    def learner(device: str) -> Learner:
+        config = LearnerConfig.model_validate({"agent": {"device": device}})
+        return Learner(OBSERVATIONS, ACTIONS, METHODS["sac"], config, 0)
+
+    assert (learner("auto").device, learner("cpu").device) == ("cpu", "cpu")
+    with pytest.raises(ConfigError, match="CUDA") as caught:
+        learner("cuda")
+    assert caught.value.field == "learner.agent.device"
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+def test_an_agent_on_the_gpu_learns_what_one_on_the_cpu_learns() -> None:
+    slow = sac()
+    fast = SacAgent(OBSERVATIONS, ACTIONS, CONFIG, SacConfig(), 0, "cuda")
+    fast.load(slow.state() | {"generator": fast.state()["generator"]})
+    batch = random_batch(np.random.default_rng(0))
+    results = [
+        agent.update(batch.on(device), batch.risk_reward.to(device))
+        for agent, device in ((slow, "cpu"), (fast, "cuda"))
+    ]
+    assert results[1].critic_loss == pytest.approx(results[0].critic_loss, rel=0.5)  # their noise differs
 
 
 @both
@@ -162,42 +188,3 @@ def test_state_of_wider_networks_is_refused(make: Make) -> None:
     wider = CONFIG.model_copy(update={"hidden_sizes": (17, 16)})
     with pytest.raises(CheckpointError, match="hidden_sizes"):
         make(wider).load(make().state())
-
-
-def check_alike(fast: list[Tensor], plain: list[PlainMlp]) -> None:
-    """And goes on from the same: a critic that becomes the smaller one by rounding alone would part them for good."""
-    for parameters, network in zip(fast, plain, strict=True):
-        torch.testing.assert_close(parameters, network.parameters(), rtol=0, atol=1e-5)
-        network.take_over(parameters)
-
-
-# The sizes beside the defaults reach the widths at which products go to oneDNN.
-@pytest.mark.parametrize(("sizes", "rows"), [((16, 16), ROWS), ((128, 128), 128)], ids=str)
-def test_each_of_a_hundred_updates_of_sac_equals_a_plain_autograd_reference(sizes: tuple[int, ...], rows: int) -> None:
-    config = CONFIG.model_copy(update={"hidden_sizes": sizes})
-    agent = sac(config)
-    plain = PlainSac(agent, config, SacConfig(), ACTIONS)
-    generator = np.random.default_rng(0)
-    for _ in range(100):
-        batch = random_batch(generator, rows)
-        agent.update(batch, batch.risk_reward)
-        plain.update(batch, batch.risk_reward)
-        check_alike([agent._policy.parameters], [plain.policy])
-        check_alike(agent._critics._parameters, plain.critics.online)
-        check_alike(agent._critics._target_parameters, plain.critics.targets)
-        assert agent.temperature == pytest.approx(plain.log_temperature.exp().item(), abs=1e-5)
-
-
-@pytest.mark.parametrize(("sizes", "rows"), [((16, 16), ROWS), ((128, 128), 128)], ids=str)
-def test_each_of_a_hundred_updates_of_ddpg_equals_a_plain_autograd_reference(sizes: tuple[int, ...], rows: int) -> None:
-    config = CONFIG.model_copy(update={"hidden_sizes": sizes})
-    agent = ddpg(config)
-    plain = PlainDdpg(agent, config)
-    generator = np.random.default_rng(0)
-    for _ in range(100):
-        batch = random_batch(generator, rows)
-        agent.update(batch, batch.risk_reward)
-        plain.update(batch, batch.risk_reward)
-        check_alike([agent._policy.parameters, agent._target_policy.parameters], [plain.policy, plain.target_policy])
-        check_alike(agent._critics._parameters, plain.critics.online)
-        check_alike(agent._critics._target_parameters, plain.critics.targets)
