@@ -16,8 +16,7 @@ from typing import Any
 import grpc
 import numpy as np
 
-from risk_sac.egos.cards import EgoCard
-from risk_sac.egos.registry import make, make_unregistered
+from risk_sac.egos.registry import EgoCard, make, make_unregistered
 from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.remote.messages import (
     METHODS,
