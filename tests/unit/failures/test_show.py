@@ -1,4 +1,5 @@
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,8 @@ from matplotlib.figure import Figure
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.show import draw, draw_recording
+from risk_sac.failures.show import CAPTION_WIDTH, caption, draw, draw_recording
+from risk_sac.records import Grade, Outcome
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 
 
@@ -114,3 +116,35 @@ def test_drawing_writes_a_picture_of_sensible_size(tmp_path: Path) -> None:
 def test_picture_of_an_unknown_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"contact.doc'; wanted a name that ends in .png"):
         draw("mixed", Recording(synthetic_contact(), synthetic_series()), tmp_path / "contact.doc")
+
+
+def lines(**judged: object) -> list[str]:
+    contact = synthetic_contact(JUDGED.model_copy(update=judged))
+    return caption("mixed", Recording(contact, with_release())).splitlines()
+
+
+def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke() -> None:
+    assert lines() == [
+        "mixed · episode low-random-0-train-7 · failure",
+        "the ego's front, at 10.0 m/s, touched the left of adversary 'pedestrian', at 1.0 m/s, "
+        "which it had seen for 1.0 s",
+        JUDGED.signature,
+        "the conflict began 1.2 s before the contact · grade careful: a careful driver would have prevented it",
+        "broken by the other: pedestrian on red",
+    ]
+    assert lines(grade=None, broke=())[-2:] == [
+        "the conflict began 1.2 s before the contact",
+        "broken by the other: nothing",
+    ]
+    assert lines(grade=Grade.UNAVOIDABLE)[-2].endswith(
+        "grade unavoidable: not even full braking at once would have prevented it"
+    )
+
+
+def test_rules_that_the_contact_failed_are_named_in_full_on_lines_that_the_page_holds() -> None:
+    contact = synthetic_contact()
+    rules = "conflict_after_release, inside_limits, inside_grip, solid_bodies, ego_model_saw, ego_moving, no_sideswipe"
+    failed = contact.episode.model_copy(update={"outcome": Outcome.DEGENERATE, "reason": rules})
+    title = caption("mixed", Recording(replace(contact, episode=failed), with_release()))
+    assert max(map(len, title.splitlines())) <= CAPTION_WIDTH
+    assert rules.replace("_", " ") in title.replace("\n", " ")
