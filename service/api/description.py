@@ -118,8 +118,6 @@ def _simplified(node: Any) -> Any:
         del node["title"]
     if "in" in node and "schema" in node:  # a parameter, whose description FastAPI repeats
         node["schema"].pop("description", None)
-    if "$ref" in node and isinstance(node.get("default"), dict):  # which the fields of the model tell
-        del node["default"]
     match node.get("anyOf"):
         case [{"type": str(kind)} as only, {"type": "null"}] if "enum" not in only:
             node.pop("anyOf")

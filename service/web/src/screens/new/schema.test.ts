@@ -7,7 +7,7 @@ const SCHEMAS: Record<string, Schema> = {
     description: "What each run\nmay spend.",
     properties: {
       episodes: { type: "integer", minimum: 1, maximum: 100, default: 30, description: "Search episodes." },
-      cpu_s: { anyOf: [{ type: "number", minimum: 0.1 }, { type: "null" }], default: null },
+      cpu_s: { type: ["number", "null"], minimum: 0.1, default: null },
     },
   },
   Spec: {

@@ -8,7 +8,7 @@ export type Values = { [name: string]: Json };
 /** The part of JSON Schema that the API's description uses. */
 export interface Schema {
   $ref?: string;
-  type?: string;
+  type?: string | string[];
   enum?: string[];
   anyOf?: Schema[];
   properties?: Record<string, Schema>;
@@ -64,14 +64,15 @@ export function shapeOf(schema: Schema, schemas: Record<string, Schema>): Shape 
   }
   if (known.anyOf?.[0]) return shapeOf(known.anyOf[0], schemas); // the others are what a form does not offer
   if (known.enum) return { kind: "choice", options: known.enum };
-  if (known.type === "array") {
+  const type = Array.isArray(known.type) ? known.type[0] : known.type; // the other is null
+  if (type === "array") {
     const { items = {}, minItems = 0, maxItems = Infinity } = known;
     return { kind: "list", item: shapeOf(items, schemas), least: minItems, most: maxItems };
   }
-  if (known.type === "boolean") return { kind: "switch" };
-  if (known.type === "number" || known.type === "integer") {
+  if (type === "boolean") return { kind: "switch" };
+  if (type === "number" || type === "integer") {
     const { minimum = -Infinity, maximum = Infinity } = known;
-    return { kind: "number", integer: known.type === "integer", low: minimum, high: maximum };
+    return { kind: "number", integer: type === "integer", low: minimum, high: maximum };
   }
   return { kind: "text", most: known.maxLength ?? Infinity, pattern: known.pattern ?? "" };
 }
@@ -79,7 +80,7 @@ export function shapeOf(schema: Schema, schemas: Record<string, Schema>): Shape 
 function fieldOf(name: string, schema: Schema, schemas: Record<string, Schema>): Field {
   const named = resolved(schema, schemas);
   const some = named.anyOf?.filter((each) => each.type !== "null") ?? [];
-  const optional = some.length > 0 && some.length < named.anyOf!.length;
+  const optional = named.anyOf ? some.length < named.anyOf.length : (named.type?.includes("null") ?? false);
   const [title, unit] = titleOf(name);
   return {
     name,
