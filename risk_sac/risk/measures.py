@@ -1,4 +1,4 @@
-"""All that is measured of a frame. Measuring acts on nothing: nobody in the simulation can tell that it was done."""
+"""Risk measures of a frame; measuring does not act on the simulation."""
 
 import math
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ def soft_min(robustness: Floats, beta: float) -> float:
 
 
 class Measures(NamedTuple):
-    """What one frame says about risk, and what the requirements say to it."""
+    """Risk measures of one frame, and the robustness of the requirements."""
 
     assessment: Assessment
     signals: dict[str, float]
@@ -57,14 +57,7 @@ class Gauge:
         rss: RssParameters,
         softmin_sharpness: float,
     ) -> None:
-        """Compiles the requirements.
-
-        Args:
-          requirements: to be monitored.
-          horizon_steps: the longest episode.
-          rss: parameters of the safe distances.
-          softmin_sharpness: β of Eq. 7.
-        """
+        """Compiles the requirements; `softmin_sharpness` is β of (7)."""
         self._monitor = Monitor(requirements, STEP_S, horizon_steps)
         self._rss = rss
         self._sharpness = softmin_sharpness

@@ -2,10 +2,9 @@
 
 C_real(s, a) = C_hard(s, a) + C_soft(s, a)                                           (5)
 
-Choice: C_hard acts on the whole episode. A scene that breaks one of its rules is rejected before the
-first step, so what remains during an episode is C_soft, in [0, 1]. It speaks of what adversaries do, and each term
-of it leaves free what an ordinary driver does: undisturbed traffic costs about 0, or a bound on the cost
-would mean nothing.
+Choice: C_hard acts on the whole episode: a scene that breaks one of its rules is rejected before the first step. What
+remains is C_soft, in [0, 1], of what adversaries do. Undisturbed traffic costs about 0, or a bound on the cost would
+mean nothing.
 
 Source: RISK-SAC, Sec. III-B.
 """
@@ -40,8 +39,8 @@ HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc", "initial_rss
 def jerk_term(accel_mps2: float, previous_accel_mps2: float, limit_mps2: float, step_s: float) -> float:
     """Abrupt control of one adversary, max(|Δa| / dt - ordinary, 0) / (greatest - ordinary), at most 1.
 
-    Choice: the greatest jerk is the actor's own, limit / BUILD_UP_S, and three quarters of it are free: what
-    ordinary drivers do at a light or behind a leader is not what the cost is to speak of.
+    Choice: the greatest jerk is the actor's own, limit / BUILD_UP_S, and three quarters of it are free, as ordinary
+    drivers need them at a light or behind a leader.
 
     Args:
       accel_mps2: its acceleration.
@@ -59,13 +58,7 @@ def jerk_term(accel_mps2: float, previous_accel_mps2: float, limit_mps2: float, 
 def acceleration_term(accel_mps2: float, lateral_accel_mps2: float, limit_mps2: float) -> float:
     """Excess acceleration of one adversary, the larger of that along and that across its way.
 
-    Each is max(|a| - comfort, 0) / (limit - comfort), at most 1. Choice: across counts too, or a car that swings
-    from side to side would cost nothing.
-
-    Args:
-      accel_mps2: its acceleration.
-      lateral_accel_mps2: across its lane, or across a pedestrian's walking direction.
-      limit_mps2: greatest absolute acceleration that it is capable of, above 0.
+    Each is max(|a| - comfort, 0) / (limit - comfort), at most 1.
     """
     comfort = min(COMFORT_MPS2, COMFORT_SHARE * limit_mps2)
     along = max(abs(accel_mps2) - comfort, 0.0) / (limit_mps2 - comfort)
@@ -77,10 +70,8 @@ def acceleration_term(accel_mps2: float, lateral_accel_mps2: float, limit_mps2: 
 def closeness_term(gap_m: float, previous_gap_m: float, step_s: float) -> float:
     """Sudden extreme proximity of one adversary to the ego, nearness · closing speed / scale.
 
-    nearness = max(1 - gap / close, 0) grows from 0 at the edge of the extreme proximity to 1 at contact, and
-    the closing speed is (previous gap - gap) / dt. The product costs only what is both near and sudden: a queue
-    at a light is near but slow, a distant oncoming car is fast but far, and neither is unrealistic. A body that
-    appears inside the close gap within one step, which no physical motion explains, costs the most.
+    nearness = max(1 - gap / close, 0) is 1 at contact; the closing speed is (previous gap - gap) / dt. Only what is
+    both near and sudden costs: a queue at a light is slow, and a distant oncoming car is far.
     """
     nearness = 1.0 - gap_m / CLOSE_GAP_M
     closing_mps = (previous_gap_m - gap_m) / step_s
@@ -113,11 +104,8 @@ def soft_cost(
 
     C_soft = 1/2 · max_k jerk_k + 1/4 · max_k excess_k + 1/4 · max_k closeness_k
 
-    Choice: jerk counts double. It is what tells commands from driving: under its bound an acceleration that is
-    jerked about hardly leaves the middle.
-
-    Choice: over the adversaries the worst counts, not the mean, or one adversary could behave as it liked in
-    the shadow of others that do nothing.
+    Choice: jerk counts double, because it tells commands from driving. Over the adversaries the worst counts, not the
+    mean, or one could behave as it liked beside others that do nothing.
 
     Args:
       accel_mps2: `n`, acceleration of each adversary in this step.
@@ -181,7 +169,7 @@ def adversaries_cost(
 def broken_hard_rule(
     overlaps: bool, gap_m: float, ttc_s: float, rss_margin: float, *, in_conflict: bool
 ) -> HardRule | None:
-    """C_hard of (5): the rule by which the frame of the release is implausible or unfair, or None.
+    """C_hard of (5): the rule that the frame of the release breaks, or None.
 
     Args:
       overlaps: whether any two bodies overlap.

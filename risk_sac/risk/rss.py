@@ -1,10 +1,9 @@
 """Responsibility-Sensitive Safety distances, and one margin for each actor.
 
-Choice: RSS gives two distances along a lane; here they are taken along the ego's axes, whatever the other's
-heading. What is along one body's axis is across the other's, so that braking and acceleration are blended by
-the angle between them: cross traffic stops by its brakes and not by its steering.
+Choice: RSS gives two distances along a lane; here they are taken along the ego's axes, whatever the other's heading.
+Braking and acceleration are blended by the angle between the bodies: cross traffic stops by its brakes.
 
-Deviation: of the lateral distance, the paper's words are taken and not its formula; see `lateral`.
+Deviation: the lateral distance follows the paper's words, not its formula; see `lateral`.
 
 Source: Shalev-Shwartz, Shammah, Shashua 2017, "On a Formal Model of Safe and Scalable Self-driving
 Cars", arXiv 1708.06374, Definitions 1 (same direction), 2 (opposite directions) and 6 (lateral).
@@ -22,17 +21,16 @@ from risk_sac.types import Bools, Floats
 LONGITUDINAL_CAP_M = LATERAL_CAP_M = 50.0
 
 # Choice: the margins that undisturbed traffic leaves, so that the scaled margin is about 1 in it: along a course the
-# time by which the ego could respond later, across it the metres to a car beside the ego in the next lane. A lateral
-# scale of 5 m would leave such a car at 0.2, below every leader that matters.
+# time by which the ego could respond later, across it the metres to a car in the next lane.
 LONGITUDINAL_SCALE_S = 0.85
-SLOW_MPS = 3.0  # who is slower counts as this fast: at standstill any margin would be endless in time
+SLOW_MPS = 3.0  # lower speeds count as this one: at standstill any margin would be endless in time
 LATERAL_SCALE_M = 1.1
 SCALED_LOW, SCALED_HIGH = -3.0, 2.0
 
 
 @compiled
 def stopping(speed_mps: float, response_s: float, accel_mps2: float, brake_mps2: float) -> float:
-    """Way until standstill, (v + v_ρ) ρ/2 + v_ρ |v_ρ| / (2 b) with v_ρ = v + ρ a, m; negative for who moves away.
+    """Way until standstill, (v + v_ρ) ρ/2 + v_ρ |v_ρ| / (2 b) with v_ρ = v + ρ a, m; negative if it moves away.
 
     Args:
       speed_mps: v, towards the other.
@@ -77,9 +75,8 @@ def opposite_direction(ego_mps: float, other_mps: float, parameters: RssParamete
 def lateral(closing_ego_mps: float, closing_other_mps: float, parameters: RssParameters) -> float:
     """d_min = μ + [Σ_i (v_i + v_i,ρ) ρ/2 + v_i,ρ |v_i,ρ| / (2 b_lat)]_+ , m  (Def. 6).
 
-    Deviation: the paper's formula has v_i,ρ² for v_i,ρ |v_i,ρ|. The two are the same for who closes in once ρ is over.
-    Who moves away even then goes on doing so while braking to a standstill, as Def. 6 says in words; v² would count
-    that way as closing in, so that the faster somebody leaves, the more room would have to be left.
+    Deviation: the paper's formula has v_i,ρ² for v_i,ρ |v_i,ρ|. The two differ for a vehicle that moves away after ρ.
+    It goes on doing so while it brakes, as Def. 6 says in words; v² would count that way as closing in.
 
     Args:
       closing_ego_mps: the ego's lateral speed towards the other; negative when it moves away.
@@ -104,26 +101,22 @@ class Margins(NamedTuple):
 def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Margins:
     """RSS margins to each other actor.
 
-    A margin is the distance between the bodies along an axis minus the RSS distance along it; bodies that
-    overlap along the axis have a negative distance, so that the margin goes on falling. The situation is dangerous
-    where both margins are negative, that is where the larger of the two is: one signal, continuous in position
-    and velocity.
+    A margin is the distance between the bodies along an axis minus the RSS distance along it; bodies that overlap along
+    the axis have a negative distance. The situation is dangerous where both margins, and so the larger, are negative.
 
     Choice: the lateral margin is the larger of that across the ego's course and that across the other's, for bodies
-    that stay clear along any direction do not touch. Otherwise an oncoming car that passes a turning ego
-    would count as a danger, for it moves across the ego's axes all the way. A pedestrian has no course worth
-    relying on.
+    that stay clear along any direction do not touch; an oncoming car that passes a turning ego is no danger. A
+    pedestrian has no course to rely on.
 
-    Choice: a margin is divided by what undisturbed traffic leaves, or by the RSS distance itself where that is more.
-    So it falls to -1 as the bodies meet. In metres it would rise before a contact: an ego that brakes hard, but too
-    late, wins back more RSS distance than it loses room.
+    Choice: a margin is divided by what undisturbed traffic leaves, or by the RSS distance where that is more, so it
+    falls to -1 as the bodies meet. In metres it would rise before a contact: an ego that brakes hard, but too late,
+    wins back more RSS distance than it loses room.
 
-    Choice: the lateral scale grows to the longitudinal one with the angle between the courses, since what is
-    across the ego's course is along that of cross traffic, and as fast.
+    Choice: the lateral scale grows to the longitudinal one with the angle between the courses.
 
     Args:
       view: the scene.
-      walks: `n`; who is a pedestrian.
+      walks: `n`; which are pedestrians.
       parameters: see `RssParameters`.
     """
     p = parameters

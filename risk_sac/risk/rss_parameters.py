@@ -1,10 +1,10 @@
-"""What `risk_sac.risk.rss` goes by; apart from it, for whoever needs nothing compiled."""
+"""Parameters of `risk_sac.risk.rss`, for modules that load no compiler."""
 
 from typing import NamedTuple
 
 
 class RssParameters(NamedTuple):
-    """What RSS assumes of both parties. The ego is the one that responds."""
+    """Assumptions of RSS about both parties; the ego responds."""
 
     response_s: float = 0.5  # ρ
     accel_mps2: float = 1.5  # a_max,accel during the response time; who follows or brakes has no foot on the pedal

@@ -19,7 +19,7 @@ from risk_sac.types import Bools, Floats
 TTC_CAP_S = 10.0  # longer times carry no risk and would only stretch the scale
 ENCOUNTER_CAP_S = 8.0  # longer times carry no risk
 
-# Choice: what a party may do that its velocity does not tell.
+# Choice: unforeseen motion.
 SPEED_SHARE = 0.2  # along its course, so much faster or slower than now
 DRIFT_MPS = 0.3  # in any direction: two vehicles that drift in their lanes
 WALK_MPS = 0.6  # in any direction, if one of the two is a pedestrian: half a walking pace
@@ -44,19 +44,15 @@ def time_to_encounter(view: RelativeView, walks: Bools) -> Floats:
     τ = min_{t ≥ 0} [ t + max_k (|s_k + v_k t| − r_k)₊ / c_k ],   c_k = c + δ (u_e |n_k · h_e| + u_o |n_k · h_o|)
 
     Both keep their velocity until t; the gap that is left then along a separating axis n_k (distance s_k of the
-    centres, relative velocity v_k, reach r_k of the bodies) is closed at a speed c_k by what nobody foresaw: a share δ
-    of the speeds u along the headings h, and c. On a collision course τ ≤ TTC, and for a leader that is as fast as the
-    ego τ is about the time headway over 2 δ. Every term is convex in t, so the minimum is where the lines that fall by
-    more than 1 a second meet the others, or at t = 0.
+    centres, relative velocity v_k, reach r_k of the bodies) is closed by unforeseen motion at a speed c_k: a share δ of
+    the speeds u along the headings h, and c. On a collision course τ ≤ TTC. Every term is convex in t, so the minimum
+    is where the lines that fall by more than 1 a second meet the others, or at t = 0.
 
-    An ego that brakes too late does not win τ back: while v² / 2d exceeds half of its braking, d / v falls.
-
-    Choice: whoever comes from behind has to keep the distance, so it fades out behind the ego's rear bumper, and what
-    overtakes the ego fades in.
+    Choice: an actor from behind has to keep the distance, so it fades out behind the ego's rear bumper.
 
     Args:
       view: the scene.
-      walks: `n`; who is a pedestrian.
+      walks: `n`; which are pedestrians.
     """
     n = len(view.x)
     encounter = np.empty(n)

@@ -22,8 +22,6 @@ from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
 
 PER_ACTOR = (*MOTION, "link")
 ON_THE_MOVE_MPS = 1.0
-
-
 PER_OTHER = {  # rows of an assessment
     "distance_m": GAP,
     "ttc_s": TTC,
