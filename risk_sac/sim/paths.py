@@ -45,22 +45,14 @@ class Along(NamedTuple):
     offset_m: float  # of its middle from the line, positive to the left
 
 
-class Paths:
-    """Paths of one net, each made once; needs a simulation that has loaded the net."""
+def path_of(route: Sequence[str], lane: str) -> Path:
+    """The path from the start of `lane` along `route`; a lane that does not lead on ends it.
 
-    def __init__(self) -> None:
-        self._paths: dict[tuple[tuple[str, ...], str], Path] = {}
-
-    def clear(self) -> None:
-        """Forgets all paths: another net may use the same names."""
-        self._paths.clear()
-
-    def of(self, route: tuple[str, ...], lane: str) -> Path:
-        """The path from the start of `lane` along `route`; a lane that does not lead on ends it."""
-        path = self._paths.get((route, lane))
-        if path is None:
-            path = self._paths[route, lane] = _path(_lanes_ahead(route, lane))
-        return path
+    The simulation must have loaded the net.
+    """
+    lanes = _lanes_ahead(route, lane)
+    lines = [np.array(libsumo.lane.getShape(lane)) for lane in lanes]
+    return path_along(lines, [libsumo.lane.getMaxSpeed(lane) for lane in lanes])
 
 
 def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:
@@ -101,11 +93,6 @@ def _reach(edges: Sequence[str], lane: str) -> int:
 
 def _edge(lane: str) -> str:
     return lane.rpartition("_")[0]
-
-
-def _path(lanes: Sequence[str]) -> Path:
-    lines = [np.array(libsumo.lane.getShape(lane)) for lane in lanes]
-    return path_along(lines, [libsumo.lane.getMaxSpeed(lane) for lane in lanes])
 
 
 def path_along(lines: Sequence[Floats], limits_mps: Sequence[float]) -> Path:

@@ -7,7 +7,7 @@ import libsumo
 import numpy as np
 
 from risk_sac.scenario.layout import Layout
-from risk_sac.sim.paths import HEADING, STATION, Along, Paths, X, Y
+from risk_sac.sim.paths import HEADING, STATION, Along, Path, X, Y, path_of
 from risk_sac.types import Floats
 
 CAR = "passenger"  # the class of all vehicles of ours
@@ -27,7 +27,7 @@ class Roads:
 
     def __init__(self) -> None:
         self._net = ""
-        self._paths = Paths()
+        self._paths: dict[tuple[tuple[str, ...], str], Path] = {}
         self._lanes: dict[tuple[tuple[str, ...], str], tuple[float, float, float]] = {}
         self._stretches: dict[str, float] = {}
         self._routes: dict[str, tuple[str, ...]] = {}
@@ -76,7 +76,10 @@ class Roads:
 
         SUMO counts in lengths of the lane, which are those of its edge; on a bend the outer lanes are drawn longer.
         """
-        path = self._paths.of(self._routes[vehicle], lane)
+        route = self._routes[vehicle]
+        path = self._paths.get((route, lane))
+        if path is None:
+            path = self._paths[route, lane] = path_of(route, lane)
         return Along(path, libsumo.vehicle.getLanePosition(vehicle) * self._stretch(lane), offset_m)
 
     def _stretch(self, lane: str) -> float:

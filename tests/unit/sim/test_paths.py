@@ -17,7 +17,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.sim.lookout import project
-from risk_sac.sim.paths import AHEAD_M, HEADING, STATION, Paths, X, Y, path_along
+from risk_sac.sim.paths import AHEAD_M, HEADING, STATION, X, Y, path_along
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import Role
 
@@ -86,15 +86,6 @@ def test_the_intersection_looks_the_same_from_every_leg(sim: SumoSimulation, tur
         path = sim.along("ego").path
         turned.append(math.remainder(float(path.points[HEADING, -1] - path.points[HEADING, 0]), math.tau))
     assert turned == pytest.approx([{1: -math.pi / 2, 2: 0.0, 3: math.pi / 2}[turn]] * 4, abs=0.02)
-
-
-def test_a_path_is_made_once_and_forgotten_with_its_net(sim: SumoSimulation) -> None:
-    sim.reset(alone("mixed", ("e1", "e2"), 2, 250.0), 0)
-    paths = Paths()
-    first = paths.of(("e1", "e2"), "e1_2")
-    assert paths.of(("e1", "e2"), "e1_2") is first
-    paths.clear()
-    assert paths.of(("e1", "e2"), "e1_2") is not first
 
 
 def test_a_lane_shorter_than_it_is_drawn_has_its_vehicles_where_they_are(sim: SumoSimulation, tmp_path: Path) -> None:
