@@ -8,11 +8,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from risk_sac.agents.controls import RandomAgent, ScriptedAgent
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
-from risk_sac.agents.random import RandomAgent
 from risk_sac.agents.replay import Transition
-from risk_sac.agents.scripted import ScriptedAgent
 from risk_sac.config import RunSpec, method_of
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, EpisodeRecord, Outcome

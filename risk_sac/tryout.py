@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from risk_sac.agents.random import RandomAgent
+from risk_sac.agents.controls import RandomAgent
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene, SimulationError

@@ -1,11 +1,10 @@
 """Adversaries that follow scripts: what a search over scenes and scripts drives them with."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from risk_sac.agents.replay import Transition
+from risk_sac.agents.controls import Control
 from risk_sac.scenario.family import Family
 from risk_sac.scripts.motions import SIZE, Genes, Seen, act, adversaries_seen, cue, is_over
 from risk_sac.types import STEP_S, Floats, Vector
@@ -15,7 +14,7 @@ BEHIND_M, BEHIND_STEPS = 6.0, 8  # who has fallen so far behind the ego, and for
 STANDING_MPS, STANDING_STEPS = 0.5, 30  # an ego that stands for so long waits for a signal, or for a queue
 
 
-class ScriptFollower:
+class ScriptFollower(Control):
     """Each adversary acts by genes of its own, which an episode is begun with; λ and α are 0.
 
     Attributes:
@@ -24,19 +23,11 @@ class ScriptFollower:
         truncated; it counts as safe, with its steps.
     """
 
-    device = "cpu"
-    dual_variable = 0.0
-    temperature = 0.0
-
     def __init__(self, family: Family) -> None:
         """Follows nothing yet; see `begin`."""
         self._pedestrian = [False] * len(family.vehicles) + [True] * len(family.pedestrians)
+        self.genes = SIZE * len(self._pedestrian)  # number of genes that an episode takes
         self.begin(np.zeros(self.genes))
-
-    @property
-    def genes(self) -> int:
-        """How many genes say what happens in an episode."""
-        return SIZE * len(self._pedestrian)
 
     def begin(self, genes: Floats) -> None:
         """Begins an episode with these genes, in [0, 1]; `SIZE` for each adversary."""
@@ -80,16 +71,3 @@ class ScriptFollower:
         self._standing = self._standing + 1 if standing else 0
         over = all(is_over(script, since_s) for script, _, since_s in acting)
         self.can_stop_early = over or self._behind >= BEHIND_STEPS or self._standing >= STANDING_STEPS
-
-    def observe(self, transition: Transition, *, own: bool = True) -> None:
-        """Forgets it."""
-
-    def update(self) -> None:
-        """Nothing to learn."""
-
-    def state(self) -> dict[str, Any]:
-        """Nothing to keep: an episode is begun anew."""
-        return {}
-
-    def load(self, state: dict[str, Any]) -> None:
-        """Nothing to restore."""

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from risk_sac.agents.scripted import ScriptedAgent
+from risk_sac.agents.controls import ScriptedAgent
 from risk_sac.config import FamilyName, RunSpec
 from risk_sac.env import Observation, RiskSacEnv
 from risk_sac.problem import Problem

@@ -13,7 +13,7 @@ import libsumo
 import numpy as np
 import pytest
 
-from risk_sac.agents.random import RandomAgent
+from risk_sac.agents.controls import RandomAgent
 from risk_sac.config import EgoConfig, FamilyName
 from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.geometry import box_view, contact_point, zone

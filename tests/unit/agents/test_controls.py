@@ -1,6 +1,7 @@
 import numpy as np
 
-from risk_sac.agents.random import RandomAgent
+from risk_sac.agents.controls import RandomAgent, ScriptedAgent
+from risk_sac.observation_layout import PER_ADVERSARY, X_M, Y_M
 
 NOTHING = np.zeros(1, dtype=np.float32)
 ADVERSARIES = 3
@@ -50,3 +51,19 @@ def test_the_same_seed_plays_the_same() -> None:
     one, again, other = (played(RandomAgent(2 * ADVERSARIES, seed=s), 30) for s in (5, 5, 6))
     assert np.array_equal(one, again)
     assert not np.array_equal(one, other)
+
+
+def seen(x_m: float, y_m: float, cos: float) -> list[float]:
+    return [x_m / X_M, y_m / Y_M, 0.0, 0.0, cos, *[0.0] * (PER_ADVERSARY - 5)]
+
+
+def test_those_ahead_cut_in_and_brake_and_all_others_keep_on() -> None:
+    ahead_left, beside, oncoming, crossing = seen(12, 3.5, 1), seen(2, -3.5, 1), seen(40, 3.5, -1), seen(20, 5, 0)
+    observation = np.array([*ahead_left, *beside, *oncoming, *crossing, 0.5, 0.5], np.float32)
+    action = ScriptedAgent(8, seed=0).act(observation)
+    assert action.tolist() == [-0.5, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+
+def test_the_cut_in_ends_in_the_middle_of_the_ego_s_path() -> None:
+    action = ScriptedAgent(2, seed=0).act(np.array(seen(12, 0.25, 1), np.float32))
+    assert action.tolist() == [-0.5, -0.25]
