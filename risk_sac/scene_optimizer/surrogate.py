@@ -26,7 +26,7 @@ with warnings.catch_warnings():
 Hyperparameters = dict[str, Tensor]
 """Raw kernel, mean and noise parameters by their name in the model."""
 
-FIT_ITERATIONS = 30  # a warm start continues from here at the next fit
+FIT_ITERATIONS = 20  # a warm start continues from here at the next fit
 ASCENT_ITERATIONS = 3  # within about half a nat of the maximum, which takes five times as long
 
 
