@@ -28,7 +28,7 @@ export function Header({ campaign, again }: { campaign: Campaign; again: () => v
         <Fact name={spec.families.length > 1 ? "Families" : "Family"}>{spec.families.join(", ")}</Fact>
         <Fact name={spec.methods.length > 1 ? "Methods" : "Method"}>{spec.methods.join(", ")}</Fact>
         <Fact name="Ego">
-          {words(spec.ego.profile)}, {spec.ego.car_following}
+          {words(campaign.ego.profile)}, {campaign.ego.car_following}
         </Fact>
         <Fact name={spec.seeds.length > 1 ? "Seeds" : "Seed"}>{spec.seeds.join(", ")}</Fact>
         <Fact name="Posted">{moment(campaign.created_at)}</Fact>
