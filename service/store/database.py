@@ -120,7 +120,7 @@ def storage_errors(doing: str) -> Iterator[None]:
 
 
 def _keep_to_ourselves(file: Path | None) -> None:
-    """Let nobody else read a SQLite database, neither a new one nor one from before this was seen to."""
+    """Make a SQLite database readable by its owner alone, a new one and an old one."""
     if file is None:
         return
     create_private(file)

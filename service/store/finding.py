@@ -101,7 +101,7 @@ def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> Ep
 
 
 def find_triage(session: Session, episode: EpisodeRow) -> TriageRow | None:
-    """What people made of a contact; None if nobody has."""
+    """The triage of a contact; None without one."""
     place = {"campaign_number": episode.campaign_number, "episode_number": episode.number}
     return session.scalars(select(TriageRow).filter_by(**place)).one_or_none()
 

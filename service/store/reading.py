@@ -28,7 +28,7 @@ class Store:
 
     Attributes:
       engine: the database.
-      revisions: of campaigns, kept by those who write and read them.
+      revisions: of campaigns, in memory.
       refusal: why the disk refuses, while it does. Campaigns at work are then shown as paused: the disk that stops
         them may refuse the note about it, too.
     """
@@ -52,7 +52,7 @@ class Store:
 
         Args:
           campaign_id: of the campaign.
-          project: who asks; None sees all. Another project's campaign is as unknown as one that never was.
+          project: of the caller; None sees all. Another project's campaign raises the same error as an unknown id.
 
         Raises:
           NotFoundError: there is none.
@@ -179,7 +179,7 @@ class Store:
             return StoredContact(read_episode(row), row.series, row.series_sha256)
 
     def triage(self, campaign_id: str, failure_id: str, project: str | None = None) -> Triage | None:
-        """What people made of the contact with this id; None if nobody has.
+        """The triage of the contact with this id; None without one.
 
         Raises:
           NotFoundError: there is no such contact.
@@ -190,7 +190,7 @@ class Store:
             return None if row is None else Triage.model_validate(row, from_attributes=True)
 
     def triages(self, number: int) -> dict[int, TriageState]:
-        """What people made of the contacts of the campaign with this number, by the numbers of the episodes."""
+        """Triage states of a campaign's contacts, by the numbers of the episodes."""
         with self._reading() as session:
             rows = session.scalars(select(TriageRow).filter_by(campaign_number=number))
             return {row.episode_number: TriageState(row.state) for row in rows}

@@ -1,4 +1,4 @@
-"""The current revision of each campaign, in memory: whoever asks whether anything has changed needs no database."""
+"""The current revision of each campaign, in memory, so that a poll needs no database."""
 
 import threading
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ class Known:
 
 
 class Revisions:
-    """What was noted of campaigns by the one who writes them, and by those who read them."""
+    """Revisions noted on each write and on each first read."""
 
     def __init__(self) -> None:
         self._known: dict[str, Known] = {}
@@ -26,7 +26,7 @@ class Revisions:
         return self._all
 
     def get(self, campaign_id: str) -> Known | None:
-        """Of one campaign; None if nobody has read or written it yet, or if there is none."""
+        """The revision of one campaign; None before its first read or write."""
         return self._known.get(campaign_id)
 
     def learn(self, campaign_id: str, project: str, revision: int) -> Known:

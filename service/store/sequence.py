@@ -1,7 +1,7 @@
 """The one order of a campaign's events: its episodes, and the changes of its state and its runs'.
 
 Both take the next number of their campaign in the transaction that writes them, which holds the campaign's row until it
-ends. So numbers become visible in their order and leave no gap: whoever has read up to one has read all before it.
+ends. So numbers become visible in their order and leave no gap: a reader that has read up to one has read all before it.
 """
 
 from operator import itemgetter
@@ -18,7 +18,7 @@ from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 def hold_campaigns(session: Session, runs: ColumnElement[bool]) -> list[CampaignRow]:
     """Campaigns of these runs, to be read before anything else that is to be changed.
 
-    On PostgreSQL nobody else writes them until the transaction ends; on SQLite the whole database is one writer's.
+    PostgreSQL locks their rows until the transaction ends; SQLite has one writer anyway.
     """
     of_runs = select(RunRow.campaign_number).where(runs)
     query = select(CampaignRow).where(CampaignRow.number.in_(of_runs))

@@ -167,7 +167,7 @@ def failure_table(
     Args:
       campaign: whose contacts they are.
       contacts: by their numbers.
-      triages: what people made of them, by their numbers; of none that nobody has looked at.
+      triages: states by the contacts' numbers; a contact without one is new.
     """
     runs = {run.number: run for run in campaign.runs}
     found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)

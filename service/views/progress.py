@@ -11,7 +11,7 @@ from service.store.tables import TALLIED
 OF_ALL = ("episodes_total", "episodes_done")
 OF_SEARCHES = ("rejected", *(name for name in TALLIED if name not in OF_ALL))
 AVERAGED = ("window_ecr", "window_pcr", "dual_variable", "temperature")
-LOOKS = 20  # that somebody who follows a campaign takes from now to its end
+LOOKS = 20  # polls of a client from now to the end of a campaign
 SOONEST_S, LATEST_S = 1, 30
 LEARNING = {name for name, method in METHODS.items() if method.learns}
 

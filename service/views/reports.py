@@ -50,7 +50,7 @@ class CampaignReport:
         if name not in self.figures:
             message = f"campaign {self._campaign_id} has no figure {name!r}; GET its `figures` lists those there are"
             raise NotFoundError(message, field="name", got=name)
-        with self._lock:  # who asks for the same figure meanwhile waits for it instead of drawing it again
+        with self._lock:  # a second request for a figure waits for the first
             if (name, format_) not in self._drawn:
                 self._drawn[name, format_] = figure_bytes(self.comparison, name, format_)
             return self._drawn[name, format_]

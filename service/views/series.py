@@ -28,7 +28,7 @@ def load_series(path: Path, sha256: str | None) -> Series:
 
 
 def series_body(arrays: Mapping[str, NDArray[Any]]) -> Series:
-    """Arrays as a body, in which numbers that are not finite are None; it leaves out arrays that nobody is told of."""
+    """The public arrays as a body; numbers that are not finite are None."""
     told = arrays.keys() & Series.model_fields.keys()
     return Series.model_validate({name: _plain(name, arrays[name]) for name in told})
 

@@ -45,7 +45,7 @@ class Studies(OnDemandCache[Study]):
         self._settings, self._stopping = settings, threading.Event()
 
     def stop(self) -> None:
-        """Ends what is being played: nobody waits for it any more."""
+        """Ends the study at work."""
         self._stopping.set()
 
     def _answer(self, study: Study) -> bytes:

@@ -18,7 +18,7 @@ logger = logging.getLogger(__name__)
 
 WALL_S = 300.0  # a table of 100,000 episodes takes ten
 
-KEPT = 1  # of some megabytes; the newest, for those who ask for it at once
+KEPT = 1  # of some megabytes each
 
 
 @dataclass(frozen=True, slots=True)
