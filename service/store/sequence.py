@@ -1,7 +1,7 @@
 """The one order of a campaign's events: its episodes, and the changes of its state and its runs'.
 
 Both take the next number of their campaign in the transaction that writes them, which holds the campaign's row until it
-ends. So numbers become visible in their order and leave no gap: a reader that has read up to one has read all before it.
+ends. So numbers become visible in their order and leave no gap: a reader of one has read all before it.
 """
 
 from operator import itemgetter
