@@ -21,13 +21,13 @@ def results_digest(records: Sequence[EpisodeRecord]) -> str:
 
 
 # Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
-YOUNGER = frozenset({"judgement", "noticed_s", "script"})
+FIELDS_ADDED_LATER = frozenset({"judgement", "noticed_s", "script"})
 
 
 def _plain(value: object) -> dict[str, Any]:
     """Records and mappings as dicts, shallowly; `json` comes back for what they contain."""
     if isinstance(value, Record):
-        return {name: each for name, each in value if each is not None or name not in YOUNGER}
+        return {name: each for name, each in value if each is not None or name not in FIELDS_ADDED_LATER}
     if isinstance(value, Mapping):
         return dict(value)
     raise TypeError(f"{value!r} of {type(value).__name__} has no canonical JSON; wanted a record of plain values")

@@ -1,4 +1,4 @@
-"""What the striker broke: the first thing an engineer asks about a failure."""
+"""Which rules the striker broke, and on what ground it was struck."""
 
 import math
 
@@ -14,6 +14,7 @@ RECENT_S = 6.0  # nobody takes longer through a junction
 SPEEDING_S = 3.0
 SPEEDING_FACTOR = 1.1
 MOVES_MPS = 0.5
+BESIDE_M = 3.0  # a pedestrian this near to a crossing means to use it
 KERB_M = 0.5  # a pedestrian this near to a crossing is stepping onto it
 RED, MUST_YIELD, MAJOR = b"ru", b"g", b"G"
 
@@ -102,3 +103,17 @@ def _front(evidence: Evidence, first: int, actor: int) -> tuple[Floats, Floats]:
     e = evidence
     heading, reach = e.heading_rad[first:, actor], e.length_m[actor] / 2
     return e.x_m[first:, actor] + reach * np.cos(heading), e.y_m[first:, actor] + reach * np.sin(heading)
+
+
+def ground(evidence: Evidence, striker: int) -> str:
+    """Names the ground of the contact: lane, junction, crossing or beside_crossing.
+
+    Crossings matter to pedestrians only.
+    """
+    where, here = evidence.ground, (evidence.x_m[-1:, striker], evidence.y_m[-1:, striker])
+    if evidence.kind[striker] == Kind.PEDESTRIAN:
+        if inside(where.crossings, *here)[0]:
+            return "crossing"
+        if inside(where.crossings, *here, BESIDE_M)[0]:
+            return "beside_crossing"
+    return "junction" if inside(where.junctions, *here)[0] else "lane"
