@@ -3,11 +3,19 @@
 import argparse
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import TypeAlias
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs
@@ -19,21 +27,28 @@ Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 """Where a group of commands adds its parsers."""
 
 
+def add_command(
+    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str
+) -> argparse.ArgumentParser:
+    """Add a command that `run` executes; returns its parser."""
+    parser = commands.add_parser(name, help=summary)
+    parser.set_defaults(command=run)
+    return parser
+
+
 def complain(message: str) -> None:
     """Prints what went wrong."""
     errors.print(printable(message), style="red", markup=False)
 
 
+def columns(bar: BarColumn) -> tuple[ProgressColumn, ...]:
+    """Around a bar, with a field `found` for what the search has found."""
+    return TextColumn("{task.description}"), bar, MofNCompleteColumn(), TextColumn("{task.fields[found]}")
+
+
 def progress_bar() -> Progress:
-    """Bars with a field `found` for what the search has found."""
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[found]}"),
-        TimeRemainingColumn(),
-        console=console,
-    )
+    """Bars with the time that remains."""
+    return Progress(*columns(BarColumn()), TimeRemainingColumn(), console=console)
 
 
 class Board:
@@ -60,12 +75,10 @@ def or_dash(value: float | None, format_: str) -> str:
     return format(value, format_) if value is not None and math.isfinite(value) else "-"
 
 
-# What XML 1.0 forbids, the other control characters, which a terminal would obey, and unpaired surrogates.
-_UNPRINTABLE = re.compile("[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
 # What names an ego.
 EGO = "default, perfect, careful, a registered ego, or a YAML file with the fields of a campaign's ego"
+# What XML 1.0 forbids, the other control characters, which a terminal would obey, and unpaired surrogates.
+_UNPRINTABLE = re.compile("[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def printable(text: str) -> str:

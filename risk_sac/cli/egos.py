@@ -11,7 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
-from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, complain, console, progress_bar
+from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, add_command, complain, console, progress_bar
 from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_campaign, read_ego
@@ -31,15 +31,11 @@ COLUMNS = (
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    egos = commands.add_parser("egos", help="who can drive, and how they compare").add_subparsers(
-        required=True, metavar="COMMAND"
-    )
-    listed = egos.add_parser("list", help="SUMO's models, the shipped egos, and those the operator has registered")
-    listed.set_defaults(command=_list)
-    ladder = egos.add_parser(
-        "ladder", help="the same search on equal budgets against each ego; the same command again goes on with it"
-    )
-    ladder.set_defaults(command=_ladder)
+    group = commands.add_parser("egos", help="who can drive, and how they compare")
+    egos = group.add_subparsers(required=True, metavar="COMMAND")
+    add_command(egos, "list", _list, "SUMO's models, the shipped egos, and those the operator has registered")
+    summary = "the same search on equal budgets against each ego; the same command again goes on with it"
+    ladder = add_command(egos, "ladder", _ladder, summary)
     names = ["default", *SHIPPED]
     ladder.add_argument("--egos", nargs="+", default=names, metavar="EGO", help=f"(default: {' '.join(names)})")
     add_campaign_flags(ladder, families="low", methods="archive", seeds=SEEDS)

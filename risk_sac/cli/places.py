@@ -13,19 +13,21 @@ from rich.markup import escape
 from rich.table import Table
 
 from risk_sac.cli.campaign_flags import MAP_HELP
-from risk_sac.cli.console import FAILED, OK, Commands, console, counted
+from risk_sac.cli.console import FAILED, OK, Commands, add_command, console, counted
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, Map, survey
 from risk_sac.scenario.maps.found import TITLES, Fit, Misfit, Pattern, Survey
 from risk_sac.scenario.maps.net import read_net
+
+if TYPE_CHECKING:
+    from risk_sac.tryout import Tried
 
 SHOWN = 20
 
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    places = commands.add_parser("places", help="where the patterns fit on a map of yours")
-    places.set_defaults(command=_places)
+    places = add_command(commands, "places", _places, "where the patterns fit on a map of yours")
     places.add_argument("network", type=Path, metavar="MAP", help=MAP_HELP)
     places.add_argument("--pattern", choices=list(FINDERS), help="only this one (default: all)")
     places.add_argument("--why", action="store_true", help="say where they do not fit, and why")
@@ -48,7 +50,7 @@ def _places(options: argparse.Namespace) -> int:
 
             options.out.write_bytes(map_png(converted.file, found))
         if options.tries is not None:
-            return try_places(Map(converted.file), found, options)
+            return _try_places(Map(converted.file), found, options)
     if options.json:
         sys.stdout.write(json.dumps(_document(found, converted.warnings)) + "\n")
         return OK
@@ -94,11 +96,7 @@ def _spot(found: Fit | Misfit) -> dict[str, object]:
     return {"pattern": spot.pattern, "place": spot.id, "x_m": spot.x_m, "y_m": spot.y_m}
 
 
-if TYPE_CHECKING:
-    from risk_sac.tryout import Tried
-
-
-def try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:
+def _try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:
     """Plays, and prints a row for each pattern; fails if a place does not run, or the ego is touched unattacked."""
     from risk_sac.tryout import sample, try_out  # here, because loading the simulator takes a second
 

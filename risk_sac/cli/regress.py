@@ -1,7 +1,6 @@
 """`risk-sac regress`: old failures against another ego, with a JUnit report."""
 
 import argparse
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.console import EGO, FAILED, OK, Commands, console, counted, printable
+from risk_sac.cli.console import EGO, FAILED, OK, Commands, add_command, console, counted, printable
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
@@ -30,18 +29,10 @@ if TYPE_CHECKING:
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    regress = commands.add_parser(
-        "regress", help="play old failures against another ego; exit status 1 if one is not fixed"
-    )
-    regress.set_defaults(command=_regress)
-    regress.add_argument(
-        "--failures",
-        type=Path,
-        nargs="+",
-        required=True,
-        metavar="SET",
-        help="bundles, folders of bundles, or folders of runs; their policy acts on after the recorded actions",
-    )
+    summary = "play old failures against another ego; exit status 1 if one is not fixed"
+    regress = add_command(commands, "regress", _regress, summary)
+    failures = "bundles, folders of bundles, or folders of runs; their policy acts on after the recorded actions"
+    regress.add_argument("--failures", type=Path, nargs="+", required=True, metavar="SET", help=failures)
     regress.add_argument("--ego", required=True, metavar="EGO", help=EGO)
     regress.add_argument("--baseline", type=Path, metavar="FILE.json", help="known cases, as --out wrote them")
     regress.add_argument("--out", type=Path, metavar="FILE.json", help="write the cases there")
@@ -71,25 +62,20 @@ def _regress(options: argparse.Namespace) -> int:
     if options.junit is not None:
         replace_file(options.junit, junit(found))
     if options.exports is not None:
-        _export(
-            options.exports,
-            options.format,
-            [each.bundle for each, case in zip(regressed, found.cases, strict=True) if not case.passed],
-        )
+        bundles = [each.bundle for each, case in zip(regressed, found.cases, strict=True) if not case.passed]
+        _export(options.exports, options.format, bundles)
     return OK if found.passed else FAILED
 
 
 def cases_table(found: Regression) -> Table:
     """The cases, and below them how many there are of each verdict."""
-    counts = Counter(case.verdict.replace("_", " ") for case in found.cases)
-    said = ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items()))
-    table = Table(box=SIMPLE_HEAD, padding=0, caption=f"{counted(len(found.cases), 'failure')}: {said}")
+    caption = f"{counted(len(found.cases), 'failure')}: {found.counts_in_words}"
+    table = Table(box=SIMPLE_HEAD, padding=0, caption=caption)
     table.caption_justify = "left"
     for name in ("verdict", "failure, and what happens now"):
         table.add_column(name, no_wrap=name == "verdict")
     for case in found.cases:
-        verdict = f"{case.verdict.replace('_', ' ')}{', known' if case.known else ''}"
-        table.add_row(verdict, Text(printable(f"{case.id}: {case.name}\n  {case.reason}")))
+        table.add_row(case.verdict_in_words, Text(printable(f"{case.id}: {case.name}\n  {case.reason}")))
     return table
 
 

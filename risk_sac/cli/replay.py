@@ -5,7 +5,7 @@ import os
 from contextlib import closing
 from pathlib import Path
 
-from risk_sac.cli.console import FAILED, OK, Commands, complain, console, counted, printable
+from risk_sac.cli.console import FAILED, OK, Commands, add_command, complain, console, counted, printable
 from risk_sac.errors import SimulationError
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import TIMES, distinct_failures
@@ -14,8 +14,7 @@ from risk_sac.types import Scene
 
 def add(commands: Commands) -> None:
     """Add the commands."""
-    bundle = commands.add_parser("bundle", help="write failures into files that stand alone")
-    bundle.set_defaults(command=_bundle)
+    bundle = add_command(commands, "bundle", _bundle, "write failures into files that stand alone")
     bundle.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
     bundle.add_argument(
         "failure", nargs="?", metavar="FAILURE", help="id of a contact, or its number; default: every distinct failure"
@@ -23,12 +22,10 @@ def add(commands: Commands) -> None:
     out = "the bundle; of every distinct failure: the folder for them"
     bundle.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
 
-    replay = commands.add_parser("replay", help="play the failure in a bundle again")
-    replay.set_defaults(command=_replay)
+    replay = add_command(commands, "replay", _replay, "play the failure in a bundle again")
     replay.add_argument("bundle", type=Path, metavar="BUNDLE", help="what `risk-sac bundle` wrote")
 
-    verify = commands.add_parser("verify", help="replay the distinct failures of runs in fresh processes")
-    verify.set_defaults(command=_verify)
+    verify = add_command(commands, "verify", _verify, "replay the distinct failures of runs in fresh processes")
     verify.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a finished run")
     times = f"how often each is replayed (default: {TIMES})"
     verify.add_argument("--times", type=int, default=TIMES, metavar="N", help=times)

@@ -5,7 +5,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from risk_sac.cli.console import OK, Commands, console
+from risk_sac.cli.console import OK, Commands, add_command, console
 from risk_sac.cli.regress import read_baseline
 from risk_sac.errors import ConfigError
 from risk_sac.run_folder.durable import replace_file
@@ -15,25 +15,19 @@ if TYPE_CHECKING:
     from risk_sac.report.evidence.folders import Found
 
 Format = Literal["html", "md", "json"]
+OUT = "report.html, report.md, or its data as report.json"
 FORMATS: dict[str, Format] = {".html": "html", ".md": "md", ".json": "json"}
 
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser("report", help="one file on what runs found, with bounds, coverage and limits")
-    parser.set_defaults(command=_report)
+    parser = add_command(commands, "report", _report, "one file on what runs found, with bounds, coverage and limits")
     parser.add_argument(
         "runs", type=Path, nargs="+", metavar="RUNS", help="folder of `risk-sac evaluate`, or folders of runs"
     )
-    parser.add_argument(
-        "--regression",
-        type=Path,
-        metavar="FILE.json",
-        help="failures against another ego, by `risk-sac regress --out`",
-    )
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="report.html, report.md, or its data as report.json"
-    )
+    regression = "failures against another ego, by `risk-sac regress --out`"
+    parser.add_argument("--regression", type=Path, metavar="FILE.json", help=regression)
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help=OUT)
 
 
 def _report(options: argparse.Namespace) -> int:

@@ -25,6 +25,7 @@ from risk_sac.cli.console import (
     OK,
     Board,
     Commands,
+    add_command,
     complain,
     console,
     counted,
@@ -38,11 +39,15 @@ from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import Results
 from risk_sac.run_folder.verified import TIMES
 
+if TYPE_CHECKING:
+    from risk_sac.execution.jobs import Job
+
+SEEDS = 5  # of a comparison that names none
+
 
 def add(commands: Commands) -> None:
     """Add the commands."""
-    run = commands.add_parser("run", help="one run without a server; the same command again goes on with it")
-    run.set_defaults(command=_run)
+    run = add_command(commands, "run", _run, "one run without a server; the same command again goes on with it")
     run.add_argument("--family", metavar="low|mixed|dense", help="scenario family")
     add_map_flags(run, several=False)
     add_ego_flag(run)
@@ -52,32 +57,18 @@ def add(commands: Commands) -> None:
     run.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags go first")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
 
-    evaluate = commands.add_parser(
-        "evaluate", help="compare methods over seeds, with tables and figures; the same command again goes on with it"
-    )
-    evaluate.set_defaults(command=_evaluate)
+    summary = "compare methods over seeds, with tables and figures; the same command again goes on with it"
+    evaluate = add_command(commands, "evaluate", _evaluate, summary)
     add_map_flags(evaluate, several=True)
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
     add_ego_flag(evaluate)
-    evaluate.add_argument(
-        "--jobs",
-        type=int,
-        metavar="N",
-        help="runs at a time (default: one per core, or what a cluster has room for)",
-    )
-    evaluate.add_argument(
-        "--executor",
-        default=os.environ.get("RISK_SAC_EXECUTOR", "local"),
-        metavar="NAME",
-        help="where runs execute: `local` or, on a cluster, `ray` (default: RISK_SAC_EXECUTOR or local)",
-    )
-    evaluate.add_argument(
-        "--verify",
-        type=int,
-        default=TIMES,
-        metavar="N",
-        help=f"how often each distinct failure is replayed (default: {TIMES})",
-    )
+    jobs = "runs at a time (default: one per core, or what a cluster has room for)"
+    evaluate.add_argument("--jobs", type=int, metavar="N", help=jobs)
+    executor = os.environ.get("RISK_SAC_EXECUTOR", "local")
+    where = "where runs execute: `local` or, on a cluster, `ray` (default: RISK_SAC_EXECUTOR or local)"
+    evaluate.add_argument("--executor", default=executor, metavar="NAME", help=where)
+    times = f"how often each distinct failure is replayed (default: {TIMES})"
+    evaluate.add_argument("--verify", type=int, default=TIMES, metavar="N", help=times)
     evaluate.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of runs, tables and figures")
 
 
@@ -98,12 +89,9 @@ def _run(options: argparse.Namespace) -> int:
 
         results = run(spec, options.out, advance)
     if not results.finished:
-        done = (results.metrics.episodes if results.metrics else 0) + (
-            results.evaluation.episodes if results.evaluation else 0
-        )
-        console.print(
-            f"Stopped after {done} of {counted(total, 'episode')}. The same command again goes on from there."
-        )
+        done = sum(phase.episodes for phase in (results.metrics, results.evaluation) if phase)
+        again = "The same command again goes on from there."
+        console.print(f"Stopped after {done} of {counted(total, 'episode')}. {again}")
         return INTERRUPTED
     console.print(_summary(spec, results))
     console.print(f"Results: {options.out}/results.json")
@@ -152,16 +140,9 @@ def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
     return (name, text) if interval is None else (f"{name} (95 %)", "{} ({:.3f} to {:.3f})".format(text, *interval))
 
 
-if TYPE_CHECKING:
-    from risk_sac.execution.jobs import Job
-
-SEEDS = 5  # of a comparison that names none
-
-
 def _evaluate(options: argparse.Namespace) -> int:
     methods = [name for name, method in METHODS.items() if not method.needs]
-    defaults = {"families": SHIPPED, "methods": methods, "seeds": range(SEEDS)}
-    defaults = {name: list(values) for name, values in defaults.items()}
+    defaults = {"families": list(SHIPPED), "methods": methods, "seeds": list(range(SEEDS))}
     options.families = families_on_map(options) or options.families
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | ego_flag(options), defaults)
     from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds

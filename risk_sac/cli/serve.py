@@ -5,15 +5,14 @@ import os
 import sys
 from pathlib import Path
 
-from risk_sac.cli.console import Commands
+from risk_sac.cli.console import Commands, add_command
 
 ARENAS = {"MALLOC_ARENA_MAX": "2"}  # glibc gives each thread an arena otherwise, and the server's memory grows
 
 
 def add(commands: Commands) -> None:
     """Add the commands."""
-    serve = commands.add_parser("serve", help="run the service in the foreground")
-    serve.set_defaults(command=_serve)
+    serve = add_command(commands, "serve", _serve, "run the service in the foreground")
     serve.add_argument("--host", metavar="ADDRESS", help="(default: 127.0.0.1)")
     serve.add_argument("--port", type=int, help="(default: 8000)")
     serve.add_argument("--data-dir", type=Path, metavar="DIR", help="(default: data)")

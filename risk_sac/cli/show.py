@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from risk_sac.cli.console import EGO, OK, Commands, console, in_words
+from risk_sac.cli.console import EGO, OK, Commands, add_command, console, in_words
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE
@@ -18,8 +18,7 @@ from risk_sac.run_folder.series import read_series
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    show = commands.add_parser("show", help="list a run's contacts, or draw one")
-    show.set_defaults(command=_show)
+    show = add_command(commands, "show", _show, "list a run's contacts, or draw one")
     show.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
     show.add_argument(
         "failure", nargs="?", metavar="FAILURE", help="id of a contact, or its number; default: list them"

@@ -10,7 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.console import OK, Commands, console, counted, printable
+from risk_sac.cli.console import OK, Commands, add_command, console, counted, printable
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, note
 from risk_sac.records import EpisodeRecord
@@ -24,18 +24,16 @@ if TYPE_CHECKING:
 
 def add(commands: Commands) -> None:
     """Add the commands."""
-    minimise = commands.add_parser("minimise", help="find the core of a failure: the least that makes the ego fail")
-    minimise.set_defaults(command=_minimise)
+    summary = "find the core of a failure: the least that makes the ego fail"
+    minimise = add_command(commands, "minimise", _minimise, summary)
     _add_failure(minimise)
     minimise.add_argument("--out", type=Path, metavar="FILE", help="write the core there, a bundle too")
 
-    region = commands.add_parser("region", help="how many of the neighbours of a failure fail too")
-    region.set_defaults(command=_region)
+    region = add_command(commands, "region", _region, "how many of the neighbours of a failure fail too")
     _add_failure(region)
     region.add_argument("--out", type=Path, metavar="FILE.json", help="write the shares there too")
 
-    clusters = commands.add_parser("clusters", help="which different failures runs have found, and one of each")
-    clusters.set_defaults(command=_clusters)
+    clusters = add_command(commands, "clusters", _clusters, "which different failures runs have found, and one of each")
     clusters.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a run, or its results.json")
     clusters.add_argument("--out", type=Path, metavar="FILE.json", help="write them there too")
 

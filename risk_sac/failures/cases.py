@@ -1,5 +1,6 @@
 """What became of old failures with another ego; see `risk_sac.failures.regress`."""
 
+from collections import Counter
 from datetime import datetime
 from enum import StrEnum
 from typing import Literal
@@ -42,6 +43,15 @@ class Case(Record):
         """Whether it keeps nobody from going on."""
         return self.known or self.verdict is Verdict.FIXED
 
+    @property
+    def verdict_in_words(self) -> str:
+        """The verdict, and whether the case was known."""
+        return f"{_words(self.verdict)}{', known' if self.known else ''}"
+
+
+def _words(verdict: Verdict) -> str:
+    return verdict.replace("_", " ")
+
 
 class Regression(Record):
     """All cases, in the order of the failures."""
@@ -54,13 +64,19 @@ class Regression(Record):
         """Whether all of them are fixed or known."""
         return all(case.passed for case in self.cases)
 
+    @property
+    def counts_in_words(self) -> str:
+        """How many cases there are of each verdict."""
+        counts = Counter(_words(case.verdict) for case in self.cases)
+        return ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items()))
+
     def beside(self, baseline: "Regression") -> "Regression":
         """With the cases marked as known that the baseline has, with the same verdict and the same failure instead."""
         known = {(case.digest, case.verdict, case.found) for case in baseline.cases}
-        cases = (
+        cases = tuple(
             case.model_copy(update={"known": (case.digest, case.verdict, case.found) in known}) for case in self.cases
         )
-        return self.model_copy(update={"cases": tuple(cases)})
+        return self.model_copy(update={"cases": cases})
 
 
 class CampaignRegression(Record):

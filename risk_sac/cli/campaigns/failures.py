@@ -10,7 +10,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.campaigns.output import at_least_one, print_answer
+from risk_sac.cli.campaigns.output import add_campaign_command, at_least_one, print_answer
 from risk_sac.cli.console import OK, Commands, in_words, notes, or_dash, printable
 from risk_sac.client import Client, Collision, Episode
 from risk_sac.errors import ConfigError
@@ -28,9 +28,7 @@ FILTERS = {
 
 def add(commands: Commands) -> None:
     """Add the commands."""
-    parser = commands.add_parser("list", help="a campaign's failures, in the order they were found")
-    parser.set_defaults(command=_list)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
+    parser = add_campaign_command(commands, "list", _list, "a campaign's failures, in the order they were found")
     parser.add_argument(
         "--grade", choices=[grade.value for grade in Grade], help="only of this grade; careful: preventable"
     )
@@ -39,22 +37,22 @@ def add(commands: Commands) -> None:
     parser.add_argument("--raw", action="store_true", help="contacts too that a rule refused")
     parser.add_argument("--limit", type=at_least_one, default=LISTED, metavar="N", help=f"at most (default: {LISTED})")
 
-    parser = commands.add_parser("show", help="one failure in words and as a picture")
-    parser.set_defaults(command=_show)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
-    parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
+    parser = add_campaign_command(commands, "show", _show, "one failure in words and as a picture")
+    _add_failure(parser)
     twin = "draw beside it the same scene with nobody attacking (idle), or with another ego"
     parser.add_argument("--twin", choices=get_args(Twin), help=twin)
     parser.add_argument("--out", type=Path, metavar="FILE.png", help="the picture (default: FAILURE.png)")
 
-    parser = commands.add_parser("bundle", help="fetch one failure as a file that stands alone")
-    parser.set_defaults(command=_bundle)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
-    parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
+    parser = add_campaign_command(commands, "bundle", _bundle, "fetch one failure as a file that stands alone")
+    _add_failure(parser)
     parser.add_argument(
         "--core", action="store_true", help="only what makes the ego fail, which takes the service 10 s"
     )
     parser.add_argument("--out", type=Path, metavar="FILE.npz", help="(default: FAILURE.npz)")
+
+
+def _add_failure(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
 
 
 def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:

@@ -128,25 +128,25 @@ def excesses(total: Total, bounds: Bounds) -> Iterator[str]:
 def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
     """Judge a campaign, which counts as measured once it has succeeded: the exit status, and why."""
     if results.complete and results.state != "succeeded":
-        return COULD_NOT_RUN, f"the campaign {_WORDS.get(results.state, results.state)}: not all of it was measured"
+        ended = "was cancelled" if results.state == "cancelled" else results.state
+        return COULD_NOT_RUN, f"the campaign {ended}: not all of it was measured"
     if not bounds:
         return OK, ""
     if not results.complete:
         return COULD_NOT_RUN, f"the campaign is {results.state}, and what it finds can still change; wait with `watch`"
     reasons: dict[str, list[str]] = {}
+    verdicts = set()
+    exceeded: list[str] = []
     for total in results.totals:
+        name = f"{total.family} {total.method}"
         for each in comparisons(total, bounds):
-            said = f"{each.name} {each.verdict} {each.bound:g}"
-            reasons.setdefault(said, []).append(f"{total.family} {total.method} {each}")
-    passed = all(each.verdict == "within" for total in results.totals for each in comparisons(total, bounds))
-    lines = [f"{said}: {', '.join(whose)}" for said, whose in reasons.items()]
-    exceeded = [
-        f"{total.family} {total.method}: {said}" for total in results.totals for said in excesses(total, bounds)
-    ]
-    lines += exceeded
-    if any("may be above" in said for said in reasons):
+            verdicts.add(each.verdict)
+            reasons.setdefault(f"{each.name} {each.verdict} {each.bound:g}", []).append(f"{name} {each}")
+        exceeded += (f"{name}: {said}" for said in excesses(total, bounds))
+    lines = [*(f"{said}: {', '.join(whose)}" for said, whose in reasons.items()), *exceeded]
+    if "may be above" in verdicts:
         lines.append("More episodes narrow an interval; --judge-by rate ignores it.")
-    return (OK if passed and not exceeded else ABOVE), "\n".join(lines)
+    return (OK if verdicts <= {"within"} and not exceeded else ABOVE), "\n".join(lines)
 
 
 def _read_known(file: Path) -> Mapping[str, frozenset[str]]:
@@ -162,6 +162,3 @@ def _read_known(file: Path) -> Mapping[str, frozenset[str]]:
     for total in earlier.totals:
         known[total.family] = known.get(total.family, frozenset()) | total.signatures.keys()
     return known
-
-
-_WORDS = {"failed": "failed", "cancelled": "was cancelled"}

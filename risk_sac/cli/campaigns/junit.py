@@ -102,8 +102,7 @@ def _named(run: RunResult, service_url: str, url: str, campaign_id: str, failure
 def _funnel(metrics: RunMetrics) -> str:
     return (
         f"{counted(metrics.raw_collisions, 'contact')}, {metrics.failures} valid, "
-        f"{metrics.distinct_failures} distinct, "
-        f"{metrics.distinct_preventable} preventable"
+        f"{metrics.distinct_failures} distinct, {metrics.distinct_preventable} preventable"
     )
 
 

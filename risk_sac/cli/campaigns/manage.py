@@ -5,11 +5,11 @@ import itertools
 import time
 from pathlib import Path
 
-from risk_sac.cli.campaigns.output import at_least_one, campaigns_table, line, print_answer
+from risk_sac.cli.campaigns.output import add_campaign_command, at_least_one, campaigns_table, line, print_answer
 from risk_sac.cli.campaigns.watch import shown
-from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, Commands, complain, notes
+from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, Commands, add_command, complain, notes
 from risk_sac.cli.regress import cases_table, junit
-from risk_sac.cli.report import format_of
+from risk_sac.cli.report import OUT, format_of
 from risk_sac.client import Client
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.cases import Regression
@@ -17,36 +17,28 @@ from risk_sac.records import State
 from risk_sac.run_folder.durable import replace_file
 
 LISTED = 20
+POLL_S = 0.5
 FILTERS = ("state", "family", "method", "label")
 
 
 def add(commands: Commands) -> None:
     """Add the commands."""
-    parser = commands.add_parser("list", help="campaigns, newest first")
-    parser.set_defaults(command=_list)
+    parser = add_command(commands, "list", _list, "campaigns, newest first")
     for name in FILTERS:
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only with this {name}")
     parser.add_argument("--limit", type=at_least_one, default=LISTED, metavar="N", help=f"at most (default: {LISTED})")
 
-    parser = commands.add_parser("cancel", help="stop a campaign; what it found stays")
-    parser.set_defaults(command=_cancel)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
+    parser = add_campaign_command(commands, "cancel", _cancel, "stop a campaign; what it found stays")
     parser.add_argument("--wait", action="store_true", help="until it has ended")
 
-    parser = commands.add_parser("delete", help="delete a campaign that has ended, and all it found")
-    parser.set_defaults(command=_delete)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
+    parser = add_campaign_command(commands, "delete", _delete, "delete a campaign that has ended, and all it found")
 
-    parser = commands.add_parser("report", help="one file on what a campaign found, with bounds, coverage and limits")
-    parser.set_defaults(command=_report)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
+    summary = "one file on what a campaign found, with bounds, coverage and limits"
+    parser = add_campaign_command(commands, "report", _report, summary)
     parser.add_argument("--regression", metavar="ID", help="of a regression of it, to be told of in the report")
-    parser.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="report.html, report.md, or its data as report.json"
-    )
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help=OUT)
 
-    parser = commands.add_parser("regress", help="play a campaign's distinct failures against another ego")
-    parser.set_defaults(command=_regress)
+    parser = add_command(commands, "regress", _regress, "play a campaign's distinct failures against another ego")
     parser.add_argument("id", metavar="ID", help="of the campaign, which has ended")
     parser.add_argument("--ego", required=True, metavar="EGO", help=EGO)
     parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="report for CI: a case per failure, named")
@@ -85,9 +77,6 @@ def _report(options: argparse.Namespace) -> int:
     replace_file(options.out, content.encode())
     notes.print(f"Report: {options.out}", markup=False, soft_wrap=True)
     return OK
-
-
-POLL_S = 0.5
 
 
 def _regress(options: argparse.Namespace) -> int:

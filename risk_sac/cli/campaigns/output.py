@@ -2,7 +2,7 @@
 
 import argparse
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel
@@ -11,19 +11,28 @@ from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons
-from risk_sac.cli.console import console, counted, on_one_line, or_dash
+from risk_sac.cli.console import Commands, add_command, console, counted, on_one_line, or_dash
 from risk_sac.client import CampaignSummary, Results
 from risk_sac.records import wire
 
 Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]
 
 
+def add_campaign_command(
+    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str
+) -> argparse.ArgumentParser:
+    """Add a command on one campaign; returns its parser."""
+    parser = add_command(commands, name, run, summary)
+    parser.add_argument("id", metavar="ID", help="of the campaign")
+    return parser
+
+
 def print_answer(options: argparse.Namespace, answer: Answer, text: Table | str) -> None:
     """Prints the answer as JSON where that is wanted, and the text otherwise."""
-    if not options.json:
-        console.print(text, markup=False, soft_wrap=isinstance(text, str))
-    else:
+    if options.json:
         console.out(json.dumps(_plain(answer), allow_nan=False), highlight=False)
+    else:
+        console.print(text, markup=False, soft_wrap=isinstance(text, str))
 
 
 def at_least_one(text: str) -> int:

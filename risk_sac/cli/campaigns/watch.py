@@ -8,25 +8,25 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.progress import BarColumn, Progress
 
 from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, campaign_flags, ego_flag
 from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, rate, verdict
 from risk_sac.cli.campaigns.junit import junit
-from risk_sac.cli.campaigns.output import figures, line, print_answer, results_table
-from risk_sac.cli.console import OK, Board, Commands, complain, notes
+from risk_sac.cli.campaigns.output import add_campaign_command, figures, line, print_answer, results_table
+from risk_sac.cli.console import OK, Board, Commands, add_command, columns, complain, notes
 from risk_sac.client import Campaign, Client, Episode, Results
 from risk_sac.config.spec_file import read_campaign
 from risk_sac.errors import ConfigError
 from risk_sac.records import Grade
 
+SEEDS = 1  # where none are named
 NAMED_FAILURES = 5  # of a run, in a JUnit report
 
 
 def add(commands: Commands) -> None:
     """Add the commands."""
-    parser = commands.add_parser("submit", help="queue a campaign")
-    parser.set_defaults(command=_submit)
+    parser = add_command(commands, "submit", _submit, "queue a campaign")
     add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
     add_ego_flag(parser)
     parser.add_argument("--label", metavar="TEXT", help="to find it by")
@@ -34,33 +34,28 @@ def add(commands: Commands) -> None:
         "--idempotency-key", metavar="KEY", help="the same key gives the same campaign, however often it is submitted"
     )
     parser.add_argument("--watch", action="store_true", help="go on as `watch` does, with its flags:")
-    add_watch_flags(parser)
+    _add_watch_flags(parser)
 
-    parser = commands.add_parser("watch", help="follow a campaign to its end, then show its results")
-    parser.set_defaults(command=_watch)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
-    add_watch_flags(parser)
+    parser = add_campaign_command(commands, "watch", _watch, "follow a campaign to its end, then show its results")
+    _add_watch_flags(parser)
 
-    parser = commands.add_parser("results", help="what a campaign has found so far")
-    parser.set_defaults(command=_results)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
+    parser = add_campaign_command(commands, "results", _results, "what a campaign has found so far")
     _add_gate_flags(parser)
 
 
-def add_watch_flags(parser: argparse.ArgumentParser) -> None:
-    """Adds the flags of `watch` to a command that goes on as it does."""
+def _add_watch_flags(parser: argparse.ArgumentParser) -> None:
     _add_gate_flags(parser)
     parser.add_argument("--timeout", type=_seconds, metavar="S", help="give up after so many seconds")
 
 
-def prepare(options: argparse.Namespace) -> None:
+def _prepare(options: argparse.Namespace) -> None:
     """Check the bounds and make the report's folder, so that nothing is waited for in vain."""
     Bounds.of(options)
     if options.junit is not None:
         options.junit.parent.mkdir(parents=True, exist_ok=True)
 
 
-def watch(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
+def _follow(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
     """Follows a campaign to its end, shows what it found and judges it."""
     try:
         with shown() as show:
@@ -72,13 +67,13 @@ def watch(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
 
 
 def _watch(options: argparse.Namespace) -> int:
-    prepare(options)
+    _prepare(options)
     with Client.from_environment(options.url) as client:
-        return watch(client, options.id, options)
+        return _follow(client, options.id, options)
 
 
 def _results(options: argparse.Namespace) -> int:
-    prepare(options)
+    _prepare(options)
     with Client.from_environment(options.url) as client:
         return _conclude(client, options.id, options)
 
@@ -121,30 +116,14 @@ def _first_failures(client: Client, campaign_id: str, run_id: str) -> list[Episo
 def _add_gate_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-ecr", type=rate, metavar="X", help="exit with 1 unless every ECR is within it")
     parser.add_argument("--max-pcr", type=rate, metavar="X", help="exit with 1 unless every PCR is within it")
-    parser.add_argument(
-        "--max-preventable",
-        type=at_least_none,
-        metavar="N",
-        help="exit with 1 if a family and method has found more distinct preventable failures",
-    )
-    parser.add_argument(
-        "--no-new-failures",
-        type=Path,
-        metavar="KNOWN.json",
-        help="exit with 1 if a kind of failure is not in what `results --json` printed of an earlier campaign",
-    )
-    parser.add_argument(
-        "--judge-by",
-        choices=JUDGED_BY,
-        default=JUDGED_BY[0],
-        help="what has to lie within: the upper end of the rate's 95 %% interval, or the rate (default: interval)",
-    )
-    parser.add_argument(
-        "--junit",
-        type=Path,
-        metavar="FILE.xml",
-        help="report for CI: a suite per family, a case per run and per method, failures named",
-    )
+    preventable = "exit with 1 if a family and method has found more distinct preventable failures"
+    parser.add_argument("--max-preventable", type=at_least_none, metavar="N", help=preventable)
+    known = "exit with 1 if a kind of failure is not in what `results --json` printed of an earlier campaign"
+    parser.add_argument("--no-new-failures", type=Path, metavar="KNOWN.json", help=known)
+    judged = "what has to lie within: the upper end of the rate's 95 %% interval, or the rate (default: interval)"
+    parser.add_argument("--judge-by", choices=JUDGED_BY, default=JUDGED_BY[0], help=judged)
+    cases = "report for CI: a suite per family, a case per run and per method, failures named"
+    parser.add_argument("--junit", type=Path, metavar="FILE.xml", help=cases)
 
 
 def at_least_none(text: str) -> int:
@@ -172,13 +151,7 @@ def shown() -> Iterator[Callable[[Campaign], None]]:
     if not notes.is_interactive:
         yield _Lines()
         return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(15),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[found]}"),
-    )
-    with Progress(*columns, console=notes) as bar:
+    with Progress(*columns(BarColumn(15)), console=notes) as bar:
         board = Board(bar)
 
         def draw(campaign: Campaign) -> None:
@@ -201,20 +174,17 @@ class _Lines:
             notes.print(line(campaign), markup=False, soft_wrap=True)
 
 
-SEEDS = 1  # where none are named
-
-
 def _submit(options: argparse.Namespace) -> int:
     for name in ("max_ecr", "max_pcr", "max_preventable", "no_new_failures", "junit", "timeout"):
         if getattr(options, name) is not None and not options.watch:
             raise ConfigError(f"--{name.replace('_', '-')}", "it without --watch", "both")
-    prepare(options)
+    _prepare(options)
     flags = campaign_flags(options, SEEDS) | ego_flag(options) | {"label": options.label}
     spec = read_campaign(options.spec, flags, {})
     with Client.from_environment(options.url) as client:
         campaign = client.submit(spec, options.idempotency_key)
         if options.watch:
             notes.print(client.url_of(campaign.id), markup=False, soft_wrap=True)
-            return watch(client, campaign.id, options)
+            return _follow(client, campaign.id, options)
     print_answer(options, campaign, line(campaign))
     return OK

@@ -1,6 +1,5 @@
 """Sections of a report on what the search found."""
 
-from collections import Counter
 from collections.abc import Iterator
 
 from risk_sac.config import FamilyName
@@ -148,8 +147,7 @@ def regression(origin: Origin) -> Section:
     if found is None:
         none = Paragraph("No other ego was played against these failures. To do so, and to be told here:")
         return Section("regression", "Regression", [none, Commands([origin.regress])])
-    counts = Counter(case.verdict.replace("_", " ") for case in found.cases)
-    said = ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items())) or "no failure"
+    said = found.counts_in_words or "no failure"
     known = sum(case.known for case in found.cases)
     text = (
         f"The failures against another ego: {ego_in_words(found.ego)}. Of {len(found.cases)}: {said}; "
@@ -169,7 +167,7 @@ def _cases(found: Regression) -> list[list[str]]:
             case.id,
             case.name,
             case.grade or DASH,
-            case.verdict.replace("_", " ") + (", known" if case.known else ""),
+            case.verdict_in_words,
             case.reason,
         ]
         for case in found.cases
