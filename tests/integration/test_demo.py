@@ -3,9 +3,16 @@ import shlex
 from pathlib import Path
 
 from risk_sac import cli
-from risk_sac.config import METHODS
-from service import demo
-from service.demo import main
+from risk_sac.client import Campaign, Episode, Run
+from risk_sac.records import Grade
+from service.demo import conclude, draw_command, main
+from tests.builders import collision, episode_record, judgement
+from tests.unit.client.scripted_server import PROGRESS
+from tests.unit.client.scripted_server import campaign as campaign_json
+
+
+def campaign(**progress: int) -> Campaign:
+    return Campaign.model_validate(campaign_json("succeeded", progress=PROGRESS | progress))
 
 
 def test_a_demo_that_cannot_be_posted_says_so_and_leaves_no_service(tmp_path, capsys):
@@ -31,43 +38,18 @@ def test_the_command_it_ends_with_draws_a_failure(tmp_path, capsys, monkeypatch)
     assert (tmp_path / "failure.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_without_a_failure_it_offers_none_to_draw(capsys):
-    demo._invite({"campaign": {"id": "c", "runs": [{"id": "low-random-0"}]}, "failures": []}, Path(), demo.Console())
-    assert capsys.readouterr().out == ""
-
-
-def test_summary_of_every_method_fits_80_columns(capsys):
-    total = {
-        "episodes": 10_000,
-        "raw_collisions": 999,
-        "failures": 999,
-        "distinct_failures": 777,
-        "distinct_preventable": 555,
-        **dict.fromkeys(("ecr", "pcr", "pcr_low", "pcr_high"), 0.5),
-    }
-    totals = [total | {"method": method} for method in METHODS]
-    demo._summarise({"results": {"totals": totals}}, demo.Console(width=80))
-    printed = capsys.readouterr().out
-    assert "…" not in printed
-    assert all(method in printed for method in METHODS)
-    assert printed.count(" 777 ") == printed.count(" 555 ") == len(METHODS)
-    assert "distinct" in printed
-
-
 def test_its_last_line_counts_what_is_worth_a_persons_time_and_no_repeats(capsys):
-    campaign = {"state": "succeeded", "reason": None, "progress": {"distinct_failures": 14, "distinct_preventable": 3}}
-    assert demo._verdict({"campaign": campaign}, demo.Console(width=80)) == 0
+    assert conclude(campaign(distinct_failures=14, distinct_preventable=3)) == 0
     assert capsys.readouterr().out == "distinct failures: 14; a careful driver would have prevented: 3\n"
 
 
-def test_it_offers_to_draw_a_preventable_failure_where_there_is_one(capsys):
+def test_it_offers_to_draw_a_preventable_failure_where_there_is_one():
     def failure(index, grade):
-        judgement = None if grade is None else {"grade": grade}
-        id_ = f"low-random-0-train-{index}"
-        return {"id": id_, "run_id": "low-random-0", "index": index, "collision": {"judgement": judgement}}
+        contact = collision(judgement=None if grade is None else judgement(grade))
+        record = episode_record(index, collision=contact).model_dump()
+        return Episode.model_validate(record | {"id": f"r-train-{index}", "run_id": "r", "wall_s": 1.0})
 
-    campaign = {"id": "c", "runs": [{"id": "low-random-0"}]}
-    failures = [failure(3, None), failure(5, "ideal"), failure(8, "careful")]
-    for known, drawn in ((failures, "low-random-0-train-8"), (failures[:2], "low-random-0-train-3")):
-        demo._invite({"campaign": campaign, "failures": known}, Path(), demo.Console())
-        assert f" {drawn} --out failure.png" in capsys.readouterr().out
+    searched = campaign().model_copy(update={"runs": [Run.model_construct(id="r")]})
+    failures = [failure(3, None), failure(5, Grade.IDEAL), failure(8, Grade.CAREFUL)]
+    assert draw_command(searched, failures, Path()).endswith(" r-train-8 --out failure.png")
+    assert draw_command(searched, failures[:2], Path()).endswith(" r-train-3 --out failure.png")

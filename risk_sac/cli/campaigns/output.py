@@ -15,6 +15,9 @@ from risk_sac.cli.console import Commands, add_command, console, counted, on_one
 from risk_sac.client import CampaignSummary, Results
 from risk_sac.records import wire
 
+NAMES = ("family", "method")
+COUNTS_AND_RATES = ("epi-\nsodes", "con-\ntacts", "valid", "dis-\ntinct", "preven-\ntable", "ECR\n95 %", "PCR\n95 %")
+
 Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]
 
 
@@ -85,9 +88,9 @@ def results_table(results: Results, bounds: Bounds) -> Table:
     """
     partial = "" if results.complete else ", so far"
     table = Table(title=f"{results.campaign_id} {results.state}{partial}", box=SIMPLE_HEAD, padding=0)
-    for name in ("family", "method"):
+    for name in NAMES:
         table.add_column(name, no_wrap=True)
-    for name in ("epi-\nsodes", "con-\ntacts", "valid", "dis-\ntinct", "preven-\ntable", "ECR\n95 %", "PCR\n95 %"):
+    for name in COUNTS_AND_RATES:
         table.add_column(name, no_wrap=True, justify="right")
     for total in results.totals:
         broken = {each.name: each for each in comparisons(total, bounds) if each.verdict != "within"}
