@@ -26,15 +26,7 @@ UNUSED_S = 3600.0  # that a place is kept for a campaign that has only been chec
 
 
 def dispose(folder: Path, forget: Callable[[], None]) -> None:
-    """Remove a folder, which may be missing, and what the database knows of it.
-
-    Args:
-      folder: of the campaign.
-      forget: removes the rows; where it raises, the folder stays.
-
-    Raises:
-      OSError: the folder cannot be renamed or removed.
-    """
+    """Removes a campaign's folder, which may be missing, and its rows; where `forget` raises, the folder stays."""
     grave = folder.with_name(f"{PREFIX}{folder.name}")
     if folder.exists():
         folder.rename(grave)
@@ -49,14 +41,11 @@ def dispose(folder: Path, forget: Callable[[], None]) -> None:
 
 
 def settle(campaigns: Path, exists: Callable[[str], bool]) -> None:
-    """Finish, or take back, what an earlier server had begun to remove.
+    """Finishes, or takes back, what an earlier server had begun to remove.
 
     Args:
       campaigns: the folder of all campaigns' folders.
       exists: whether the database has a campaign with this id.
-
-    Raises:
-      OSError: the folder cannot be written.
     """
     for folder in sorted(campaigns.glob("*")):
         name = folder.name.removeprefix(PREFIX)
@@ -78,14 +67,7 @@ class Retention:
         self._looked_at = float("-inf")
 
     def retire(self, dispose: Callable[[str], None]) -> None:
-        """Look for campaigns to delete, if it is time.
-
-        Args:
-          dispose: deletes the campaign with this id.
-
-        Raises:
-          StorageError: the database cannot be read, or `dispose` says so.
-        """
+        """Deletes a batch of old campaigns with `dispose`, which takes an id, if it is time."""
         if self._days is None or time.monotonic() - self._looked_at < RETENTION_S:
             return
         old = self._store.ended_before(time.time() - self._days * DAY_S, BATCH)
@@ -104,11 +86,7 @@ class UnusedPlaces:
         self._looked_at = float("-inf")
 
     def remove(self) -> None:
-        """Look for them, if it is time.
-
-        Raises:
-          StorageError: the database cannot be read, or the library cannot be written.
-        """
+        """Removes unused places, if it is time."""
         if time.monotonic() - self._looked_at < LOOK_S:
             return
         try:

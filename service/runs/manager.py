@@ -74,11 +74,7 @@ class Manager:
         return int(min(self._settings.max_workers, self._executor.slots))
 
     def start(self) -> None:
-        """Take up what an earlier server left, then work the queue.
-
-        Raises:
-          StorageError: the database or the data folder cannot be written.
-        """
+        """Takes up what an earlier server left, then works the queue."""
         try:
             settle(self._settings.data_dir / "campaigns", self._store.exists)
         except OSError as error:
@@ -89,7 +85,7 @@ class Manager:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop all workers at their next episode boundary, leave their runs queued, and return.
+        """Stops all workers at their next episode boundary and leaves their runs queued.
 
         Runs whose worker cannot even be killed stay `running`; the next start puts them back in the queue.
         """
@@ -101,13 +97,12 @@ class Manager:
             logger.error("workers of runs %s did not end", sorted(self._scheduler.active))
 
     def submit(self, spec: CampaignSpec, *, project: str = "default", key: str | None = None) -> StoredCampaign:
-        """Queue a campaign, or find the one that this idempotency key has queued before.
+        """Queues a campaign, or finds the one that this idempotency key has queued before.
 
         Raises:
           ConfigError: the campaign cannot be run; the error names the field.
           ConflictError: the key has queued another campaign.
           QuotaError: the project has used up its share.
-          StorageError: it cannot be written down.
         """
         spec = checked_campaign(spec)
         with self._lock:
@@ -121,12 +116,7 @@ class Manager:
         return campaign
 
     def cancel(self, campaign_id: str, project: str | None = None) -> StoredCampaign:
-        """Cancel a campaign; does nothing to one that has ended.
-
-        Raises:
-          NotFoundError: there is no such campaign.
-          StorageError: the cancellation cannot be written down.
-        """
+        """Cancels a campaign; does nothing to one that has ended."""
         with self._lock:
             for number in self._ledger.cancel(campaign_id, project):
                 self._scheduler.cancel(number, self._settings.grace_s)
@@ -135,18 +125,12 @@ class Manager:
     def triage(
         self, campaign_id: str, failure_id: str, state: TriageState, comment: str, project: str | None = None
     ) -> Triage:
-        """Note what people make of a failure; raises what `Ledger.triage` does."""
+        """Stores the triage of a failure."""
         with self._lock:
             return self._ledger.triage(campaign_id, failure_id, state, comment, project)
 
     def delete(self, campaign_id: str, project: str | None = None) -> None:
-        """Remove a campaign that has ended, with its files.
-
-        Raises:
-          NotFoundError: there is no such campaign.
-          ConflictError: it has not ended.
-          StorageError: its files or rows cannot be removed.
-        """
+        """Deletes a campaign with its files; ConflictError if it has not ended."""
         with self._lock:
             campaign = self._store.campaign(campaign_id, project)
             leaving = any(active.run.ids["campaign"] == campaign_id for active in self._scheduler.active.values())

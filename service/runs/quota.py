@@ -9,16 +9,7 @@ HOUR_S = 3600.0
 
 
 def check_quota(usage: Usage, new_runs: int, settings: ServiceSettings) -> None:
-    """Refuse runs that a project may not queue now.
-
-    Args:
-      usage: what the project takes already.
-      new_runs: how many it asks for.
-      settings: hold the quotas.
-
-    Raises:
-      QuotaError: too many would wait, or its worker hours are used up.
-    """
+    """Raises QuotaError where too many of a project's runs would wait, or its worker hours are used up."""
     if usage.queued_runs + new_runs > settings.quota_queued_runs:
         raise QuotaError(
             f"got {new_runs} runs with {usage.queued_runs} waiting already; wanted at most "

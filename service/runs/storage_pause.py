@@ -31,7 +31,7 @@ class StoragePause:
         return self._store.refusal
 
     def begin(self, reason: str) -> None:
-        """The disk refused; campaigns at work are shown as paused from now on."""
+        """Shows campaigns at work as paused from now on."""
         logger.error("paused: %s", reason)
         calm = time.monotonic() - self._refused_at > CALM_S
         self._wait_s = FIRST_WAIT_S if calm else min(2 * self._wait_s, LONGEST_WAIT_S)
@@ -39,14 +39,14 @@ class StoragePause:
         self._store.refusal = reason
 
     def write_down(self, numbers: Collection[int], reason: str) -> None:
-        """Note which runs the pause has hit, if the disk takes as much as that."""
+        """Stores which runs are paused, if the disk takes as much as that."""
         try:
             self._ledger.pause(numbers, reason)
         except StorageError:
             logger.info("the pause itself cannot be written down; it is shown all the same")
 
     def try_again(self) -> None:
-        """End the pause if the disk has room, or be more patient with it; does nothing before its time has come."""
+        """Ends the pause if the disk has room, else doubles the wait; does nothing before the wait is over."""
         if time.monotonic() - self._refused_at < self._wait_s:
             return
         try:
@@ -67,11 +67,7 @@ def refused(doing: str, folder: Path, error: OSError) -> str:
 
 
 def _probe(folder: Path) -> None:
-    """Write as much as the next checkpoints may take.
-
-    Raises:
-      OSError: the disk refuses.
-    """
+    """Writes as much as the next checkpoints may take."""
     probe = folder / ".probe"
     try:
         with probe.open("wb", buffering=0) as file:

@@ -13,7 +13,7 @@ HOUR_S = 3600
 
 
 def add_usage(session: Session, project: str, busy_s: float) -> None:
-    """A project has used a worker for some time, now."""
+    """Adds worker time to what a project has used in the present hour."""
     hour = int(time.time() // HOUR_S)
     row = session.get(UsageRow, (project, hour))
     if row is None:
@@ -23,7 +23,7 @@ def add_usage(session: Session, project: str, busy_s: float) -> None:
 
 
 def count(run: RunRow, outcome: Outcome, sign: int) -> None:
-    """Add an episode that ended so to a run's counts, or take it away."""
+    """Adds an episode with this outcome to a run's counts (+1), or takes it out (-1)."""
     run.episodes_done += sign
     run.rejected += sign * (outcome is Outcome.REJECTED)
     run.raw_collisions += sign * (outcome in (Outcome.FAILURE, Outcome.DEGENERATE))
@@ -31,14 +31,14 @@ def count(run: RunRow, outcome: Outcome, sign: int) -> None:
 
 
 def tally(run: RunRow) -> None:
-    """What only the run itself can count: which failures are distinct is decided by those before them."""
+    """Copies order-dependent counts from the run's metrics."""
     phases = [from_json(text) for text in (run.metrics, run.evaluation) if text is not None]
     for name in ("distinct_failures", "preventable", "distinct_preventable"):
         setattr(run, name, sum(phase.get(name, 0) for phase in phases))
 
 
 def fill(row: EpisodeRow, event: EpisodeDone) -> None:
-    """Write what a worker said of an episode into its row."""
+    """Fills an episode's row from a worker's message."""
     fill_record(row, event.record)
     row.series = event.series
     row.series_sha256 = event.series_sha256
@@ -47,7 +47,7 @@ def fill(row: EpisodeRow, event: EpisodeDone) -> None:
 
 
 def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
-    """Write an episode's record into its row, and what is searched for by columns."""
+    """Writes an episode's record into its row, and the columns that are searched."""
     row.phase = record.phase
     row.index = record.index
     row.outcome = record.outcome

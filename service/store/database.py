@@ -31,11 +31,7 @@ PRAGMAS = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON", "busy_time
 
 
 def open_database(url: str) -> Engine:
-    """Connect, check for damage, and bring the tables up to date.
-
-    Raises:
-      StorageError: it cannot be opened, is damaged, belongs to a newer version, or is another server's.
-    """
+    """Connects, checks for damage and brings the tables up to date."""
     engine = connect(url)
     try:
         with storage_errors("opening the database"):
@@ -48,11 +44,7 @@ def open_database(url: str) -> Engine:
 
 
 def connect(url: str) -> Engine:
-    """A database as it is, neither checked nor brought up to date; SQLite's file is made where there is none.
-
-    Raises:
-      StorageError: the URL names no database that can be used, or others can read its file and that cannot be mended.
-    """
+    """A database as it is, neither checked nor brought up to date; SQLite's file is made where there is none."""
     try:
         kind = make_url(url).get_backend_name()
         if kind == "sqlite":
@@ -87,11 +79,7 @@ def sqlite_file(url: str) -> Path | None:
 
 @contextmanager
 def held(engine: Engine) -> Iterator[None]:
-    """Be the only server that writes this database; SQLite's is guarded by the lock of the data folder.
-
-    Raises:
-      StorageError: another server holds it.
-    """
+    """Keeps other servers from this database; SQLite's is guarded by the lock of the data folder."""
     if engine.dialect.name != "postgresql":
         yield
         return
@@ -107,10 +95,7 @@ def held(engine: Engine) -> Iterator[None]:
 
 @contextmanager
 def storage_errors(doing: str) -> Iterator[None]:
-    """Turn what the database driver raises into a StorageError with its reason.
-
-    Broken constraints and statements are bugs, not storage, and pass through.
-    """
+    """Turns the driver's errors into StorageError; broken constraints and statements are bugs and pass through."""
     try:
         yield
     except (IntegrityError, ProgrammingError):
@@ -165,11 +150,7 @@ def newest_step() -> str:
 
 
 def step_forward(engine: Engine) -> None:
-    """Creates the tables of a new database, or takes all steps that are missing, in one transaction.
-
-    Raises:
-      StorageError: another version wrote the database.
-    """
+    """Creates the tables of a new database, or takes all steps that are missing, in one transaction."""
     if present_step(engine) is None and not inspect(engine).has_table(ServerRow.__tablename__):
         _take(engine, _create)
     else:
@@ -177,11 +158,7 @@ def step_forward(engine: Engine) -> None:
 
 
 def step_back(engine: Engine) -> None:
-    """Takes the newest step back.
-
-    Raises:
-      StorageError: it cannot be taken back, or was never taken.
-    """
+    """Takes the newest step back; StorageError if it was never taken."""
     step, newest = present_step(engine), newest_step()
     if step != newest:
         raise StorageError(f"database is at step {step}; wanted {newest}, the newest: nothing else is taken back")

@@ -38,11 +38,7 @@ class Judged:
 
 
 def find_campaign(session: Session, campaign_id: str, project: str | None = None) -> CampaignRow:
-    """The row with this public id, if it is the project's.
-
-    Raises:
-      NotFoundError: there is none.
-    """
+    """The row with this public id, if it is the project's."""
     # No id has a NUL, and PostgreSQL does not even look for one.
     query = select(CampaignRow).where(CampaignRow.id == campaign_id)
     row = None if "\0" in campaign_id else session.scalars(query).one_or_none()
@@ -53,11 +49,7 @@ def find_campaign(session: Session, campaign_id: str, project: str | None = None
 
 
 def find_run(session: Session, campaign: CampaignRow, run_id: str) -> int:
-    """Number of a campaign's run with this public id.
-
-    Raises:
-      NotFoundError: there is none.
-    """
+    """Number of a campaign's run with this public id."""
     query = select(RunRow.number).filter_by(campaign_number=campaign.number, id=run_id)
     number = None if "\0" in run_id else session.scalar(query)
     if number is not None:
@@ -81,12 +73,8 @@ def episode_page(
 
 
 def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> EpisodeRow:
-    """The campaign's episode with this id in which the ego touched something.
-
-    Raises:
-      NotFoundError: there is none.
-    """
-    run_id, phase, index = split_failure_id(failure_id)
+    """The campaign's episode with this id in which the ego touched something."""
+    run_id, phase, index = _split(failure_id)
     query = (
         select(EpisodeRow)
         .join(EpisodeRow.run)
@@ -96,7 +84,10 @@ def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> Ep
     )
     row = session.scalars(query).one_or_none()
     if row is None:
-        raise unknown_failure(campaign.id, failure_id)
+        message = (
+            f"campaign {campaign.id} has no failure {failure_id!r}; GET its `failures?tier=raw` lists all contacts"
+        )
+        raise NotFoundError(message, field="failure_id", got=failure_id)
     return row
 
 
@@ -106,16 +97,10 @@ def find_triage(session: Session, episode: EpisodeRow) -> TriageRow | None:
     return session.scalars(select(TriageRow).filter_by(**place)).one_or_none()
 
 
-def split_failure_id(failure_id: str) -> tuple[str, str, int]:
+def _split(failure_id: str) -> tuple[str, str, int]:
     """Run, phase and index; an id of another shape yields a run that cannot exist."""
     for phase in RECORDED.values():
         run_id, _, index = failure_id.rpartition(f"-{phase}-")  # the last: an i.i.d. run's own id has it too
         if "\0" not in run_id and index.isascii() and index.isdigit() and len(index) < 10:
             return run_id, phase, int(index)
     return "", "", -1
-
-
-def unknown_failure(campaign_id: str, failure_id: str) -> NotFoundError:
-    """What to raise where no contact has this id."""
-    message = f"campaign {campaign_id} has no failure {failure_id!r}; GET its `failures?tier=raw` lists all contacts"
-    return NotFoundError(message, field="failure_id", got=failure_id)

@@ -34,29 +34,17 @@ class Store:
     """
 
     def __init__(self, url: str) -> None:
-        """Open the database, creating it where there is none.
-
-        Raises:
-          StorageError: it cannot be opened, is no database, or is damaged.
-        """
+        """Opens the database, creating it where there is none."""
         self.engine = open_database(url)
         self.refusal: str | None = None
         self.revisions = Revisions()
 
     def close(self) -> None:
-        """Close all connections."""
+        """Closes all connections."""
         self.engine.dispose()
 
     def campaign(self, campaign_id: str, project: str | None = None) -> StoredCampaign:
-        """The campaign with this id.
-
-        Args:
-          campaign_id: of the campaign.
-          project: of the caller; None sees all. Another project's campaign raises the same error as an unknown id.
-
-        Raises:
-          NotFoundError: there is none.
-        """
+        """The campaign with this id."""
         with self._reading() as session:
             return self._campaign(find_campaign(session, campaign_id, project))
 
@@ -86,11 +74,7 @@ class Store:
             return StoredPage(items=tuple(self._campaign(row) for row in rows[:limit]), last=last)
 
     def revision(self, campaign_id: str, project: str | None = None) -> str:
-        """A name for what a campaign, its runs and its episodes look like now; another one once they do not.
-
-        Raises:
-          NotFoundError: there is no such campaign.
-        """
+        """A name for what a campaign, its runs and its episodes look like now; another one once they do not."""
         known = self.known_revision(campaign_id, project)
         if known is not None:
             return known
@@ -110,20 +94,12 @@ class Store:
         return self._shown_revision(self.revisions.all)
 
     def events(self, campaign_id: str, *, limit: int, after: int = 0) -> StoredPage[Episode | StateChange]:
-        """Episodes of a campaign and changes of its state and its runs', in their one order, just after `after`.
-
-        Raises:
-          NotFoundError: there is no such campaign.
-        """
+        """Episodes of a campaign and changes of its state and its runs', in their one order, just after `after`."""
         with self._reading() as session:
             return event_page(session, find_campaign(session, campaign_id), limit, after)
 
     def count_of_events(self, campaign_id: str) -> int:
-        """How many have happened so far, which is the newest one's sequence.
-
-        Raises:
-          NotFoundError: there is no such campaign.
-        """
+        """How many have happened so far, which is the newest one's sequence."""
         with self._reading() as session:
             return find_campaign(session, campaign_id).events
 
@@ -138,11 +114,7 @@ class Store:
         judged: Judged | None = None,
         project: str | None = None,
     ) -> StoredPage[Episode]:
-        """In order of arrival, from the episode just after number `after`; no outcomes means all.
-
-        Raises:
-          NotFoundError: there is no such campaign, or it has no such run.
-        """
+        """In order of arrival, from the episode just after number `after`; no outcomes means all."""
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             if run_id is None:
@@ -153,11 +125,7 @@ class Store:
             return episode_page(session, query, outcomes, limit, after or 0)
 
     def plain_episodes(self, number: int, outcomes: Collection[Outcome] = ()) -> Iterator[PlainEpisode]:
-        """What searches did in the campaign with this number, in order of arrival; no outcomes means all episodes.
-
-        Raises:
-          StorageError: one of them is damaged.
-        """
+        """What searches did in the campaign with this number, in order of arrival; no outcomes means all episodes."""
         row = EpisodeRow
         query = select(row.number, row.run_number, row.phase, row.index, row.outcome, row.record)
         query = query.where(row.campaign_number == number, *Judged(iid=False).conditions()).order_by(row.number)
@@ -168,22 +136,14 @@ class Store:
                 yield PlainEpisode(*found[:-1], from_json(found.record))
 
     def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredContact:
-        """The episode with this id in which the ego touched something.
-
-        Raises:
-          NotFoundError: there is none.
-        """
+        """The episode with this id in which the ego touched something."""
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             row = find_failure(session, campaign, failure_id)
             return StoredContact(read_episode(row), row.series, row.series_sha256)
 
     def triage(self, campaign_id: str, failure_id: str, project: str | None = None) -> Triage | None:
-        """The triage of the contact with this id; None without one.
-
-        Raises:
-          NotFoundError: there is no such contact.
-        """
+        """The triage of the contact with this id; None without one."""
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             row = find_triage(session, find_failure(session, campaign, failure_id))

@@ -22,7 +22,7 @@ class Revisions:
 
     @property
     def all(self) -> int:
-        """Of all campaigns together: how often one of them was written since the start."""
+        """How often any campaign was written since the start."""
         return self._all
 
     def get(self, campaign_id: str) -> Known | None:
@@ -30,7 +30,7 @@ class Revisions:
         return self._known.get(campaign_id)
 
     def learn(self, campaign_id: str, project: str, revision: int) -> Known:
-        """Remember what was read; an older revision never replaces a newer one."""
+        """Notes what was read; an older revision never replaces a newer one."""
         with self._lock:
             known = self._known.get(campaign_id)
             if known is None or known.revision < revision:
@@ -38,13 +38,13 @@ class Revisions:
             return known
 
     def note(self, campaign_id: str, project: str, revision: int) -> None:
-        """Remember what was written: the campaign has this revision now."""
+        """Notes the revision that was written."""
         with self._lock:
             self._known[campaign_id] = Known(project, revision)
             self._all += 1
 
     def forget(self, campaign_id: str) -> None:
-        """A campaign was deleted."""
+        """Drops a campaign that was deleted."""
         with self._lock:
             self._known.pop(campaign_id, None)
             self._all += 1

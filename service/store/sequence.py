@@ -32,11 +32,7 @@ def next_sequence(campaign: CampaignRow) -> int:
 
 
 def event_page(session: Session, campaign: CampaignRow, limit: int, after: int) -> StoredPage[Episode | StateChange]:
-    """Events number `after + 1` and on, without a gap.
-
-    Raises:
-      StorageError: one is missing.
-    """
+    """Events number `after + 1` and on; StorageError if one is missing."""
     # No further than the campaign said: the two tables are read one after the other, and what is written in between
     # would show in the second one without what came before it.
     last = min(after + limit, campaign.events)

@@ -14,32 +14,20 @@ ONLY = 1  # number of the one row, which the migration wrote
 
 
 def cursor_secret(engine: Engine) -> bytes:
-    """What cursors are sealed with.
-
-    Raises:
-      StorageError: the database cannot be read, or the row is damaged.
-    """
+    """What cursors are sealed with."""
     with storage_errors("reading"), Session(engine) as session:
         return bytes.fromhex(session.get_one(ServerRow, ONLY).cursor_secret)
 
 
 def keys_were_made(engine: Engine) -> bool:
-    """Whether an API key was ever made; this never becomes false again.
-
-    Raises:
-      StorageError: the database cannot be read, or the row is damaged.
-    """
+    """Whether an API key was ever made; this never becomes false again."""
     with storage_errors("reading"), Session(engine) as session:
         return session.get_one(ServerRow, ONLY).keys_made_at is not None
 
 
 @contextmanager
 def noting_keys(engine: Engine) -> Iterator[None]:
-    """Notes that keys were made, if what is done meanwhile succeeds.
-
-    Raises:
-      StorageError: the database cannot be written.
-    """
+    """Notes that keys were made, if what is done meanwhile succeeds."""
     doing = "noting that there are API keys"
     with (
         storage_errors(doing),

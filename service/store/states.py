@@ -26,11 +26,7 @@ RESUMED = {State.RUNNING: State.QUEUED, State.PAUSED: State.QUEUED, State.CANCEL
 
 
 def advance(current: State, new: State) -> State:
-    """`new`, once the table allows it after `current`.
-
-    Raises:
-      TransitionError: the table has no such transition.
-    """
+    """`new`; TransitionError unless it may follow `current`."""
     if new not in TRANSITIONS[current]:
         allowed = ", ".join(sorted(TRANSITIONS[current])) or "nothing"
         raise TransitionError(f"state is {current}; got {new}, wanted {allowed}")
@@ -38,14 +34,10 @@ def advance(current: State, new: State) -> State:
 
 
 def campaign_state(current: State, runs: Collection[State]) -> State:
-    """State of a campaign whose runs are in these states.
+    """State of a campaign whose runs, at least one, are in these states.
 
     A campaign ends with its last run. One failed run fails it, and one that was asked to cancel ends
     cancelled unless every run had already succeeded.
-
-    Args:
-      current: the campaign's state so far.
-      runs: states of all its runs, never empty.
     """
     if current.final:
         return current

@@ -21,11 +21,7 @@ class Statistics:
 
 
 def read_statistics(engine: Engine) -> Statistics:
-    """What the database says now.
-
-    Raises:
-      StorageError: it cannot be read.
-    """
+    """What the database says now."""
     campaigns = select(CampaignRow.state, func.count().label("campaigns")).group_by(CampaignRow.state)
     sums = (func.sum(getattr(RunRow, name)).label(name) for name in TALLIED)
     kind = (RunRow.family, RunRow.method, RunRow.state)
@@ -41,10 +37,6 @@ def read_statistics(engine: Engine) -> Statistics:
 
 
 def check_readable(engine: Engine) -> None:
-    """Ask the database for as little as it can be asked for.
-
-    Raises:
-      StorageError: it cannot be read.
-    """
+    """Ask the database for as little as it can be asked for."""
     with storage_errors("reading"), engine.connect() as connection:
         connection.execute(select(CampaignRow.number).limit(1)).first()

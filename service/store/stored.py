@@ -64,12 +64,12 @@ class StoredCampaign(CampaignHead):
 
     @property
     def families(self) -> list[str]:
-        """Of its runs, as they were posted."""
+        """Families of its runs, as they were posted."""
         return list(dict.fromkeys(run.family for run in self.runs))
 
     @property
     def methods(self) -> list[str]:
-        """Of its runs, as they were posted."""
+        """Methods of its runs, as they were posted."""
         return list(dict.fromkeys(run.method for run in self.searches))
 
     @property
@@ -85,11 +85,7 @@ class StoredCampaign(CampaignHead):
 
     @property
     def spec(self) -> CampaignSpec:
-        """What was posted; read only when it is asked for, which a list does not.
-
-        Raises:
-          OutdatedError: an earlier version took what this one refuses.
-        """
+        """What was posted, read on demand; OutdatedError if this version refuses it."""
         try:
             return _read_spec(self.spec_json)
         except ValidationError as error:

@@ -31,11 +31,7 @@ class Ledger:
         self._repeated_s: dict[int, float] = {}  # time of runs that only repeated what was known
 
     def find(self, project: str, key: str, spec: CampaignSpec) -> StoredCampaign | None:
-        """The campaign that was created with this idempotency key.
-
-        Raises:
-          ConflictError: the key was used for another campaign.
-        """
+        """The campaign that was created with this idempotency key; ConflictError if it differs."""
         with storage_errors("reading"), Session(self._store.engine) as session:
             row = session.scalars(select(CampaignRow).filter_by(project=project, idempotency_key=key)).one_or_none()
             if row is None:
@@ -47,7 +43,7 @@ class Ledger:
         return found
 
     def create(self, spec: CampaignSpec, project: str = "default", key: str | None = None) -> StoredCampaign:
-        """Write a new campaign and its runs down, all queued."""
+        """Stores a new campaign with its runs, all queued."""
         row = CampaignRow(id=f"c{secrets.token_hex(8)}", project=project, idempotency_key=key, label=spec.label)
         row.spec, row.state, row.created_at = spec.model_dump_json(), State.QUEUED, time.time()
         row.runs = [
@@ -68,7 +64,7 @@ class Ledger:
             return StoredCampaign.from_row(row, str(row.revision))
 
     def start_run(self, number: int) -> None:
-        """A worker is being launched for this run."""
+        """Notes that a worker is launched for this run."""
         with self._run(number, "starting a run") as (session, row):
             _move(session, row, State.RUNNING)
             row.started_at = row.started_at or time.time()
@@ -119,7 +115,7 @@ class Ledger:
         return grown
 
     def end_run(self, number: int, state: State, reason: str | None = None, result: Finished | None = None) -> None:
-        """A run reached its end; its campaign ends with the last one."""
+        """Ends a run, and its campaign with the last one."""
         with self._run(number, "ending a run") as (session, row):
             _move(session, row, state, reason)
             row.finished_at = time.time()
@@ -133,12 +129,12 @@ class Ledger:
                 row.repetitions = stored(dict(result.repetitions)) if result.repetitions else None
 
     def requeue_run(self, number: int, reason: str | None = None) -> None:
-        """A run lost its worker; it will resume from its checkpoint."""
+        """Queues a run that lost its worker; it resumes from its checkpoint."""
         with self._run(number, "putting a run back in the queue") as (session, row):
             _move(session, row, State.QUEUED, reason)
 
     def pause(self, numbers: Collection[int], reason: str) -> None:
-        """The disk refused these runs, which had workers."""
+        """Pauses those of these runs that are at work."""
         with self._writing("pausing") as session:
             paused = RunRow.number.in_(numbers)
             hold_campaigns(session, paused)
@@ -148,7 +144,7 @@ class Ledger:
                     _settle(session, row.campaign)
 
     def resume(self) -> int:
-        """Settle what has no worker any more, after a pause or an earlier server; returns how many runs wait again."""
+        """Queues or cancels runs without a worker, after a pause or a restart; returns how many were queued."""
         with self._writing("resuming") as session:
             interrupted = RunRow.state.in_(RESUMED)
             hold_campaigns(session, interrupted)
@@ -159,11 +155,7 @@ class Ledger:
             return sum(row.state == State.QUEUED for row in rows)
 
     def cancel(self, campaign_id: str, project: str | None = None) -> list[int]:
-        """Cancel what waits and mark what runs; returns the numbers of the runs to stop.
-
-        Raises:
-          NotFoundError: there is no such campaign.
-        """
+        """Cancels queued runs and marks running ones; returns the numbers of the runs to stop."""
         with self._writing("cancelling a campaign") as session:
             campaign = find_campaign(session, campaign_id, project)
             session.refresh(campaign, with_for_update=True)  # held, as by `hold_campaigns`
@@ -185,11 +177,7 @@ class Ledger:
     def triage(
         self, campaign_id: str, failure_id: str, state: TriageState, comment: str, project: str | None = None
     ) -> Triage:
-        """Note what people make of a contact; noting the same again changes nothing.
-
-        Raises:
-          NotFoundError: there is no such campaign or contact.
-        """
+        """Stores the triage of a contact; storing the same again changes nothing."""
         with self._writing("noting what people make of a failure") as session:
             campaign = find_campaign(session, campaign_id, project)
             session.refresh(campaign, with_for_update=True)  # held, as by `hold_campaigns`
@@ -205,11 +193,7 @@ class Ledger:
             return Triage.model_validate(row, from_attributes=True)
 
     def delete(self, campaign_id: str) -> None:
-        """Remove a campaign with all that belongs to it.
-
-        Raises:
-          NotFoundError: there is no such campaign.
-        """
+        """Deletes a campaign with all its rows."""
         with self._writing("deleting a campaign") as session:
             number = find_campaign(session, campaign_id).number
             session.expunge_all()
@@ -236,10 +220,10 @@ class Ledger:
 
 
 def _refuse(session: Session, run: RunRow, flaky: Collection[int]) -> None:
-    """Failures that do not repeat are none."""
+    """Takes failures that do not repeat out of the run's failures."""
     if not flaky:
         return
-    indices = set(flaky)  # which may be more than a statement may have parameters
+    indices = set(flaky)  # filtered here: a statement has a limit on parameters
     failures = select(EpisodeRow).filter_by(run_number=run.number, outcome=Outcome.FAILURE)
     for row in session.scalars(failures):
         if row.index not in indices:
@@ -249,13 +233,15 @@ def _refuse(session: Session, run: RunRow, flaky: Collection[int]) -> None:
         count(run, Outcome(row.outcome), +1)
 
 
-def _place(number: int, event: EpisodeDone) -> tuple[int, str, int]:
+Place = tuple[int, str, int]
+"""Where an episode belongs: number of its run, phase, index."""
+
+
+def _place(number: int, event: EpisodeDone) -> Place:
     return number, event.record.phase, event.record.index
 
 
-def _known_episodes(
-    session: Session, events: Sequence[tuple[int, EpisodeDone]]
-) -> dict[tuple[int, str, int], EpisodeRow]:
+def _known_episodes(session: Session, events: Sequence[tuple[int, EpisodeDone]]) -> dict[Place, EpisodeRow]:
     """The rows of those that were stored before, by their places."""
     place = tuple_(EpisodeRow.run_number, EpisodeRow.phase, EpisodeRow.index)
     query = select(EpisodeRow).where(place.in_([_place(number, event) for number, event in events]))
@@ -269,7 +255,7 @@ def _move(session: Session, run: RunRow, state: State, reason: str | None = None
 
 
 def _settle(session: Session, campaign: CampaignRow) -> None:
-    """Let a campaign follow its runs, and show that something of it has changed."""
+    """Derives a campaign's state from its runs and raises its revision."""
     campaign.revision += 1
     current = State(campaign.state)
     # What states there are, without the runs themselves: they may be thousands, and each start and end comes by here.
@@ -278,17 +264,13 @@ def _settle(session: Session, campaign: CampaignRow) -> None:
     if new is current:
         return
     campaign.state = new
-    campaign.reason = next((f"run {run.id}: {run.reason}" for run in campaign.runs if _tells(run, new)), None)
+    reasons = (f"run {run.id}: {run.reason}" for run in campaign.runs if run.reason and run.state == new)
+    campaign.reason = next(reasons, None)
     if new is State.RUNNING:
         campaign.started_at = campaign.started_at or time.time()
     if new.final:
         campaign.finished_at = time.time()
     _log(session, campaign, None, new, campaign.reason)
-
-
-def _tells(run: RunRow, state: State) -> bool:
-    """Whether a run is why its campaign is in this state."""
-    return bool(run.reason) and run.state == state
 
 
 def _log(session: Session, campaign: CampaignRow, run_id: str | None, state: State, reason: str | None) -> None:
