@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from risk_sac.config import FamilyName
+from risk_sac.failures.net import roads_of
 from risk_sac.failures.recording import BOX, Recording, on_body
-from risk_sac.failures.roads import roads_of
 from risk_sac.types import Kind, Role
 
 EGO_COLOUR, OTHER_COLOUR, BYSTANDER_COLOUR = "tab:blue", "tab:red", "tab:gray"

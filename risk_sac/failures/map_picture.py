@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from risk_sac.canvas import canvas, picture
 from risk_sac.failures.from_above import SURFACE_COLOURS
-from risk_sac.failures.roads import Surface, read_surfaces
+from risk_sac.failures.net import Surface, read_net, surfaces
 from risk_sac.scenario.maps.found import TITLES, Pattern, Survey
 
 MARKS: dict[Pattern, tuple[str, str]] = {
@@ -30,11 +30,11 @@ def map_png(net: Path, found: Survey) -> bytes:
 
 
 def _figure(net: Path, found: Survey) -> Figure:
-    surfaces = read_surfaces(net)
-    figure = canvas((WIDTH_IN, _height_in(surfaces)))
+    ground = surfaces(read_net(net))
+    figure = canvas((WIDTH_IN, _height_in(ground)))
     axis = figure.subplots()
     for use, colour in SURFACE_COLOURS.items():
-        outlines = [surface.outline for surface in surfaces if surface.use == use]
+        outlines = [surface.outline for surface in ground if surface.use == use]
         axis.add_collection(PolyCollection(outlines, facecolors=colour, edgecolors="0.6", linewidths=0.2))
     x = [misfit.spot.x_m for misfit in found.misfits]
     y = [misfit.spot.y_m for misfit in found.misfits]
@@ -54,8 +54,8 @@ def _figure(net: Path, found: Survey) -> Figure:
     return figure
 
 
-def _height_in(surfaces: Sequence[Surface]) -> float:
-    points = np.concatenate([surface.outline for surface in surfaces])
+def _height_in(ground: Sequence[Surface]) -> float:
+    points = np.concatenate([surface.outline for surface in ground])
     wide_m, high_m = np.maximum(np.ptp(points, axis=0), 1.0)
     return float(np.clip(WIDTH_IN * high_m / wide_m, *HEIGHT_IN))
 

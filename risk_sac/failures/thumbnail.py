@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from risk_sac.failures.net import Surface
 from risk_sac.failures.recording import BOX, Recording, on_body
-from risk_sac.failures.roads import Surface
 from risk_sac.types import Floats, Kind
 
 WIDTH, HEIGHT = 240, 150  # px

@@ -4,9 +4,9 @@ import hashlib
 from dataclasses import dataclass, field, replace
 
 from risk_sac import __version__
+from risk_sac.failures.net import SurfaceUse, roads_of
 from risk_sac.failures.question import Twin, read_twin
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.roads import Use, roads_of
 from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.records import Collision, Episode, Record
 from risk_sac.run_folder.results import Contact
@@ -87,7 +87,7 @@ def pictures(settings: ServiceSettings) -> OnDemandCache[Picture]:
 class Surface(Record):
     """A piece of ground that one drives or walks on."""
 
-    use: Use
+    use: SurfaceUse
     outline: list[tuple[float, float]]
     """Its corners, m, on the map that the series is on; the last one is joined to the first."""
 

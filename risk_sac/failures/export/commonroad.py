@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from risk_sac.failures.export.formats import Files, commonroad_python
-from risk_sac.failures.export.net import Head, Lane, boundaries
 from risk_sac.failures.export.recorded import Actor, Recorded, colour, cycle, goal
 from risk_sac.failures.export.written import BESIDE, beside, document
+from risk_sac.failures.net import Head, Lane, boundaries
 from risk_sac.types import STEP_S
 
 FREE, AS_RECORDED = "failure.xml", "failure-as-recorded.xml"

@@ -4,15 +4,15 @@ The ego is blue and its striker orange; a body that the ego does not know of is 
 """
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from risk_sac.failures.export.formats import Files
 from risk_sac.failures.export.recorded import Actor, Recorded, colour
+from risk_sac.failures.net import Surface, surfaces
 from risk_sac.failures.recording import BOX, on_body
-from risk_sac.failures.roads import Surface, read_surfaces
 from risk_sac.failures.sentence import sentence
 from risk_sac.types import STEP_S, Floats
 
@@ -31,9 +31,9 @@ LIGHTS = {"red": "#d00000", "red_yellow": "#e07000", "yellow": "#e0b000", "green
 def files(failure: Recorded) -> Files:
     """One file."""
     first = max(failure.frames - round(LAST_S / STEP_S), 0)
-    surfaces = read_surfaces(failure.net_file)
+    ground = surfaces(failure.net)
     middles = _middles(failure, first)
-    pictures = [_picture(failure, surfaces, frame, middle) for frame, middle in enumerate(middles, start=first)]
+    pictures = [_picture(failure, ground, frame, middle) for frame, middle in enumerate(middles, start=first)]
     palette = _palette()
     flat = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     step_ms = round(STEP_S * 1000)
@@ -78,7 +78,7 @@ def _middles(failure: Recorded, first: int) -> list[Floats]:
     return found[::-1]
 
 
-def _picture(failure: Recorded, surfaces: list[Surface], frame: int, middle: Floats) -> Image.Image:
+def _picture(failure: Recorded, ground: Sequence[Surface], frame: int, middle: Floats) -> Image.Image:
     picture = Image.new("RGB", (WIDTH * FINE, HEIGHT * FINE), PAPER)
     pen = ImageDraw.Draw(picture)
     scale = WIDTH * FINE / VIEW_M
@@ -87,7 +87,7 @@ def _picture(failure: Recorded, surfaces: list[Surface], frame: int, middle: Flo
         pixels = (points - middle) * (scale, -scale) + (WIDTH * FINE / 2, HEIGHT * FINE / 2)
         return [(float(x), float(y)) for x, y in pixels]
 
-    for surface in surfaces:
+    for surface in ground:
         pen.polygon(placed(surface.outline), fill=GROUND[surface.use], outline=EDGE)
     for lane in failure.net.lanes.values():
         for place, head in enumerate(lane.heads if lane.use != "crossing" else []):

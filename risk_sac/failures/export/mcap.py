@@ -13,9 +13,9 @@ from foxglove import messages as fox
 from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
 
 from risk_sac.failures.export.formats import Files
-from risk_sac.failures.export.net import Lane, boundaries
 from risk_sac.failures.export.recorded import Actor, Recorded, colour
 from risk_sac.failures.export.written import BESIDE, beside
+from risk_sac.failures.net import Lane, boundaries
 from risk_sac.failures.sentence import sentence
 from risk_sac.types import Floats
 

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from risk_sac.errors import ConfigError
-from risk_sac.failures.export.net import Net, boundaries
 from risk_sac.failures.export.written import BESIDE, document
+from risk_sac.failures.net import Net, boundaries
 from risk_sac.types import Floats
 
 WALL_S = 120.0  # a second suffices

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import WORLD, Bundle, Manifest, check_world
-from risk_sac.failures.export.net import Lane, Net, read_net
+from risk_sac.failures.net import Lane, Net, read_net
 from risk_sac.failures.recording import Series
 from risk_sac.problem import Problem
 from risk_sac.records import Collision

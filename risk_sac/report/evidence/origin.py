@@ -12,8 +12,8 @@ import numpy as np
 
 from risk_sac.errors import RiskSacError
 from risk_sac.failures.cases import Regression
+from risk_sac.failures.net import roads_of
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.roads import roads_of
 from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.markdown import run_command

@@ -10,8 +10,8 @@ import pytest
 from shapely import Polygon, box
 
 import sumo_nets
+from risk_sac.failures.net import read_net, roads_of, surfaces
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.roads import read_surfaces, roads_of
 from risk_sac.failures.thumbnail import EGO, GREY, HEIGHT, STRIKER, WIDTH, thumbnail
 from tests.unit.failures.staged import synthetic_contact, synthetic_series
 
@@ -99,7 +99,7 @@ def test_the_roads_in_view_lie_below_everything_else_with_stripes_across_a_cross
     view = box(0, 0, WIDTH, HEIGHT)
     for shape in ground:
         assert Polygon(points(shape)).intersects(view) if shape.get("fill") != "none" else len(points(shape)) == 2
-    assert 0 < len(ground) < len(read_surfaces(Path(sumo_nets.__path__[0]) / "mixed" / "mixed.net.xml"))
+    assert 0 < len(ground) < len(surfaces(read_net(Path(sumo_nets.__path__[0]) / "mixed" / "mixed.net.xml")))
 
 
 def test_a_screen_full_of_them_is_drawn_at_once_and_small() -> None:

@@ -1,18 +1,31 @@
-"""Reads of a SUMO net what the formats need: lanes with neighbours and successors, and the signals' programs."""
+"""Reads of a SUMO net what pictures and formats need: surfaces, lanes with successors, and the signals' programs."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from risk_sac.failures.roads import points_of
+import sumo_nets
+from risk_sac.config import FamilyName
+from risk_sac.scenario.families import family_named
 from risk_sac.types import Floats
 
-Use = Literal["road", "inside", "sidewalk", "crossing"]
+SurfaceUse = Literal["lane", "sidewalk", "crossing", "junction"]
+LaneUse = Literal["road", "inside", "sidewalk", "crossing"]
+SURFACES: Mapping[LaneUse, SurfaceUse] = {"road": "lane", "sidewalk": "sidewalk", "crossing": "crossing"}
 DEFAULT_WIDTH_M = 3.2  # of a lane without one, as in SUMO
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Ground that one drives or walks on: a lane, crossing or junction."""
+
+    use: SurfaceUse
+    outline: Floats  # `k x 2`, m, a closed ring without its last point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +44,7 @@ class Lane:
     id: str
     edge: str
     index: int  # 0 is the rightmost
-    use: Use
+    use: LaneUse
     centre: Floats  # `k x 2`, m
     width_m: float
     speed_mps: float
@@ -67,6 +80,7 @@ class Net:
 
     lanes: Mapping[str, Lane]
     signals: Mapping[str, Program]
+    junctions: Sequence[Floats]  # outlines, `k x 2`, m
 
     def neighbours(self, lane: Lane) -> tuple[Lane | None, Lane | None]:
         """The lanes of the same edge to its right and to its left."""
@@ -87,7 +101,17 @@ def read_net(file: Path) -> Net:
         )
         for logic in root.iter("tlLogic")
     }
-    return Net(lanes, signals)
+    junctions = [
+        _points(junction.get("shape", ""))
+        for junction in root.iter("junction")
+        if junction.get("type") not in ("internal", "dead_end")
+    ]
+    return Net(lanes, signals, junctions)
+
+
+def _points(shape: str) -> Floats:
+    """Returns `k x 2` of "x,y x,y ..."; a height, where given, is dropped."""
+    return np.array([[float(value) for value in point.split(",")[:2]] for point in shape.split()]).reshape(-1, 2)
 
 
 def _lanes(edge: ET.Element) -> list[Lane]:
@@ -100,7 +124,7 @@ def _lanes(edge: ET.Element) -> list[Lane]:
             edge=edge.get("id", ""),
             index=int(lane.get("index", "0")),
             use=_use(function, lane),
-            centre=points_of(lane.get("shape", "")),
+            centre=_points(lane.get("shape", "")),
             width_m=float(lane.get("width", DEFAULT_WIDTH_M)),
             speed_mps=float(lane.get("speed", "13.89")),
         )
@@ -108,7 +132,7 @@ def _lanes(edge: ET.Element) -> list[Lane]:
     ]
 
 
-def _use(function: str, lane: ET.Element) -> Use:
+def _use(function: str, lane: ET.Element) -> LaneUse:
     if function == "crossing":
         return "crossing"
     if lane.get("allow") == "pedestrian":
@@ -142,3 +166,33 @@ def boundaries(centre: Floats, width_m: float) -> tuple[Floats, Floats]:
     mitre = before + after
     mitre /= (1.0 + (before * after).sum(axis=1, keepdims=True)).clip(min=0.5)
     return centre + mitre * width_m / 2, centre - mitre * width_m / 2
+
+
+def roads_of(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Surface]:
+    """Returns the surfaces of a scene's net."""
+    return _shipped(family_named(family).layout(scene).net)
+
+
+@cache  # there are a few nets, and they stay as they are
+def _shipped(name: str) -> Sequence[Surface]:
+    return surfaces(read_net(Path(sumo_nets.__path__[0]) / name))
+
+
+def surfaces(net: Net) -> Sequence[Surface]:
+    """Returns the surfaces of a net, junctions first so that lanes are drawn over them.
+
+    Lanes inside junctions overlap each other and are left out: the junction's own outline stands for them.
+    """
+    found = [Surface("junction", outline) for outline in net.junctions]
+    for lane in net.lanes.values():
+        if lane.use == "crossing" or not lane.edge.startswith(":"):
+            found.append(Surface(SURFACES[lane.use], _ribbon(lane.centre, lane.width_m)))
+    return found
+
+
+def _ribbon(centre: Floats, width_m: float) -> Floats:
+    """Returns the outline, `2k x 2`, of a ribbon along a line; each point is moved across the line's direction."""
+    along = np.gradient(centre, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    left = np.column_stack((-along[:, 1], along[:, 0])) * width_m / 2
+    return np.concatenate((centre + left, (centre - left)[::-1]))
