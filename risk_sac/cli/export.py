@@ -6,32 +6,32 @@ from pathlib import Path
 
 from risk_sac.cli.console import OK, Commands, console
 from risk_sac.errors import ConfigError
-from risk_sac.failures.export.formats import FORMATS, Files, FormatName, check_carries, of_episodes, of_failure
+from risk_sac.failures.export.formats import FORMATS, Files, FormatName, check_carries, export
 from risk_sac.run_folder.results import RESULTS
 
 
 def add(commands: Commands) -> None:
     """Add the command."""
     formats = "\n".join(f"  {name:13}{format_.what}" for name, format_ in FORMATS.items())
-    export = commands.add_parser(
+    parser = commands.add_parser(
         "export",
         help="write a failure in a format that other tools read",
         epilog=f"formats:\n{formats}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    export.set_defaults(command=_export)
+    parser.set_defaults(command=_export)
     source = "the bundle of a failure; of parquet: folders of runs, or folders that hold such"
-    export.add_argument("source", type=Path, nargs="+", metavar="BUNDLE", help=source)
-    export.add_argument("--format", type=FormatName, required=True, choices=list(FormatName), help="see below")
+    parser.add_argument("source", type=Path, nargs="+", metavar="BUNDLE", help=source)
+    parser.add_argument("--format", type=FormatName, required=True, choices=list(FormatName), help="see below")
     out = "the file; where a format is several files, a new folder, or a name that ends in .zip"
-    export.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
+    parser.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
 
 
 def _export(options: argparse.Namespace) -> int:
     name, format_ = options.format, FORMATS[options.format]
     check_carries(name, format_.of)  # before anything is read
     if format_.of == "episodes":
-        files = of_episodes(name, list(_runs(options.source)))
+        files = export(name, list(_runs(options.source)))
     else:
         if len(options.source) > 1:
             raise ConfigError("BUNDLE", f"{len(options.source)} bundles", f"one, since {name} holds one failure")
@@ -50,7 +50,7 @@ def _failure(name: FormatName, bundle: Path) -> Files:
     if bundle.is_dir():
         expected = f"the bundle of a failure, since {name} holds one"
         raise ConfigError("BUNDLE", f"{bundle}, which is a folder", expected, "`risk-sac bundle RUN FAILURE` makes it")
-    return of_failure(name, Recorded.of(read_bundle(bundle)))
+    return export(name, Recorded.of(read_bundle(bundle)))
 
 
 def _runs(folders: list[Path]) -> Iterator[Path]:

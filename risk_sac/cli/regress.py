@@ -17,7 +17,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression, Verdict
-from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names, of_failure
+from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, export, names
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import RESULTS, read_results
 from risk_sac.run_folder.verified import distinct_failures
@@ -91,7 +91,7 @@ def _export(folder: Path, formats: list[FormatName], bundles: list["Bundle"]) ->
         for name in formats:
             suffix = FORMATS[name].suffix
             out = folder / f"{stem}{f'-{name}' if suffix == '.zip' else ''}{suffix}"
-            write(FORMATS[name], of_failure(name, Recorded.of(bundle)), out)
+            write(FORMATS[name], export(name, Recorded.of(bundle)), out)
     console.print(f"{counted(len(bundles), 'failure')} to look at: {folder}", soft_wrap=True)
 
 

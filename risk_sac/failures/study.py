@@ -6,8 +6,8 @@ from pathlib import Path
 
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, RiskSacError
-from risk_sac.failures.bundle import Bundle, bundle_bytes, make_bundle
-from risk_sac.failures.export.formats import FORMATS, of_failure
+from risk_sac.failures.bundle import bundle_bytes, make_bundle
+from risk_sac.failures.export.formats import FORMATS, export
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.export.written import packed
 from risk_sac.failures.minimise import minimise
@@ -21,23 +21,24 @@ from risk_sac.run_folder.series import read_series
 
 
 def answer(question: Question) -> bytes:
-    """Returns a bundle, a core or an export as files, a region as JSON, a twin with its time series."""
+    """Returns a bundle, a core or an export as files, a region as JSON, a twin with its time series.
+
+    Raises:
+      SimulationError: the failure does not repeat here.
+    """
+    spec, episode, recorded = question.spec, question.episode, read_series(question.series)
+    with closing(RiskSacEnv.of(spec)) as env:
+        played = repeated(env, spec, episode, recorded)
     if question.subject == "twin":
-        return _twin(question)
-    bundle = _bundle(question)
+        changed = twin(spec, episode, actions_of(recorded), question.twin)
+        return twin_bytes(TwinPlay.of(question.twin, changed.collision), changed.series)
+    bundle = make_bundle(spec, episode, recorded, played.signal_heads, _policy(question))
     if question.subject == "region":
         return region(bundle).model_dump_json().encode()
     if question.subject == "export":
         assert question.format is not None  # since it asks for an export
-        return packed(FORMATS[question.format], of_failure(question.format, Recorded.of(bundle)))
+        return packed(FORMATS[question.format], export(question.format, Recorded.of(bundle)))
     return bundle_bytes(minimise(bundle) if question.subject == "core" else bundle)
-
-
-def _bundle(question: Question) -> Bundle:
-    recorded = read_series(question.series)
-    with closing(RiskSacEnv.of(question.spec)) as env:
-        played = repeated(env, question.spec, question.episode, recorded)
-    return make_bundle(question.spec, question.episode, recorded, played.signal_heads, _policy(question))
 
 
 def _policy(question: Question) -> FrozenPolicy | None:
@@ -51,15 +52,6 @@ def _policy(question: Question) -> FrozenPolicy | None:
         return policy_of(folder, read_results(folder))
     except ConfigError:  # results are not there yet
         return None
-
-
-def _twin(question: Question) -> bytes:
-    """Of a failure that repeats here: what a change does to another episode tells nothing."""
-    recorded = read_series(question.series)
-    with closing(RiskSacEnv.of(question.spec)) as env:
-        repeated(env, question.spec, question.episode, recorded)
-    played = twin(question.spec, question.episode, actions_of(recorded), question.twin)
-    return twin_bytes(TwinPlay.of(question.twin, played.collision), played.series)
 
 
 def _main(asked: Path, file: Path) -> int:

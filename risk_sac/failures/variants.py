@@ -1,6 +1,6 @@
 """Plays variants of a failure: in another scene, with other actions, in other traffic; and counts which still fail."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
 
@@ -124,7 +124,8 @@ def region(bundle: Bundle) -> Region:
     """
     stage = Stage(bundle)
     with closing(stage.env):
-        return Region(shares=tuple(_share(stage, what, variants) for what, variants in _neighbours(stage)))
+        failed = {what: [stage.fails(variant) for variant in variants] for what, variants in _neighbours(stage)}
+    return Region(shares=tuple(Share.of(what, sum(each), len(each)) for what, each in failed.items()))
 
 
 def _neighbours(stage: Stage) -> Iterator[tuple[str, list[Variant]]]:
@@ -133,8 +134,3 @@ def _neighbours(stage: Stage) -> Iterator[tuple[str, list[Variant]]]:
         yield f"scene by {share:.0%}", [original.perturbed(space, share, 0.0, random) for _ in range(COPIES)]
     yield "other traffic", [replace(original, seed=original.seed + 1 + i) for i in range(SEEDS)]
     yield f"actions by {ACTIONS:.0%}", [original.perturbed(space, 0.0, ACTIONS, random) for _ in range(COPIES)]
-
-
-def _share(stage: Stage, what: str, variants: Iterable[Variant]) -> Share:
-    failed = [stage.fails(variant) for variant in variants]
-    return Share.of(what, sum(failed), len(failed))

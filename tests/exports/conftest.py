@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from risk_sac.failures.bundle import read_bundle
-from risk_sac.failures.export.formats import FORMATS, FormatName, of_failure
+from risk_sac.failures.export.formats import FORMATS, FormatName, export
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.export.written import write
 from tests.exports.make_examples import FOLDER, played_here
@@ -41,7 +41,7 @@ def exported(failure: Callable[[str], Recorded], tmp_path_factory: pytest.TempPa
     def of(family: str, name: FormatName) -> Path:
         out = folder / f"{family}-{name}{'' if FORMATS[name].suffix == '.zip' else FORMATS[name].suffix}"
         if not out.exists():
-            write(FORMATS[name], of_failure(name, failure(family)), out)
+            write(FORMATS[name], export(name, failure(family)), out)
         return out
 
     return of

@@ -12,7 +12,7 @@ from pathlib import Path
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import SimulationError
 from risk_sac.failures.bundle import Bundle, make_bundle, read_bundle, write_bundle
-from risk_sac.failures.export.formats import FORMATS, FormatName, names, of_episodes, of_failure
+from risk_sac.failures.export.formats import FORMATS, FormatName, export, names
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.export.written import write
 from risk_sac.failures.play import play
@@ -51,11 +51,11 @@ def main() -> None:
         write_bundle(bundle, played_here(read_bundle(bundle)))
     failure = Recorded.of(read_bundle(FOLDER / f"{SHOWN}.npz"))
     for name in names("failure"):
-        write(FORMATS[name], of_failure(name, failure), example(name))
+        write(FORMATS[name], export(name, failure), example(name))
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([sys.executable, "-m", "risk_sac", "run", *SEARCH, "--out", folder], check=True)
         for name in names("episodes"):
-            write(FORMATS[name], of_episodes(name, [Path(folder)]), example(name))
+            write(FORMATS[name], export(name, [Path(folder)]), example(name))
 
 
 if __name__ == "__main__":

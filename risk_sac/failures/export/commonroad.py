@@ -8,6 +8,8 @@ import json
 import subprocess
 import tempfile
 import xml.etree.ElementTree as ET
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -100,13 +102,8 @@ def _lights(failure: Recorded) -> dict[Head, dict[str, Any]]:
 
 
 def _light(failure: Recorded, lane: Lane, head: Head, number: int) -> dict[str, Any]:
-    phases: list[tuple[int, str]] = []
-    for steps, letters in cycle(failure, head.signal):
-        shown = STATES[colour(letters[head.index])]
-        if phases and phases[-1][1] == shown:
-            phases[-1] = (phases[-1][0] + steps, shown)
-        else:
-            phases.append((steps, shown))
+    shown = [(steps, STATES[colour(letters[head.index])]) for steps, letters in cycle(failure, head.signal)]
+    phases = [(sum(steps for steps, _ in run), state) for state, run in groupby(shown, itemgetter(1))]
     position = boundaries(lane.centre, lane.width_m)[1][-1]
     direction = DIRECTIONS.get(head.turn, "all")
     return {"number": number, "position": position.tolist(), "cycle": phases, "direction": direction}

@@ -1,4 +1,7 @@
-"""Table of the export formats. A format's module, and the packages that it needs, are imported when it is made."""
+"""Table of the export formats.
+
+The module of a format has its name and a function `files`; it and its packages are imported when an export is made.
+"""
 
 import os
 import sys
@@ -8,7 +11,7 @@ from enum import StrEnum
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from risk_sac.errors import ConfigError
 
@@ -40,7 +43,6 @@ class Format:
     title: str  # in a menu
     what: str  # in one sentence
     of: Literal["failure", "episodes"]  # one failure, or all episodes of runs
-    module: str  # in this room; has `files`
     packages: tuple[str, ...] = ()  # that it imports, beyond those that are always there
     python: Callable[[], Path] | None = None  # that has the packages, where it is not ours
     suffix: str = ".zip"  # of what is downloaded: several files, or the one that it is
@@ -71,20 +73,17 @@ FORMATS: Mapping[FormatName, Format] = {
         title="SUMO",
         what="net, vehicle types and a TraCI script that replays it in sumo or sumo-gui, and its FCD",
         of="failure",
-        module="sumo",
     ),
     FormatName.OPENSCENARIO: Format(
         title="OpenSCENARIO",
         what="OpenSCENARIO XML 1.2 on an OpenDRIVE 1.7 road, signals included; the ego is free, or drives as recorded",
         of="failure",
-        module="openscenario",
         packages=("scenariogeneration", "sumo"),
     ),
     FormatName.COMMONROAD: Format(
         title="CommonRoad",
         what="CommonRoad XML 2020a with a planning problem for the ego, or with the ego as recorded",
         of="failure",
-        module="commonroad",
         packages=("commonroad",),
         python=commonroad_python,
     ),
@@ -92,7 +91,6 @@ FORMATS: Mapping[FormatName, Format] = {
         title="MCAP",
         what="a recording with foxglove schemas: roads, bodies, signals, distances, requirements",
         of="failure",
-        module="mcap",
         packages=("foxglove",),
         suffix=".mcap",
         media_type="application/octet-stream",
@@ -101,7 +99,6 @@ FORMATS: Mapping[FormatName, Format] = {
         title="GIF",
         what="an animation of the last seconds, seen from above",
         of="failure",
-        module="gif",
         suffix=".gif",
         media_type="image/gif",
     ),
@@ -109,31 +106,11 @@ FORMATS: Mapping[FormatName, Format] = {
         title="Parquet",
         what="a table with a row for every episode of the runs, whatever its outcome",
         of="episodes",
-        module="parquet",
         packages=("pyarrow",),
         suffix=".parquet",
         media_type="application/vnd.apache.parquet",
     ),
 }
-
-
-def of_failure(name: FormatName, failure: "Recorded") -> Files:
-    """Exports a failure.
-
-    Raises:
-      ConfigError: the format holds no single failure, lacks a package, or cannot hold this failure.
-      SimulationError: the format plays it again, and it does not repeat here.
-    """
-    return _maker(name, "failure")(failure)
-
-
-def of_episodes(name: FormatName, runs: Sequence[Path]) -> Files:
-    """Exports all episodes of the runs in some folders.
-
-    Raises:
-      ConfigError: the format holds one failure alone or lacks a package, or a folder holds no run.
-    """
-    return _maker(name, "episodes")(runs)
 
 
 def names(of: Literal["failure", "episodes"]) -> list[FormatName]:
@@ -153,7 +130,13 @@ def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
         raise ConfigError("format", got, remedy=format_.remedy)
 
 
-def _maker(name: FormatName, of: Literal["failure", "episodes"]) -> Callable[[Any], Files]:
-    check_carries(name, of)
-    maker: Callable[[Any], Files] = import_module(f"risk_sac.failures.export.{FORMATS[name].module}").files
-    return maker
+def export(name: FormatName, source: "Recorded | Sequence[Path]") -> Files:
+    """Exports a failure, or all episodes of the runs in some folders.
+
+    Raises:
+      ConfigError: the format holds no such thing, lacks a package, or cannot hold this failure; or no run is there.
+      SimulationError: the format plays the failure again, and it does not repeat here.
+    """
+    check_carries(name, "episodes" if isinstance(source, Sequence) else "failure")
+    files: Files = import_module(f"risk_sac.failures.export.{name}").files(source)
+    return files

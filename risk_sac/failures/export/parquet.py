@@ -56,7 +56,7 @@ def _rows(folder: Path, results: Results) -> list[dict[str, Any]]:
         "ego": spec.ego.model_dump_json(),
     }
     return [
-        {"id": record.id_in(spec.id), **run, **_plain(record.model_dump())}
+        {"id": record.id_in(spec.id), **run, **record.model_dump()}
         for record in (verified.judged(records) if verified else records)
     ]
 
@@ -80,12 +80,3 @@ def _type(annotation: Any) -> pa.DataType:
     if issubclass(annotation, Enum):
         return pa.string()
     return SCALARS[annotation]
-
-
-def _plain(value: Any) -> Any:
-    """Replaces enums by their texts."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value.value if isinstance(value, Enum) else value

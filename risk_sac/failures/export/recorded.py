@@ -19,7 +19,7 @@ from risk_sac.records import Collision
 from risk_sac.scenario.layout import Layout
 from risk_sac.types import STEP_S, Floats, Kind, Role
 
-PER_FRAME = ("x_m", "y_m", "heading_rad", "vx_mps", "vy_mps", "speed_mps", "accel_mps2", "visible")
+PER_FRAME = ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")
 PER_ACTOR = ("kind", "role", "length_m", "width_m")
 BEYOND_M = 60.0  # into the last road, where a free ego has been through what the failure is about
 COLOURS = {"r": "red", "u": "red_yellow", "y": "yellow", "g": "green", "o": "off", "s": "green"}
@@ -40,8 +40,6 @@ class Actor:
     y_m: Floats
     heading_rad: Floats  # without jumps of 2π
     speed_mps: Floats
-    vx_mps: Floats
-    vy_mps: Floats
     accel_mps2: Floats
 
     @property
@@ -144,7 +142,6 @@ class Recorded:
 def _actor(series: Series, column: int) -> Actor:
     last = int(np.flatnonzero(np.isfinite(series["x_m"][:, column]))[-1]) + 1
     per_frame = {name: np.asarray(series[name][:last, column], dtype=np.float64) for name in PER_FRAME}
-    del per_frame["visible"]
     per_frame["heading_rad"] = np.unwrap(per_frame["heading_rad"])
     return Actor(
         id=str(series["ids"][column]),
@@ -160,7 +157,7 @@ def _actor(series: Series, column: int) -> Actor:
 def _check(manifest: Manifest, series: Series) -> None:
     """Refuses what no recording looks like."""
     frames, actors = len(series["time_s"]), len(np.atleast_1d(series.get("ids", np.empty(0))))
-    wanted = dict.fromkeys(PER_FRAME, (frames, actors)) | dict.fromkeys(PER_ACTOR, (actors,))
+    wanted = dict.fromkeys((*PER_FRAME, "visible"), (frames, actors)) | dict.fromkeys(PER_ACTOR, (actors,))
     for name, shape in wanted.items():
         if name not in series or series[name].shape != shape or series[name].dtype.kind not in "fi":
             raise ConfigError("BUNDLE", f"{manifest.id} has no sound array {name}, so that nothing can be told of it")
