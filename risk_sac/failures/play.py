@@ -74,13 +74,9 @@ def twin_recording(spec: RunSpec, recording: Recording, changed: EgoConfig | Non
 
 
 def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoConfig | None) -> Played:
-    """Plays a failure's episode with another ego, or without an attack.
+    """Plays a failure's episode, with its actions since the release, with another ego.
 
-    Args:
-      spec: of the run that found it.
-      episode: of the failure.
-      actions: since the release, `T x a`.
-      changed: the other ego; None leaves the adversaries to SUMO and lets pedestrians stand.
+    Without another ego there is no attack: adversaries are left to SUMO, and pedestrians stand.
 
     Raises:
       ConfigError: the other ego poses no problem that can be run.
@@ -90,8 +86,7 @@ def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoCon
         spec = spec.model_copy(update={"ego": changed})
     problem = Problem.from_spec(spec)
     steps = min(len(actions) + round(AFTER_S / STEP_S), problem.family.horizon_steps)
-    longer = np.zeros((steps, actions.shape[1]), dtype=actions.dtype)
-    longer[: len(actions)] = actions[:steps]
+    longer = np.pad(actions, ((0, steps - len(actions)), (0, 0)))
     attacked = changed is not None and method_of(spec.method).agent != "none"
     with closing(RiskSacEnv(problem, spec.learner.reward, controlled=attacked)) as env:
         return play(env, Scene(spec.family, episode.scene), episode.seed, longer)

@@ -157,8 +157,7 @@ def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:
         actions = actions_of(bundle.series)
         if policy is None:
             rest = env.problem.family.horizon_steps - len(actions)
-            actions = np.vstack((actions, np.zeros((rest, actions.shape[1]), dtype=actions.dtype)))
-            return _played(env, bundle, actions, None)
+            return _played(env, bundle, np.pad(actions, ((0, rest), (0, 0))), None)
         held = Held(spec.learner.agent.decision_steps)
         return _played(env, bundle, actions, lambda observation: held.act(partial(policy, observation)))
 

@@ -42,12 +42,7 @@ class Variant:
 
 
 class Stage:
-    """Plays variants of one failure.
-
-    Attributes:
-      original: the failure as it was, and a tail of no action.
-      played: episodes so far.
-    """
+    """Plays variants of one failure; `original` is the failure as it was, and a tail of no action."""
 
     def __init__(self, bundle: Bundle) -> None:
         """Plays the failure once more; a SimulationError if it does not happen here."""
@@ -63,7 +58,7 @@ class Stage:
             actions=_with_tail(actions_of(bundle.series), self.env.problem.family.horizon_steps),
             seed=episode.seed,
         )
-        self.played = 0
+        self.played = 0  # episodes so far
         if not self.fails(self.original):
             self.env.close()
             raise SimulationError(f"{bundle.manifest.id} does not happen here")
@@ -110,7 +105,7 @@ def alike(found: Collision | None, wanted: Collision) -> bool:
 
 def _with_tail(actions: Floats, horizon_steps: int) -> Floats:
     steps = min(round(TAIL_S / STEP_S), horizon_steps - len(actions))
-    return np.vstack((actions, np.zeros((steps, actions.shape[1]), dtype=actions.dtype)))
+    return np.pad(actions, ((0, steps), (0, 0)))
 
 
 def region(bundle: Bundle) -> Region:

@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +16,10 @@ from risk_sac.failures.minimise import COPIES, minimise
 from risk_sac.failures.variants import Stage
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import distinct_failures, read_verified
+from tests.acceptance.conftest import Tell
 from tests.egos import served
 
 RUN = ["--family", "low", "--method", "archive", "--seed", "41", "--episodes", "30"]
-Tell = Callable[..., tuple[int, str, str]]
 
 
 @dataclass(frozen=True)
@@ -55,17 +55,6 @@ def far(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Found, str]]
     with pytest.MonkeyPatch.context() as patch, served("broken", folder, deadline_s=60, response_time_s=1.0) as table:
         register(patch, folder, table)
         yield found(folder, "far"), table
-
-
-@pytest.fixture
-def tell(capsys: pytest.CaptureFixture[str]) -> Tell:
-    def told(*arguments: object) -> tuple[int, str, str]:
-        capsys.readouterr()
-        status = main([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        return status, " ".join(printed.out.split()), " ".join(printed.err.split())
-
-    return told
 
 
 def test_failures_of_an_ego_in_our_process_repeat(near: Found, tell: Tell) -> None:

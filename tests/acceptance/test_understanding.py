@@ -4,7 +4,6 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -29,11 +28,10 @@ from risk_sac.report import read_run
 from risk_sac.run_folder.results import FAILURES, read_results, series_name
 from risk_sac.run_folder.series import read_series, write_series
 from risk_sac.run_folder.verified import VERIFIED, distinct_failures, read_verified
+from tests.acceptance.conftest import Tell
 from tests.acceptance.test_bundle import changed, manifest, series
 
 RUN = ["--family", "low", "--method", "archive", "--seed", "3", "--episodes", "60"]
-Told = tuple[int, str, str]
-Tell = Callable[..., Told]
 
 
 @pytest.fixture(scope="module")
@@ -60,17 +58,6 @@ def failure(failures: Path) -> Path:
             if all(stage.fails(copy) for copy in stage.copies(stage.original, SHARE, COPIES)):
                 return file
     raise AssertionError("all of them are needles")
-
-
-@pytest.fixture
-def tell(capsys: pytest.CaptureFixture[str]) -> Tell:
-    def told(*arguments: object) -> Told:
-        capsys.readouterr()
-        status = main([str(argument) for argument in arguments])
-        printed = capsys.readouterr()
-        return status, " ".join(printed.out.split()), " ".join(printed.err.split())
-
-    return told
 
 
 def struck(bundle: Bundle) -> tuple[object, ...]:

@@ -36,13 +36,7 @@ DECIMALS = 6  # µm
 
 
 def write(told: dict[str, Any], file: Path, actors: list[int]) -> None:
-    """Writes one scenario.
-
-    Args:
-      told: what `commonroad.py` describes.
-      file: to write.
-      actors: numbers of those that the scenario has as obstacles.
-    """
+    """Writes one scenario, as `commonroad.py` describes it, with some actors as obstacles."""
     name = ScenarioID(map_name="RiskSac", configuration_id=1, obstacle_behavior="T", prediction_id=1)
     scenario = Scenario(told["step_s"], name)
     network = LaneletNetwork()

@@ -34,7 +34,8 @@ def files(failure: Recorded) -> Files:
     content, context = io.BytesIO(), Context()
     options = foxglove.mcap.MCAPWriteOptions(compression_threads=0)
     with foxglove.open_mcap(content, context=context, writer_options=options) as writer:
-        SceneUpdateChannel("/roads", context=context).log(_roads(failure), log_time=0)
+        roads = fox.SceneUpdate(entities=[_surface(lane) for lane in failure.net.lanes.values()])
+        SceneUpdateChannel("/roads", context=context).log(roads, log_time=0)
         actors = SceneUpdateChannel("/actors", context=context)
         signals = SceneUpdateChannel("/signals", context=context)
         frames, measures = FrameTransformsChannel("/tf", context=context), _measures_channel(failure, context)
@@ -68,10 +69,6 @@ def _paint(tone: tuple[float, float, float], alpha: float = 1.0) -> fox.Color:
 
 def _turned(heading_rad: float) -> fox.Quaternion:
     return fox.Quaternion(x=0, y=0, z=math.sin(heading_rad / 2), w=math.cos(heading_rad / 2))
-
-
-def _roads(failure: Recorded) -> fox.SceneUpdate:
-    return fox.SceneUpdate(entities=[_surface(lane) for lane in failure.net.lanes.values()])
 
 
 def _surface(lane: Lane) -> fox.SceneEntity:

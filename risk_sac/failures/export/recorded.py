@@ -31,7 +31,7 @@ class Actor:
     """A road user; its arrays have a row for each frame until it left the net."""
 
     id: str
-    kind: Kind
+    pedestrian: bool
     role: Role
     length_m: float
     width_m: float
@@ -41,11 +41,6 @@ class Actor:
     heading_rad: Floats  # without jumps of 2π
     speed_mps: Floats
     accel_mps2: Floats
-
-    @property
-    def pedestrian(self) -> bool:
-        """Whether it walks."""
-        return self.kind is Kind.PEDESTRIAN
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +140,7 @@ def _actor(series: Series, column: int) -> Actor:
     per_frame["heading_rad"] = np.unwrap(per_frame["heading_rad"])
     return Actor(
         id=str(series["ids"][column]),
-        kind=Kind(int(series["kind"][column])),
+        pedestrian=bool(series["kind"][column] == Kind.PEDESTRIAN),
         role=Role(int(series["role"][column])),
         length_m=float(series["length_m"][column]),
         width_m=float(series["width_m"][column]),
