@@ -112,7 +112,8 @@ def test_cancel_stops_at_an_episode_and_keeps_what_was_found(shared):
     campaign_id = shared.post(seeds=[0, 1, 2], budget={"episodes": 1000})
     shared.wait_for(campaign_id, lambda seen: seen["progress"]["episodes_done"] > 4)
     for _ in range(2):
-        assert shared.client.post(f"/v1/campaigns/{campaign_id}/cancel").status_code == 202
+        cancelled = shared.client.post(f"/v1/campaigns/{campaign_id}/cancel")
+        assert (cancelled.status_code, cancelled.headers["location"]) == (202, f"/v1/campaigns/{campaign_id}")
     campaign = shared.wait(campaign_id)
     assert campaign["state"] == "cancelled"
     assert [run["state"] for run in campaign["runs"]] == ["cancelled"] * 3

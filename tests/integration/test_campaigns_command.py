@@ -8,8 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import threading
-import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
@@ -259,25 +257,6 @@ def test_the_key_in_the_environment_opens_the_service(
     complaints = capsys.readouterr().err
     assert complaints.count("answered 401") == 2
     assert key.read_text() not in complaints
-
-
-def test_watch_outlives_a_server_that_is_killed_and_restarted(
-    serve: Callable[..., Service], capsys: pytest.CaptureFixture[str]
-) -> None:
-    service = serve()
-    campaign = service.post(seeds=[0, 1], budget={"episodes": 40})
-
-    def restart() -> None:
-        service.wait_for(campaign, lambda seen: seen["progress"]["episodes_done"] >= 10)
-        service.stop(signal.SIGKILL)
-        time.sleep(1)
-        service.start()
-
-    restarting = threading.Thread(target=restart)
-    restarting.start()
-    assert cli.main(["campaigns", "watch", campaign, "--url", f"http://127.0.0.1:{service.port}"]) == 0
-    restarting.join()
-    assert "succeeded: 80/80 episodes" in capsys.readouterr().err
 
 
 def test_a_terminal_shows_a_bar_for_each_run_at_work(service: Service) -> None:

@@ -53,18 +53,16 @@ def test_failures_are_read_page_by_page(client: Client) -> None:
     assert client.failure(campaign.id, only[0].id).index == only[0].index
 
 
-@pytest.mark.parametrize("workers", [1, 2])  # the runs come one after the other, or side by side
-def test_the_events_tell_of_every_episode_and_of_the_end(workers: int, serve: Callable[..., Service]) -> None:
-    with connected(serve("striking_worker", max_workers=workers)) as client:
-        campaign = client.submit(SPEC)
-        events = list(client.events(campaign.id))
-        episodes = [event.data for event in events if event.name in ("episode", "failure")]
-        assert sorted((each["run_id"], each["index"]) for each in episodes) == [
-            (run, index) for run in ("low-random-0", "low-random-1") for index in range(6)
-        ]
-        assert (events[-1].name, events[-1].data["run_id"], events[-1].data["state"]) == ("state", None, "succeeded")
-        assert list(client.events(campaign.id, events[3].id)) == events[4:]
-        assert list(client.events(campaign.id, events[-1].id)) == []
+def test_the_events_tell_of_every_episode_and_of_the_end(client: Client) -> None:
+    campaign = client.submit(SPEC)
+    events = list(client.events(campaign.id))
+    episodes = [event.data for event in events if event.name in ("episode", "failure")]
+    assert sorted((each["run_id"], each["index"]) for each in episodes) == [
+        (run, index) for run in ("low-random-0", "low-random-1") for index in range(6)
+    ]
+    assert (events[-1].name, events[-1].data["run_id"], events[-1].data["state"]) == ("state", None, "succeeded")
+    assert list(client.events(campaign.id, events[3].id)) == events[4:]
+    assert list(client.events(campaign.id, events[-1].id)) == []
 
 
 def test_lists_are_filtered_by_the_service(client: Client) -> None:

@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 import httpx
 import pytest
 
+from tests.hostile_networks import NET
 from tests.server import LONG_S
 
 SPEC = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 1}}
@@ -73,15 +74,19 @@ def test_what_curl_sends_by_itself_is_refused_with_what_to_send(client, path):
     assert client.post(path, content=b"", headers={"content-type": remedy}).status_code in (400, 422)
 
 
-def test_a_campaign_that_is_packed_for_the_way_is_refused(client):
+@pytest.mark.parametrize(
+    ("path", "kind", "body", "status"),
+    [("/v1/campaigns", "json", json.dumps(SPEC), 202), ("/v1/networks", "xml", NET, 201)],
+)
+def test_what_is_packed_for_the_way_is_refused(client, path, kind, body, status):
     def post(content, encoding):
-        headers = {"content-type": "application/json", "content-encoding": encoding}
-        return client.post("/v1/campaigns", content=content, headers=headers)
+        headers = {"content-type": f"application/{kind}", "content-encoding": encoding}
+        return client.post(path, content=content, headers=headers)
 
-    packed = post(gzip.compress(json.dumps(SPEC).encode()), "gzip")
+    packed = post(gzip.compress(body.encode()), "gzip")
     assert packed.status_code == 415
     assert "content-encoding is 'gzip'; wanted none" in packed.json()["detail"]
-    assert post(json.dumps(SPEC).encode(), "identity").status_code == 202
+    assert post(body.encode(), "identity").status_code == status
 
 
 class Links(HTMLParser):

@@ -1,7 +1,5 @@
 """What shows a whole campaign at once, and what people note of it, on a real server."""
 
-import contextlib
-import sqlite3
 from types import SimpleNamespace
 
 import pytest
@@ -107,27 +105,3 @@ def test_a_triage_that_is_none_is_refused_and_nothing_changes(service, noted, bo
         assert error["wanted"] == "one of comment, state"
     assert service.client.get(noted.path).json()["triage"] == before
     assert noted.put(state="new", comment="x" * 2000).status_code == 200
-
-
-def test_a_triage_of_what_is_no_failure_is_404(service, campaign):
-    for failure in ("low-random-0-train-0", "nothing", "a%00b"):
-        answer = service.client.put(f"/v1/campaigns/{campaign}/failures/{failure}/triage", json={"state": "new"})
-        assert (answer.status_code, answer.json()["reason"]) == (404, "unknown_id"), failure
-    assert service.client.put("/v1/campaigns/c0/failures/x/triage", json={"state": "new"}).status_code == 404
-
-
-def test_a_triage_survives_a_restart_and_goes_with_its_campaign(serve):
-    service = serve("striking_worker")
-    campaign = service.post(budget={"episodes": 2})
-    service.wait(campaign)
-    failure = service.get(campaign, "/failures")["items"][0]["id"]
-    path = f"/v1/campaigns/{campaign}/failures/{failure}"
-    noted = service.client.put(f"{path}/triage", json={"state": "dismissed", "comment": "ghost"}).json()
-    service.stop()
-    service.start()
-    assert service.client.get(path).json()["triage"] == noted
-    assert service.get(campaign, "/failure-table")["triage"] == ["dismissed"]
-    assert service.client.delete(f"/v1/campaigns/{campaign}").status_code == 204
-    assert service.client.get(path).status_code == 404
-    with contextlib.closing(sqlite3.connect(service.data_dir / "risk-sac.db")) as database:
-        assert database.execute("SELECT count(*) FROM triages").fetchone() == (0,)

@@ -168,6 +168,7 @@ def test_what_there_is_not_is_a_problem_that_says_what_there_is(get, part, accep
     assert response.status_code == status
     assert response.headers["content-type"] == "application/problem+json"
     assert said in response.json()["detail"]
+    assert (response.json()["reason"] == "not_acceptable") == (status == 406)
 
 
 def test_table_grows_with_the_runs_and_names_those_that_are_missing(service):

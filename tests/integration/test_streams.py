@@ -100,6 +100,7 @@ def test_a_stream_of_what_comes_tells_all_that_comes(shared):
     assert [first, *tail] == told_all[told_all.index(first) :]
 
 
+@pytest.mark.torture
 def test_what_was_told_first_is_told_again_in_its_order_from_every_id(serve):
     """Followed as it happens, through a server that stops amid it and through two runs that wait and go on."""
     service = serve("striking_worker")

@@ -3,7 +3,7 @@ import gzip
 import httpx
 import pytest
 from starlette.applications import Starlette
-from starlette.responses import Response, StreamingResponse
+from starlette.responses import Response
 from starlette.routing import Route
 
 from service.api.middleware import LEAST_BYTES, Compression
@@ -43,17 +43,6 @@ async def test_what_is_packed_already_and_streams_of_events_are_not(media_type):
     headers, content = await answer(media_type)
     assert "content-encoding" not in headers
     assert content == CONTENT
-
-
-@pytest.mark.anyio
-async def test_events_are_sent_one_by_one():
-    async def events():
-        for number in range(3):
-            yield f"data: {number}\n\n"
-
-    headers, content = await answer("text/event-stream", content=events(), respond=StreamingResponse)
-    assert "content-encoding" not in headers
-    assert content == b"data: 0\n\ndata: 1\n\ndata: 2\n\n"
 
 
 @pytest.mark.anyio

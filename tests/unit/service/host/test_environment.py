@@ -17,7 +17,6 @@ PROGRAMS = {
     "keys": [*RISK_SAC, "keys", "list"],
     "database": [sys.executable, "-m", "service.store", "back"],
 }
-each_program = pytest.mark.parametrize("program", PROGRAMS)
 
 
 def start(program: str, folder: Path, **settings: str) -> subprocess.CompletedProcess[str]:
@@ -27,7 +26,7 @@ def start(program: str, folder: Path, **settings: str) -> subprocess.CompletedPr
     )
 
 
-@each_program
+@pytest.mark.parametrize("program", PROGRAMS)
 def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program: str, tmp_path: Path) -> None:
     wrong = {"port": "http", "grace_s": "nan", "log_format": "xml", "cors_origins": "*", "allowed_hosts": "[1]"}
     ended = start(program, tmp_path, **wrong)
@@ -42,16 +41,12 @@ def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program: str, t
     assert list(tmp_path.iterdir()) == []
 
 
-@each_program
-def test_a_missing_folder_of_secrets_ends_the_start_in_one_line(program: str, tmp_path: Path) -> None:
-    ended = start(program, tmp_path, secrets_dir="/run/no-such-secrets")
+def test_a_missing_folder_of_secrets_or_a_file_in_its_place_ends_the_start_in_one_line(tmp_path: Path) -> None:
+    ended = start("service", tmp_path, secrets_dir="/run/no-such-secrets")
     assert (ended.returncode, ended.stdout) == (2, "")
     wanted = "which is missing; wanted a folder that has settings as files"
     assert ended.stderr == f"RISK_SAC_SECRETS_DIR: got '/run/no-such-secrets', {wanted}\n"
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_file_in_place_of_the_folder_of_secrets_is_refused(tmp_path: Path) -> None:
     (tmp_path / "secrets").write_text("")
     ended = start("keys", tmp_path / "data", secrets_dir=str(tmp_path / "secrets"))
     assert (ended.returncode, ended.stderr.count("\n")) == (2, 1)

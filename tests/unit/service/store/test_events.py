@@ -26,7 +26,7 @@ def campaign(ledger, episode, done):
         for number in numbers:
             ledger.add_episodes([(number, episode(index, Outcome.FAILURE if index == 2 else Outcome.SAFE))])
         if index == 1:
-            ledger.requeue_run(first)
+            ledger.requeue_run(first, "worker was killed by SIGKILL")
             ledger.start_run(first)
     ledger.end_run(first, State.SUCCEEDED, result=done)
     ledger.end_run(second, State.SUCCEEDED, result=done)
@@ -66,6 +66,8 @@ def test_all_is_told_in_the_order_in_which_it_was_written(store, campaign):
     ends = ["low-random-0 succeeded", "low-random-1 succeeded", "campaign succeeded"]
     assert told == begins + episodes[:4] + again + episodes[4:] + ends
     assert positions == list(range(1, len(told) + 1))
+    requeued = store.events(campaign.id, limit=100).items[told.index("low-random-0 queued")]
+    assert requeued.reason == "worker was killed by SIGKILL"
 
 
 @pytest.mark.parametrize("limit", [1, 2, 3, 7, 100])

@@ -89,23 +89,6 @@ def test_a_pause_that_the_disk_refuses_to_note_is_shown_all_the_same(store, ledg
     assert store.revision(campaign.id) == before
 
 
-def test_changes_of_state_come_in_their_order(store, ledger):
-    campaign = ledger.create(SPEC)
-    number = start(store, ledger)
-    ledger.requeue_run(number, "worker was killed by SIGKILL")
-    ledger.cancel(campaign.id)
-    changes = store.events(campaign.id, limit=100).items
-    assert [(change.run_id, change.state) for change in changes[:4]] == [
-        ("low-risk-sac-3", State.RUNNING),
-        (None, State.RUNNING),
-        ("low-risk-sac-3", State.QUEUED),
-        (None, State.QUEUED),
-    ]
-    assert changes[2].reason == "worker was killed by SIGKILL"
-    assert (changes[-1].run_id, changes[-1].state) == (None, State.CANCELLED)
-    assert store.events(campaign.id, after=4, limit=100).items == changes[4:]
-
-
 def test_another_project_sees_nothing(store, ledger, episode):
     ours, theirs = ledger.create(SPEC, "ours"), ledger.create(SPEC, "theirs")
     assert [item.id for item in store.campaigns(limit=5, project="ours").items] == [ours.id]
