@@ -5,8 +5,8 @@ Source: RISK-SAC, Sec. IV-A.2.
 
 from collections.abc import Mapping
 
-from risk_sac.scenario.family import EGO, Family, at_most, friction, initial_speed, offset_of, road_odd
-from risk_sac.scenario.layout import CAR_LENGTH_M, Layout, VehicleStart, surroundings, vehicle
+from risk_sac.scenario.family import EGO, HORIZON_STEPS, Family, at_most, friction, initial_speed, offset_of, road_odd
+from risk_sac.scenario.layout import CAR_LENGTH_M, Layout, VehicleStart, layout_at, vehicle
 from risk_sac.scenario.place import Stretch, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Role
@@ -38,21 +38,14 @@ def family(name: str, place: Stretch) -> Family:
             vehicles.append(car("follower", Role.BACKGROUND, place.ego, behind_m, ego_speed))
         distant_m = xi["lead_gap_m"] + DISTANT_M
         vehicles.append(car("distant", Role.BACKGROUND, place.ego, distant_m, xi["lead_speed_mps"]))
-        return Layout(
-            ego=car(EGO, Role.EGO, place.ego, 0.0, ego_speed), vehicles=tuple(vehicles), **surroundings(place, xi)
-        )
+        return layout_at(place, xi, car(EGO, Role.EGO, place.ego, 0.0, ego_speed), vehicles)
 
     return Family(
         name=name,
         summary=place.summary,
-        horizon_steps=150,
+        horizon_steps=HORIZON_STEPS,
         space=SceneSpace(name, _parameters(place, beside, followed=followed)),
-        odd=road_odd(
-            lanes=place.lanes,
-            limit_mps=place.speed_limit_mps,
-            signals=("none",) if place.signal is None else ("fixed_time",),
-            crossings=("none",),
-        ),
+        odd=road_odd(place, ("none",) if place.signal is None else ("fixed_time",), ("none",)),
         vehicles=("lead", *beside),
         pedestrians=(),
         layout=layout,

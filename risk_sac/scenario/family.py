@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from risk_sac.config import CrossingType, DynamicElements, Environment, FamilyName, Interval, Odd, Scenery, SignalType
 from risk_sac.scenario.layout import Layout
-from risk_sac.scenario.place import Signal
+from risk_sac.scenario.place import Place, Signal
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 EGO = "ego"
+HORIZON_STEPS = 150
 WALK_OFFSET_M = 1.9  # of a pedestrian from the middle of its way, along the road, at most
 
 
@@ -33,7 +34,7 @@ class Family:
 
 
 def friction() -> Parameter:
-    """Of the whole road, the same for everybody."""
+    """The parameter of the road's surface."""
     return Parameter("friction", "1", 0.6, 1.0, "tyre-road friction coefficient", "environment.friction")
 
 
@@ -43,21 +44,14 @@ def top_speed(limit_mps: float) -> float:
 
 
 def initial_speed(name: str, low: float, limit_mps: float, meaning: str) -> Parameter:
-    """Of a vehicle, m/s; that of the ego, by its name, is bounded apart from the others'.
-
-    Args:
-      name: of the parameter.
-      low: the lowest, where half the limit is no lower.
-      limit_mps: of the road.
-      meaning: of the parameter.
-    """
+    """The parameter of a vehicle's initial speed, from `low`, or half the road's limit if that is lower."""
     odd = "dynamic.ego_speed_mps" if name.startswith("ego") else "dynamic.vehicle_speed_mps"
     high = top_speed(limit_mps)
     return Parameter(name, "m/s", at_most(low, high / 2), at_most(high, high), meaning, odd)
 
 
 def walking(offset: str) -> tuple[Parameter, ...]:
-    """Of the pedestrian: along the road, from the kerb, and how fast."""
+    """The parameters of the pedestrian: along the road, from the kerb, and how fast."""
     return (
         Parameter("pedestrian_offset_m", "m", -WALK_OFFSET_M, WALK_OFFSET_M, offset),
         Parameter("pedestrian_setback_m", "m", 0.3, 5, "pedestrian's distance from the kerb"),
@@ -66,7 +60,7 @@ def walking(offset: str) -> tuple[Parameter, ...]:
 
 
 def offset_of(signal: Signal | None) -> tuple[Parameter, ...]:
-    """Where in its cycle the signal is, if there is one."""
+    """The parameter of where in its cycle the signal is, if there is one."""
     if signal is None:
         return ()
     meaning = "position in the signal's cycle at the start"
@@ -78,14 +72,12 @@ def at_most(usual: float, room: float) -> float:
     return usual if usual <= room else math.floor(room * 10 + 1e-9) / 10
 
 
-def road_odd(
-    *, lanes: float, limit_mps: float, signals: tuple[SignalType, ...], crossings: tuple[CrossingType, ...]
-) -> Odd:
-    """A family's default: its own roads, and what a driver, a walker and the weather do anywhere."""
-    pedestrians = crossings != ("none",)
+def road_odd(place: Place, signals: tuple[SignalType, ...], crossings: tuple[CrossingType, ...]) -> Odd:
+    """A family's default ODD: its own roads, and what drivers, pedestrians and the weather do anywhere."""
+    pedestrians, limit_mps = crossings != ("none",), place.speed_limit_mps
     return Odd(
         scenery=Scenery(
-            lanes=Interval(low=lanes, high=lanes),
+            lanes=Interval(low=place.lanes, high=place.lanes),
             speed_limit_mps=Interval(low=limit_mps, high=limit_mps),
             signal_types=signals,
             crossing_types=crossings,
@@ -98,7 +90,7 @@ def road_odd(
             vehicle_accel_mps2=Interval(low=-8, high=3.5),
             vehicle_lateral_speed_mps=Interval(low=0, high=1.2),
             vehicle_lateral_accel_mps2=Interval(low=0, high=1.5),
-            pedestrian_speed_mps=Interval(low=0, high=2),  # walking; who wants them to run says so
+            pedestrian_speed_mps=Interval(low=0, high=2),  # walking; a user's ODD may let them run
             pedestrian_accel_mps2=Interval(low=-1.5, high=1.5),
         ),
     )

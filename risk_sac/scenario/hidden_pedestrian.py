@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from risk_sac.config import CrossingType, SignalType
 from risk_sac.scenario.family import (
     EGO,
+    HORIZON_STEPS,
     Family,
     at_most,
     friction,
@@ -21,16 +22,7 @@ from risk_sac.scenario.family import (
     top_speed,
     walking,
 )
-from risk_sac.scenario.layout import (
-    LEAD_IN_S,
-    TRUCK_LENGTH_M,
-    Body,
-    Layout,
-    VehicleStart,
-    pedestrian,
-    surroundings,
-    vehicle,
-)
+from risk_sac.scenario.layout import LEAD_IN_S, TRUCK_LENGTH_M, Layout, VehicleStart, layout_at, pedestrian, vehicle
 from risk_sac.scenario.place import CrossingPlace, Site
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Role
@@ -49,34 +41,20 @@ def family(name: str, place: CrossingPlace) -> Family:
     def layout(xi: Mapping[str, float]) -> Layout:
         site = place.sites[-1] if xi.get("crossing", 1.0) >= 0.5 else place.sites[0]
         ego_m, ego_mps = xi["ego_distance_m"], xi["ego_speed_mps"]
-        truck: Body = "truck"
         occluder_m, occluder_mps = xi["occluder_distance_m"], xi["occluder_speed_mps"]
-        return Layout(
-            ego=vehicle(EGO, Role.EGO, site.ego, ego_m, ego_mps),
-            vehicles=(
-                vehicle(
-                    "occluder",
-                    Role.ADVERSARY,
-                    site.occluder,
-                    -occluder_m - TRUCK_LENGTH_M if site.beyond else occluder_m,
-                    occluder_mps,
-                    body=truck,
-                ),
-                vehicle("follower", Role.BACKGROUND, site.ego, ego_m + FOLLOWING_M, ego_mps),
-                *_oncoming(site),
-            ),
-            pedestrians=(pedestrian(site.walk, xi),),
-            **surroundings(place, xi),
-        )
+        before_m = -occluder_m - TRUCK_LENGTH_M if site.beyond else occluder_m
+        ego = vehicle(EGO, Role.EGO, site.ego, ego_m, ego_mps)
+        occluder = vehicle("occluder", Role.ADVERSARY, site.occluder, before_m, occluder_mps, body="truck")
+        follower = vehicle("follower", Role.BACKGROUND, site.ego, ego_m + FOLLOWING_M, ego_mps)
+        return layout_at(place, xi, ego, (occluder, follower, *_oncoming(site)), (pedestrian(site.walk, xi),))
 
     return Family(
         name=name,
         summary=place.summary,
-        horizon_steps=150,
+        horizon_steps=HORIZON_STEPS,
         space=SceneSpace(name, _parameters(place)),
         odd=road_odd(
-            lanes=place.lanes,
-            limit_mps=place.speed_limit_mps,
+            place,
             signals=tuple(sorted({_SIGNALS[site.signalised] for site in place.sites})),
             crossings=tuple(sorted({_CROSSINGS[site.signalised] for site in place.sites})),
         ),
@@ -91,12 +69,12 @@ _CROSSINGS: dict[bool, CrossingType] = {False: "zebra", True: "signalised"}
 
 
 def room_wanted_m(limit_mps: float) -> float:
-    """Before a crossing on the ego's track, at the least."""
+    """Least room before a crossing on the ego's track."""
     return NEAREST_M + FOLLOWING_M + TRUCK_LENGTH_M + LEAD_IN_S * top_speed(limit_mps)
 
 
 def room_beyond_m() -> float:
-    """Before a crossing on the track of who comes the other way, at the least."""
+    """Least room before a crossing on an oncoming occluder's track."""
     return LEAD_IN_S * OCCLUDER_MPS + TRUCK_LENGTH_M
 
 

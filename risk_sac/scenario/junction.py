@@ -6,6 +6,7 @@ Source: RISK-SAC, Sec. IV-A.2.
 from collections.abc import Mapping
 
 from risk_sac.scenario.family import (
+    HORIZON_STEPS,
     Family,
     at_most,
     friction,
@@ -15,7 +16,7 @@ from risk_sac.scenario.family import (
     top_speed,
     walking,
 )
-from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S, Layout, VehicleStart, pedestrian, surroundings, vehicle
+from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S, Layout, VehicleStart, layout_at, pedestrian, vehicle
 from risk_sac.scenario.place import JunctionPlace, Leg
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Role
@@ -41,22 +42,18 @@ def family(name: str, place: JunctionPlace) -> Family:
             for stream in place.streams
             for i, i_gap in enumerate((xi["background_gap_m"], 2 * xi["background_gap_m"]))
         ]
-        return Layout(
-            ego=_approaching(place.ego, Role.EGO, xi),
-            vehicles=(*(_approaching(leg, Role.ADVERSARY, xi) for leg in place.others), *background),
-            pedestrians=() if place.walk is None else (pedestrian(place.walk, xi),),
-            **surroundings(place, xi),
-        )
+        attackers = [_approaching(leg, Role.ADVERSARY, xi) for leg in place.others]
+        walkers = () if place.walk is None else (pedestrian(place.walk, xi),)
+        return layout_at(place, xi, _approaching(place.ego, Role.EGO, xi), attackers + background, walkers)
 
     signalised = place.signal is not None
     return Family(
         name=name,
         summary=place.summary,
-        horizon_steps=150,
+        horizon_steps=HORIZON_STEPS,
         space=SceneSpace(name, _parameters(place)),
         odd=road_odd(
-            lanes=place.lanes,
-            limit_mps=place.speed_limit_mps,
+            place,
             signals=("fixed_time",) if signalised else ("none",),
             crossings=("none",) if place.walk is None else ("signalised",) if signalised else ("zebra",),
         ),
@@ -67,23 +64,19 @@ def family(name: str, place: JunctionPlace) -> Family:
 
 
 def room_wanted_m(limit_mps: float) -> float:
-    """Before a stop line, at the least."""
+    """Least room before a stop line."""
     return NEAREST_M + LEAST_RANGE_M + CAR_LENGTH_M + LEAD_IN_S * top_speed(limit_mps)
 
 
 def room_of_a_stream_m() -> float:
-    """Before the stop line of a road with background traffic."""
+    """Least room before the stop line of a road with background traffic."""
     return STREAM_M + 2 * WIDEST_GAP_M + CAR_LENGTH_M + LEAD_IN_S * STREAM_MPS
 
 
 def _approaching(leg: Leg, role: Role, xi: Mapping[str, float]) -> VehicleStart:
-    track = leg.turns[_choice(xi.get(f"{leg.name}_turn", 0.0), len(leg.turns))]
+    options = len(leg.turns)
+    track = leg.turns[min(int(xi.get(f"{leg.name}_turn", 0.0) * options), options - 1)]  # equal parts of [0, 1]
     return vehicle(leg.name, role, track, xi[f"{leg.name}_distance_m"], xi[f"{leg.name}_speed_mps"])
-
-
-def _choice(value: float, options: int) -> int:
-    """Which of the equal parts of [0, 1] a value lies in, from 0."""
-    return min(int(value * options), options - 1)
 
 
 def _parameters(place: JunctionPlace) -> tuple[Parameter, ...]:

@@ -1,13 +1,13 @@
 """Where everybody starts: the plain data between a scene and a simulator."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal, TypedDict
+from typing import Literal
 
 from risk_sac.scenario.ground import Area, areas
-from risk_sac.scenario.place import CrossingPlace, Ground, JunctionPlace, Stretch, Track, Walk
+from risk_sac.scenario.place import Ground, Place, Track, Walk
 from risk_sac.types import Role
 
 LEAD_IN_S = 1.5  # in which SUMO drives all vehicles, before the adversaries are released to the policy
@@ -59,25 +59,20 @@ class Layout:
     wary: bool = False  # whether drivers stop for an ego that stands askew; SUMO tells them of a box along its lane
 
 
-class Surroundings(TypedDict):
-    """What a layout says of a place, whoever starts there."""
-
-    net: str
-    crossings: tuple[Area, ...]
-    roadway: tuple[Area, ...]
-    junctions: tuple[Area, ...]
-    lane_width_m: float
-    signal: str | None
-    signal_offset_s: float
-    friction: float
-    wary: bool
-
-
-def surroundings(place: Stretch | CrossingPlace | JunctionPlace, xi: Mapping[str, float]) -> Surroundings:
-    """The fields of a layout that do not say where anybody starts."""
+def layout_at(
+    place: Place,
+    xi: Mapping[str, float],
+    ego: VehicleStart,
+    vehicles: Iterable[VehicleStart],
+    pedestrians: tuple[PedestrianStart, ...] = (),
+) -> Layout:
+    """The layout of a scene at a place, given where its actors start."""
     crossings, roadway, junctions = _areas(place.ground)
-    return Surroundings(
+    return Layout(
         net=place.net,
+        ego=ego,
+        vehicles=tuple(vehicles),
+        pedestrians=pedestrians,
         crossings=crossings,
         roadway=roadway,
         junctions=junctions,
@@ -98,16 +93,9 @@ def vehicle(
     lead_m: float | None = None,
     body: Body = "car",
 ) -> VehicleStart:
-    """A vehicle `before_m` before the reference of its track once the adversaries are released.
+    """A vehicle whose front is `before_m` before its track's reference once the adversaries are released.
 
-    Args:
-      id_: its name.
-      role: who drives it.
-      track: its way.
-      before_m: of its front bumper; negative beyond the reference.
-      speed_mps: at the start, and on until the release.
-      lead_m: what it drives until the release; at its speed if not given.
-      body: its size.
+    Until then it drives `lead_m`; if that is not given, it keeps its speed.
     """
     route, piece, position_m = track.start(before_m, LEAD_IN_S * speed_mps if lead_m is None else lead_m)
     return VehicleStart(
@@ -135,6 +123,6 @@ def pedestrian(walk: Walk, xi: Mapping[str, float]) -> PedestrianStart:
     )
 
 
-@cache  # an episode asks for the ground anew, and it stays as it is
+@cache  # every episode asks for it
 def _areas(ground: Ground) -> tuple[tuple[Area, ...], tuple[Area, ...], tuple[Area, ...]]:
     return areas(ground.crossings), areas(ground.roadway), areas(ground.junctions)

@@ -1,5 +1,6 @@
 """Positions of vehicles along their paths, and their lateral room."""
 
+from functools import cache
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -7,7 +8,7 @@ import libsumo
 import numpy as np
 
 from risk_sac.scenario.layout import Layout
-from risk_sac.sim.paths import HEADING, STATION, Along, Path, X, Y, path_of
+from risk_sac.sim.paths import HEADING, STATION, Along, X, Y, path_of
 from risk_sac.types import Floats
 
 CAR = "passenger"  # the class of all vehicles of ours
@@ -27,9 +28,6 @@ class Roads:
 
     def __init__(self) -> None:
         self._net = ""
-        self._paths: dict[tuple[tuple[str, ...], str], Path] = {}
-        self._lanes: dict[tuple[tuple[str, ...], str], tuple[float, float, float]] = {}
-        self._stretches: dict[str, float] = {}
         self._routes: dict[str, tuple[str, ...]] = {}
 
     def enter(self, layout: Layout) -> None:
@@ -37,9 +35,7 @@ class Roads:
         self._routes = {start.id: start.route for start in (layout.ego, *layout.vehicles)}
         if layout.net != self._net:  # another one may use the same names
             self._net = layout.net
-            self._lanes.clear()
-            self._stretches.clear()
-            self._paths.clear()
+            self._path, self._widths, self._stretch = cache(path_of), cache(_widths), cache(_stretch)
 
     def along(self, vehicle: str) -> Along:
         """Where a vehicle is on its path."""
@@ -58,15 +54,11 @@ class Roads:
     def place(self, vehicle: str, offset_m: float, width_m: float) -> tuple[Room, Along]:
         """How far a vehicle may move sideways, and where it is on its path.
 
-        Only lanes that its route continues from count: SUMO halts a vehicle at the end of any other.
-
-        Args:
-          vehicle: its id.
-          offset_m: of its centre from that of its lane, positive to the left.
-          width_m: of its body.
+        Only lanes that its route continues from count: SUMO halts a vehicle at the end of any other. `offset_m` is that
+        of its centre from its lane's, positive to the left.
         """
         lane = libsumo.vehicle.getLaneID(vehicle)
-        right_lanes, left_lanes, lane_width = self._lane(self._routes[vehicle], lane)
+        right_lanes, left_lanes, lane_width = self._widths(self._routes[vehicle], lane)
         spare = (lane_width - width_m) / 2 - EDGE_M
         room = Room(left_lanes + spare - offset_m, right_lanes + spare + offset_m)
         return room, self._along(vehicle, lane, offset_m)
@@ -76,30 +68,19 @@ class Roads:
 
         SUMO counts in lengths of the lane, which are those of its edge; on a bend the outer lanes are drawn longer.
         """
-        route = self._routes[vehicle]
-        path = self._paths.get((route, lane))
-        if path is None:
-            path = self._paths[route, lane] = path_of(route, lane)
-        return Along(path, libsumo.vehicle.getLanePosition(vehicle) * self._stretch(lane), offset_m)
+        station_m = libsumo.vehicle.getLanePosition(vehicle) * self._stretch(lane)
+        return Along(self._path(self._routes[vehicle], lane), station_m, offset_m)
 
-    def _stretch(self, lane: str) -> float:
-        """Length of a lane's line / length of the lane; 1 where they differ by rounding."""
-        stretch = self._stretches.get(lane)
-        if stretch is None:
-            drawn_m = float(np.hypot(*np.diff(libsumo.lane.getShape(lane), axis=0).T).sum())
-            length_m = libsumo.lane.getLength(lane)
-            stretch = self._stretches[lane] = drawn_m / length_m if abs(drawn_m - length_m) > ROUNDED_M else 1.0
-        return stretch
 
-    def _lane(self, route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
-        """Width of the lanes right and left of `lane` that lead on along `route`, and its own."""
-        widths = self._lanes.get((route, lane))
-        if widths is None:
-            widths = self._lanes[route, lane] = _widths(route, lane)
-        return widths
+def _stretch(lane: str) -> float:
+    """Length of a lane's line / length of the lane; 1 where they differ by rounding."""
+    drawn_m = float(np.hypot(*np.diff(libsumo.lane.getShape(lane), axis=0).T).sum())
+    length_m: float = libsumo.lane.getLength(lane)
+    return drawn_m / length_m if abs(drawn_m - length_m) > ROUNDED_M else 1.0
 
 
 def _widths(route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
+    """Width of the lanes right and left of `lane` that lead on along `route`, and its own."""
     edge, _, index = lane.rpartition("_")
     widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
     own = int(index)

@@ -51,10 +51,8 @@ class SumoSimulation:
     def __init__(self, ego: EgoConfig, senses: Senses | None = None, pilot: Pilot | None = None) -> None:
         """Starts nothing yet.
 
-        Args:
-          ego: SUMO's models that drive it.
-          senses: what it perceives; everything if not given.
-          pilot: drives it in their place once `hand_over_ego` was called.
+        Without senses the ego perceives everything. A pilot drives it in place of SUMO's models from `hand_over_ego`
+        on.
         """
         self._ego = ego
         self._senses = senses or Perception(0.0, EVERYTHING)
@@ -64,20 +62,21 @@ class SumoSimulation:
         self._roads = Roads()
 
     def reset(self, layout: Layout, seed: int) -> Frame:
-        """Sets up an episode and returns its first frame; SUMO drives all vehicles until `release`.
+        """Sets up an episode and returns its first frame; the same seed and commands give the same episode.
 
-        Adversaries keep the speed they start with, or drive slower where SUMO's models want that.
-
-        Args:
-          layout: where all actors start.
-          seed: SUMO's seed; the same seed and commands give the same episode.
+        SUMO drives all vehicles until `release`. Adversaries keep the speed they start with, or drive slower where
+        SUMO's models want that.
 
         Raises:
           SimulationError: SUMO refused the layout.
         """
         options = ["-n", str(NETS / layout.net), "-a", str(NETS / "vtypes.add.xml"), "--seed", str(seed), *OPTIONS]
         try:
-            self._load(options)
+            if self._started:
+                libsumo.load(options)
+            else:
+                libsumo.start(["sumo", *options])
+                self._started = True
             place(layout, self._ego)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
@@ -98,19 +97,8 @@ class SumoSimulation:
         self._hide()
         return self._reading.frame
 
-    def _load(self, options: list[str]) -> None:
-        if not self._started:
-            libsumo.start(["sumo", *options])
-            self._started = True
-            return
-        libsumo.load(options)
-
     def hand_over_ego(self) -> None:
-        """Hands the ego to its pilot, if it has one.
-
-        Raises:
-          EgoFailed: the pilot cannot drive.
-        """
+        """Hands the ego to its pilot, if it has one; raises `EgoFailed` if that cannot drive."""
         if self._pilot is None:
             return
         frame = self._reading.frame

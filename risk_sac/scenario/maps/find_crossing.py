@@ -6,6 +6,7 @@ left. So it is where roads have one lane in each direction.
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import pairwise
 
 from risk_sac.scenario.family import top_speed
@@ -13,11 +14,11 @@ from risk_sac.scenario.hidden_pedestrian import OCCLUDER_M, room_beyond_m, room_
 from risk_sac.scenario.layout import LEAD_IN_S, TRUCK_LENGTH_M
 from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.clearance import truck_reaches
-from risk_sac.scenario.maps.find_junction import turn
+from risk_sac.scenario.maps.find_junction import roomy, turn
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot
-from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net, wrapped
-from risk_sac.scenario.maps.ways import AFTER_S, Way, track, way_on
+from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net
+from risk_sac.scenario.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario.place import CrossingPlace, Site, Track
 
 OCCLUDED_S = 4.0  # of driving that the way of who hides the pedestrian goes on
@@ -37,11 +38,7 @@ def spots(net: Net) -> Iterator[Spot]:
 
 
 def place(net: Net, spot: Spot) -> CrossingPlace:
-    """The crossing at the end of a road.
-
-    Raises:
-      NoFit: nothing could hide a pedestrian there, or there is no room to come from or to go on to.
-    """
+    """The crossing at the end of a road; raises `NoFit` where nothing can hide a pedestrian, or there is no room."""
     edge = net.edges[spot.id]
     crossing = net.crossings_of[edge.end, edge.id][0]
     check_limit(edge.drivable[0])
@@ -72,23 +69,21 @@ def place(net: Net, spot: Spot) -> CrossingPlace:
 
 def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[Lane, Track, Track, Link]:
     """The leftmost lane that leads on for an episode and has one to its right that leads anywhere, and clear of it."""
-    why = ""
+    whys = []
     for right, own in reversed(list(pairwise(edge.drivable))):
-        driven, hiding = _ego(net, own), _straight(net, right, OCCLUDED_S)
-        if isinstance(driven, str) or isinstance(hiding, str):
-            why = why or (driven if isinstance(driven, str) else str(hiding))
-            continue
-        (ego, link), (occluder, beside) = driven, hiding
-        least_m = TRUCK_LENGTH_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
-        if occluder.room_m < least_m:
-            why = why or f"the lane beside can be come from for {occluder.room_m:.0f} m; wanted {least_m:.0f} m"
-        elif truck_reaches(net, beside, link):
-            why = (
-                why or f"a truck that drives on from {right.id!r} reaches into the way of who drives on from {own.id!r}"
-            )
-        else:
+        try:
+            (ego, link), (occluder, beside) = _ego(net, own), _straight(net, right, OCCLUDED_S)
+            least_m = TRUCK_LENGTH_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
+            if occluder.room_m < least_m:
+                raise NoFit(f"the lane beside can be come from for {occluder.room_m:.0f} m; wanted {least_m:.0f} m")
+            if truck_reaches(net, beside, link):
+                raise NoFit(
+                    f"a truck that drives on from {right.id!r} reaches into the way of who drives on from {own.id!r}"
+                )
             return own, ego, occluder, link
-    raise NoFit(why)
+        except NoFit as why:
+            whys.append(why)
+    raise whys[0]
 
 
 def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[Lane, Track, Track, Link]:
@@ -101,13 +96,8 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[Lane, Trac
             f"{edge.id!r} has 1 lane for cars, and none beside it for those who come the other way; wanted one of the "
             "two, so that a vehicle can hide the pedestrian"
         )
-    driven = _ego(net, own)
-    if isinstance(driven, str):
-        raise NoFit(driven)
-    ego, link = driven
+    ego, link = _ego(net, own)
     way = way_on(net, beside[0], (TRUCK_LENGTH_M + OCCLUDER_M) / beside[0].limit_mps + OCCLUDED_S)
-    if not isinstance(way, Way):
-        raise NoFit(way)
     occluder = track(net, way, 0.0, TRUCK_LENGTH_M + OCCLUDER_M)
     if occluder.room_m < room_beyond_m():
         came = f"those who come the other way can be come from for {occluder.room_m:.0f} m"
@@ -121,28 +111,25 @@ def _is_beside(own: Lane, other: Lane) -> bool:
     cos, sin = math.cos(own.way_out_rad), math.sin(own.way_out_rad)
     left_m = (to_y - y) * cos - (to_x - x) * sin
     along_m = (to_x - x) * cos + (to_y - y) * sin
-    back = abs(wrapped(other.way_in_rad - own.way_out_rad)) > math.pi - BESIDE_RAD
+    back = abs(math.remainder(other.way_in_rad - own.way_out_rad, math.tau)) > math.pi - BESIDE_RAD
     return back and 0.0 < left_m <= (own.width_m + other.width_m) / 2 + MEDIAN_M and abs(along_m) <= SHIFTED_M
 
 
-def _ego(net: Net, own: Lane) -> tuple[Track, Link] | str:
-    """The ego's track, if there is room, and the link it begins with; or why there is none."""
-    found = _straight(net, own, AFTER_S)
-    wanted_m = room_wanted_m(own.limit_mps)
-    if not isinstance(found, str) and found[0].room_m < wanted_m:
-        return f"{own.edge!r} can be come from for {found[0].room_m:.0f} m; wanted {wanted_m:.0f} m"
-    return found
+def _ego(net: Net, own: Lane) -> tuple[Track, Link]:
+    """The ego's track, if there is room, and the link it begins with."""
+    found, link = _straight(net, own, AFTER_S)
+    return roomy(found, own.edge, room_wanted_m(own.limit_mps)), link
 
 
-def _straight(net: Net, lane: Lane, onward_s: float) -> tuple[Track, Link] | str:
-    """The track over the straightest link of a lane that leads on so far, and that link; or why there is none."""
-    why = f"lane {lane.id!r} leads nowhere, or nowhere that its signal ever lets anybody go"
+def _straight(net: Net, lane: Lane, onward_s: float) -> tuple[Track, Link]:
+    """The track over the straightest link of a lane that leads on so far, and that link."""
+    why = NoFit(f"lane {lane.id!r} leads nowhere, or nowhere that its signal ever lets anybody go")
     for link in sorted(net.onward.get(lane.id, ()), key=lambda link: abs(link.turn_rad)):
-        found = turn(net, link, onward_s)
-        if isinstance(found, Track):
-            return found, link
-        why = found
-    return why
+        try:
+            return turn(net, link, onward_s), link
+        except NoFit as error:
+            why = error
+    raise why
 
 
 def _oncoming(net: Net, own: str, crossed: tuple[str, ...]) -> tuple[Track, ...]:
@@ -155,5 +142,8 @@ def _oncoming(net: Net, own: str, crossed: tuple[str, ...]) -> tuple[Track, ...]
         for link in net.back.get(lane.id, ())
         if abs(link.turn_rad) < 0.8
     ]
-    found = [turn(net, link, ONWARD_S) for link in links]
-    return tuple(each for each in found if isinstance(each, Track))[:2]
+    found = []
+    for link in links:
+        with suppress(NoFit):
+            found.append(turn(net, link, ONWARD_S))
+    return tuple(found[:2])

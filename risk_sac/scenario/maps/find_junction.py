@@ -5,6 +5,7 @@ Whose ways cross is what the net says: the foe bits of its links.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from risk_sac.scenario import junction
@@ -12,8 +13,8 @@ from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.clearance import ROOM_M, too_near, waits_in_the_way
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot
-from risk_sac.scenario.maps.net import Edge, Link, Net, wrapped
-from risk_sac.scenario.maps.ways import AFTER_S, Way, track, way_on
+from risk_sac.scenario.maps.net import Edge, Link, Net
+from risk_sac.scenario.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
 
 ATTACKERS = ("oncoming", "from_left", "from_right")
@@ -46,25 +47,18 @@ def spots(net: Net) -> Iterator[Spot]:
 
 
 def place(net: Net, spot: Spot) -> JunctionPlace:
-    """The junction at the end of a road.
-
-    Raises:
-      NoFit: nothing crosses, or there is no room to come from or to go on to.
-    """
+    """The junction at the end of a road; raises `NoFit` where nothing crosses, or there is too little road."""
     edge = net.edges[spot.id]
     at = net.junctions[edge.end]
     own = approach(net, edge)
-    ego, why = leg(net, own, "ego", AFTER_S)
-    if ego is None:
-        raise NoFit(why)
+    ego = leg(net, own, "ego", AFTER_S)
     others = _others(net, own)
     legs, whys = {}, []
     for name, other in others.items():
-        found, why = leg(net, other, name, ONWARD_S)
-        if found is not None:
-            legs[name] = found
-        else:
-            whys.append(why)
+        try:
+            legs[name] = leg(net, other, name, ONWARD_S)
+        except NoFit as why:
+            whys.append(str(why))
     if not legs and at.type == UNREGULATED:
         raise NoFit(f"the junction {at.id!r} is {UNREGULATED}: nobody lets anybody pass there; wanted one with rules")
     if not legs and all(link.index is None for link in own.links):
@@ -91,11 +85,7 @@ def place(net: Net, spot: Spot) -> JunctionPlace:
 
 
 def approach(net: Net, edge: Edge) -> Approach:
-    """The ways on from a road: to each road that follows, from the leftmost lane that leads there.
-
-    Raises:
-      NoFit: it is a dead end.
-    """
+    """The ways on from a road, each from the leftmost lane that leads there; raises `NoFit` at a dead end."""
     by_target: dict[str, Link] = {}
     for lane in edge.drivable:  # from right to left, so that the leftmost stays
         for link in net.onward.get(lane.id, ()):
@@ -108,82 +98,75 @@ def approach(net: Net, edge: Edge) -> Approach:
     return Approach(edge, tuple(sorted(by_target.values(), key=lambda link: -link.turn_rad)))
 
 
-def leg(net: Net, road: Approach, name: str, onward_s: float) -> tuple[Leg | None, str]:
-    """Where somebody comes from and may go to; or why nobody can."""
-    tracks, why = [], ""
+def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
+    """Where a vehicle comes from and may go to; raises `NoFit` where no way has room."""
+    tracks, whys = [], []
+    check_limit(road.links[0].source)
     limit_mps = road.links[0].source.limit_mps
-    try:
-        check_limit(road.links[0].source)
-    except NoFit as error:
-        return None, str(error)
-    wanted_m = junction.room_wanted_m(limit_mps)
     for link in road.links:
-        found = turn(net, link, onward_s)
-        if isinstance(found, str):
-            why = why or found
-        elif found.room_m < wanted_m:
-            why = why or f"{road.edge.id!r} can be come from for {found.room_m:.0f} m; wanted {wanted_m:.0f} m"
-        else:
-            tracks.append(found)
+        try:
+            tracks.append(roomy(turn(net, link, onward_s), road.edge.id, junction.room_wanted_m(limit_mps)))
+        except NoFit as why:
+            whys.append(why)
     if not tracks:
-        return None, why
-    return Leg(name=name, speed_limit_mps=limit_mps, turns=tuple(tracks)), ""
+        raise whys[0]
+    return Leg(name=name, speed_limit_mps=limit_mps, turns=tuple(tracks))
 
 
-def turn(net: Net, link: Link, onward_s: float) -> Track | str:
-    """The track over a link, or what is in the way."""
+def roomy(found: Track, edge: str, wanted_m: float) -> Track:
+    """The track; raises `NoFit` if it begins too near to its reference."""
+    if found.room_m < wanted_m:
+        raise NoFit(f"{edge!r} can be come from for {found.room_m:.0f} m; wanted {wanted_m:.0f} m")
+    return found
+
+
+def turn(net: Net, link: Link, onward_s: float) -> Track:
+    """The track over a link; raises `NoFit` if something is in the way."""
     if (lane := waits_in_the_way(net, link)) is not None:
-        return (
+        raise NoFit(
             f"who turns from {link.source.edge!r} to {link.target.edge!r} waits in the junction where it reaches into "
             f"{lane.id!r}, the way of those it waits for"
         )
     if (beside := too_near(net, link)) is not None:
-        return (
+        raise NoFit(
             f"the ways of lanes {link.source.id!r} and {beside.source.id!r} to {link.target.edge!r} come nearer than "
             f"{ROOM_M} m to each other: two cannot drive there beside each other"
         )
     length_m = link.source.length_m
     way = way_on(net, link.source, onward_s + length_m / link.source.limit_mps, through=link)
-    return track(net, way, length_m) if isinstance(way, Way) else way
+    return track(net, way, length_m)
 
 
 def stream(net: Net, road: Approach) -> Track | None:
     """Straight on from the rightmost lane, where a lane is left beside it."""
     if len(road.edge.drivable) < 2:
         return None
-    links = [link for lane in road.edge.drivable[:1] for link in net.onward.get(lane.id, ())]
+    links = net.onward.get(road.edge.drivable[0].id)
     if not links:
         return None
-    found = turn(net, min(links, key=lambda link: abs(link.turn_rad)), ONWARD_S)
-    return found if isinstance(found, Track) and found.room_m >= junction.room_of_a_stream_m() else None
+    with suppress(NoFit):
+        found = turn(net, min(links, key=lambda link: abs(link.turn_rad)), ONWARD_S)
+        return roomy(found, road.edge.id, junction.room_of_a_stream_m())
+    return None
 
 
 def _others(net: Net, own: Approach) -> Mapping[str, Approach]:
     """The roads with a way that is a foe of the ego's; of several from one side, the one squarest to it."""
     best: dict[str, tuple[float, Approach]] = {}
     for edge in net.arriving[own.edge.end]:
-        if edge is own.edge:
+        links = [link for lane in edge.drivable for link in net.onward.get(lane.id, ())]
+        if edge is own.edge or not any(net.are_foes(one, link) for one in own.links for link in links):
             continue
-        try:
-            other = approach(net, edge)
-        except NoFit:
-            continue
-        foes = _foes(net, own.links, edge)
-        if not foes:
-            continue
+        other = approach(net, edge)
         name, off_rad = _side(own, other)
         if name not in best or off_rad < best[name][0]:
             best[name] = off_rad, other
     return {name: best[name][1] for name in ATTACKERS if name in best}
 
 
-def _foes(net: Net, own: Sequence[Link], edge: Edge) -> bool:
-    return any(net.are_foes(one, link) for one in own for lane in edge.drivable for link in net.onward.get(lane.id, ()))
-
-
 def _side(own: Approach, other: Approach) -> tuple[str, float]:
     """From where another road comes, and by how much not quite from there."""
-    relative = wrapped(other.driven_rad - own.driven_rad)
+    relative = math.remainder(other.driven_rad - own.driven_rad, math.tau)
     if abs(relative) > ONCOMING_RAD:
         return "oncoming", math.pi - abs(relative)
     if abs(relative) < BESIDE_RAD:  # it joins the ego's road, as a ramp does

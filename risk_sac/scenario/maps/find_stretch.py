@@ -1,6 +1,7 @@
 """Where on a net car following fits: on a lane that can be driven on for an episode, with room behind the ego."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 
 from risk_sac.scenario.car_following import LEAST_BEHIND_M
 from risk_sac.scenario.maps.around import signal_of
@@ -25,11 +26,7 @@ def spots(net: Net) -> Iterator[Spot]:
 
 
 def place(net: Net, spot: Spot) -> Stretch:
-    """Car following on a road.
-
-    Raises:
-      NoFit: it has no room.
-    """
+    """Car following on a road; raises `NoFit` where it has no room."""
     edge = net.edges[spot.id]
     check_limit(edge.drivable[0])
     reference_m = round(edge.drivable[0].length_m / 2, 2)
@@ -55,11 +52,7 @@ def place(net: Net, spot: Spot) -> Stretch:
 
 
 def check_limit(lane: Lane) -> None:
-    """Refuses roads on which nobody drives as a car does.
-
-    Raises:
-      NoFit: the limit is too low or too high.
-    """
+    """Raises `NoFit` for a road whose speed limit is none for cars."""
     if not SLOWEST_MPS <= lane.limit_mps <= FASTEST_MPS:
         wanted = f"wanted {SLOWEST_MPS:g} to {FASTEST_MPS:g} m/s"
         raise NoFit(f"the speed limit of {lane.edge!r} is {lane.limit_mps:g} m/s; {wanted}")
@@ -68,21 +61,21 @@ def check_limit(lane: Lane) -> None:
 def _lane_to_drive(net: Net, edge: Edge, reference_m: float) -> tuple[Lane, Way]:
     """The lane nearest to the middle that leads on for an episode."""
     middle = edge.drivable[len(edge.drivable) // 2].index
-    why = ""
+    whys = []
     for lane in sorted(edge.drivable, key=lambda lane: abs(lane.index - middle)):
-        way = way_on(net, lane, DRIVEN_S + reference_m / lane.limit_mps)
-        if isinstance(way, Way):
-            return lane, way
-        why = why or way
-    raise NoFit(why)
+        try:
+            return lane, way_on(net, lane, DRIVEN_S + reference_m / lane.limit_mps)
+        except NoFit as why:
+            whys.append(why)
+    raise whys[0]
 
 
 def _beside(net: Net, lane: Lane, reference_m: float) -> Track | None:
-    way = way_on(net, lane, BESIDE_S + reference_m / lane.limit_mps)
-    if not isinstance(way, Way):
-        return None
-    found = track(net, way, reference_m, PIECES_M)
-    return found if found.room_m >= LEAST_BEHIND_M else None
+    with suppress(NoFit):
+        way = way_on(net, lane, BESIDE_S + reference_m / lane.limit_mps)
+        found = track(net, way, reference_m, PIECES_M)
+        return found if found.room_m >= LEAST_BEHIND_M else None
+    return None
 
 
 def _soon(way: Way, left_m: float) -> list[Link]:

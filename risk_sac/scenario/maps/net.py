@@ -78,7 +78,7 @@ class Link:
     @property
     def turn_rad(self) -> float:
         """How far it turns to the left."""
-        return wrapped(self.target.way_in_rad - self.source.way_out_rad)
+        return math.remainder(self.target.way_in_rad - self.source.way_out_rad, math.tau)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,12 +151,7 @@ class Net:
 
 
 def read_tree(path: Path) -> ET.Element:
-    """Reads the XML of a net that we, the sandbox or netconvert have written.
-
-    Raises:
-      MapError: it is no XML.
-      OSError: it cannot be read.
-    """
+    """Reads the XML of a net that we, the sandbox or netconvert have written; raises `MapError` if it is none."""
     try:
         return ET.parse(path).getroot()
     except ET.ParseError as error:
@@ -164,16 +159,7 @@ def read_tree(path: Path) -> ET.Element:
 
 
 def read_net(path: Path, root: ET.Element | None = None) -> Net:
-    """Reads a net.
-
-    Args:
-      path: its file.
-      root: its XML, if that is read already.
-
-    Raises:
-      MapError: it is no net on which anything could be found; the message says why.
-      OSError: it cannot be read.
-    """
+    """Reads a net, or takes its XML from `root`; raises `MapError` if nothing could be found on it."""
     root = read_tree(path) if root is None else root
     if root.tag != "net":
         raise MapError("network", f"{path.name} with the root <{root.tag}>", "<net>", "convert it first")
@@ -193,11 +179,6 @@ def read_net(path: Path, root: ET.Element | None = None) -> Net:
             "network", "roads meet, but no lane leads on to another: the net lacks its <connection> elements"
         )
     return net
-
-
-def wrapped(angle_rad: float) -> float:
-    """The same angle within ±π."""
-    return (angle_rad + math.pi) % (2 * math.pi) - math.pi
 
 
 def _net(root: ET.Element) -> Net:

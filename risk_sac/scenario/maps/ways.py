@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from risk_sac.scenario.maps.clearance import too_near
+from risk_sac.scenario.maps.found import NoFit
 from risk_sac.scenario.maps.net import Lane, Link, Net
 from risk_sac.scenario.place import Piece, Track
 
@@ -22,65 +23,49 @@ class Way:
     links: tuple[Link, ...]  # one fewer
 
 
-def way_on(net: Net, first: Lane, seconds: float, through: Link | None = None) -> Way | str:
-    """The straightest way on from a lane that takes so long at the speed limits, no edge of it twice.
+def way_on(net: Net, first: Lane, seconds: float, through: Link | None = None) -> Way:
+    """The straightest way on from a lane that takes `seconds` at the speed limits, no edge of it twice.
 
-    Args:
-      net: where.
-      first: where it begins.
-      seconds: how long it has to be.
-      through: the first link, where it is given.
-
-    Returns:
-      The way; or what is in the way.
+    Raises:
+      NoFit: every way is too short.
     """
-    search = _Search(net, seconds)
-    if search.extend([first], [], first.length_m / first.limit_mps, through):
-        return Way(tuple(search.lanes), tuple(search.links))
-    return (
-        f"the longest way on that was found ends with edge {search.farthest!r} after {search.reached_s:.0f} s of "
-        f"driving; wanted {seconds:.0f} s"
-    )
+    tries, farthest, reached_s = TRIES, first.edge, 0.0
 
-
-class _Search:
-    def __init__(self, net: Net, seconds: float) -> None:
-        self._net, self._seconds, self._tries = net, seconds, TRIES
-        self.lanes: list[Lane] = []
-        self.links: list[Link] = []
-        self.farthest, self.reached_s = "", 0.0
-
-    def extend(self, lanes: list[Lane], links: list[Link], gone_s: float, through: Link | None = None) -> bool:
-        """Depth first, the straightest way first."""
-        if gone_s > self.reached_s or not self.farthest:
-            self.farthest, self.reached_s = lanes[-1].edge, gone_s
-        if gone_s >= self._seconds and through is None:
-            self.lanes, self.links = lanes, links
-            return True
+    def extend(lanes: list[Lane], links: list[Link], gone_s: float, following: Sequence[Link]) -> Way | None:
+        """Searches depth first, the straightest way first."""
+        nonlocal tries, farthest, reached_s
+        if gone_s > reached_s:
+            farthest, reached_s = lanes[-1].edge, gone_s
+        if gone_s >= seconds and (links or through is None):
+            return Way(tuple(lanes), tuple(links))
         been = {lane.edge for lane in lanes}
-        following = [through] if through else sorted(self._net.onward.get(lanes[-1].id, ()), key=_bend)
         for link in following:
-            if link.target.edge in been or self._tries == 0 or too_near(self._net, link) is not None:
+            if link.target.edge in been or tries == 0 or too_near(net, link) is not None:
                 continue
-            self._tries -= 1
+            tries -= 1
             inside_s = sum(lane.length_m / lane.limit_mps for lane in link.inside)
             after_s = gone_s + inside_s + link.target.length_m / link.target.limit_mps
-            if self.extend([*lanes, link.target], [*links, link], after_s):
-                return True
-        return False
+            if way := extend([*lanes, link.target], [*links, link], after_s, _onward(net, link.target)):
+                return way
+        return None
+
+    way = extend([first], [], first.length_m / first.limit_mps, [through] if through else _onward(net, first))
+    if way is None:
+        found = f"the longest way on that was found ends with edge {farthest!r} after {reached_s:.0f} s of driving"
+        raise NoFit(f"{found}; wanted {seconds:.0f} s")
+    return way
+
+
+def _onward(net: Net, lane: Lane) -> list[Link]:
+    return sorted(net.onward.get(lane.id, ()), key=_bend)
 
 
 def way_back(net: Net, last: Lane, metres: float, onward: Sequence[str] = ()) -> Way:
-    """The straightest way to a lane, up to so much of it before that lane; shorter where the map ends.
+    """The straightest way to a lane, `metres` of it before that lane; shorter where the map ends.
 
-    It also ends where a lane forks into several of the next road, and whoever comes from there would be driven by SUMO
-    into another of them; and at a signal, for whoever starts before it may stand at its red light until the end.
-
-    Args:
-      net: where.
-      last: the lane.
-      metres: how much is wanted.
-      onward: the edges that are driven after the lane's.
+    It also ends where a lane forks into several of the next road, and SUMO would drive into another of them than the
+    one on the way; and at a signal, since a vehicle that starts before it may stand at its red light until the end.
+    `onward` are the edges that are driven after the lane's.
     """
     lanes, links, length_m = [last], list[Link](), 0.0
     while length_m < metres:
@@ -111,7 +96,7 @@ def track(net: Net, on: Way, reference_m: float, beyond_m: float = 0.0) -> Track
       net: where.
       on: its first lane has the reference.
       reference_m: from the beginning of that lane.
-      beyond_m: so far beyond the reference somebody may start.
+      beyond_m: how far beyond the reference a vehicle may start.
     """
     back = way_back(net, on.lanes[0], BEFORE_M - reference_m, [lane.edge for lane in on.lanes[1:]])
     been = {lane.edge for lane in on.lanes}
