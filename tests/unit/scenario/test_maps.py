@@ -22,7 +22,7 @@ from risk_sac.scenario.maps.finder import Map, place_at, survey
 from risk_sac.scenario.maps.found import NoFit
 from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net, read_net
 from risk_sac.scenario.maps.ways import way_back, way_on
-from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch, Track
+from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch
 from risk_sac.sim.sumo import SumoSimulation
 from tests.maps import osm_town
 
