@@ -16,7 +16,7 @@ from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_campaign, read_ego
 from risk_sac.egos.registry import SHIPPED, cards
-from risk_sac.metrics import wilson_interval
+from risk_sac.metrics import pooled_counts, wilson_interval
 
 if TYPE_CHECKING:
     from risk_sac.report import FinishedRun
@@ -85,12 +85,9 @@ def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[s
         of_family = [run.metrics["search"] for run in runs if run.spec.family == family]
         if not of_family:
             continue
-        episodes, invalid, contacts, valid, preventable = (
-            sum(getattr(metrics, count) for metrics in of_family)
-            for count in ("episodes", "invalid", "raw_collisions", "failures", "preventable")
-        )
-        driven = episodes - invalid
-        counts = map(str, (len(of_family), episodes, invalid, contacts, valid))
+        pooled = pooled_counts(of_family)
+        valid, preventable, driven = pooled.failures, pooled.preventable, pooled.driven
+        counts = map(str, (len(of_family), pooled.episodes, pooled.invalid, pooled.raw_collisions, valid))
         rates = _rate(valid, driven), str(preventable), _rate(preventable, driven)
         rows.append(((preventable / max(driven, 1), valid / max(driven, 1)), [family, name, *counts, *rates]))
     return [row for _, row in sorted(rows, key=lambda each: each[0], reverse=True)]

@@ -11,7 +11,6 @@ from risk_sac.errors import ConfigError
 from risk_sac.run_folder.durable import replace_file
 
 if TYPE_CHECKING:
-    from risk_sac.report.evidence import Evidence, Origin
     from risk_sac.report.evidence.folders import Found
 
 Format = Literal["html", "md", "json"]
@@ -31,7 +30,8 @@ def add(commands: Commands) -> None:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from risk_sac.report.evidence import Origin, gathered, show_command  # here, because loading numpy takes a while
+    # Here, because loading numpy takes a while.
+    from risk_sac.report.evidence import Origin, gathered, html, markdown, report, show_command
     from risk_sac.report.evidence.folders import read_folders
 
     format_ = format_of(options.out)
@@ -46,7 +46,11 @@ def _report(options: argparse.Namespace) -> int:
         folders=found.folders,
         regression=regression,
     )
-    content = _content(format_, found, evidence, origin)
+    if format_ == "json":
+        content = evidence.model_dump_json(indent=2) + "\n"
+    else:
+        document = report(found.comparison, evidence, origin)
+        content = html(document) if format_ == "html" else markdown(document)
     options.out.parent.mkdir(parents=True, exist_ok=True)
     replace_file(options.out, content.encode())
     console.print(f"Report: {options.out}", soft_wrap=True)
@@ -58,15 +62,6 @@ def format_of(file: Path) -> Format:
     if file.suffix not in FORMATS:
         raise ConfigError("--out", f"{file.name!r}", f"a name that ends in {', '.join(FORMATS)}")
     return FORMATS[file.suffix]
-
-
-def _content(format_: Format, found: "Found", evidence: "Evidence", origin: "Origin") -> str:
-    from risk_sac.report.evidence import html, markdown, report
-
-    if format_ == "json":
-        return evidence.model_dump_json(indent=2) + "\n"
-    document = report(found.comparison, evidence, origin)
-    return html(document) if format_ == "html" else markdown(document)
 
 
 def _regress(found: "Found") -> str:

@@ -33,7 +33,7 @@ class Comparison:
     """What the report shows. The same runs give the same comparison."""
 
     spec: CampaignSpec
-    command: str
+    command: str  # what a reader types to get the same
     spec_file: str  # where `risk-sac run --spec` finds the campaign
     spec_command: str  # what a reader types to have that file; empty where it lies there already
     methods: tuple[MethodName, ...]  # the reference first
@@ -94,15 +94,11 @@ def compare(
 ) -> Comparison:
     """Compares the methods of a campaign by the runs that have finished.
 
-    Args:
-        spec: the campaign.
-        runs: finished runs, in any order, those of the i.i.d. phase among them; those of other specs are left out.
-        command: what a reader types to get the same.
-        spec_file: where `risk-sac run --spec` finds the campaign.
-        spec_command: what a reader types to have that file; empty where it lies there already.
-        reasons: why a run is missing, by `RunSpec.digest`; "not finished" for the rest.
+    The runs are in any order, those of the i.i.d. phase among them; those of other specs are left out. `reasons` says
+    why a run is missing, by `RunSpec.digest`.
     """
-    methods = _reference_first(spec.methods)
+    reference = REFERENCE if REFERENCE in spec.methods else spec.methods[0]
+    methods = (reference, *(method for method in spec.methods if method != reference))
     found = {run.spec.digest: run for run in runs}
 
     def missing(wanted: Sequence[RunSpec]) -> tuple[MissingRun, ...]:
@@ -134,11 +130,6 @@ def _failures(family: FamilyName, runs: Sequence[FinishedRun]) -> Iterator[tuple
     for run in runs:
         if run.spec.family == family:
             yield from ((each.id_in(run.spec.id), each) for each in run.records)
-
-
-def _reference_first(methods: Sequence[MethodName]) -> tuple[MethodName, ...]:
-    reference = REFERENCE if REFERENCE in methods else methods[0]
-    return (reference, *(method for method in methods if method != reference))
 
 
 def _cells(runs: Sequence[FinishedRun]) -> Iterator[Cell]:

@@ -38,6 +38,11 @@ class Look:
     dashes: str
     width: float = 1.3
 
+    @property
+    def line(self) -> dict[str, Any]:
+        """As arguments of matplotlib."""
+        return {"color": self.colour, "linestyle": self.dashes, "linewidth": self.width}
+
 
 # Paul Tol's "muted" scheme, safe for the colour-blind, one for each method that is no control; line styles tell apart
 # what a grey print does not.
@@ -86,18 +91,9 @@ def _curves(comparison: Comparison, drawn: Curves) -> Figure:
     for rank, (method, at, values) in enumerate(curve_values(comparison, family, curve)):
         counts.append(len(values))
         look = LOOKS[method]
-        front = 100 - rank  # the reference lies on top
         first = min(curve.first, len(at)) - 1
         at, values = at[first:], values[:, first:]
-        axes.plot(
-            at,
-            values.mean(axis=0),
-            color=look.colour,
-            linestyle=look.dashes,
-            linewidth=look.width,
-            label=method,
-            zorder=front,
-        )
+        axes.plot(at, values.mean(axis=0), label=method, zorder=100 - rank, **look.line)  # the reference lies on top
         if len(values) > 1:
             axes.fill_between(at, *_band(values), color=look.colour, alpha=0.13, linewidth=0, zorder=1)
     axes.set_xlabel("processor time, s" if curve.timed else "search episode")
@@ -129,7 +125,6 @@ def _bars(comparison: Comparison, drawn: Bars) -> Figure:
     width = 0.84 / len(methods)
     counts = []
     for place, method in enumerate(methods):
-        label: str | None = method
         for middle, family in enumerate(families):
             cells = [cell for cell in comparison.group(family, phase) if cell.method == method]
             estimate = cells[0].estimates[metric.name] if cells else None
@@ -138,8 +133,7 @@ def _bars(comparison: Comparison, drawn: Bars) -> Figure:
             mean = estimate.mean if estimate else None
             if not mean:  # a bar that nobody sees
                 axes.text(x, 0, "–" if mean is None else "0", ha="center", va="bottom", color="0.4", fontsize=7)
-            axes.bar(x, mean or 0.0, 0.9 * width, color=LOOKS[method].colour, label=label)
-            label = None
+            axes.bar(x, mean or 0.0, 0.9 * width, color=LOOKS[method].colour, label="" if middle else method)
             if estimate and mean is not None and estimate.low is not None and estimate.high is not None:
                 error = [[mean - estimate.low], [estimate.high - mean]]
                 axes.errorbar(x, mean, error, color="0.35", linewidth=0.9, capsize=1.5 if len(methods) > 5 else 3)
@@ -162,9 +156,8 @@ def _times(comparison: Comparison, drawn: Times) -> Figure:
     counts = []
     for cell in (cell for cell in comparison.group(family, phase) if any(cell.contacts_by_second)):
         counts.append(len(cell.seeds))
-        look = LOOKS[cell.method]
         for axes, bins in ((conflict, cell.conflicts_by_second), (contact, cell.contacts_by_second)):
-            axes.stairs(bins, color=look.colour, linestyle=look.dashes, linewidth=look.width, label=cell.method)
+            axes.stairs(bins, label=cell.method, **LOOKS[cell.method].line)
     conflict.set(xlabel="release to conflict, s", ylabel=f"valid failures ({phase})", ylim=(0, None))
     contact.set_xlabel("release to contact, s")
     conflict.margins(x=0)

@@ -11,7 +11,7 @@ from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import Comparison, declared
 from risk_sac.report.definitions import ROWS, definitions, symbol
 from risk_sac.report.kinds import clusters, signatures, studies
-from risk_sac.report.page import DASH, interval, number, percent, table, this_platform
+from risk_sac.report.page import DASH, interval, number, percent, platform_in_words, table, versions_in_words
 from risk_sac.report.paired import LEVEL, PairedTest, pairs_needed, smallest_p
 from risk_sac.report.runs import HEADLINE, LIMITS, FinishedRun, found_within
 
@@ -46,16 +46,15 @@ def table_markdown(comparison: Comparison) -> str:
 
 
 def _head(comparison: Comparison) -> str:
-    spec, platform = comparison.spec, this_platform()
-    versions = ", ".join(f"{name} {version}" for name, version in comparison.versions.items())
+    spec = comparison.spec
     facts = {
         "campaign": f"`{spec.digest}`",
         "runs": f"{len(comparison.runs)} of {len(comparison.runs) + len(comparison.missing)}: "
         f"families {', '.join(spec.families)} × {len(spec.methods)} methods × seeds {', '.join(map(str, spec.seeds))}",
         "budget of a run": f"{spec.budget.episodes} search episodes{_cut_short(spec.budget)}, "
         f"{spec.budget.evaluation_episodes} evaluation episodes with the policy frozen",
-        "versions": versions or DASH,
-        "platform": f"{platform['machine']}, {platform['cpu']}, Python {platform['python']}",
+        "versions": versions_in_words(comparison.versions) or DASH,
+        "platform": platform_in_words(),
     }
     lines = (f"- {name}: {value}" for name, value in facts.items())
     return f"# Comparison of methods\n\n```\n{comparison.command}\n```\n\n" + "\n".join(lines) + "\n"

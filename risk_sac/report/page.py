@@ -28,9 +28,14 @@ def number(value: float | None, format_: str) -> str:
     return DASH if value is None else format(value, format_)
 
 
-def percent(rate: float) -> str:
+def percent(rate: float, decimals: int = 1) -> str:
     """Of a rate."""
-    return f"{100 * rate:.1f} %"
+    return f"{100 * rate:.{decimals}f} %"
+
+
+def versions_in_words(versions: Mapping[str, str]) -> str:
+    """Packages with their versions."""
+    return ", ".join(f"{name} {version}" for name, version in versions.items())
 
 
 _CPU_INFO = Path("/proc/cpuinfo")
@@ -39,6 +44,12 @@ _CPU_INFO = Path("/proc/cpuinfo")
 def this_platform() -> Mapping[str, str]:
     """Architecture, processor and Python of this machine: what seconds, and the last bits of a digest, depend on."""
     return {"machine": platform.machine(), "cpu": _cpu(), "python": platform.python_version()}
+
+
+def platform_in_words() -> str:
+    """The same on one line."""
+    here = this_platform()
+    return f"{here['machine']}, {here['cpu']}, Python {here['python']}"
 
 
 def _cpu() -> str:

@@ -4,6 +4,7 @@ Source: RISK-SAC, Sec. II-A; ISO 34503 for the ODD's branches.
 """
 
 import math
+from collections.abc import Iterator
 from typing import Any, TypeVar
 
 from risk_sac.config import Interval, Odd, Requirement, Scenery, Settings
@@ -182,6 +183,12 @@ def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...
     formula = f"not historically[0,{BRAKING_HOLD_S:g}] (ego_braking_mps2 >= {braking_mps2:g})"
     requirements.append(Requirement(name="bounded_braking", formula=formula, scale=braking_mps2, shapes=False))
     return tuple(requirements)
+
+
+def paths(odd: Odd) -> Iterator[str]:
+    """The fields of an ODD, each as `branch.name`."""
+    for branch in type(odd).model_fields:
+        yield from (f"{branch}.{name}" for name in type(getattr(odd, branch)).model_fields)
 
 
 def field(odd: Odd, path: str) -> Any:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from risk_sac.config import FamilyName, Interval, Odd
 from risk_sac.records import Collision, ConflictType, EpisodeRecord, Outcome, Record
 from risk_sac.scenario.family import Family
-from risk_sac.scenario.odd import TINY, field, intersect, narrow
+from risk_sac.scenario.odd import TINY, field, intersect, narrow, paths
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Bools, Floats
 from risk_sac.verdicts.taxonomy import CELLS, FailureKind, kind_of
@@ -153,6 +153,7 @@ def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Cove
     """Count what these episodes looked at; those from before the family had all its parameters are left out."""
     whole = intersect(family.odd, odd)
     space = narrow(family.space, whole)
+    varied = {parameter.odd for parameter in space.parameters}
     known = [record for record in records if set(space.names) <= record.scene.keys()]
     columns = [np.array([record.scene[name] for record in known], dtype=np.float64) for name in space.names]
     played = np.array([record.outcome not in NOT_PLAYED for record in known], dtype=bool)
@@ -169,7 +170,7 @@ def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Cove
             _parameter(axis, axis.places(column), played, failed) for axis, column in zip(fine, columns, strict=True)
         ),
         pairs=tuple(_pair(*both, played, failed) for both in combinations(placed, 2)),
-        fixed=tuple(_fixed(whole, space)),
+        fixed=tuple(path for path in paths(whole) if path not in varied),
         beyond=tuple(_beyond(whole, space)),
         kinds=kinds(record.collision for record in known),
     )
@@ -202,14 +203,6 @@ def _pair(
         failed=int(cells_failed.sum()),
         never=tuple(f"{one.names[i]} × {other.names[j]}" for i, j in np.argwhere(~cells_played)),
     )
-
-
-def _fixed(odd: Odd, space: SceneSpace) -> Iterator[str]:
-    varied = {parameter.odd for parameter in space.parameters}
-    for branch in type(odd).model_fields:
-        for name in type(getattr(odd, branch)).model_fields:
-            if f"{branch}.{name}" not in varied:
-                yield f"{branch}.{name}"
 
 
 def _beyond(odd: Odd, space: SceneSpace) -> Iterator[str]:

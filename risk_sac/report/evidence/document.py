@@ -3,11 +3,10 @@
 import base64
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from itertools import count
-from typing import Literal
 
 from jinja2 import Environment, StrictUndefined, Template
 
@@ -15,27 +14,10 @@ from risk_sac.report.page import table
 
 
 @dataclass(frozen=True, slots=True)
-class Paragraph:
-    """A few sentences."""
-
-    text: str
-    kind: Literal["paragraph"] = "paragraph"
-
-
-@dataclass(frozen=True, slots=True)
-class Banner:
-    """What nobody may overlook."""
-
-    text: str
-    kind: Literal["banner"] = "banner"
-
-
-@dataclass(frozen=True, slots=True)
 class Items:
     """Facts, one a line."""
 
     items: Sequence[str]
-    kind: Literal["items"] = "items"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +28,6 @@ class Table:
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     left: int = 1
-    kind: Literal["table"] = "table"
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,16 +35,6 @@ class Commands:
     """What to type."""
 
     lines: Sequence[str]
-    kind: Literal["commands"] = "commands"
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """An image that the page holds itself."""
-
-    alt: str
-    media_type: str
-    content: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +44,7 @@ class Card:
     title: str
     lines: Sequence[str]
     command: str
-    picture: Picture | None
+    picture: bytes | None  # an SVG that the page holds itself
     missing: str = ""  # why there is no picture
 
 
@@ -82,10 +53,9 @@ class Cards:
     """Several of them, side by side where there is room."""
 
     cards: Sequence[Card]
-    kind: Literal["cards"] = "cards"
 
 
-Block = Paragraph | Banner | Items | Table | Commands | Cards
+Block = str | Items | Table | Commands | Cards  # text is a paragraph
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +65,7 @@ class Section:
     id: str  # unique within the document; letters and hyphens
     title: str
     blocks: Sequence[Block]
-    parts: Sequence["Section"] = field(default=())
+    parts: Sequence["Section"] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +73,7 @@ class Document:
     """A whole report."""
 
     title: str
-    banner: Banner
+    banner: str  # stands out at the top
     facts: Sequence[tuple[str, str]]
     sections: Sequence[Section]
 
@@ -116,18 +86,7 @@ _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u200e\u200f\u202a-\u202
 
 def html(document: Document) -> str:
     """The file; the same document gives the same text."""
-    return _template().render(document=document, policy=POLICY, ids=Counter())
-
-
-class Counter:
-    """Numbers regions, so that no two have the same name."""
-
-    def __init__(self) -> None:
-        self._next = count(1)
-
-    def next(self) -> int:
-        """The first is 1."""
-        return next(self._next)
+    return _template().render(document=document, policy=POLICY, number=count(1).__next__)
 
 
 def shown(text: str) -> str:
@@ -135,15 +94,19 @@ def shown(text: str) -> str:
     return _UNSEEN.sub("\ufffd", text)
 
 
-def _inline(picture: Picture) -> str:
+def _inline(svg: bytes) -> str:
     """As an image, an SVG can run nothing and load nothing."""
-    return f"data:{picture.media_type};base64,{base64.b64encode(picture.content).decode()}"
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+
+
+def _kind(block: Block) -> str:
+    return type(block).__name__
 
 
 @cache
 def _template() -> Template:
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters |= {"shown": shown, "inline": _inline}
+    environment.filters |= {"shown": shown, "inline": _inline, "kind": _kind}
     return environment.from_string((files(__package__) / "report.html").read_text(encoding="utf-8"))
 
 
@@ -158,7 +121,7 @@ def markdown(document: Document) -> str:
 
 def _lines(document: Document) -> Iterator[str]:
     yield f"# {_text(document.title)}\n"
-    yield from _block(document.banner)
+    yield f"> **{_text(document.banner)}**\n"
     yield from (f"- {_text(name)}: {_text(value)}" for name, value in document.facts)
     for section in document.sections:
         yield from _section(section, "##")
@@ -174,10 +137,8 @@ def _section(section: Section, mark: str) -> Iterator[str]:
 
 def _block(block: Block) -> Iterator[str]:
     match block:
-        case Paragraph(text):
-            yield f"{_text(text)}\n"
-        case Banner(text):
-            yield f"> **{_text(text)}**\n"
+        case str():
+            yield f"{_text(block)}\n"
         case Items(items):
             yield from (f"- {_text(item)}" for item in items)
             yield ""

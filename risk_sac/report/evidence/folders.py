@@ -4,7 +4,6 @@ import contextlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 from risk_sac.config import IID_METHODS, CampaignSpec, Iid, RunSpec
 from risk_sac.config.spec_file import read_campaign
@@ -17,8 +16,6 @@ from risk_sac.scenario.families import family_named
 SPEC, RUNS = "spec.yaml", "runs"
 SHARED = ("ego", "odd", "requirements", "learner")
 AGAIN = "risk-sac evaluate --spec spec.yaml --out campaign"  # with the spec that the report ends with
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,14 +77,10 @@ def _campaign(runs: Sequence[RunSpec]) -> CampaignSpec:
                 )
     first = searches[0]
     return CampaignSpec(
-        families=_each(run.family for run in runs),
-        methods=_each(run.method for run in searches if run.method not in IID_METHODS),
+        families=tuple(dict.fromkeys(run.family for run in runs)),
+        methods=tuple(dict.fromkeys(run.method for run in searches if run.method not in IID_METHODS)),
         seeds=tuple(sorted({run.seed for run in searches})),
         budget=first.budget,
         iid=Iid(episodes=drawn[0].budget.episodes, seed=drawn[0].seed) if drawn else None,
         **{name: getattr(first, name) for name in SHARED},
     )
-
-
-def _each(names: Iterable[T]) -> tuple[T, ...]:
-    return tuple(dict.fromkeys(names))

@@ -6,11 +6,11 @@ from risk_sac.config import IID_METHODS, FamilyName
 from risk_sac.errors import ConfigError
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.coverage import BINS, PAIR_BINS, Coverage, ParameterCoverage
-from risk_sac.report.evidence.document import Block, Commands, Items, Paragraph, Section, Table
+from risk_sac.report.evidence.document import Block, Commands, Items, Section, Table
 from risk_sac.report.evidence.gathered import Bound, Drawn, Evidence, FamilyCoverage
 from risk_sac.report.evidence.origin import again
 from risk_sac.report.evidence.words import odd_in_words
-from risk_sac.report.page import DASH
+from risk_sac.report.page import DASH, percent
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 
@@ -44,9 +44,9 @@ def bounds(comparison: Comparison, evidence: Evidence) -> Section:
     """How often the ego fails where nobody has searched."""
     title = "How often it fails where nobody searched"
     if comparison.spec.iid is None:
-        return Section("bounds", title, [Paragraph(NO_IID), Commands(["iid: {episodes: 300}", "--iid 300"])])
+        return Section("bounds", title, [NO_IID, Commands(["iid: {episodes: 300}", "--iid 300"])])
     blocks: list[Block] = [
-        Paragraph(
+        (
             "These scenes were drawn from the ODD independently of each other and of any search, uniformly between the "
             "bounds of each scene parameter, with a seed of their own. Bounds are Clopper and Pearson's, exact and "
             "one-sided: the rate is at most the upper one with 95 % confidence, and at least the lower one with 95 %, "
@@ -61,13 +61,13 @@ def bounds(comparison: Comparison, evidence: Evidence) -> Section:
         blocks.append(Table("bounds", columns, rows, left=3))
     if unended := sum(each.unended for each in evidence.bounds):
         why = f"In {unended} scenes the simulator died, or the ego failed to drive"
-        blocks.append(Paragraph(f"{why}: upper bounds count them as failures."))
+        blocks.append(f"{why}: upper bounds count them as failures.")
     if comparison.undrawn:
         lacking = [f"{run.spec.id}: {run.reason}" for run in comparison.undrawn]
-        blocks += [Paragraph("Missing, and so without bounds:"), Items(lacking)]
+        blocks += ["Missing, and so without bounds:", Items(lacking)]
     if comparison.drawn:
         first = comparison.drawn[0]
-        blocks += [Paragraph("One of these runs again, to the digit:"), Commands([again(comparison, first)])]
+        blocks += ["One of these runs again, to the digit:", Commands([again(comparison, first)])]
     return Section("bounds", title, blocks)
 
 
@@ -83,16 +83,11 @@ def _rows(each: Drawn) -> Iterator[list[str]]:
             TRAFFIC[each.method],
             what,
             f"{bound.count} of {each.played}",
-            percent(bound.high),
-            percent(bound.low),
+            percent(bound.high, 2),
+            percent(bound.low, 2),
             str(each.scenes),
             str(each.refused),
         ]
-
-
-def percent(rate: float) -> str:
-    """With two decimals, for rates are small."""
-    return f"{100 * rate:.2f} %"
 
 
 def coverage(evidence: Evidence) -> Section:
@@ -103,7 +98,7 @@ def coverage(evidence: Evidence) -> Section:
         "was a valid failure; a scene that was refused is none. What unfolds after the beginning is in the taxonomy."
     )
     parts = [_of_family(family, found) for family, found in evidence.coverage.items()]
-    return Section("coverage", "Coverage", [Paragraph(text)], parts)
+    return Section("coverage", "Coverage", [text], parts)
 
 
 def _of_family(family: FamilyName, found: FamilyCoverage) -> Section:
@@ -111,7 +106,7 @@ def _of_family(family: FamilyName, found: FamilyCoverage) -> Section:
     blocks: list[Block] = [
         *_parameters(searched, "search"),
         *(_parameters(found.iid, "i.i.d. phase") if found.iid else []),
-        Paragraph("Never sampled, by the search or the i.i.d. phase:"),
+        "Never sampled, by the search or the i.i.d. phase:",
         Items(list(_never(found)) or ["Every bin of every parameter, and every cell of every pair, has an episode."]),
         *_taxonomy(searched),
     ]
@@ -121,10 +116,16 @@ def _of_family(family: FamilyName, found: FamilyCoverage) -> Section:
 def _parameters(coverage: Coverage, who: str) -> Iterator[Block]:
     numbers = [each for each in coverage.parameters if not each.categorical]
     sorts = [each for each in coverage.parameters if each.categorical]
-    yield Paragraph(f"By the {who}: {coverage.episodes} episodes, as failed / played in each tenth of the range.")
+    yield f"By the {who}: {coverage.episodes} episodes, as failed / played in each tenth of the range."
     heads = ["parameter", "from", "to", *(str(number + 1) for number in range(BINS))]
     rows = [
-        [_named(each), f"{each.low:.4g}", f"{each.high:.4g}", *_counts(each), *[DASH] * (BINS - len(each.bins))]
+        [
+            _named(each),
+            f"{each.low:.4g}",
+            f"{each.high:.4g}",
+            *(f"{bin_.failed} / {bin_.played}" for bin_ in each.bins),
+            *[DASH] * (BINS - len(each.bins)),
+        ]
         for each in numbers
     ]
     yield Table(f"bins, {who}", heads, rows)
@@ -134,7 +135,7 @@ def _parameters(coverage: Coverage, who: str) -> Iterator[Block]:
     failed = sum(each.failed for each in coverage.pairs)
     played = sum(each.played for each in coverage.pairs)
     cells = sum(each.cells for each in coverage.pairs)
-    yield Paragraph(
+    yield (
         f"Pairs of parameters: {len(coverage.pairs)} with {cells:,} cells, of which {played:,} have an episode and "
         f"{failed:,} a valid failure."
     )
@@ -142,10 +143,6 @@ def _parameters(coverage: Coverage, who: str) -> Iterator[Block]:
 
 def _named(each: ParameterCoverage) -> str:
     return each.name if each.unit == "1" else f"{each.name} ({each.unit})"
-
-
-def _counts(each: ParameterCoverage) -> list[str]:
-    return [f"{bin_.failed} / {bin_.played}" for bin_ in each.bins]
 
 
 def _never(found: FamilyCoverage) -> Iterator[str]:
@@ -173,10 +170,10 @@ def _never(found: FamilyCoverage) -> Iterator[str]:
 
 def _taxonomy(coverage: Coverage) -> Iterator[Block]:
     found = coverage.kinds
-    yield Paragraph(
+    yield (
         f"Taxonomy of failures: {len(found.hit)} of {found.cells:,} cells hold a valid failure of the search. Most of "
         "the others hold what no ego and no road allows."
     )
     if found.hit:
         yield Table("taxonomy", ["cell", "failures"], [[name, str(count)] for name, count in found.hit.items()])
-    yield Paragraph(f"In no failure: {', '.join(found.never) or 'nothing; each value was met'}.")
+    yield f"In no failure: {', '.join(found.never) or 'nothing; each value was met'}."

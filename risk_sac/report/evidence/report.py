@@ -5,15 +5,15 @@ from collections.abc import Iterator
 import yaml
 
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.evidence.document import Banner, Block, Commands, Document, Items, Paragraph, Section, Table
+from risk_sac.report.evidence.document import Block, Commands, Document, Items, Section, Table
 from risk_sac.report.evidence.gathered import Evidence
 from risk_sac.report.evidence.looked import bounds, coverage, odd
 from risk_sac.report.evidence.origin import Origin, again
 from risk_sac.report.evidence.searched import budget, clusters, funnel, regression
 from risk_sac.report.evidence.words import ego_in_words
-from risk_sac.report.page import DASH, this_platform
+from risk_sac.report.page import DASH, platform_in_words, versions_in_words
 
-BANNER = Banner(
+BANNER = (
     "Search results are no crash rate. The search looks for what goes wrong, so its counts say that something can "
     "happen, never how often. Only the section on scenes that nobody searched says how often, and only for such scenes."
 )
@@ -50,8 +50,7 @@ def report(comparison: Comparison, evidence: Evidence, origin: Origin) -> Docume
 
 
 def _facts(comparison: Comparison) -> Iterator[tuple[str, str]]:
-    spec, platform = comparison.spec, this_platform()
-    versions = ", ".join(f"{name} {version}" for name, version in comparison.versions.items())
+    spec = comparison.spec
     yield "ego", ego_in_words(spec.ego)
     yield "its version", _versions(comparison)
     yield "families", ", ".join(spec.families)
@@ -59,8 +58,8 @@ def _facts(comparison: Comparison) -> Iterator[tuple[str, str]]:
     yield "seeds", ", ".join(map(str, spec.seeds))
     yield "runs", _finished(comparison)
     yield "campaign", spec.digest
-    yield "software", versions or DASH
-    yield "made on", f"{platform['machine']}, {platform['cpu']}, Python {platform['python']}"
+    yield "software", versions_in_words(comparison.versions) or DASH
+    yield "made on", platform_in_words()
 
 
 def _versions(comparison: Comparison) -> str:
@@ -68,9 +67,8 @@ def _versions(comparison: Comparison) -> str:
     ego = comparison.spec.ego
     if ego.driver is not None:
         return ego.version or "not told"
-    named = {name: comparison.versions.get(name) for name in ("libsumo", "risk-sac")}
-    told = ", ".join(f"{name} {version}" for name, version in named.items() if version)
-    return told or "unknown: no run has finished"
+    named = {name: version for name, version in comparison.versions.items() if name in ("libsumo", "risk-sac")}
+    return versions_in_words(named) or "unknown: no run has finished"
 
 
 def _finished(comparison: Comparison) -> str:
@@ -91,7 +89,7 @@ def _limits(comparison: Comparison) -> Section:
     if comparison.missing:
         rows = [[run.spec.family, run.spec.method, str(run.spec.seed), run.reason] for run in comparison.missing]
         blocks += [
-            Paragraph(f"{len(rows)} runs are missing, and in no number above:"),
+            f"{len(rows)} runs are missing, and in no number above:",
             Table("missing runs", ["family", "method", "seed", "why"], rows, left=4),
         ]
     return Section("limits", "Limits", blocks)
@@ -99,23 +97,23 @@ def _limits(comparison: Comparison) -> Section:
 
 def _redo(comparison: Comparison, origin: Origin) -> Section:
     blocks: list[Block] = [
-        Paragraph("The whole campaign, budget and funnel:"),
+        "The whole campaign, budget and funnel:",
         Commands([comparison.command]),
-        Paragraph("This report, its kinds of failures and its pictures:"),
+        "This report, its kinds of failures and its pictures:",
         Commands([origin.report]),
-        Paragraph("Bounds, bins, all pairs and cells, as JSON:"),
+        "Bounds, bins, all pairs and cells, as JSON:",
         Commands([origin.data]),
     ]
     runs = (*comparison.runs, *comparison.drawn)
     if comparison.spec_command:
-        blocks += [Paragraph("The campaign's settings, spec.yaml:"), Commands([comparison.spec_command])]
+        blocks += ["The campaign's settings, spec.yaml:", Commands([comparison.spec_command])]
     else:
-        blocks += [Paragraph("The campaign's settings, to be put into spec.yaml:"), Commands([_settings(comparison)])]
+        blocks += ["The campaign's settings, to be put into spec.yaml:", Commands([_settings(comparison)])]
     if runs:
         blocks += [
-            Paragraph(f"One run. Its results.json then has the digest {runs[0].digest}:"),
+            f"One run. Its results.json then has the digest {runs[0].digest}:",
             Commands([again(comparison, runs[0])]),
-            Paragraph("The others go the same way, by their family, method and seed:"),
+            "The others go the same way, by their family, method and seed:",
             Table(
                 "runs",
                 ["run", "episodes", "digest"],

@@ -3,11 +3,10 @@
 from collections.abc import Iterator
 
 from risk_sac.config import FamilyName
-from risk_sac.failures.cases import Regression
 from risk_sac.failures.clusters import Cluster
 from risk_sac.records import EpisodeRecord, Grade
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Paragraph, Picture, Section, Table
+from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Section, Table
 from risk_sac.report.evidence.origin import Origin, draw
 from risk_sac.report.evidence.words import ego_in_words
 from risk_sac.report.markdown import verified
@@ -33,13 +32,19 @@ def budget(comparison: Comparison) -> Section:
     if spec.budget.cpu_s is not None:
         allowed.append(f"at most {spec.budget.cpu_s:g} s of processor time for the search")
     rows = [
-        [family, method, str(len(of)), _sum(len(run.records) for run in of), f"{sum(run.cpu_s for run in of):,.0f}"]
+        [
+            family,
+            method,
+            str(len(of)),
+            f"{sum(len(run.records) for run in of):,}",
+            f"{sum(run.cpu_s for run in of):,.0f}",
+        ]
         for family in spec.families
         for method in comparison.methods
         if (of := comparison.of_cell(family, method))
     ]
     blocks: list[Block] = [
-        Paragraph(f"Each run may spend {', and '.join(allowed)}. What was spent:"),
+        f"Each run may spend {', and '.join(allowed)}. What was spent:",
         Table("what was spent", ["family", "method", "runs", "episodes", "CPU s"], rows, left=2),
     ]
     return Section("budget", "Budget", blocks)
@@ -60,7 +65,7 @@ def funnel(comparison: Comparison) -> Section:
         if cell.phase == "search"
     ]
     blocks: list[Block] = [
-        Paragraph(
+        (
             "Refused: the scene was infeasible, and nothing was played. Valid: no artefact of the simulator, and the "
             "ego had a part in it. Distinct: resembles no earlier one of the same run. Preventable: the distinct ones "
             "that a careful driver in the ego's place would have prevented. Verified: of the first failures of each "
@@ -80,14 +85,14 @@ def clusters(comparison: Comparison, origin: Origin) -> Section:
         "who strikes it orange, others grey."
     )
     parts = [_of_family(comparison, family, origin) for family in comparison.spec.families]
-    return Section("failures", "Which failures there are", [Paragraph(text)], parts)
+    return Section("failures", "Which failures there are", [text], parts)
 
 
 def _of_family(comparison: Comparison, family: FamilyName, origin: Origin) -> Section:
     found = comparison.overviews.get(family)
     if found is None or not found.clusters:
         none = "No run of it has finished." if found is None else "None was found. That proves nothing: see the limits."
-        return Section(f"failures-{family}", family, [Paragraph(none)])
+        return Section(f"failures-{family}", family, [none])
     shown = found.clusters[:MOST_CARDS]
     episodes = {
         record.id_in(run.spec.id): (run, record)
@@ -101,12 +106,11 @@ def _of_family(comparison: Comparison, family: FamilyName, origin: Origin) -> Se
         f" {_counted(rest, 'more kind')}, with the fewest preventable failures, left out here." if rest else ""
     )
     cards = [_card(each, *episodes[each.representative], origin) for each in shown]
-    return Section(f"failures-{family}", family, [Paragraph(said), Cards(cards)])
+    return Section(f"failures-{family}", family, [said, Cards(cards)])
 
 
 def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Origin) -> Card:
     drawing = draw(run, origin.folders.get(run.spec.digest), record.index)
-    alt = f"The contact from above: {cluster.name}"
     return Card(
         title=cluster.name,
         lines=[
@@ -115,7 +119,7 @@ def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Ori
             *_told(run, record),
         ],
         command=origin.show(run, cluster.representative),
-        picture=Picture(alt, "image/svg+xml", drawing.svg) if drawing.svg else None,
+        picture=drawing.svg,
         missing=drawing.missing,
     )
 
@@ -145,7 +149,7 @@ def regression(origin: Origin) -> Section:
     """What became of the failures with another ego."""
     found = origin.regression
     if found is None:
-        none = Paragraph("No other ego was played against these failures. To do so, and to be told here:")
+        none = "No other ego was played against these failures. To do so, and to be told here:"
         return Section("regression", "Regression", [none, Commands([origin.regress])])
     said = found.counts_in_words or "no failure"
     known = sum(case.known for case in found.cases)
@@ -154,28 +158,9 @@ def regression(origin: Origin) -> Section:
         f"{known} known from a baseline. {'All are fixed or known.' if found.passed else 'Not all are fixed or known.'}"
     )
     columns = ["failure", "kind", "grade", "verdict", "what happens now"]
-    return Section(
-        "regression",
-        "Regression",
-        [Paragraph(text), Table("regression", columns, _cases(found), left=5), Commands([origin.regress])],
-    )
-
-
-def _cases(found: Regression) -> list[list[str]]:
-    return [
-        [
-            case.id,
-            case.name,
-            case.grade or DASH,
-            case.verdict_in_words,
-            case.reason,
-        ]
-        for case in found.cases
-    ]
-
-
-def _sum(values: Iterator[int]) -> str:
-    return f"{sum(values):,}"
+    rows = [[case.id, case.name, case.grade or DASH, case.verdict_in_words, case.reason] for case in found.cases]
+    table = Table("regression", columns, rows, left=5)
+    return Section("regression", "Regression", [text, table, Commands([origin.regress])])
 
 
 def _counted(count: int, noun: str) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 from risk_sac.config import EgoConfig, Interval, Odd
 from risk_sac.scenario.family import Family
-from risk_sac.scenario.odd import field, intersect
+from risk_sac.scenario.odd import field, intersect, paths
 
 PROFILES = {
     "default": "SUMO's driver with a delay and a line of sight",
@@ -35,12 +35,12 @@ def ego_in_words(ego: EgoConfig) -> str:
     """Who drives, how fast it reacts, and what it sees."""
     if ego.driver is not None:
         parts = [f"registered driver {ego.driver}", f"responds within {ego.response_s:g} s"]
-        return ", ".join([*parts, *_sight(ego)])
-    parts = [
-        f"profile {ego.profile} ({PROFILES[ego.profile]})",
-        f"car-following model {ego.car_following}",
-        f"decides every {ego.reaction_time_s:g} s",
-    ]
+    else:
+        parts = [
+            f"profile {ego.profile} ({PROFILES[ego.profile]})",
+            f"car-following model {ego.car_following}",
+            f"decides every {ego.reaction_time_s:g} s",
+        ]
     return ", ".join([*parts, *_sight(ego)])
 
 
@@ -58,11 +58,9 @@ def _sight(ego: EgoConfig) -> Iterator[str]:
 def odd_in_words(family: Family, odd: Odd) -> Iterator[tuple[str, str]]:
     """The fields of the ODD that a family and a campaign allow together, and what each allows."""
     whole = intersect(family.odd, odd)
-    for branch in type(whole).model_fields:
-        for name in type(getattr(whole, branch)).model_fields:
-            path = f"{branch}.{name}"
-            words, unit = FIELDS.get(path, (path, ""))
-            yield words, _allowed(field(whole, path), unit)
+    for path in paths(whole):
+        words, unit = FIELDS.get(path, (path, ""))
+        yield words, _allowed(field(whole, path), unit)
 
 
 def _allowed(value: object, unit: str) -> str:
