@@ -38,9 +38,8 @@ from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
 from risk_sac.verdicts.artefact import Handling
 from risk_sac.verdicts.collision import Acquaintance, collision_of
 from risk_sac.verdicts.evidence import Evidence, Ground
-from risk_sac.verdicts.online import conflicts_now
+from risk_sac.verdicts.online import CarefulReflex, conflicts_now
 from risk_sac.verdicts.path import Path, polyline
-from risk_sac.verdicts.wheel import CarefulReflex
 
 FEASIBLE_TRIES = 100
 Observation = NDArray[np.float32]

@@ -1,30 +1,39 @@
-"""Another body as seen along the ego's path, which may bend."""
+"""Another body along the ego's path, which may bend, and the conflict with one that drives the ego's way.
+
+Source: UN Regulation 157, Annex 3 (guidance on traffic disturbance critical scenarios): a cut-in is perceived 0.375 m
+off the lane's centre, a leader's braking from 5 m/s² on, and both are a danger below 2 s to collision. One beside the
+ego has no time to collision along the lane.
+"""
 
 import math
-from typing import NamedTuple
+from typing import Generic, NamedTuple
 
 import numpy as np
 
 from risk_sac.jit import compiled
-from risk_sac.types import Floats
-from risk_sac.verdicts.course import Body
+from risk_sac.types import Bools, Floats
+from risk_sac.verdicts.course import HORIZON_S, Body, F, Size, at
 from risk_sac.verdicts.path import Path, project
 
+WANDER_M = 0.375  # what a vehicle strays from its lane's centre without meaning anything
+DANGER_TTC_S = 2.0
+LEADER_BRAKES_MPS2 = 5.0
 
-class Along(NamedTuple):
-    """Another body as seen along the ego's path."""
 
-    gap_m: float  # from the ego's front to the other's rear, below 0 alongside and behind
-    behind_m: float  # from the other's front to the ego's rear
-    ttc_s: float  # along the path; inf if it is not ahead, or the ego does not close in
-    across_m: float  # of its centre from the ego's path, positive to the left
-    turn_rad: float  # its heading relative to the path, full turns not taken off
-    speed_mps: float  # along the path
-    aside_s: float  # until the sides touch, as the two move across now; inf if they do not come nearer
+class Along(NamedTuple, Generic[F]):
+    """Another body as seen along the ego's path: now, or in each of `T` frames."""
+
+    gap_m: F  # from the ego's front to the other's rear, below 0 alongside and behind
+    behind_m: F  # from the other's front to the ego's rear
+    ttc_s: F  # along the path; inf if it is not ahead, or the ego does not close in
+    across_m: F  # of its centre from the ego's path, positive to the left
+    turn_rad: F  # its heading relative to the path, full turns not taken off
+    speed_mps: F  # along the path
+    aside_s: F  # until the sides touch, as the two move across now; inf if they do not come nearer
 
 
 @compiled
-def along(path: Path, first: int, s: float, speed: float, half_length: float, half_width: float, other: Body) -> Along:
+def along(path: Path, first: int, s: float, speed: float, size: Size, other: Body[float]) -> Along[float]:
     """Places a body along the ego's path.
 
     Args:
@@ -32,55 +41,99 @@ def along(path: Path, first: int, s: float, speed: float, half_length: float, ha
       first: the last of its points that the ego has passed.
       s: where on it the ego is.
       speed: of the ego.
-      half_length: of the ego.
-      half_width: of the ego.
+      size: of the ego.
       other: the body.
     """
     other_s, across, heading = project(path, first, other.x, other.y)
     turn = other.heading - heading
-    reach = half_length + abs(math.cos(turn)) * other.half_length + abs(math.sin(turn)) * other.half_width
+    cos, sin, (half_length, half_width) = abs(math.cos(turn)), abs(math.sin(turn)), other.size
+    reach = size.half_length + cos * half_length + sin * half_width
     gap, behind = other_s - s - reach, s - other_s - reach
     speed_along = other.vx * math.cos(heading) + other.vy * math.sin(heading)
     closing = speed - speed_along
     ttc = gap / closing if gap > 0.0 and closing > 0.0 else math.inf
-    beside = half_width + abs(math.cos(turn)) * other.half_width + abs(math.sin(turn)) * other.half_length
+    beside = size.half_width + cos * half_width + sin * half_length
     room = max(abs(across) - beside, 0.0)
     coming = math.copysign(1.0, across) * (other.vx * math.sin(heading) - other.vy * math.cos(heading))
     aside = room / coming if coming > 0.0 else math.inf
     return Along(gap, behind, ttc, across, turn, speed_along, aside)
 
 
-class AlongSeries(NamedTuple):
-    """`Along` of every frame, `T` of each."""
-
-    gap_m: Floats
-    behind_m: Floats
-    ttc_s: Floats
-    across_m: Floats
-    turn_rad: Floats
-    speed_mps: Floats
-    aside_s: Floats
-
-
 @compiled
-def along_series(
-    path: Path,
-    speed: Floats,
-    half_length: float,
-    half_width: float,
-    x: Floats,
-    y: Floats,
-    heading: Floats,
-    vx: Floats,
-    vy: Floats,
-    other_half_length: float,
-    other_half_width: float,
-) -> AlongSeries:
+def along_series(path: Path, speed: Floats, size: Size, other: Body[Floats]) -> Along[Floats]:
     """Places a body along the ego's path frame by frame; the path has a point per frame."""
     rows = np.empty((7, len(speed)))
     for t in range(len(speed)):
-        other = Body(x[t], y[t], heading[t], vx[t], vy[t], other_half_length, other_half_width)
-        seen = along(path, t, path.s[t], speed[t], half_length, half_width, other)
+        seen = along(path, t, path.s[t], speed[t], size, at(other, t))
         rows[0, t], rows[1, t], rows[2, t] = seen.gap_m, seen.behind_m, seen.ttc_s
         rows[3, t], rows[4, t], rows[5, t], rows[6, t] = seen.across_m, seen.turn_rad, seen.speed_mps, seen.aside_s
-    return AlongSeries(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
+    return Along(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
+
+
+@compiled
+def towards(across: float, offset: float, lane_width: float) -> float:
+    """How far a vehicle is off the centre of the lane beside the ego's, towards the ego, m.
+
+    SUMO's offset jumps by a lane's width when the vehicle passes to the next lane; where it stands across the ego's
+    path tells which lane's centre is meant. Without a recorded offset that place alone decides.
+
+    Args:
+      across: of its centre from the ego's path, positive to the left.
+      offset: from the centre of the lane SUMO has it on, positive to the left; or NaN.
+      lane_width: of the lanes.
+    """
+    seen = lane_width - abs(across)
+    if math.isnan(offset):
+        return seen
+    recorded = -offset if across > 0.0 else offset
+    return recorded + lane_width * round((seen - recorded) / lane_width)
+
+
+@compiled
+def lane_conflict(
+    other: Along[float], speed: float, offset: float, accel: float, lane_width: float, wary: bool
+) -> tuple[bool, bool]:
+    """Whether a conflict begins with a vehicle that drives the ego's way, and whether one goes on that had begun.
+
+    A cut-in begins when the vehicle is more than 0.375 m off its lane's centre towards the ego, and less than 2 s
+    ahead, or alongside and coming nearer; a conflict with a leader when it brakes harder than 5 m/s², or is less than
+    2 s ahead.
+    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s; who is
+    alongside comes nearer if the sides would touch within 4 s, or it is half in the ego's lane. Who merely hangs over
+    the line does not.
+
+    Args:
+      other: the vehicle along the ego's path.
+      speed: of the ego.
+      offset: see `towards`.
+      accel: of the vehicle.
+      lane_width: of the lanes.
+      wary: whether whoever is alongside counts, if it comes nearer or not.
+    """
+    in_lane = abs(other.across_m) <= lane_width / 2
+    coming = in_lane or towards(other.across_m, offset, lane_width) > WANDER_M
+    alongside = other.gap_m <= 0.0 and other.behind_m <= 0.0 and (wary or in_lane or other.aside_s < HORIZON_S)
+    brakes = in_lane and 0.0 < other.gap_m <= HORIZON_S * speed and accel < -LEADER_BRAKES_MPS2
+    begins = brakes or (coming and (alongside or other.ttc_s < DANGER_TTC_S))
+    return begins, begins or (coming and other.ttc_s < HORIZON_S)
+
+
+@compiled
+def lane_conflicts(
+    others: Along[Floats], speed: Floats, offset: Floats, accel: Floats, lane_width: float, wary: bool
+) -> tuple[Bools, Bools]:
+    """`lane_conflict` of every frame, two arrays `T`."""
+    count = len(speed)
+    begins, lasts = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    for t in range(count):
+        other = Along(
+            others.gap_m[t],
+            others.behind_m[t],
+            others.ttc_s[t],
+            others.across_m[t],
+            others.turn_rad[t],
+            others.speed_mps[t],
+            others.aside_s[t],
+        )
+        begins[t], lasts[t] = lane_conflict(other, speed[t], offset[t], accel[t], lane_width, wary)
+    return begins, lasts

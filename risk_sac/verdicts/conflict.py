@@ -12,11 +12,9 @@ import numpy as np
 from risk_sac.jit import compiled
 from risk_sac.records import ConflictType
 from risk_sac.types import Bools, Floats, Kind
-from risk_sac.verdicts.along import AlongSeries, along_series
-from risk_sac.verdicts.areas import soon_inside
-from risk_sac.verdicts.course import CORRIDOR_M, HORIZON_S, Body, entry_distance, time_to_touch
-from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.lane_conflict import lane_conflicts
+from risk_sac.verdicts.along import Along, along_series, lane_conflicts
+from risk_sac.verdicts.course import HORIZON_S, Body, Size, at, entry_distance, time_to_touch
+from risk_sac.verdicts.evidence import Evidence, soon_inside
 from risk_sac.verdicts.path import Path, recorded_path
 
 KERB_S = 1.0  # a pedestrian this near to the carriageway is about to step onto it
@@ -55,7 +53,8 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     path = ego_path(evidence)
     known = evidence.known[:, striker]
     seen = seen_along(path, evidence, striker)
-    course = _courses(path, evidence, striker)
+    size, motion = recorded_size(evidence, 0), recorded_motion(evidence, striker)
+    course = collision_courses(path, column(evidence.speed_mps, 0), size.corridor(), motion)
     same_way = _drives_the_same_way(evidence, striker, seen.turn_rad)
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         begins = lasts = begins_if_wary = lasts_if_wary = course & _at_the_carriageway(evidence, striker)
@@ -85,7 +84,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     )
 
 
-def _lane_conflicts(evidence: Evidence, striker: int, seen: AlongSeries, *, wary: bool) -> tuple[Bools, Bools]:
+def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wary: bool) -> tuple[Bools, Bools]:
     e = evidence
     offset, accel = column(e.lane_offset_m, striker), column(e.accel_mps2, striker)
     return lane_conflicts(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
@@ -114,44 +113,13 @@ def _since(begins: Bools, lasts: Bools) -> int:
     return first
 
 
-def _courses(path: Path, evidence: Evidence, striker: int) -> Bools:
-    """Frames at the end of the record from which the bodies, keeping their speeds, meet within the horizon."""
-    e = evidence
-    return collision_courses(
-        path,
-        column(e.speed_mps, 0),
-        e.length_m[0] / 2,
-        e.width_m[0] / 2 + CORRIDOR_M,
-        column(e.x_m, striker),
-        column(e.y_m, striker),
-        column(e.heading_rad, striker),
-        column(e.vx_mps, striker),
-        column(e.vy_mps, striker),
-        e.length_m[striker] / 2,
-        e.width_m[striker] / 2,
-    )
-
-
 @compiled
-def collision_courses(
-    path: Path,
-    speed: Floats,
-    half_length: float,
-    half_width: float,
-    x: Floats,
-    y: Floats,
-    heading: Floats,
-    vx: Floats,
-    vy: Floats,
-    other_half_length: float,
-    other_half_width: float,
-) -> Bools:
+def collision_courses(path: Path, speed: Floats, size: Size, motion: Body[Floats]) -> Bools:
     """Whether each frame is on a collision course, `T`; looked for backwards, False before it was first interrupted."""
     found = np.zeros(len(speed), dtype=np.bool_)
     missing = 0
     for t in range(len(speed) - 1, -1, -1):
-        other = Body(x[t], y[t], heading[t], vx[t], vy[t], other_half_length, other_half_width)
-        found[t] = time_to_touch(path, path.s[t], speed[t], half_length, half_width, other, HORIZON_S) <= HORIZON_S
+        found[t] = time_to_touch(path, path.s[t], speed[t], size, at(motion, t), HORIZON_S) <= HORIZON_S
         missing = 0 if found[t] else missing + 1
         if missing > BRIDGE + 1:  # the last frame may be beyond the contact
             break
@@ -183,22 +151,22 @@ def ego_path(evidence: Evidence) -> Path:
     return recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
 
 
-def seen_along(path: Path, evidence: Evidence, striker: int) -> AlongSeries:
+def seen_along(path: Path, evidence: Evidence, striker: int) -> Along[Floats]:
     """The striker along the ego's path, frame by frame."""
+    size, motion = recorded_size(evidence, 0), recorded_motion(evidence, striker)
+    return along_series(path, column(evidence.speed_mps, 0), size, motion)
+
+
+def recorded_motion(evidence: Evidence, actor: int) -> Body[Floats]:
+    """The body of an actor in every frame."""
     e = evidence
-    return along_series(
-        path,
-        column(e.speed_mps, 0),
-        e.length_m[0] / 2,
-        e.width_m[0] / 2,
-        column(e.x_m, striker),
-        column(e.y_m, striker),
-        column(e.heading_rad, striker),
-        column(e.vx_mps, striker),
-        column(e.vy_mps, striker),
-        e.length_m[striker] / 2,
-        e.width_m[striker] / 2,
-    )
+    x, y, heading, vx, vy = (column(each, actor) for each in (e.x_m, e.y_m, e.heading_rad, e.vx_mps, e.vy_mps))
+    return Body(x, y, heading, vx, vy, recorded_size(e, actor))
+
+
+def recorded_size(evidence: Evidence, actor: int) -> Size:
+    """The size of an actor."""
+    return Size(float(evidence.length_m[actor]) / 2, float(evidence.width_m[actor]) / 2)
 
 
 def column(values: Floats, actor: int) -> Floats:
@@ -211,20 +179,10 @@ def _way_to_corridor(path: Path, evidence: Evidence, striker: int) -> Floats:
 
     Both paths are on record, so where they meet is known, and that both come there too.
     """
-    e, first = evidence, evidence.since(HORIZON_S)
-    x, y = column(e.x_m, striker)[first:], column(e.y_m, striker)[first:]
-    distance, _ = entry_distance(
-        path,
-        first,
-        path.s[-1],
-        e.length_m[0] / 2,
-        e.width_m[0] / 2 + CORRIDOR_M,
-        x,
-        y,
-        column(e.heading_rad, striker)[first:],
-        e.length_m[striker] / 2,
-        e.width_m[striker] / 2,
-    )
+    first, motion = evidence.since(HORIZON_S), recorded_motion(evidence, striker)
+    x, y, heading = motion.x[first:], motion.y[first:], motion.heading[first:]
+    corridor = recorded_size(evidence, 0).corridor()
+    distance, _ = entry_distance(path, first, path.s[-1], corridor, x, y, heading, motion.size)
     gone = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
     return np.concatenate((np.full(first, np.inf), distance - gone))
 

@@ -37,7 +37,7 @@ RSS = RssParameters(
 class Situation(NamedTuple):
     """What a driver goes by, besides the time."""
 
-    along: Along  # the striker along the ego's path
+    along: Along[float]  # the striker along the ego's path
     speed_mps: float  # its own
     braking_mps2: float  # its own, now
     half_width_m: float

@@ -11,6 +11,7 @@ from risk_sac.scenario.ground import Area
 from risk_sac.types import STEP_S, Bools, Floats, Frame
 
 Letters = NDArray[np.uint8]
+KERB_STEPS = 10  # looks within the time ahead
 
 PER_ACTOR = (
     "x_m",
@@ -165,6 +166,26 @@ class Evidence:
         steps = np.diff(offset, prepend=offset[:1])
         unwrapped: Floats = offset[0] + np.cumsum(steps - width * np.round(steps / width))
         return unwrapped
+
+
+def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.0) -> Bools:
+    """Which points lie in any of the areas, or no further than `margin_m` outside one."""
+    found = np.zeros(np.shape(x_m), dtype=np.bool_)
+    for area in areas:
+        here = np.ones(np.shape(x_m), dtype=np.bool_)
+        for nx, ny, c in area.sides:
+            here &= nx * x_m + ny * y_m <= c + margin_m
+        found |= here
+    return found
+
+
+def soon_inside(
+    areas: Sequence[Area], x_m: Floats, y_m: Floats, vx_mps: Floats, vy_mps: Floats, ahead_s: float
+) -> Bools:
+    """Which points are in one of the areas now or, keeping their velocity, within `ahead_s`."""
+    t = np.linspace(0.0, ahead_s, KERB_STEPS + 1)[:, None]
+    soon: Bools = np.any(inside(areas, x_m + t * vx_mps, y_m + t * vy_mps), axis=0)
+    return soon
 
 
 def _runs(frames: Sequence[Frame]) -> Iterator[tuple[int, int]]:

@@ -6,9 +6,8 @@ import numpy as np
 
 from risk_sac.records import ConflictType
 from risk_sac.types import Bools, Floats, Kind
-from risk_sac.verdicts.areas import inside
 from risk_sac.verdicts.conflict import Conflict
-from risk_sac.verdicts.evidence import Evidence, Letters
+from risk_sac.verdicts.evidence import Evidence, Letters, inside
 
 RECENT_S = 6.0  # nobody takes longer through a junction
 SPEEDING_S = 3.0

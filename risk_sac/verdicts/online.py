@@ -8,18 +8,19 @@ import math
 
 import numpy as np
 
+from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import Bools, Frame, Kind
-from risk_sac.verdicts.along import along
-from risk_sac.verdicts.areas import soon_inside
+from risk_sac.verdicts.along import along, lane_conflict
 from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_COS, YIELDING_MPS2
-from risk_sac.verdicts.course import CORRIDOR_M, HORIZON_S, Body, entry_distance, time_to_touch
-from risk_sac.verdicts.evidence import Ground
-from risk_sac.verdicts.lane_conflict import lane_conflict
+from risk_sac.verdicts.course import HORIZON_S, Body, Size, entry_distance, time_to_touch
+from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S, careful
+from risk_sac.verdicts.evidence import Ground, soon_inside
 from risk_sac.verdicts.path import Path
 
 NEAR_S = 1.0  # two vehicles that pass a place no further apart in time are in each other's way
 AHEAD_M = 0.5  # between two foreseen poses
 STANDING_MPS = 0.1
+OVER_S = 1.0  # a conflict that has been gone for so long is over
 YIELDS = frozenset(b"ruyg")  # signals at which a driver is expected to stop, or to let others pass
 
 
@@ -50,68 +51,81 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, war
 
 def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground, wary: bool) -> bool:
     f = frame
-    other = Body(f.x_m[i], f.y_m[i], f.heading_rad[i], f.vx_mps[i], f.vy_mps[i], f.length_m[i] / 2, f.width_m[i] / 2)
-    speed, half_length = f.ego_speed_mps, float(f.length_m[0]) / 2
-    half_width = float(f.width_m[0]) / 2 + CORRIDOR_M
+    size, other_size = (Size(float(f.length_m[each]) / 2, float(f.width_m[each]) / 2) for each in (0, i))
+    other = Body(f.x_m[i], f.y_m[i], f.heading_rad[i], f.vx_mps[i], f.vy_mps[i], other_size)
+    speed, corridor = f.ego_speed_mps, size.corridor()
     if f.kind[i] == Kind.PEDESTRIAN:
         here = slice(i, i + 1)
         areas = ground.roadway + ground.crossings
         if ground.roadway and not soon_inside(areas, f.x_m[here], f.y_m[here], f.vx_mps[here], f.vy_mps[here], KERB_S):
             return False
-        return time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S
-    seen = along(path, 0, float(path.s[0]), speed, half_length, float(f.width_m[0]) / 2, other)
+        return time_to_touch(path, path.s[0], speed, corridor, other, HORIZON_S) <= HORIZON_S
+    seen = along(path, 0, float(path.s[0]), speed, size, other)
     if math.cos(seen.turn_rad) > SAME_WAY_COS:
         offset, accel = f.lane_offset_m[i], f.accel_mps2[i]
         begins, _ = lane_conflict(seen, speed, offset, accel, ground.lane_width_m, wary)
         return begins
     yields = not wary and f.accel_mps2[i] <= -BRAKES_MPS2
     braking_mps2 = FIRM_MPS2 if yields else YIELDING_MPS2
-    entry_m, meets_m = _entry(path, speed, half_length, half_width, other, float(f.speed_mps[i]), braking_mps2)
+    entry_m, meets_m = _entry(path, speed, corridor, other, float(f.speed_mps[i]), braking_mps2)
     stops = not math.isfinite(entry_m)
     if stops and int(f.link[i]) in YIELDS:
         return False
-    if time_to_touch(path, path.s[0], speed, half_length, half_width, other, HORIZON_S) <= HORIZON_S:
+    if time_to_touch(path, path.s[0], speed, corridor, other, HORIZON_S) <= HORIZON_S:
         return True
-    return not stops and _both_come(entry_m, meets_m - path.s[0], speed, half_length, other, float(f.speed_mps[i]))
+    return not stops and _both_come(entry_m, meets_m - path.s[0], speed, size, other, float(f.speed_mps[i]))
 
 
 def _entry(
-    path: Path,
-    speed: float,
-    half_length: float,
-    half_width: float,
-    other: Body,
-    other_speed: float,
-    braking_mps2: float,
+    path: Path, speed: float, corridor: Size, other: Body[float], other_speed: float, braking_mps2: float
 ) -> tuple[float, float]:
     """`entry_distance` of who goes on straight, as far as it needs to stop; infinite if it can stop before."""
     stopping_m = other_speed**2 / (2 * braking_mps2)
     ahead = np.linspace(0.0, stopping_m, math.ceil(stopping_m / AHEAD_M) + 1)
     cos, sin = (other.vx / other_speed, other.vy / other_speed) if other_speed > STANDING_MPS else (0.0, 0.0)
-    return entry_distance(
-        path,
-        0,
-        path.s[0] + speed * HORIZON_S,
-        half_length,
-        half_width,
-        other.x + ahead * cos,
-        other.y + ahead * sin,
-        np.full(len(ahead), other.heading),
-        other.half_length,
-        other.half_width,
-    )
+    x, y, heading = other.x + ahead * cos, other.y + ahead * sin, np.full(len(ahead), other.heading)
+    return entry_distance(path, 0, path.s[0] + speed * HORIZON_S, corridor, x, y, heading, other.size)
 
 
 def _both_come(
-    entry_m: float, meets_m: float, speed: float, half_length: float, other: Body, other_speed: float
+    entry_m: float, meets_m: float, speed: float, size: Size, other: Body[float], other_speed: float
 ) -> bool:
     """Whether both pass the place where their ways meet within the horizon, and less than 1 s apart."""
     if speed < STANDING_MPS or other_speed < STANDING_MPS:
         return False
-    passing_m = 2 * (half_length + other.half_length)
+    passing_m = 2 * (size.half_length + other.size.half_length)
     here_s, there_s = max(meets_m, 0.0) / speed, entry_m / other_speed
     return (
         here_s <= HORIZON_S
         and here_s <= there_s + passing_m / other_speed + NEAR_S
         and there_s <= here_s + passing_m / speed + NEAR_S
     )
+
+
+class CarefulReflex:
+    """The careful driver in the closed loop; one for each episode.
+
+    It drives as the ego does, and brakes as `careful` says from the moment it perceives a conflict, if that is harder.
+    """
+
+    def __init__(self, ground: Ground) -> None:
+        self._ground = ground
+        self._since_s: float | None = None
+        self._last_s = 0.0
+
+    def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
+        """How hard it brakes now, m/s²; 0 while it perceives no conflict.
+
+        Args:
+          frame: all actors now.
+          path: the ego's way ahead, from its centre.
+          seen: `n`, who of the frame is in its sight.
+        """
+        now = frame.time_s
+        if conflicts_now(frame, path, seen, self._ground).any():
+            self._since_s, self._last_s = (now if self._since_s is None else self._since_s), now
+        elif self._since_s is not None and now - self._last_s > OVER_S:
+            self._since_s = None
+        if self._since_s is None or now - self._since_s < CAREFUL_PERCEIVES_S:
+            return 0.0
+        return careful(now - self._since_s - CAREFUL_PERCEIVES_S, self._ground.friction * GRAVITY_MPS2)

@@ -9,6 +9,7 @@ from risk_sac.jit import compiled
 from risk_sac.types import Floats
 
 STANDING_M = 1e-6  # two points nearer than this are one
+Pose = tuple[float, float, float]  # x, y, heading of a body's centre
 
 
 class Path(NamedTuple):
@@ -44,7 +45,7 @@ def polyline(x: Floats, y: Floats, heading_rad: float = 0.0) -> Path:
 
 
 @compiled
-def pose_at(path: Path, s: float) -> tuple[float, float, float]:
+def pose_at(path: Path, s: float) -> Pose:
     """Where the body is after `s` metres: x, y, heading."""
     last = len(path.s) - 1
     if s >= path.s[last] or last == 0:

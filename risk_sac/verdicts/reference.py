@@ -10,12 +10,14 @@ import numpy as np
 from risk_sac.geometry import box_view, contact_point, zone
 from risk_sac.records import ConflictType, Grade, ReferenceOutcome
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.verdicts.along import AlongSeries
-from risk_sac.verdicts.conflict import Conflict, ego_path, seen_along
+from risk_sac.types import Floats
+from risk_sac.verdicts.along import Along
+from risk_sac.verdicts.conflict import Conflict, ego_path, recorded_motion, recorded_size, seen_along
+from risk_sac.verdicts.course import Body, Size
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path
-from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, Track, drive, replay
+from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, drive, replay
 
 # Who perceives, and how long after the conflict began. Choice: fsm and rss look out from the beginning of the conflict
 # on, not before, and perceive what they themselves hold to be dangerous: all drivers judge the same conflict.
@@ -53,66 +55,39 @@ def grade(outcomes: Mapping[str, ReferenceOutcome]) -> Grade:
 def replayed_contact_s(evidence: Evidence, striker: int) -> float:
     """When the recorded motions touch, from the release: a check of the rollout's means; inf if they never do."""
     path, track = ego_path(evidence), striker_track(evidence, striker)
-    after = replay(path, evidence.length_m[0] / 2, evidence.width_m[0] / 2, track, evidence.step_s)
-    return float(evidence.time_s[0] + after)
+    return float(evidence.time_s[0] + replay(path, recorded_size(evidence, 0), track, evidence.step_s))
 
 
-def striker_track(evidence: Evidence, striker: int) -> Track:
-    """The striker's recorded motion."""
-    e = evidence
-    return Track(
-        np.ascontiguousarray(e.x_m[:, striker]),
-        np.ascontiguousarray(e.y_m[:, striker]),
-        np.unwrap(e.heading_rad[:, striker]),
-        float(e.vx_mps[-1, striker]),
-        float(e.vy_mps[-1, striker]),
-        float(e.length_m[striker]) / 2,
-        float(e.width_m[striker]) / 2,
-    )
+def striker_track(evidence: Evidence, striker: int) -> Body[Floats]:
+    """The striker's recorded motion, its heading without jumps of 2π."""
+    motion = recorded_motion(evidence, striker)
+    return motion._replace(heading=np.unwrap(motion.heading))
 
 
 def _outcome(
-    evidence: Evidence, path: Path, track: Track, driver: int, began: int, perceives_s: float
+    evidence: Evidence, path: Path, track: Body[Floats], driver: int, began: int, perceives_s: float
 ) -> ReferenceOutcome:
-    e = evidence
+    e, size = evidence, recorded_size(evidence, 0)
     first = began + round(perceives_s / e.step_s)
-    last = len(e.time_s) - 1
-    half_length, half_width = float(e.length_m[0]) / 2, float(e.width_m[0]) / 2
-    if first >= last:  # it is struck before it perceives
-        ending = Ending(
-            True,
-            last * e.step_s,
-            float(e.speed_mps[-1, 0]),
-            *_pose(path),
-            track.x[-1],
-            track.y[-1],
-            track.heading[-1],
-            0.0,
-            float(e.speed_mps[-1, 0]),
-        )
+    if first >= len(e.time_s) - 1:  # it is struck before it perceives
+        speed = float(e.speed_mps[-1, 0])
+        pose, other = ((each.x[-1], each.y[-1], each.heading[-1]) for each in (path, track))
+        ending = Ending(True, speed, pose, other, lead_m=0.0, passing_mps=speed)
     else:
         speed = float(e.speed_mps[first, 0])
         grip = e.ground.friction * GRAVITY_MPS2
-        ending = drive(
-            driver, path, half_length, half_width, track, first, speed, grip, HORIZON_S - perceives_s, e.step_s
-        )
-    blameless = (
-        not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, half_length, half_width, track)
-    )
+        ending = drive(driver, path, size, track, first, speed, grip, HORIZON_S - perceives_s, e.step_s)
+    blameless = not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, size, track.size)
     if blameless and ending.lead_m <= LEAD_M:
         return AVOIDED
     return ReferenceOutcome(avoids=False, impact_speed_mps=float(ending.passing_mps if blameless else ending.speed_mps))
 
 
-def _pose(path: Path) -> tuple[float, float, float]:
-    return float(path.x[-1]), float(path.y[-1]), float(path.heading[-1])
-
-
-def _from_behind(ending: Ending, half_length: float, half_width: float, track: Track) -> bool:
+def _from_behind(ending: Ending, size: Size, other_size: Size) -> bool:
     """Whether the contact lies on the ego's rear."""
-    dx, dy = ending.other_x - ending.x, ending.other_y - ending.y
-    cos, sin = np.cos(ending.heading), np.sin(ending.heading)
-    turn = ending.other_heading - ending.heading
+    (x, y, heading), (other_x, other_y, other_heading) = ending.pose, ending.other
+    dx, dy, turn = other_x - x, other_y - y, other_heading - heading
+    cos, sin = np.cos(heading), np.sin(heading)
     still = np.zeros(1)
     view = box_view(
         np.array([dx * cos + dy * sin]),
@@ -121,14 +96,13 @@ def _from_behind(ending: Ending, half_length: float, half_width: float, track: T
         still,
         np.array([np.cos(turn)]),
         np.array([np.sin(turn)]),
-        np.array([track.half_length]),
-        np.array([track.half_width]),
+        np.array([other_size.half_length]),
+        np.array([other_size.half_width]),
         0.0,
         0.0,
-        half_length,
-        half_width,
+        *size,
     )
-    return zone(*contact_point(view), half_length, half_width) == "rear"
+    return zone(*contact_point(view), *size) == "rear"
 
 
 def _by_ttc(evidence: Evidence, path: Path, striker: int) -> ReferenceOutcome:
@@ -145,7 +119,7 @@ def _by_ttc(evidence: Evidence, path: Path, striker: int) -> ReferenceOutcome:
     return ReferenceOutcome(avoids=False, impact_speed_mps=float(evidence.speed_mps[-1, 0]))
 
 
-def _intrusion(evidence: Evidence, striker: int, seen: AlongSeries) -> int:
+def _intrusion(evidence: Evidence, striker: int, seen: Along[Floats]) -> int:
     """The frame in which the striker last came 0.3 m into the ego's lane; the contact's if it did not."""
     e = evidence
     reach = (

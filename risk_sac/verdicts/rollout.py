@@ -12,7 +12,7 @@ import numpy as np
 from risk_sac.jit import compiled
 from risk_sac.types import Floats
 from risk_sac.verdicts.along import along
-from risk_sac.verdicts.course import Body, touches
+from risk_sac.verdicts.course import Body, Size, touches
 from risk_sac.verdicts.drivers import (
     FUZZY_DELAY_S,
     RSS_DELAY_S,
@@ -23,7 +23,7 @@ from risk_sac.verdicts.drivers import (
     rss,
     towards_command,
 )
-from risk_sac.verdicts.path import Path, pose_at
+from risk_sac.verdicts.path import Path, Pose, pose_at
 
 CAREFUL, IDEAL, FUZZY, RSS = range(4)
 FINE_S = 0.01  # between two box tests; at 30 m/s of closing 0.3 m
@@ -32,37 +32,20 @@ HORIZON_S = 8.0  # from the beginning of the conflict
 STANDING_MPS = 0.1
 
 
-class Track(NamedTuple):
-    """A recorded motion at equal steps; `T` of each. After its end it goes on with its last velocity."""
-
-    x: Floats
-    y: Floats
-    heading: Floats  # without jumps of 2π
-    vx: float  # after the end
-    vy: float
-    half_length: float
-    half_width: float
-
-
 class Ending(NamedTuple):
     """How a rollout ended; the poses are those of the contact."""
 
     touched: bool
-    time_s: float  # from the first recorded frame
     speed_mps: float
-    x: float
-    y: float
-    heading: float
-    other_x: float
-    other_y: float
-    other_heading: float
+    pose: Pose
+    other: Pose
     lead_m: float  # how much further along the path it was than the recorded ego, as long as that is recorded
     passing_mps: float  # its speed at that time
 
 
 @compiled
-def place(track: Track, frame: float) -> tuple[float, float, float]:
-    """Where the body is at a fraction of a frame, or after the record's end: x, y, heading."""
+def place(track: Body[Floats], frame: float) -> Pose:
+    """Where the body is at a fraction of a frame; at the record's end, after it."""
     last = len(track.x) - 1
     if frame >= last:
         return track.x[last], track.y[last], track.heading[last]
@@ -79,9 +62,8 @@ def place(track: Track, frame: float) -> tuple[float, float, float]:
 def drive(
     driver: int,
     path: Path,
-    half_length: float,
-    half_width: float,
-    track: Track,
+    size: Size,
+    track: Body[Floats],
     first: int,
     speed: float,
     grip: float,
@@ -93,9 +75,8 @@ def drive(
     Args:
       driver: CAREFUL, IDEAL, FUZZY or RSS.
       path: the recorded ego's, a point per frame.
-      half_length: of the ego.
-      half_width: of the ego.
-      track: the striker's recorded motion.
+      size: of the ego.
+      track: the striker's recorded motion, its heading without jumps of 2π; it goes on with its last velocity.
       first: the frame from which the driver drives; for FUZZY and RSS from which it looks out.
       speed: of the ego then.
       grip: the most braking the road bears, m/s².
@@ -105,20 +86,18 @@ def drive(
     s, braking, wanted, danger_s = path.s[first], 0.0, 0.0, math.inf
     lead, passing = 0.0, speed
     last = len(track.x) - 1
-    x, y, heading = pose_at(path, s)
-    other_x, other_y, other_heading = place(track, float(first))
+    pose, other = pose_at(path, s), place(track, float(first))
     looks = driver in (FUZZY, RSS)
     for step in range(1, round(horizon_s / FINE_S) + 1):
         since = (step - 1) * FINE_S
         frame = first + since / step_s
         if looks and (step - 1) % LOOK == 0:
-            moves = track.vx, track.vy
+            vx, vy = track.vx[last], track.vy[last]
             if frame < last:
                 k = int(frame)
-                moves = (track.x[k + 1] - track.x[k]) / step_s, (track.y[k + 1] - track.y[k]) / step_s
-            wanted = _wanted(
-                driver, path, s, speed, braking, half_length, half_width, track, other_x, other_y, other_heading, moves
-            )
+                vx, vy = (track.x[k + 1] - track.x[k]) / step_s, (track.y[k + 1] - track.y[k]) / step_s
+            striker = Body(other[0], other[1], other[2], vx, vy, track.size)
+            wanted = _wanted(driver, path, s, speed, braking, size, striker)
             if wanted > 0.0:
                 danger_s = min(danger_s, since)
         if driver == CAREFUL:
@@ -144,48 +123,29 @@ def drive(
             if own_frame < last:  # it stays, while the recorded ego may come past
                 lead = s - path.s[last]
             break
-        x, y, heading = pose_at(path, s)
-        other_x, other_y, other_heading = place(track, own_frame)
+        pose, other = pose_at(path, s), place(track, own_frame)
         if own_frame > last:
-            other_x += (own_frame - last) * step_s * track.vx
-            other_y += (own_frame - last) * step_s * track.vy
-        if touches(
-            x, y, heading, half_length, half_width, other_x, other_y, other_heading, track.half_length, track.half_width
-        ):
-            return Ending(
-                True, own_frame * step_s, speed, x, y, heading, other_x, other_y, other_heading, lead, passing
-            )
-    return Ending(False, math.inf, speed, x, y, heading, other_x, other_y, other_heading, lead, passing)
+            beyond_s = (own_frame - last) * step_s
+            other = other[0] + beyond_s * track.vx[last], other[1] + beyond_s * track.vy[last], other[2]
+        if touches(pose, size, other, track.size):
+            return Ending(True, speed, pose, other, lead, passing)
+    return Ending(False, speed, pose, other, lead, passing)
 
 
 @compiled
-def _wanted(
-    driver: int,
-    path: Path,
-    s: float,
-    speed: float,
-    braking: float,
-    half_length: float,
-    half_width: float,
-    track: Track,
-    x: float,
-    y: float,
-    heading: float,
-    moves: tuple[float, float],
-) -> float:
+def _wanted(driver: int, path: Path, s: float, speed: float, braking: float, size: Size, other: Body[float]) -> float:
     """What a driver that goes by what it sees would brake with now."""
-    other = Body(x, y, heading, moves[0], moves[1], track.half_length, track.half_width)
     first = max(int(np.searchsorted(path.s, s, side="right")) - 1, 0)
-    seen = along(path, first, s, speed, half_length, half_width, other)
-    direction = heading - seen.turn_rad
-    across = moves[1] * math.cos(direction) - moves[0] * math.sin(direction)
-    reach = abs(math.sin(seen.turn_rad)) * track.half_length + abs(math.cos(seen.turn_rad)) * track.half_width
-    situation = Situation(seen, speed, braking, half_width, reach, across)
+    seen = along(path, first, s, speed, size, other)
+    direction = other.heading - seen.turn_rad
+    across = other.vy * math.cos(direction) - other.vx * math.sin(direction)
+    reach = abs(math.sin(seen.turn_rad)) * other.size.half_length + abs(math.cos(seen.turn_rad)) * other.size.half_width
+    situation = Situation(seen, speed, braking, size.half_width, reach, across)
     return fuzzy(situation) if driver == FUZZY else rss(situation)
 
 
 @compiled
-def replay(path: Path, half_length: float, half_width: float, track: Track, step_s: float) -> float:
+def replay(path: Path, size: Size, track: Body[Floats], step_s: float) -> float:
     """When the recorded ego first touches the striker, s from the first frame; inf if it never does."""
     last = len(track.x) - 1
     per_step = round(step_s / FINE_S)
@@ -193,10 +153,6 @@ def replay(path: Path, half_length: float, half_width: float, track: Track, step
         frame = step / per_step
         k = min(int(frame), max(last - 1, 0))
         s = path.s[k] + (frame - k) * (path.s[min(k + 1, last)] - path.s[k])
-        x, y, heading = pose_at(path, s)
-        other_x, other_y, other_heading = place(track, frame)
-        if touches(
-            x, y, heading, half_length, half_width, other_x, other_y, other_heading, track.half_length, track.half_width
-        ):
+        if touches(pose_at(path, s), size, place(track, frame), track.size):
             return frame * step_s
     return math.inf

@@ -24,7 +24,7 @@ from risk_sac.sim.placing import STEERED
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Frame
 from risk_sac.verdicts.conflict import Conflict, find_conflict
-from risk_sac.verdicts.course import touches
+from risk_sac.verdicts.course import Size, touches
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S, careful, ideal
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.reference import LEAD_M, reference_outcomes, replayed_contact_s
@@ -148,7 +148,7 @@ def avoids(sim: SumoSimulation, struck: Struck, driver: str) -> bool:
         before, frame = frame, sim.step()
         for k in range(1, FINE + 1):
             ego, other = pose(before, frame, k / FINE), strikers_pose(struck, step - 1 + k / FINE)
-            if touches(*ego, half_length, half_width, *other, *size):
+            if touches(ego, Size(half_length, half_width), other, Size(*size)):
                 rear = struck_side(ego, other, half_length, half_width, *size) == "rear"
                 return (speed <= STANDING_MPS or rear) and lead_m <= LEAD_M
         if speed <= STANDING_MPS and step > struck.conflict.frame:

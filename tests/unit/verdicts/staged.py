@@ -8,7 +8,7 @@ import numpy as np
 
 from risk_sac.scenario.ground import Area
 from risk_sac.types import STEP_S, Floats, Kind, Role
-from risk_sac.verdicts.course import touches
+from risk_sac.verdicts.course import Size, touches
 from risk_sac.verdicts.evidence import Evidence, Ground
 
 CAR_M = (4.6, 1.85)
@@ -112,7 +112,7 @@ def stage(
 def _first_contact(poses: Floats, sizes: Floats) -> int:
     for t, frame in enumerate(poses):
         for i in range(1, len(sizes)):
-            if touches(*frame[0], *(sizes[0] / 2), *frame[i], *(sizes[i] / 2)):
+            if touches(tuple(frame[0]), Size(*sizes[0] / 2), tuple(frame[i]), Size(*sizes[i] / 2)):
                 return t
     raise AssertionError("nobody touched the ego; the staged episode has no contact")
 

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.verdicts.along import Along, along
-from risk_sac.verdicts.course import Body
-from risk_sac.verdicts.lane_conflict import lane_conflict, towards
+from risk_sac.verdicts.along import Along, along, lane_conflict, towards
+from risk_sac.verdicts.course import Body, Size
 from risk_sac.verdicts.path import polyline
 
 LANE_M = 3.3
+CAR = Size(2.3, 0.9)
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -37,7 +37,7 @@ def test_a_wrapped_offset_says_what_the_place_says(across: float) -> None:
     assert towards(across, offset, LANE_M) == pytest.approx(towards(across, math.nan, LANE_M))
 
 
-def seen(gap: float, ttc: float = math.inf, across: float = 0.0, aside: float = math.inf) -> Along:
+def seen(gap: float, ttc: float = math.inf, across: float = 0.0, aside: float = math.inf) -> Along[float]:
     return Along(gap, -gap - 9.2, ttc, across, 0.0, 10.0, aside)
 
 
@@ -76,5 +76,5 @@ def test_who_is_alongside_and_stays_there_counts_from_half_way_into_the_lane_on(
 @pytest.mark.parametrize(("towards_mps", "expected"), [(0.6, 2.0), (0.3, 4.0), (0.0, math.inf), (-0.6, math.inf)])
 def test_the_sides_touch_when_the_room_between_them_is_gone(side: int, towards_mps: float, expected: float) -> None:
     path = polyline(np.array([0.0, 100.0]), np.array([0.0, 0.0]), 0.0)
-    other = Body(21.0, side * 3.0, 0.0, 10.0, -side * towards_mps, 2.3, 0.9)  # 1.2 m between two cars 1.8 m wide
-    assert along(path, 0, 20.0, 10.0, 2.3, 0.9, other).aside_s == pytest.approx(expected)
+    other = Body(21.0, side * 3.0, 0.0, 10.0, -side * towards_mps, CAR)  # 1.2 m between two cars 1.8 m wide
+    assert along(path, 0, 20.0, 10.0, CAR, other).aside_s == pytest.approx(expected)
