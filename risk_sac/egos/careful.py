@@ -4,9 +4,9 @@ from risk_sac.egos.driving import Lookout, idm, needed_braking, stop_at_signal, 
 from risk_sac.egos.road import lane_keeping
 from risk_sac.egos.seam import Control, Episode, Perceived, Vehicle
 from risk_sac.types import SPEED
+from risk_sac.verdicts.along import LEADER_BRAKES_MPS2
 from risk_sac.verdicts.course import HORIZON_S
 from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S, careful
-from risk_sac.verdicts.along import LEADER_BRAKES_MPS2
 
 HEADWAY_S = 2.0  # which the regulation's driver keeps
 RISK_TTC_S = 2.0  # below which the regulation's driver perceives a risk

@@ -8,8 +8,7 @@ import numpy as np
 
 from risk_sac.metrics.features import outcome_features
 from risk_sac.records import Collision, EpisodeRecord, Grade, Record
-from risk_sac.verdicts.distinct import distinct_failures, signature_of
-from risk_sac.verdicts.taxonomy import CELLS, kind_of
+from risk_sac.verdicts.distinct import CELLS, distinct_failures, kind_of, signature_of
 
 WIDTH = 0.25  # of the outcome features' ranges: failures farther apart than that are not much alike
 

@@ -5,15 +5,21 @@ A figure is a row of `rows`: its names, its formula, and how runs are pooled. `t
 Source: RISK-SAC, Sec. IV (evaluation metrics); what the paper leaves open is marked as a choice.
 """
 
-from risk_sac.metrics.accumulator import MetricsAccumulator
-from risk_sac.metrics.counts import COUNTS, Counts, pooled_counts
-from risk_sac.metrics.digest import results_digest
+from risk_sac.metrics.accumulator import MetricsAccumulator, results_digest
 from risk_sac.metrics.features import FEATURES, outcome_features
 from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, clopper_pearson, wilson_interval
-from risk_sac.metrics.metric import Kept, Metric, Ratio
-from risk_sac.metrics.pooling import Estimate, estimate, mean_over_runs, pooled_bins, pooled_signatures
+from risk_sac.metrics.metric import (
+    Estimate,
+    Kept,
+    Metric,
+    Ratio,
+    estimate,
+    mean_over_runs,
+    pooled_bins,
+    pooled_signatures,
+)
 from risk_sac.metrics.rows import METRICS, RATIOS, MetricName
-from risk_sac.metrics.tally import WINDOW, Tally, preventable
+from risk_sac.metrics.tally import COUNTS, WINDOW, Counts, Tally, pooled_counts, preventable
 
 __all__ = [
     "COUNTS",

@@ -1,12 +1,17 @@
-"""`RunMetrics` of the episodes so far."""
+"""What a run's records add up to: its metrics so far, and the digest by which results are compared."""
 
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from risk_sac.metrics.counts import COUNTS
 from risk_sac.metrics.metric import Kept
 from risk_sac.metrics.rows import METRICS, steps_per_distinct_failure
-from risk_sac.metrics.tally import Tally
-from risk_sac.records import EpisodeRecord, RunMetrics
+from risk_sac.metrics.tally import COUNTS, Tally
+from risk_sac.records import EpisodeRecord, Record, RunMetrics
+
+# Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
+FIELDS_ADDED_LATER = frozenset({"judgement", "noticed_s", "script"})
 
 
 class MetricsAccumulator:
@@ -62,3 +67,24 @@ def _kept(tally: Tally) -> dict[str, Any]:
             interval = metric.interval(value, tally)
             found[f"{kept.field}_low"], found[f"{kept.field}_high"] = interval or (None, None)
     return found
+
+
+def results_digest(records: Sequence[EpisodeRecord]) -> str:
+    """SHA-256 over one line of canonical JSON per record; equal digests mean equal results.
+
+    Keys are sorted and floats written so that they read back exactly. Records hold no wall-clock values.
+    """
+    digest = hashlib.sha256()
+    for record in records:
+        line = json.dumps(record, default=_plain, sort_keys=True, separators=(",", ":"))
+        digest.update(line.encode() + b"\n")
+    return digest.hexdigest()
+
+
+def _plain(value: object) -> dict[str, Any]:
+    """Records and mappings as dicts, shallowly; `json` comes back for what they contain."""
+    if isinstance(value, Record):
+        return {name: each for name, each in value if each is not None or name not in FIELDS_ADDED_LATER}
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"{value!r} of {type(value).__name__} has no canonical JSON; wanted a record of plain values")

@@ -8,10 +8,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from risk_sac.metrics.counts import Counts
 from risk_sac.metrics.features import FEATURES
 from risk_sac.metrics.metric import Derived, Kept, Metric, Ratio
-from risk_sac.metrics.tally import WINDOW, Tally
+from risk_sac.metrics.tally import WINDOW, Counts, Tally
 from risk_sac.records import ARTEFACT_RULES
 
 PER_STEPS = 1000  # environment steps over which the rate of distinct failures is taken
@@ -90,7 +89,7 @@ def distinct_preventable_rate(counts: Counts) -> float | None:
 
 
 def coverage(tally: Tally) -> float:
-    """Kinds of failures found: cells of `risk_sac.verdicts.taxonomy`."""
+    """Kinds of failures found: cells of `risk_sac.verdicts.distinct`."""
     return len(tally.kinds)
 
 

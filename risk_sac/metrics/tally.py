@@ -2,15 +2,14 @@
 
 import math
 from collections import Counter, deque
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 
 from risk_sac.errors import NotFinite
-from risk_sac.metrics.counts import Counts
 from risk_sac.metrics.features import Spread, outcome_features
-from risk_sac.records import Collision, EpisodeRecord, Outcome
+from risk_sac.records import EpisodeRecord, Outcome, RunMetrics
 from risk_sac.types import STEP_S
-from risk_sac.verdicts.distinct import DistinctFailures
-from risk_sac.verdicts.taxonomy import FailureKind, kind_of
+from risk_sac.verdicts.distinct import DistinctFailures, FailureKind, kind_of
 
 STEPS_PER_S = round(1 / STEP_S)
 WINDOW = 100  # episodes of the sliding ECR and PCR
@@ -22,6 +21,37 @@ def preventable(record: EpisodeRecord) -> bool:
     A collision that was never judged counts as not preventable.
     """
     return record.outcome is Outcome.FAILURE and record.collision is not None and record.collision.preventable
+
+
+@dataclass(kw_only=True)
+class Counts:
+    """The counts of a run, as `RunMetrics` has them; several runs have their sums."""
+
+    episodes: int = 0
+    rejected: int = 0
+    raw_collisions: int = 0
+    failures: int = 0
+    distinct_failures: int = 0
+    preventable: int = 0
+    avoidable: int = 0
+    distinct_preventable: int = 0
+    artefacts: int = 0
+    unresponsive: int = 0
+    invalid: int = 0
+    environment_steps: int = 0
+
+    @property
+    def driven(self) -> int:
+        """Episodes that rates are taken over: all, but for those in which the ego failed to drive."""
+        return self.episodes - self.invalid
+
+
+COUNTS = tuple(each.name for each in fields(Counts))
+
+
+def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
+    """Each count summed over the runs; what two runs found alike counts twice."""
+    return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in COUNTS})
 
 
 @dataclass(kw_only=True)
@@ -81,7 +111,11 @@ class Tally(Counts):
         if record.collision is None:
             raise ValueError(f"episode {record.index} is a failure without a collision; wanted its collision record")
         features = outcome_features(record.collision)
-        _require_finite_times(record.collision)
+        judged = record.collision.judgement
+        times_s = [record.collision.time_s, *([judged.conflict_s] if judged else [])]
+        if not all(map(math.isfinite, times_s)):
+            striker = record.collision.other_id
+            raise NotFinite(f"collision with {striker!r} and its conflict are at {times_s} s; wanted finite times")
         new = self._distinct.add(record.collision)  # the last that may refuse it
         self._spread.add(features)
         self.distance = self._spread.distance
@@ -91,7 +125,6 @@ class Tally(Counts):
         self.avoidable += record.collision.avoidable
         if record.collision.preventable:  # whichever of its kind came first
             self.distinct_preventable += self._distinct_preventable.add(record.collision)
-        judged = record.collision.judgement
         if judged is not None:
             self.kinds.add(kind_of(record.collision, judged))
             self.unresponsive += judged.unresponsive
@@ -102,13 +135,3 @@ class Tally(Counts):
     def _second(self, time_s: float) -> int:
         """The bin of a time; what began before the release is in the first, and the horizon's end in the last."""
         return min(max(0, math.floor(time_s)), len(self.contacts_by_second) - 1)
-
-
-def _require_finite_times(collision: Collision) -> None:
-    times_s = [collision.time_s]
-    if collision.judgement is not None:
-        times_s.append(collision.judgement.conflict_s)
-    if not all(map(math.isfinite, times_s)):
-        raise NotFinite(
-            f"collision with {collision.other_id!r} and its conflict are at {times_s} s; wanted finite times"
-        )

@@ -2,11 +2,9 @@
 
 from risk_sac.records import Judgement
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
-from risk_sac.verdicts.ego import manoeuvre, response
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.labels import broken, ground
+from risk_sac.verdicts.labels import broken, ground, manoeuvre, response, signature
 from risk_sac.verdicts.reference import grade, reference_outcomes
-from risk_sac.verdicts.signature import signature
 
 DEFINITIONS = 4  # raise it with whatever changes a verdict; what was judged before says by which it was
 

@@ -17,7 +17,7 @@ from risk_sac.scenario.family import Family
 from risk_sac.scenario.odd import TINY, field, intersect, narrow, paths
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Bools, Floats
-from risk_sac.verdicts.taxonomy import CELLS, FailureKind, kind_of
+from risk_sac.verdicts.distinct import CELLS, FailureKind, kind_of
 
 BINS, PAIR_BINS = 10, 4
 NOT_PLAYED = (Outcome.REJECTED, Outcome.INVALID)

@@ -14,8 +14,7 @@ from risk_sac.metrics.rows import (
     preventable_collision_rate,
 )
 from risk_sac.records import Funnel, Grade, Outcome, RunMetrics
-from risk_sac.verdicts.distinct import distinct_failures
-from risk_sac.verdicts.taxonomy import kind_of
+from risk_sac.verdicts.distinct import distinct_failures, kind_of
 from tests.builders import judgement
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
 

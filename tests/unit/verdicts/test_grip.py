@@ -4,8 +4,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from risk_sac.verdicts.artefact import inside_grip, used_grip
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.grip import inside_grip, used_grip
 from tests.unit.verdicts.staged import (
     cut_in,
     leader_brakes,

@@ -2,7 +2,7 @@ from typing import Any
 
 import pytest
 
-from risk_sac.verdicts.taxonomy import FailureKind, kind_of
+from risk_sac.verdicts.distinct import FailureKind, kind_of
 from tests.builders import collision, judgement
 
 

@@ -8,7 +8,7 @@ from risk_sac.report.evidence.coverage import VALUES, axis_of, coverage, kinds
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import narrow
 from risk_sac.scenario.space import Parameter
-from risk_sac.verdicts.taxonomy import CELLS
+from risk_sac.verdicts.distinct import CELLS
 from tests.builders import collision, episode_record, judgement
 
 MIXED = FAMILIES["mixed"]
