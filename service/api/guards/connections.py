@@ -6,7 +6,6 @@ is bounded; a newcomer takes the place of the connection that has owed a request
 
 import asyncio
 import logging
-import os
 import resource
 import socket
 import time
@@ -37,24 +36,17 @@ class Server(uvicorn.Server):
     """Uvicorn's server with a bounded number of connections."""
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings, **options: Any) -> None:
-        http = cast(type[asyncio.Protocol], partial(Connection, room=Room(settings)))
-        super().__init__(uvicorn.Config(app, http=http, backlog=_accepted_at_once(), **options))
+        room = Room(settings)
+        http = cast(type[asyncio.Protocol], partial(Connection, room=room))
+        super().__init__(uvicorn.Config(app, http=http, backlog=room.accepted_at_once, **options))
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Starts to listen, with a long queue of connections that are not accepted yet."""
         await super().startup(sockets)
         # asyncio also takes the backlog as the number of connections that it accepts in one turn, which must be small.
         for listening in (each for server in self.servers for each in server.sockets):
-            with socket.socket(fileno=os.dup(listening.fileno())) as same:
+            with listening.dup() as same:
                 same.listen(BACKLOG)
-
-
-def _accepted_at_once() -> int:
-    return max(4, min(BACKLOG, _descriptors() // 32))
-
-
-def _descriptors() -> int:
-    return resource.getrlimit(resource.RLIMIT_NOFILE)[0]
 
 
 class Room:
@@ -63,33 +55,28 @@ class Room:
     def __init__(self, settings: ServiceSettings) -> None:
         self.head_s = settings.head_timeout_s
         self.owing: dict[Connection, None] = {}  # those that owe a request head, longest first
-        # Closed connections may still hold their descriptors when the next ones are accepted.
+        descriptors = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+        self.accepted_at_once = max(4, min(BACKLOG, descriptors // 32))
         workers = settings.max_workers if settings.executor == "local" else 0
-        possible = max(FEWEST, _descriptors() - OWN_FILES - WORKER_FILES * workers - 4 * _accepted_at_once())
+        # Closed connections may still hold their descriptors when the next ones are accepted.
+        possible = max(FEWEST, descriptors - OWN_FILES - WORKER_FILES * workers - 4 * self.accepted_at_once)
         self._most = min(possible, settings.max_connections or possible)
-        self._open: set[Connection] = set()
         self._full_at = float("-inf")
 
     def enter(self, connection: "Connection") -> None:
-        """Adds a connection; if there are too many, drops the one that has owed a head for longest."""
-        self._open.add(connection)
-        if len(self._open) <= self._most:
+        """Makes room for a new connection: if there are too many, drops the one that has owed a head for longest."""
+        if len(connection.connections) <= self._most:  # of the server, as uvicorn counts them
             return
         now = time.monotonic()
         if now - self._full_at > CALM_S:
             logger.warning("%d connections are as many as may be; for a new one the longest idle goes", self._most)
         self._full_at = now
         longest = next(iter(self.owing))
-        self.leave(longest)
+        del self.owing[longest]
         if longest is connection:  # all others are being answered
             connection.refuse(f"{self._most} connections are open; wanted fewer: try again in 1 s")
         else:
             longest.transport.abort()
-
-    def leave(self, connection: "Connection") -> None:
-        """Removes a connection."""
-        self._open.discard(connection)
-        self.owing.pop(connection, None)
 
 
 class Connection(HttpToolsProtocol):
@@ -109,7 +96,7 @@ class Connection(HttpToolsProtocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Cancels the deadlines."""
-        self._room.leave(self)
+        self._room.owing.pop(self, None)
         for timer in filter(None, (self._head_due, self._reading_due)):
             timer.cancel()
         super().connection_lost(exc)
@@ -174,22 +161,20 @@ class BodyLimit:
         self._settings = settings
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on; where the body is refused, reading it raises, and the refusal replaces the app's answer."""
+        """Passes on; where the body is refused, reading it raises the refusal, which the app answers with."""
         headers = dict(scope["headers"]) if scope["type"] == "http" else {}
         if b"content-length" not in headers and b"transfer-encoding" not in headers:
             await self._app(scope, receive, send)
             return
         settings = self._settings
-        upload = scope["path"].startswith(UPLOADS)
-        limit = settings.max_upload_bytes if upload else settings.max_body_bytes
+        limit = settings.max_upload_bytes if scope["path"].startswith(UPLOADS) else settings.max_body_bytes
         if int(headers.get(b"content-length", 0)) > limit:  # uvicorn has checked that it is a number
             await problem_response(scope["path"], _too_large(limit))(scope, receive, send)
             return
         received, waited_s, complete = 0, 0.0, False
-        refusal: ProblemError | None = None
 
         async def limited_receive() -> Message:
-            nonlocal received, waited_s, complete, refusal
+            nonlocal received, waited_s, complete
             if complete:  # what is waited for now is that the client leaves
                 return await receive()
             began = time.monotonic()
@@ -199,24 +184,15 @@ class BodyLimit:
             except TimeoutError as error:
                 slow = f"{settings.min_body_rate} bytes per second, for more than {settings.body_patience_s:g} s"
                 detail, status = f"the body comes more slowly than {slow}; wanted it faster", HTTPStatus.REQUEST_TIMEOUT
-                close = {"Connection": "close"}  # nobody waits for the rest
-                refusal = ProblemError(status, Reason.UPLOAD_TOO_SLOW, detail, headers=close)
-                raise refusal from error
+                raise ProblemError(status, Reason.UPLOAD_TOO_SLOW, detail, headers={"Connection": "close"}) from error
             waited_s += time.monotonic() - began  # without the time that the service takes itself
             received += len(message.get("body", b""))
             complete = not message.get("more_body", False)
             if received > limit:
-                refusal = _too_large(limit)
-                raise refusal
+                raise _too_large(limit)
             return message
 
-        async def limited_send(message: Message) -> None:
-            if refusal is None:  # else FastAPI's form parser would answer 400
-                await send(message)
-
-        await self._app(scope, limited_receive, limited_send)
-        if refusal is not None:
-            await problem_response(scope["path"], refusal)(scope, receive, send)
+        await self._app(scope, limited_receive, send)
 
 
 def _too_large(limit: int) -> ProblemError:
