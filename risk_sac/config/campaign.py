@@ -63,8 +63,7 @@ class Budget(Settings):
     evaluation_episodes: Annotated[int, Field(ge=0, le=10_000)] = 0
     """Episodes of the frozen policy after the search."""
     cpu_s: Annotated[float, Field(ge=0.1, le=1e7)] | None = None
-    """Processor time after which a search ends that has episodes left, s; how many it has played then depends on the
-    processor."""
+    """Processor time after which a search ends, s; how many episodes it has played then depends on the processor."""
     least_episodes: Annotated[int, Field(ge=1, le=100_000)] = 1
     """Search episodes that are played whatever the processor time, so that one run serves two budgets."""
 
@@ -83,8 +82,8 @@ class Budget(Settings):
 class Iid(Settings):
     """What a campaign ends with where it is to say how often its ego fails: scenes that no search has chosen.
 
-    Each is drawn from the ODD independently of all others, uniformly between the bounds of each parameter. They are
-    played with undisturbed traffic and, apart from it, with random adversaries, in runs of their own.
+    They are drawn from the ODD independently, uniformly between each parameter's bounds, and played with undisturbed
+    traffic and with random adversaries, in runs of their own.
     """
 
     episodes: Annotated[int, Field(ge=1, le=100_000)] = 300

@@ -30,12 +30,11 @@ class SensorConfig(Settings):
 
 
 class EgoConfig(Settings):
-    """SUMO's default driver, with a driver's delay and a driver's view; or a driver that the operator has registered.
+    """SUMO's default driver with a driver's delay and view, or a driver that the operator has registered.
 
-    The profile `perfect` reacts within one simulation step and sees everything. The profile `careful` is the default
-    with the careful driver's braking on top, by whom preventable failures are judged.
-
-    A registered driver takes SUMO's place from the adversaries' release on, and has the same view.
+    The profile `perfect` reacts within one simulation step and sees everything; `careful` adds the braking of the
+    careful driver, by whom preventable failures are judged. A registered driver takes over at the adversaries' release
+    and has the same view.
     """
 
     profile: Literal["default", "perfect", "careful"] = "default"
@@ -50,8 +49,8 @@ class EgoConfig(Settings):
     version: Annotated[str | None, Field(exclude_if=_left_out, min_length=1, max_length=100)] = None
     """Of the registered ego. It is filled in where a campaign is posted; a run refuses to go on with another one."""
     response_time_s: Annotated[float | None, Field(exclude_if=_left_out, ge=0.0, le=5.0)] = None
-    """Time within which the ego responds, s, from which its time-to-collision requirement follows. By default what a
-    registered ego declares of itself, and `reaction_time_s` of SUMO's models."""
+    """Time within which the ego responds, s; its time-to-collision requirement follows from it. By default what a
+    registered ego declares, or `reaction_time_s`."""
 
     @property
     def response_s(self) -> float:

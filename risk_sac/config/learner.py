@@ -27,15 +27,13 @@ class AgentConfig(Settings):
     target_rate: Annotated[float, Field(ge=1e-5, le=1)] = 0.01
     """τ of the target networks' moving average."""
     warmup_steps: Annotated[int, Field(ge=0, le=10_000_000)] = 1000
-    """Environment steps before the first update, the warm start's among them; the policy's own ones are uniformly
-    random."""
+    """Environment steps before the first update, the warm start's included; the policy's own are uniformly random."""
     decision_steps: Annotated[int, Field(ge=1, le=50)] = 5
     """Environment steps for which the policy holds an action; they make one transition of the memory."""
     updates_per_step: Annotated[float, Field(ge=0, le=20)] = 1.0
     """Updates in an environment step. One costs as much as two or three steps."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
-    """Where the networks live; `auto` is the CPU, which is faster for networks this small. Results are reproducible on
-    equal devices only."""
+    """`auto` is the CPU, which is faster for networks this small. Results are reproducible on equal devices only."""
 
 
 class SacConfig(Settings):
@@ -80,8 +78,7 @@ class LagrangianConfig(Settings):
     cost_limit: Fraction = 0.2
     """d, on the policy's mean realism cost per step, which is in [0, 1]; undisturbed traffic costs 0.01 to 0.05."""
     maximum: Annotated[float, Field(ge=1e-6, le=1000)] = 0.15
-    """Cap on λ, so that a burst of cost cannot drown the risk reward for good; at 0.5 an episode would pay for its cost
-    what a failure is worth."""
+    """Cap on λ, so that a burst of cost cannot drown the risk reward; at 0.5 cost would outweigh a failure."""
 
 
 class RewardConfig(Settings):
@@ -121,8 +118,8 @@ class SceneOptimizerConfig(Settings):
     initial_scenes: Annotated[int, Field(ge=2, le=1000)] = 16
     """Sobol scenes before the first model."""
     window: Annotated[int, Field(ge=8, le=1000)] = 150
-    """Newest observations the model is fitted to: the policy changes, so old scores go stale. An ask and a tell
-    take at most 25 ms of processor time on average at 150, and about twice as long at 300."""
+    """Newest observations the model is fitted to: the policy changes, so old scores go stale. Asking and
+    telling take at most 25 ms at 150, twice as long at 300."""
     refit_every: Annotated[int, Field(ge=1, le=1000)] = 10
     """Fewest observations between two fits of the kernel's hyper-parameters; a fifth of those kept if that is more."""
     candidates: Annotated[int, Field(ge=16, le=8192)] = 128

@@ -27,8 +27,8 @@ class Progress(Record):
     distinct_preventable: int
     """The distinct ones among them; sum over the runs."""
     window_ecr: Real
-    """ECR over each run's newest 100 episodes: mean over the runs at work, or over all once none is. Controls, which do
-    not learn, are left out of it, unless the campaign has nothing else; its results have each method by itself."""
+    """ECR over each run's newest 100 episodes: mean over the runs at work, or over all once none is. Controls are left
+    out, unless the campaign has nothing else."""
     window_pcr: Real
     """PCR, averaged the same way."""
     dual_variable: Real

@@ -79,8 +79,8 @@ class Judgement(Record):
     conflict_s: Real
     """When the conflict began; negative before the release."""
     noticed_s: float | None = None
-    """The same for a wary driver, to whom whoever hangs over its line beside the ego is in conflict, and whoever could
-    not stop by braking gently; `conflict_after_release` goes by it. Null in what is older than the difference."""
+    """The same for a wary driver, to whom an actor that hangs over its line or could not stop gently is in conflict;
+    `conflict_after_release` goes by it. Null in older records."""
     conflict_x_m: Real
     """Where the striker was then, on the map."""
     conflict_y_m: Real
@@ -138,8 +138,7 @@ class Collision(Record):
     min_robustness: Least = _early("min_robustness")
     """Soft minimum of the requirements, until 1 s before the contact too."""
     simulator_agrees: bool | None
-    """Whether SUMO lists the collision within 0.3 s; null for pedestrians, whom it does not know, and for an ego that
-    it does not drive."""
+    """Whether SUMO lists the collision within 0.3 s; null for pedestrians and for an ego that SUMO does not drive."""
     verdicts: Mapping[str, bool] = {}
     """Validity rule → passed."""
     judgement: Judgement | None = None
@@ -187,8 +186,8 @@ class EpisodeRecord(Record):
     scene: Mapping[str, Real]
     outcome: Outcome
     reason: str
-    """Rule that rejected the scene, sim_crash, the validity rules that the contact failed, or how the ego failed:
-    ego_deadline, ego_malformed, ego_crash, ego_off_road; else empty."""
+    """Rule that rejected the scene, validity rules that the contact failed, sim_crash, ego_deadline, ego_malformed,
+    ego_crash or ego_off_road; else empty."""
     steps: int
     risk_return: Real
     """Σ R_risk, of the risk reward alone."""
@@ -197,7 +196,7 @@ class EpisodeRecord(Record):
     mean_cost: Real
     """Mean C_soft over the executed steps."""
     min_ttc_s: Least
-    """Over the whole episode, the contact included, and so 0 if there is one; null in a record without any."""
+    """Over the whole episode, so 0 if there is a contact; null in a record without any."""
     min_robustness: Least
     """Soft minimum of the requirements, over the whole episode too."""
     objective: float | None
@@ -209,7 +208,7 @@ class EpisodeRecord(Record):
     environment_steps: int
     """Of the run, up to and including this episode."""
     script: tuple[float, ...] | None = None
-    """Genes of the scripts that the adversaries followed, see `risk_sac.scripts`; null where a policy drove them."""
+    """Genes of the scripts that the adversaries followed; null where a policy drove them."""
     collision: Collision | None = None
 
     def id_in(self, run_id: str) -> str:
@@ -267,9 +266,9 @@ class Episode(EpisodeRecord):
     run_id: str
     wall_s: float
     funnel: Funnel | None = None
-    """What the run's phase had found up to and including this episode, as it was told then; null in what is older."""
+    """What the run's phase had found up to and including this episode; null in older records."""
     repetition: Repetition | None = None
-    """Of the first failure of its kind, once the run has ended; a failure that was not the same each time is flaky."""
+    """Of the first failure of its kind, once the run has ended."""
 
 
 class EpisodePage(Page[Episode]):

@@ -68,8 +68,7 @@ class Cell:
     rejected_rate: float
     """Infeasible scenes / episodes."""
     unresponsive_share: float | None
-    """Share of the valid collisions with a visible collision course of 1.5 s or more during which the ego never braked;
-    null without one."""
+    """Share of the valid collisions after 1.5 s or more of a visible collision course in which the ego never braked."""
     signatures: Mapping[str, int]
     """Signature → valid collisions."""
     conflicts_by_second: tuple[int, ...]

@@ -2,8 +2,10 @@
 
 import itertools
 import json
+import re
 from collections import Counter
 from collections.abc import Sequence
+from http import HTTPStatus
 from typing import Any
 
 from fastapi import FastAPI
@@ -13,6 +15,7 @@ from pydantic import TypeAdapter
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.config.methods import RunMethod
 from risk_sac.records import StateChange
+from service.api.answers.responses import WAIT, header
 from service.api.guards.gate import HEALTH, PUBLIC
 from service.api.posted import input_schemas
 from service.api.posted_campaign import campaign_schemas
@@ -32,20 +35,19 @@ _SECURITY = {
         "description": "Made by `risk-sac keys create`. On a loopback address none is needed until one was made.",
     }
 }
-_WAIT = {"Retry-After": {"description": "Seconds until asking again pays.", "schema": {"type": "integer"}}}
-_SCHEME = {"WWW-Authenticate": {"description": "`Bearer`", "schema": {"type": "string"}}}
+_SCHEME = {"WWW-Authenticate": header("`Bearer`", required=False)}
 _Answers = dict[str, tuple[str, dict[str, Any]]]
 _FULL = "too many connections are open"
 _BODY: _Answers = {"408": ("The body comes too slowly", {}), "413": ("The body is too large", {})}
 _ALL: _Answers = {
     "421": ("The Host header names no address of this service", {}),
-    "503": (_FULL.capitalize(), _WAIT),
+    "503": (_FULL.capitalize(), WAIT),
 }
-_COUNTED: _Answers = {"429": ("Too many requests, or too much for the project's quota", _WAIT)}
+_COUNTED: _Answers = {"429": ("Too many requests, or too much for the project's quota", WAIT)}
 _GUARDED: _Answers = {
     "401": ("The API key is missing, wrong or revoked", _SCHEME),
     "403": ("The API key does not reach so far, or the request comes from a foreign page", {}),
-    "503": (f"The API keys are lost or damaged, as `detail` says, or {_FULL}", _WAIT),
+    "503": (f"The API keys are lost or damaged, as `detail` says, or {_FULL}", WAIT),
 }
 _CHOICES: dict[str, dict[str, Any]] = {
     "FamilyName": TypeAdapter(FamilyName).json_schema(),
@@ -68,6 +70,8 @@ def _document(app: FastAPI) -> dict[str, Any]:
     for operations in document["paths"].values():
         for operation in operations.values():
             for status, response in operation["responses"].items():
+                if response["description"] == "Successful Response":
+                    response["description"] = HTTPStatus(int(status)).phrase
                 if int(status) >= 400:
                     response["content"] = {"application/problem+json": response["content"]["application/json"]}
     _describe_guards(document)
@@ -116,8 +120,14 @@ def _simplified(node: Any) -> Any:
     node = {key: _simplified(child) for key, child in node.items()}
     if isinstance(node.get("title"), str):
         del node["title"]
+    if isinstance(node.get("description"), str):  # without the ends of docstrings' lines
+        node["description"] = re.sub(r"(?<!\n)\n(?!\n)", " ", node["description"])
     if "in" in node and "schema" in node:  # a parameter, whose description FastAPI repeats
         node["schema"].pop("description", None)
+        if not node["required"]:
+            del node["required"]
+    if "$ref" in node and isinstance(node.get("default"), dict):
+        node["default"] = {}  # the schema that is referred to has the default of each field
     match node.get("anyOf"):
         case [{"type": str(kind)} as only, {"type": "null"}] if "enum" not in only:
             node.pop("anyOf")

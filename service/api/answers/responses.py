@@ -7,14 +7,14 @@ from service.api.answers.problem_body import Problem
 Responses = dict[int | str, dict[str, Any]]
 
 
-def problem(status: int, description: str) -> Responses:
+def problem(status: int, description: str, headers: dict[str, Any] | None = None) -> Responses:
     """A response that is a problem."""
-    return {status: {"model": Problem, "description": description}}
+    return {status: {"model": Problem, "description": description} | ({"headers": headers} if headers else {})}
 
 
 def header(description: str, type_: str = "string", *, required: bool = True) -> dict[str, Any]:
     """A header of a response."""
-    return {"description": description, "required": required, "schema": {"type": type_}}
+    return {"description": description, "schema": {"type": type_}} | ({"required": True} if required else {})
 
 
 MALFORMED = problem(400, "The body is no JSON")
@@ -28,11 +28,12 @@ STORAGE = problem(503, "The database cannot be read or written")
 STOPPED = problem(503, "Campaigns make no progress")
 UNREADY = problem(503, "The disk or the database refuses")
 
-_RETRY = header(
-    "Seconds to wait before asking again: a twentieth of the time left; absent once the campaign has ended.",
-    "integer",
-    required=False,
-)
+WAIT = {"Retry-After": header("Seconds to wait before asking again.", "integer", required=False)}
+_RETRY = {
+    "Retry-After": header(
+        "Seconds to wait: a twentieth of the time left; absent once the campaign has ended.", "integer", required=False
+    )
+}
 _TAGGED = {
     "ETag": header("Changes whenever the body does."),
     "Cache-Control": header("`no-cache`: keep it, and ask with If-None-Match."),
@@ -47,5 +48,5 @@ def _tagged(headers: dict[str, Any]) -> Responses:
 
 
 TAGGED = _tagged(_TAGGED)
-LIVE = _tagged(_TAGGED | {"Retry-After": _RETRY})
-ACCEPTED: Responses = {202: {"headers": {"Location": header("Where to follow it."), "Retry-After": _RETRY}}}
+LIVE = _tagged(_TAGGED | _RETRY)
+ACCEPTED: Responses = {202: {"headers": {"Location": header("Where to follow it.")} | _RETRY}}

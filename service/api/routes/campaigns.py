@@ -46,8 +46,7 @@ IdempotencyKey = Annotated[
         min_length=1,
         max_length=200,
         pattern=r"^[\x21-\x7e]+$",
-        description="Any string of the client's own. Posting the same campaign again with the same key gives the"
-        " campaign that there is, so that a client that got no answer can simply try again.",
+        description="Posting the same campaign with the same key again gives the campaign that there is.",
     ),
 ]
 Points = Annotated[int, Query(ge=1, le=1000, description="Of each curve, at most.")]

@@ -40,8 +40,8 @@ class Family(Record):
     odd_limits: Odd
     """How far a campaign's own may go: a few fields may be wider than the default, as far as this."""
     requirements: list[Requirement]
-    """What the default ego has to meet in the default ODD. A campaign's own ODD and ego change their thresholds; the
-    campaign's own requirements come on top, under other names."""
+    """What the default ego has to meet in the default ODD. A campaign's ODD and ego change the thresholds; its own
+    requirements come on top."""
 
 
 class Signal(Record):

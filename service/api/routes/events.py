@@ -40,8 +40,7 @@ EVENT = {
 EVENTS: Responses = {
     200: {
         "description": "`episode`, or `failure` for a valid one of a search: an Episode, with the funnel of its run so"
-        " far. `state`: a StateChange. The end of a run"
-        " or of the campaign comes after all its episodes, and the stream ends with that of the campaign.",
+        " far. `state`: a StateChange. A run's end comes after all its episodes; the campaign's ends the stream.",
         "content": {"text/event-stream": {"schema": EVENT, "example": EXAMPLE}},
     },
     204: {"description": "The campaign has ended and all was told; do not come back."},
@@ -56,8 +55,8 @@ Newest = Annotated[
     Query(
         ge=0,
         le=1000,
-        description="Begin with so many of the newest events, 0 to hear only of what comes; without it with the"
-        " campaign's first. Last-Event-ID goes before it.",
+        description="Begin with so many of the newest events; without it with the campaign's first. Last-Event-ID"
+        " goes before it.",
     ),
 ]
 

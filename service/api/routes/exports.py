@@ -9,20 +9,14 @@ from starlette.concurrency import run_in_threadpool
 from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names
 from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
-from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, header, problem
+from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, WAIT, Responses, problem
 from service.api.context import CurrentCaller, Service
 from service.errors import ConflictError
 from service.store.stored import StoredCampaign
 from service.views.tables import Table
 
 LACKING = problem(501, "The service lacks a package that makes this format")
-CROWDED: Responses = {
-    503: STORAGE[503]
-    | {
-        "description": "The database cannot be read, or too many wait for theirs",
-        "headers": {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)},
-    }
-}
+CROWDED = problem(503, "The database cannot be read, or too many wait for theirs", WAIT)
 TABLE: Responses = {200: {"content": {FORMATS[name].media_type: {} for name in names("episodes")}}}
 NOTHING_YET = problem(409, "No run has played an episode yet")
 

@@ -10,7 +10,7 @@ from fastapi.concurrency import run_in_threadpool
 from service.api.answers.pages import Cursor, Limit
 from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
-from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses, header, problem
+from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, WAIT, Responses, header, problem
 from service.api.context import CurrentCaller, Service
 from service.api.posted import media_type
 from service.networks.limits import MAX_EDGES, MAX_EXPANDED_BYTES, MAX_FILES, WALL_S
@@ -25,23 +25,20 @@ REFUSALS: Responses = (
     | problem(409, "The project has as many networks as it may")
     | problem(415, "The body is declared as something else, or carries a Content-Encoding")
     | problem(422, "The upload is refused, and `detail` says why; or a query parameter is wrong")
-    | problem(503, "The disk refuses; or there are too many uploads at once, and Retry-After says when to come again")
+    | problem(503, "The disk refuses, or there are too many uploads at once", WAIT)
 )
-FINDING: Responses = problem(422, "Nothing can be found on the network, and `detail` says why") | problem(
-    503, "The disk refuses; or there are too many searches at once, and Retry-After says when to come again"
+FINDING = problem(422, "Nothing can be found on the network, and `detail` says why") | problem(
+    503, "The disk refuses, or there are too many searches at once", WAIT
 )
-FINDING[503]["headers"] = {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)}
 DRAWN: Responses = {200: {"content": {"image/png": {}}}}
-REFUSALS[503]["headers"] = {"Retry-After": header("Seconds until asking again pays.", "integer", required=False)}
 DESCRIPTION = f"""Check a SUMO road network and keep it. Its `places` are where campaigns can be run on it.
 
 The body is a net (`.net.xml`), an OpenStreetMap extract or OpenDRIVE, the same as gzip, or a zip archive of one net \
-and up to {MAX_FILES - 1} route and additional files; what a file is, its root element says. A map that is no net is \
-converted by SUMO's netconvert, and `warnings` has what it remarks, and whether lanes for cars, signals or connections \
-are missing. UTF-8, at most {MAX_EXPANDED_BYTES >> 20} MiB once unpacked \
-and {MAX_EDGES} edges, those inside junctions included. What names a file, includes one or writes output is refused. \
-What was read is written anew and loaded by the simulator once, in a process that may take {WALL_S} s; only that is \
-kept, without comments, under names of the service's own."""
+and up to {MAX_FILES - 1} route and additional files, told apart by their root elements. A map that is no net is \
+converted by SUMO's netconvert; `warnings` has its remarks, and whether lanes for cars, signals or connections are \
+missing. UTF-8, at most {MAX_EXPANDED_BYTES >> 20} MiB once unpacked and {MAX_EDGES} edges, those inside junctions \
+included. What names a file, includes one or writes output is refused. What was read is written anew and loaded once, \
+in at most {WALL_S} s; only that is kept, without comments, under names of the service's own."""
 DOCUMENTED_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,

@@ -19,7 +19,7 @@ from risk_sac.report import Comparison, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
 from service.api.answers.representations import accepted_format, caching, entity_tag, has, not_modified
-from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses
+from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNACCEPTABLE, UNKNOWN, Responses
 from service.api.context import Context, CurrentCaller, Service
 from service.store.stored import StoredCampaign
 from service.views.reports import CampaignReport
@@ -47,9 +47,8 @@ class Figure(Record):
     """A figure of the report."""
 
     name: Annotated[str, Field(examples=["ecr_low", "bars_rho_c_evaluation"])]
-    """With a family: `ecr_`, `pcr_`, `lambda_` and `alpha_`, curves over the search; `preventable_found_` and
-    `distinct_found_`, what was found over processor time; `times_`, histograms of the time
-    from the adversaries' release to conflict and contact. `bars_` with a metric: all families."""
+    """`ecr_`, `pcr_`, `lambda_`, `alpha_`: curves over a family's search; `preventable_found_`, `distinct_found_`: what
+    was found over processor time; `times_`: from release to conflict and contact. `bars_`: a metric of all families."""
     files: list[FigureFile]
 
 
@@ -71,11 +70,10 @@ SPECS: dict[str, Callable[[CampaignSpec], str]] = {"json": CampaignSpec.model_du
 
 CACHED = {
     "ETag": {
-        "description": "Changes when a run finishes, when the reason why one is missing changes, and when the core or "
-        "the region of a failure is noted in a run's folder; absent where the folder of a finished run cannot be read.",
+        "description": "Changes whenever the body does; absent where the folder of a finished run cannot be read.",
         "schema": {"type": "string"},
     },
-    "Cache-Control": {"description": "`no-cache`: keep it, and ask with If-None-Match.", "schema": {"type": "string"}},
+    "Cache-Control": TAGGED[200]["headers"]["Cache-Control"],
 }
 UNCHANGED: Responses = {304: {"description": "What If-None-Match names still holds", "headers": CACHED}}
 
