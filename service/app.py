@@ -10,7 +10,6 @@ from prometheus_client import Histogram
 
 from risk_sac import __version__
 from risk_sac.execution.executor import Executor, executor_named
-from risk_sac.execution.messages import Event
 from risk_sac.scenario.library import VARIABLE
 from service.api.answers.pages import Cursors
 from service.api.answers.problems import add_problem_handlers
@@ -51,7 +50,7 @@ from service.views.studies import Studies
 from service.views.tables import Tables
 
 
-def create_app(settings: ServiceSettings, executor: Executor[Event] | None = None) -> FastAPI:
+def create_app(settings: ServiceSettings, executor: Executor | None = None) -> FastAPI:
     """The service as an ASGI application; it touches neither disk nor processes until it is started.
 
     Args:
@@ -92,7 +91,7 @@ def create_app(settings: ServiceSettings, executor: Executor[Event] | None = Non
 
 @contextmanager
 def opened(
-    settings: ServiceSettings, executor: Executor[Event], latencies: Histogram, made: AuthEnabledFlag
+    settings: ServiceSettings, executor: Executor, latencies: Histogram, made: AuthEnabledFlag
 ) -> Iterator[Context]:
     """The data folder, held exclusively, with its database open and its queue at work.
 

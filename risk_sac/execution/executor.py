@@ -1,16 +1,17 @@
 """The seam between the scheduler and the machines on which runs execute."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Generic, Literal, Protocol, TypeVar, get_args
+from typing import Literal, Protocol, get_args
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
+from risk_sac.execution.messages import Event, Heard, hear
 
-Word = TypeVar("Word")  # what a worker may say
+FOLDER = "{folder}"  # argument that stands for the path of the run's folder
 WORDS = "RISK_SAC_WORDS"
 """Variable that names the file descriptor to which a worker writes its words."""
 
@@ -34,26 +35,19 @@ class Exited:
     status: int | None = None  # of its process, negative for a signal; None where there was none
 
 
-@dataclass(frozen=True, slots=True)
-class Heard(Generic[Word]):
-    """A line of a worker, understood."""
-
-    word: Word | None  # to be passed on; None for a mere sign of life
-    progress: bool = False  # it has finished an episode
-    last: bool = False  # it has no more to say, and is to leave
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Program(Generic[Word]):
-    """How a worker is started, what it says, and when it is killed."""
+class Program:
+    """How a worker is started and when it is killed.
 
-    arguments: Callable[[RunSpec, Path], Sequence[str]]
-    """For the Python interpreter, given a run and its folder."""
+    A worker gets its run as a line of JSON on its standard input. The end of that means that nothing reads its words.
+    """
+
+    arguments: tuple[str, ...]
+    """For the Python interpreter."""
     log: str
     """File in the run's folder for what it prints."""
-    hear: Callable[[bytes], Heard[Word]]
-    """Reads a line of the worker's words; a ValueError refuses it. A worker gets its run as a line of JSON on its
-    standard input, whose end tells it that its words are not read any more."""
+    hear: Callable[[bytes], Heard] = hear
+    """Reads a line of its words; a ValueError refuses it."""
     environment: Mapping[str, str] = field(default_factory=dict)
     """Variables that it has besides those of its starter."""
     lease_s: float = math.inf
@@ -88,7 +82,7 @@ class Cluster:
         return sum(node.slots for node in self.nodes if node.alive)
 
 
-class Executor(Protocol[Word]):
+class Executor(Protocol):
     """Executes attempts at runs and reports what becomes of them; any thread may call it.
 
     A run has a number. Each attempt at it has a higher number than the one before. Messages of all but the latest
@@ -103,7 +97,7 @@ class Executor(Protocol[Word]):
           ValueError: the run has had this attempt or a later one.
         """
 
-    def events(self, timeout_s: float) -> list[tuple[int, Word | Exited]]:
+    def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """Returns messages since the last call, by run, waiting up to `timeout_s` for one.
 
         The last message of each latest attempt is `Exited`.
@@ -131,7 +125,7 @@ class Executor(Protocol[Word]):
 
 
 ExecutorName = Literal["local", "ray"]
-MakeExecutor = Callable[[Program[Any]], Executor[Any]]
+MakeExecutor = Callable[[Program], Executor]
 
 
 def executor_named(name: str) -> MakeExecutor:

@@ -10,8 +10,8 @@ from typing import Literal
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import Executor, Program
-from risk_sac.execution.messages import EpisodeDone, Event, Finished, hear
+from risk_sac.execution.executor import FOLDER, Executor, Program
+from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import QueuedRun, Scheduler
 from risk_sac.run_folder.crashes import PATIENCE
 from risk_sac.run_folder.results import RESULTS, read_results
@@ -61,14 +61,9 @@ Progress = Callable[[Sequence[Job]], None]
 """Told about all jobs a few times a second."""
 
 
-def worker_program() -> Program[Event]:
+def worker_program() -> Program:
     """The worker without a limit on its memory, that replays no failures."""
-    return Program(
-        arguments=lambda spec, folder: ["-m", "risk_sac.execution.worker", str(folder), "0", "0", "0"],
-        log=LOG,
-        hear=hear,
-        linger_s=LINGER_S,
-    )
+    return Program(arguments=("-m", "risk_sac.execution.worker", FOLDER, "0", "0", "0"), log=LOG, linger_s=LINGER_S)
 
 
 class JobStore:
@@ -132,7 +127,7 @@ class JobStore:
 
 def execute(
     jobs: Sequence[Job],
-    executor: Executor[Event],
+    executor: Executor,
     at_once: int,
     progress: Progress,
     stopping: Callable[[], bool],

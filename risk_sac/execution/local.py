@@ -6,11 +6,11 @@ import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Generic
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import Cause, Exited, Program, Word
+from risk_sac.execution.executor import Cause, Exited, Program
 from risk_sac.execution.mailbox import Mailbox
+from risk_sac.execution.messages import Event
 from risk_sac.execution.postmortem import exited
 from risk_sac.execution.process import Subprocess
 
@@ -60,16 +60,16 @@ class Lease:
         return None
 
 
-class LocalExecutor(Generic[Word]):
+class LocalExecutor:
     """Executes each attempt in a subprocess, with a thread that reads its words and notices its end at once.
 
     The thread checks five times a second whether the worker overstays or has fallen silent.
     """
 
-    def __init__(self, program: Program[Word]) -> None:
+    def __init__(self, program: Program) -> None:
         self._program = program
-        self._mailbox: Mailbox[Word] = Mailbox()
-        self._workers: dict[int, _Worker[Word]] = {}
+        self._mailbox = Mailbox()
+        self._workers: dict[int, _Worker] = {}
         self._lock = threading.Lock()
 
     def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
@@ -88,7 +88,7 @@ class LocalExecutor(Generic[Word]):
             self._workers[number] = worker
         threading.Thread(target=self._follow, args=(number, attempt, worker), name=f"run-{number}", daemon=True).start()
 
-    def events(self, timeout_s: float) -> list[tuple[int, Word | Exited]]:
+    def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """See `Executor.events`."""
         return self._mailbox.take(timeout_s)
 
@@ -121,7 +121,7 @@ class LocalExecutor(Generic[Word]):
             if worker is not None:
                 worker.stop(grace_s)
 
-    def _follow(self, number: int, attempt: int, worker: "_Worker[Word]") -> None:
+    def _follow(self, number: int, attempt: int, worker: "_Worker") -> None:
         while (status := worker.process.status) is None:
             self._pass_on(number, attempt, worker.words(LOOK_S))
             worker.look(time.monotonic())
@@ -133,15 +133,15 @@ class LocalExecutor(Generic[Word]):
                 del self._workers[number]
         self._mailbox.put(number, attempt, worker.exited(status))
 
-    def _pass_on(self, number: int, attempt: int, words: list[Word]) -> None:
+    def _pass_on(self, number: int, attempt: int, words: list[Event]) -> None:
         for word in words:
             self._mailbox.put(number, attempt, word)
 
 
-class _Worker(Generic[Word]):
+class _Worker:
     """An attempt and its executor's patience with it; but for `stop` and `kill` it belongs to one thread."""
 
-    def __init__(self, program: Program[Word], process: Subprocess) -> None:
+    def __init__(self, program: Program, process: Subprocess) -> None:
         self.process = process
         self._program = program
         self._lease = Lease(program.lease_s, program.stall_s)
@@ -158,7 +158,7 @@ class _Worker(Generic[Word]):
             self._told_to_stop = True
             self.process.terminate()
 
-    def words(self, timeout_s: float) -> list[Word]:
+    def words(self, timeout_s: float) -> list[Event]:
         """Reads its words up to the last, waiting up to `timeout_s` for one."""
         words = []
         for line in self.process.lines(timeout_s):

@@ -3,16 +3,16 @@
 import contextlib
 import queue
 import threading
-from typing import Generic
 
-from risk_sac.execution.executor import Exited, Word
+from risk_sac.execution.executor import Exited
+from risk_sac.execution.messages import Event
 
 
-class Mailbox(Generic[Word]):
+class Mailbox:
     """Queue from many threads to one; messages of an attempt that was overtaken or has ended are dropped."""
 
     def __init__(self) -> None:
-        self._messages: queue.SimpleQueue[tuple[int, int, Word | Exited] | None] = queue.SimpleQueue()
+        self._messages: queue.SimpleQueue[tuple[int, int, Event | Exited] | None] = queue.SimpleQueue()
         self._latest: dict[int, int] = {}  # attempt at each run
         self._lock = threading.Lock()
 
@@ -33,7 +33,7 @@ class Mailbox(Generic[Word]):
         with self._lock:
             self._latest.pop(number, None)
 
-    def put(self, number: int, attempt: int, message: Word | Exited) -> None:
+    def put(self, number: int, attempt: int, message: Event | Exited) -> None:
         """Adds a message."""
         self._messages.put((number, attempt, message))
 
@@ -41,7 +41,7 @@ class Mailbox(Generic[Word]):
         """Lets a waiting `take` return."""
         self._messages.put(None)
 
-    def take(self, timeout_s: float) -> list[tuple[int, Word | Exited]]:
+    def take(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """Returns messages since the last call, waiting up to `timeout_s` for one."""
         messages = []
         with contextlib.suppress(queue.Empty):
@@ -52,7 +52,7 @@ class Mailbox(Generic[Word]):
                 brought = self._messages.get_nowait()
         return messages
 
-    def _passes(self, number: int, attempt: int, message: Word | Exited) -> bool:
+    def _passes(self, number: int, attempt: int, message: Event | Exited) -> bool:
         with self._lock:
             passes = self._latest.get(number) == attempt
             if passes and isinstance(message, Exited):

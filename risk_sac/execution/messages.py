@@ -4,11 +4,11 @@ Every line is strict JSON from which nothing is lost: words are written as `risk
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
-from risk_sac.execution.executor import Heard
 from risk_sac.records import EpisodeRecord, Record, Repetition, RunMetrics
 
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
@@ -81,6 +81,15 @@ Event = Started | EpisodeDone | Finished | Failed
 _WORD: TypeAdapter[Event | Heartbeat] = TypeAdapter(Annotated[Event | Heartbeat, Field(discriminator="type")])
 
 
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """A line of a worker, understood."""
+
+    word: Event | None  # to be passed on; None for a mere sign of life
+    progress: bool = False  # it has finished an episode
+    last: bool = False  # it has no more to say, and is to leave
+
+
 def encode(word: Event | Heartbeat) -> bytes:
     """One line, newline included."""
     return word.model_dump_json().encode() + b"\n"
@@ -95,7 +104,7 @@ def decode(line: bytes) -> Event | Heartbeat:
     return _WORD.validate_json(line)
 
 
-def hear(line: bytes) -> Heard[Event]:
+def hear(line: bytes) -> Heard:
     """Parses one line of a worker for an executor.
 
     Raises:

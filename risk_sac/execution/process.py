@@ -8,12 +8,11 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import psutil
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import WORDS, Program
+from risk_sac.execution.executor import FOLDER, WORDS, Program
 from risk_sac.execution.postmortem import WorkerLog
 
 logger = logging.getLogger(__name__)
@@ -31,7 +30,7 @@ class Subprocess:
       listening: whether its words can still be read.
     """
 
-    def __init__(self, program: Program[Any], spec: RunSpec, folder: Path) -> None:
+    def __init__(self, program: Program, spec: RunSpec, folder: Path) -> None:
         """Starts it.
 
         Raises:
@@ -39,12 +38,13 @@ class Subprocess:
         """
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / program.log
+        arguments = (str(folder) if each == FOLDER else each for each in program.arguments)
         with path.open("ab") as log:
             self.log = WorkerLog(path, log.tell())
             self._words, words = os.pipe()
             try:
                 self._process = subprocess.Popen(
-                    [sys.executable, *program.arguments(spec, folder)],
+                    [sys.executable, *arguments],
                     stdin=subprocess.PIPE,
                     stdout=log,
                     stderr=log,

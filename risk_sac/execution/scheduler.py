@@ -79,7 +79,7 @@ class Scheduler:
       stopping: whether no run starts any more.
     """
 
-    def __init__(self, executor: Executor[Event], store: RunStore, attempts: int) -> None:
+    def __init__(self, executor: Executor, store: RunStore, attempts: int) -> None:
         """Starts nothing yet.
 
         Args:

@@ -5,11 +5,10 @@ import threading
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 
-from risk_sac.config import CampaignSpec, RunSpec
-from risk_sac.execution.executor import Cluster, Executor, Program
-from risk_sac.execution.messages import EpisodeDone, Event, Finished, hear
+from risk_sac.config import CampaignSpec
+from risk_sac.execution.executor import FOLDER, Cluster, Executor, Program
+from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler
 from risk_sac.problem import checked_campaign
 from risk_sac.records import State, Triage, TriageState
@@ -36,7 +35,7 @@ class Manager:
     Requests call `submit`, `cancel`, `triage` and `delete` from their own threads; the lock makes every step whole.
     """
 
-    def __init__(self, settings: ServiceSettings, store: Store, executor: Executor[Event]) -> None:
+    def __init__(self, settings: ServiceSettings, store: Store, executor: Executor) -> None:
         self._settings = settings
         self._store = store
         self._ledger = Ledger(store)
@@ -243,17 +242,12 @@ class Manager:
         self._pause(reason, run)
 
 
-def worker_program(settings: ServiceSettings) -> Program[Event]:
+def worker_program(settings: ServiceSettings) -> Program:
     """The worker that the settings name."""
-
-    def arguments(spec: RunSpec, folder: Path) -> Sequence[str]:
-        numbers = settings.worker_niceness, settings.worker_memory_bytes, settings.replays
-        return ["-m", settings.worker_module, str(folder), *map(str, numbers)]
-
+    numbers = settings.worker_niceness, settings.worker_memory_bytes, settings.replays
     return Program(
-        arguments=arguments,
+        arguments=("-m", settings.worker_module, FOLDER, *map(str, numbers)),
         log=LOG,
-        hear=hear,
         lease_s=settings.lease_s,
         stall_s=settings.stall_s,
         linger_s=settings.grace_s,

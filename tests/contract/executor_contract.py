@@ -13,16 +13,23 @@ from typing import Any
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import Cause, Executor, Exited, Heard, MakeExecutor, Program
+from risk_sac.execution.executor import FOLDER, Cause, Executor, Exited, MakeExecutor, Program
+from risk_sac.execution.messages import Heard
 
 SPEC = RunSpec(family="low", method="random", seed=7)
 LONG_S = 60
 SOON_S = 5  # a worker that is lost is told of by then
 OVERLOADED = 4  # a busy machine may take so many times as long
 
+# A worker elsewhere is given another folder to work in; here it meets the test in the run's own.
+START = """
+import os, pathlib, sys
+folder = os.path.join(sys.argv[1], os.path.basename(sys.argv[2]))
+exec(pathlib.Path(folder + '.py').read_text())
+"""
 WORKER = """
 import json, os, signal, sys, threading, time
-folder, spec = sys.argv[1], sys.stdin.readline()
+spec = sys.stdin.readline()
 words = int(os.environ['RISK_SAC_WORDS'])
 def say(word):
     os.write(words, json.dumps(word).encode() + b'\\n')  # in one piece, whatever another thread says
@@ -48,8 +55,8 @@ if os.fork() == 0:
 """
 
 
-def hear(line: bytes) -> Heard[str]:
-    word = json.loads(line)
+def hear(line: bytes) -> Heard:
+    word: Any = json.loads(line)
     if not isinstance(word, str):
         raise ValueError(f"got {word!r}; wanted a word")
     return Heard(None if word == "alive" else word, progress=word == "episode", last=word == "last")
@@ -59,35 +66,31 @@ class Runs:
     """An executor at work: the program of a run is the code that was submitted for it."""
 
     def __init__(self, make: MakeExecutor, folder: Path, **patience: Any) -> None:
-        self._codes: dict[str, str] = {}  # by the name of the run's folder
         self._folder = folder
         self._numbers: set[int] = set()
-        program = Program(arguments=self._arguments, log="log", hear=hear, **{"linger_s": LONG_S} | patience)
-        self.executor: Executor[str] = make(program)
-
-    def _arguments(self, spec: RunSpec, folder: Path) -> list[str]:
-        # A worker elsewhere is given another folder to work in; here it meets the test in the run's own.
-        return ["-c", WORKER + self._codes[folder.name], str(self._folder / folder.name)]
+        arguments = "-c", START, str(folder), FOLDER
+        program = Program(arguments=arguments, log="log", hear=hear, **{"linger_s": LONG_S} | patience)
+        self.executor: Executor = make(program)
 
     def folder(self, number: int, attempt: int = 1) -> Path:
         return self._folder / f"{number}-{attempt}"
 
     def submit(self, code: str, number: int = 1, attempt: int = 1) -> None:
         folder = self.folder(number, attempt)
-        self._codes[folder.name] = code
+        folder.with_name(f"{folder.name}.py").write_text(WORKER + code)
         self.executor.submit(number, attempt, SPEC, folder)
         self._numbers.add(number)
 
-    def messages(self, ends: int = 1) -> list[tuple[int, str | Exited]]:
+    def messages(self, ends: int = 1) -> list[tuple[int, Any]]:
         """All that is told until so many runs have ended."""
-        told: list[tuple[int, str | Exited]] = []
+        told: list[tuple[int, Any]] = []
         deadline = time.monotonic() + LONG_S
         while sum(isinstance(message, Exited) for _, message in told) < ends:
             assert time.monotonic() < deadline, told
             told += self.executor.events(1)
         return told
 
-    def first(self) -> tuple[int, str | Exited]:
+    def first(self) -> tuple[int, Any]:
         """The one message that is told next."""
         deadline = time.monotonic() + LONG_S
         while not (told := self.executor.events(1)):
@@ -114,7 +117,7 @@ class Runs:
         self.executor.close()
 
 
-def outcome(told: list[tuple[int, str | Exited]]) -> tuple[list[str], Cause]:
+def outcome(told: list[tuple[int, Any]]) -> tuple[list[str], Cause]:
     """What one run said, and why its worker is gone."""
     *words, exited = [message for _, message in told]
     assert isinstance(exited, Exited)

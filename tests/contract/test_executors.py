@@ -1,5 +1,4 @@
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
@@ -24,10 +23,10 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         yield cluster
 
 
-class Reused(RayExecutor[Any]):
+class Reused(RayExecutor):
     """One for all tests, since another client of Ray costs several seconds of a processor."""
 
-    def begin_anew(self, program: Program[Any]) -> "Reused":
+    def begin_anew(self, program: Program) -> "Reused":
         self._program, self._mailbox, self._ordered = program, Mailbox(), {}
         return self
 

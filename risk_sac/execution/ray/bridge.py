@@ -22,10 +22,9 @@ from ray.exceptions import RayError, RayTaskError
 
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Cause, Cluster, Exited
-from risk_sac.execution.local import Lease, Signs
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.execution.ray.cluster import connected, nodes
-from risk_sac.execution.ray.node import Attendant, Files, Order, Report, read, versions, write
+from risk_sac.execution.ray.node import Attendant, Files, Order, read, versions, write
 from risk_sac.execution.ray.settings import RaySettings, read_settings
 
 logger = logging.getLogger("risk_sac.execution.ray.bridge")
@@ -39,10 +38,6 @@ BEATS = 5  # reports within a lease
 
 class _Over(Exception):
     """Nothing more is wanted of an attempt."""
-
-    def __init__(self, cause: Cause, reason: str) -> None:
-        super().__init__(reason)
-        self.exited = Exited(reason, cause)
 
 
 class Attempt:
@@ -58,11 +53,9 @@ class Attempt:
         self._settings = settings
         self._say = say
         self._lock = threading.Lock()
-        self._given_up = self._told_to_stop = False
+        self._killed = self._told_to_stop = False
         self._stop_by = math.inf
         self._heard_at = time.monotonic()
-        self._lease = Lease(settings.ray_lease_s, math.inf)
-        self._reports = 0
         self._actor: Any = None
 
     @property
@@ -70,28 +63,24 @@ class Attempt:
         """Since its last report, s."""
         return time.monotonic() - self._heard_at
 
-    def give_up(self) -> None:
-        """Kills it; once this returns, it writes no file any more."""
-        with self._lock:
-            self._given_up = True
-        self._kill()
-
     def stop(self, grace_s: float) -> None:
-        """Tells its worker to stop; after the shortest grace time it is killed."""
-        with self._lock:
-            self._told_to_stop = True
-            self._stop_by = min(self._stop_by, time.monotonic() + grace_s)
+        """Tells its worker to stop; after the shortest grace time it is killed.
+
+        Once this returns after no grace time, it writes no file any more.
+        """
+        self._told_to_stop = True
+        self._stop_by = min(self._stop_by, time.monotonic() + grace_s)
         if self.node is None or grace_s <= 0:
             self._kill()
         else:
             self._actor.cancel.remote(grace_s)
 
-    def follow(self) -> Exited:
-        """Passes on what it says from the beginning to the end; returns what became of it."""
+    def follow(self) -> None:
+        """Passes on what it says from the beginning to the end, and what became of it."""
         try:
             exited = self._followed()
         except _Over as over:
-            exited = over.exited
+            exited = Exited(str(over), Cause.STOPPED)
         except RayTaskError as error:
             exited = Exited(_blamed(error.cause or error), Cause.CRASHED)
         except RayError as error:
@@ -99,55 +88,49 @@ class Attempt:
         except OSError as error:
             exited = Exited(_blamed(error), Cause.CRASHED)
         self._kill()
-        if self._told_to_stop and exited.cause is not Cause.ENDED:
-            exited = replace(exited, cause=Cause.ENDED)
-        return exited
+        self._say("said", self.order.id, [replace(exited, cause=Cause.ENDED) if self._told_to_stop else exited])
 
     def _followed(self) -> Exited:
         order, settings = self.order, self._settings
         memory = {"memory": settings.ray_memory_bytes_per_run} if settings.ray_memory_bytes_per_run else {}
+        actor = ray.remote(Attendant).options(
+            num_cpus=settings.ray_cpus_per_run, max_concurrency=2, scheduling_strategy="SPREAD", **memory
+        )
         with self._lock:
-            if self._given_up or self._told_to_stop:
-                raise _Over(Cause.ENDED, "stopped before it began")
-            self._actor = (
-                ray.remote(Attendant)
-                .options(
-                    num_cpus=settings.ray_cpus_per_run,
-                    max_concurrency=2,
-                    scheduling_strategy="SPREAD",
-                    **memory,
-                )
-                .remote()
-            )
+            if self._killed:
+                raise _Over("stopped before it began")
+            self._actor = actor.remote()
         beside: Files = {name: path.read_bytes() for name, path in order.beside.items()}
         self.node = self._answer(self._actor.begin.remote(order, read(order.folder), beside, versions()))
         while True:
-            report: Report = self._answer(self._actor.poll.remote(settings.ray_lease_s / BEATS))
+            messages, files = self._answer(self._actor.poll.remote(settings.ray_lease_s / BEATS))
             with self._lock:
-                if self._given_up:
-                    raise _Over(Cause.ENDED, "another attempt has begun")
-                write(order.folder, report.files)  # before the words that tell of them
-            if report.lines:
-                self._say("said", order.id, report.lines)
-            if report.exited is not None:
-                return report.exited
+                if self._killed:
+                    raise _Over("killed")
+                write(order.folder, files)  # before the words that tell of them
+            exited: Exited | None = messages.pop() if messages and isinstance(messages[-1], Exited) else None
+            if messages:
+                self._say("said", order.id, messages)
+            if exited is not None:
+                return exited
 
     def _answer(self, reference: Any) -> Any:
         """Waits for a call of the actor; without a limit until the worker has begun, since it may wait for room."""
-        looked_at = time.monotonic()
+        silent_s, looked_at = 0.0, time.monotonic()
         while not ray.wait([reference], timeout=LOOK_S)[0]:
             now = time.monotonic()
-            watched_s, looked_at = min(now - looked_at, HELD_UP_S), now
-            if self._given_up:
-                raise _Over(Cause.ENDED, "another attempt has begun")
+            silent_s += min(now - looked_at, HELD_UP_S)
+            looked_at = now
             if now >= self._stop_by + HURRY_S:
-                raise _Over(Cause.ENDED, "killed after its grace time")
-            if self.node is not None and self._lease.passed(watched_s, Signs(self._reports)) is not None:
-                raise _Over(Cause.STOPPED, f"nothing was heard of its node for {self._settings.ray_lease_s:g} s")
-        self._reports, self._heard_at = self._reports + 1, time.monotonic()
+                raise _Over("killed after its grace time")
+            if self.node is not None and silent_s >= self._settings.ray_lease_s:
+                raise _Over(f"nothing was heard of its node for {self._settings.ray_lease_s:g} s")
+        self._heard_at = time.monotonic()
         return ray.get(reference)
 
     def _kill(self) -> None:
+        with self._lock:
+            self._killed = True
         if self._actor is not None:
             with contextlib.suppress(RayError):  # there may be no head any more
                 ray.kill(self._actor)
@@ -177,22 +160,18 @@ class Bridge:
                 continue
             match self._server.recv():
                 case "submit", Order() as order:
-                    begun = self._attempts[order.id] = Attempt(order, self._settings, self.say)
-                    threading.Thread(target=self._follow, args=(begun,), daemon=True).start()
-                case "give up", id_:
-                    if attempt := self._attempts.get(id_):
-                        attempt.give_up()
+                    attempt = self._attempts[order.id] = Attempt(order, self._settings, self.say)
+                    threading.Thread(target=self._follow, args=(attempt,), daemon=True).start()
                 case "cancel", id_, grace_s:
-                    if attempt := self._attempts.get(id_):
-                        attempt.stop(grace_s)
+                    if id_ in self._attempts:
+                        self._attempts[id_].stop(grace_s)
                 case _:
                     return
         logger.error("nothing was heard of the cluster's head for %g s", self._settings.ray_lease_s)
 
     def _follow(self, attempt: Attempt) -> None:
-        exited = attempt.follow()
+        attempt.follow()
         del self._attempts[attempt.order.id]
-        self.say("exited", attempt.order.id, exited)
 
     def _watch(self) -> None:
         """Tells of the cluster every few seconds."""

@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import ray
@@ -18,9 +18,8 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Node
-from risk_sac.execution.postmortem import without_folders
 from risk_sac.execution.ray.caretaker import Caretaker
-from risk_sac.execution.ray.node import Versions, differing, look, versions
+from risk_sac.execution.ray.node import Versions, check, versions
 from risk_sac.execution.ray.settings import RaySettings, variable
 
 logger = logging.getLogger(__name__)
@@ -158,36 +157,32 @@ def _check_nodes(settings: RaySettings) -> None:
         got = f"{settings.ray_cpus_per_run:g} processors and {settings.ray_memory_bytes_per_run} bytes for a run"
         raise ConfigError(variable("ray_cpus_per_run"), f"{got}; no node of the cluster has as much")
     expected = versions()
-    asked = [(node.address, _on_node(look, node.id).remote(settings.ray_scratch_dir)) for node in able]
-    found = [_check_node(address, reference, expected, settings) for address, reference in asked]
+    asked = [(node.address, _on_node(node.id).remote(settings.ray_scratch_dir, expected)) for node in able]
+    found = [_answers(address, reference, expected) for address, reference in asked]
     if not any(found):
         raise ConfigError(ADDRESS, f"all nodes were lost: {', '.join(node.address for node in able)}")
 
 
-def _on_node(function: Callable[..., Any], node: str) -> Any:
+def _on_node(node: str) -> Any:
     strategy = NodeAffinitySchedulingStrategy(node, soft=False)
-    return ray.remote(function).options(num_cpus=0, max_retries=0, scheduling_strategy=strategy)
+    return ray.remote(check).options(num_cpus=0, max_retries=0, scheduling_strategy=strategy)
 
 
-def _check_node(address: str, reference: Any, expected: Versions, settings: RaySettings) -> bool:
-    """Refuses what a node says; False if it was lost, which the head tells after a while."""
+def _answers(address: str, reference: Any, expected: Versions) -> bool:
+    """Passes on what a node refuses; False if it was lost, which the head tells after a while."""
     try:
-        found, refused = ray.get(reference, timeout=PROBE_S)
+        ray.get(reference, timeout=PROBE_S)
     except GetTimeoutError as error:
         raise ConfigError(ADDRESS, f"node {address} does not answer within {PROBE_S:g} s") from error
     except RayTaskError as error:
+        if isinstance(error.cause, ConfigError):
+            raise error.cause from None
         wanted = f"risk-sac {expected['risk-sac']} and all that belongs to it, as on the server's machine"
         got = f"node {address}, which cannot run what is here ({_first(error.cause)})"
         raise ConfigError(ADDRESS, got, wanted) from error
     except RayError as error:
         logger.warning("node %s was lost: %s", address, _first(error))
         return False
-    if other := differing(found, expected):
-        raise ConfigError(ADDRESS, f"on node {address}: {other}")
-    if refused is not None:
-        why = without_folders(_first(refused))
-        got = f"{str(settings.ray_scratch_dir)!r}, which node {address} cannot write to ({why})"
-        raise ConfigError(variable("ray_scratch_dir"), got, "a folder that every node makes for itself")
     return True
 
 

@@ -9,17 +9,18 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Generic
+from typing import Any
 
 from risk_sac.config import SHIPPED, RunSpec
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import Cause, Cluster, Exited, Program, Word
+from risk_sac.execution.executor import Cause, Cluster, Exited, Program
 from risk_sac.execution.mailbox import Mailbox
+from risk_sac.execution.messages import Event
 from risk_sac.execution.ray.node import Order
 from risk_sac.execution.ray.settings import read_settings, variable
 from risk_sac.scenario import library
@@ -42,7 +43,7 @@ class _Ordered:
     told_to_stop: bool = False
 
 
-class RayExecutor(Generic[Word]):
+class RayExecutor:
     """Orders attempts and passes on what is said of them.
 
     A thread listens to the bridge. When the cluster is lost, what was at work on it is told to be lost, and what is
@@ -52,7 +53,7 @@ class RayExecutor(Generic[Word]):
       cluster: as it was a few seconds ago; without nodes while it is lost.
     """
 
-    def __init__(self, program: Program[Word]) -> None:
+    def __init__(self, program: Program) -> None:
         """Reaches the cluster.
 
         Raises:
@@ -66,7 +67,7 @@ class RayExecutor(Generic[Word]):
         self.cluster = Cluster()
         self._program = program
         self._scratch = read_settings().ray_scratch_dir
-        self._mailbox: Mailbox[Word] = Mailbox()
+        self._mailbox = Mailbox()
         self._ordered: dict[str, _Ordered] = {}
         self._lock = threading.RLock()
         self._closed = threading.Event()
@@ -90,7 +91,7 @@ class RayExecutor(Generic[Word]):
         with self._lock:
             for overtaken in [each for each in self._ordered.values() if each.number == number]:
                 del self._ordered[overtaken.order.id]
-                self._say("give up", overtaken.order.id)
+                self._say("cancel", overtaken.order.id, 0)
             self._ordered[order.id] = ordered = _Ordered(order, number, attempt)
             ordered.sent = self._say("submit", order)
 
@@ -107,23 +108,10 @@ class RayExecutor(Generic[Word]):
             place = (library.library() / spec.family).resolve()
             beside |= {f"places/{spec.family}/{file.name}": file for file in place.iterdir()}
             environment[library.VARIABLE] = str(scratch / "places")
-        program = self._program
-        return Order(
-            id=id_,
-            spec=spec,
-            folder=folder,
-            scratch=scratch,
-            arguments=tuple(program.arguments(spec, scratch / folder.name)),
-            beside=beside,
-            environment=environment | dict(program.environment),
-            log=program.log,
-            hear=program.hear,
-            lease_s=program.lease_s,
-            stall_s=program.stall_s,
-            linger_s=program.linger_s,
-        )
+        program = replace(self._program, environment=environment)
+        return Order(id=id_, spec=spec, program=program, folder=folder, scratch=scratch, beside=beside)
 
-    def events(self, timeout_s: float) -> list[tuple[int, Word | Exited]]:
+    def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """See `Executor.events`."""
         return self._mailbox.take(timeout_s)
 
@@ -139,7 +127,7 @@ class RayExecutor(Generic[Word]):
                 if ordered.sent:
                     self._say("cancel", ordered.order.id, grace_s)
                 else:
-                    self._end(ordered, Exited("stopped before it began", Cause.ENDED))
+                    self._pass_on(ordered, Exited("stopped before it began"))
 
     def close(self) -> None:
         """Leaves the cluster; actors that are still there end."""
@@ -169,7 +157,7 @@ class RayExecutor(Generic[Word]):
                 self._bridge, self.cluster = None, Cluster()
                 for ordered in [each for each in self._ordered.values() if each.sent]:
                     cause = Cause.ENDED if ordered.told_to_stop else Cause.LOST
-                    self._end(ordered, Exited("the cluster was lost", cause))
+                    self._pass_on(ordered, Exited("the cluster was lost", cause))
             bridge = self._reached_again()
 
     def _hear(self, kind: str, *content: Any) -> None:
@@ -178,18 +166,8 @@ class RayExecutor(Generic[Word]):
                 before, (self.cluster,) = self.cluster.slots, content
                 if before != self.cluster.slots:
                     self._mailbox.wake()
-                return
-            id_, said = content
-            ordered = self._ordered.get(id_)
-            if ordered is None:
-                return  # an attempt that was overtaken
-            if kind == "exited":
-                self._end(ordered, said)
-                return
-            for line in said:
-                word = self._program.hear(line).word
-                if word is not None:
-                    self._mailbox.put(ordered.number, ordered.attempt, word)
+            elif content[0] in self._ordered:  # else another attempt has overtaken it
+                self._pass_on(self._ordered[content[0]], *content[1])
 
     def _reached_again(self) -> "_Bridge | None":
         """Another bridge, once there is a cluster; None if this was closed."""
@@ -212,9 +190,11 @@ class RayExecutor(Generic[Word]):
             return bridge
         return None
 
-    def _end(self, ordered: _Ordered, exited: Exited) -> None:
-        del self._ordered[ordered.order.id]
-        self._mailbox.put(ordered.number, ordered.attempt, exited)
+    def _pass_on(self, ordered: _Ordered, *messages: Event | Exited) -> None:
+        for message in messages:
+            self._mailbox.put(ordered.number, ordered.attempt, message)
+            if isinstance(message, Exited):
+                del self._ordered[ordered.order.id]
 
 
 class _Bridge:

@@ -9,17 +9,18 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 from risk_sac.config import RunSpec
 from risk_sac.egos.registry import installed
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import Exited, Heard, Program
+from risk_sac.execution.executor import Exited, Program
 from risk_sac.execution.local import LocalExecutor
+from risk_sac.execution.messages import Event
+from risk_sac.execution.postmortem import without_folders
 from risk_sac.execution.ray.caretaker import Caretaker
 from risk_sac.execution.ray.settings import variable
 from risk_sac.run_folder.durable import replace_file
@@ -41,25 +42,10 @@ class Order:
 
     id: str  # of this attempt and no other, of this server or an earlier one
     spec: RunSpec
+    program: Program
     folder: Path  # of the run, on the server's machine
     scratch: Path  # of the attempt, on its node
-    arguments: tuple[str, ...]  # for the Python interpreter
     beside: Mapping[str, Path]  # what the worker reads beside the run's folder, by its path in `scratch`
-    environment: Mapping[str, str]
-    log: str
-    hear: Callable[[bytes], Heard[Any]]
-    lease_s: float
-    stall_s: float
-    linger_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Report:
-    """What has happened to an attempt since the last report."""
-
-    lines: tuple[bytes, ...] = ()  # that the worker has said
-    files: Files = field(default_factory=dict)  # written before it said so
-    exited: Exited | None = None  # in the last report
 
 
 class Attendant:
@@ -69,14 +55,12 @@ class Attendant:
         """Starts the worker; returns Ray's name of this node.
 
         Raises:
-          ConfigError: the node has other versions, or its folder for attempts belongs to somebody else.
+          ConfigError: see `check`.
           OSError: the folder cannot be written.
         """
         import ray
 
-        if other := differing(versions(), expected):
-            raise ConfigError(variable("ray_address"), f"a node has joined whose {other}")
-        scratch_dir(order.scratch.parent)
+        check(order.scratch.parent, expected)
         order.scratch.mkdir(mode=0o700)
         self._caretaker = Caretaker(order.scratch)
         self._folder = order.scratch / order.folder.name
@@ -85,34 +69,24 @@ class Attendant:
         write(order.scratch, beside)
         self._seen = signatures(self._folder)
         self._grown_due = 0.0
-        self._local = LocalExecutor(
-            Program(
-                arguments=lambda spec, folder: order.arguments,
-                log=order.log,
-                hear=_raw(order.hear),
-                lease_s=order.lease_s,
-                stall_s=order.stall_s,
-                linger_s=order.linger_s,
-                environment=order.environment,
-            )
-        )
+        self._local = LocalExecutor(order.program)
         self._local.submit(1, 1, order.spec, self._folder)
         if (pid := self._local.pid(1)) is not None:
             self._caretaker.watch(pid)
         return str(ray.get_runtime_context().get_node_id())
 
-    def poll(self, wait_s: float) -> Report:
-        """What has happened since the last call, waiting up to `wait_s` for something."""
+    def poll(self, wait_s: float) -> tuple[list[Event | Exited], Files]:
+        """Returns messages since the last call and files written before them, waiting up to `wait_s` for a message."""
         heard = self._local.events(wait_s)
         if heard and not isinstance(heard[-1][1], Exited):
             time.sleep(GATHER_S)
             heard += self._local.events(0)
-        lines = tuple(message for _, message in heard if not isinstance(message, Exited))
-        exited = next((message for _, message in heard if isinstance(message, Exited)), None)
-        files = self._changed(exited is not None)
-        if exited is not None:
+        messages = [message for _, message in heard]
+        ended = bool(messages) and isinstance(messages[-1], Exited)
+        files = self._changed(ended)
+        if ended:
             self._caretaker.act()
-        return Report(lines, files, exited)
+        return messages, files
 
     def cancel(self, grace_s: float) -> None:
         """Tells the worker to stop."""
@@ -145,18 +119,25 @@ class Attendant:
                 grown = False
 
 
-def scratch_dir(folder: Path) -> None:
-    """Makes the folder for all attempts of this node.
+def check(scratch: Path, expected: Versions) -> None:
+    """Checks this node's versions, and its folder for attempts.
 
     Raises:
-      ConfigError: it belongs to another user.
-      OSError: it cannot be written.
+      ConfigError: it has other versions than the server's machine, or cannot use the folder.
     """
-    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-    if folder.stat().st_uid != os.getuid():
-        got = f"{str(folder)!r}, which belongs to another user on this node"
-        raise ConfigError(variable("ray_scratch_dir"), got, "a folder of its own")
-    tempfile.TemporaryFile(dir=folder).close()
+    import ray
+
+    node = f"node {ray.util.get_node_ip_address()}"
+    if other := differing(versions(), expected):
+        raise ConfigError(variable("ray_address"), f"on {node}: {other}")
+    try:
+        scratch.mkdir(parents=True, exist_ok=True, mode=0o700)
+        tempfile.TemporaryFile(dir=scratch).close()
+        if scratch.stat().st_uid != os.getuid():
+            raise PermissionError("it belongs to another user")
+    except OSError as error:
+        got = f"{str(scratch)!r}, which {node} cannot write to ({without_folders(str(error))})"
+        raise ConfigError(variable("ray_scratch_dir"), got, "a folder that every node makes for itself") from error
 
 
 def signatures(folder: Path) -> dict[str, tuple[int, int, int]]:
@@ -185,15 +166,6 @@ def write(folder: Path, files: Files) -> None:
         replace_file(path, content)
 
 
-def look(folder: Path) -> tuple[Versions, str | None]:
-    """What has to hold on a node: its versions, and what keeps it from its folder for attempts."""
-    try:
-        scratch_dir(folder)
-    except (OSError, ConfigError) as error:
-        return versions(), str(error)
-    return versions(), None
-
-
 def versions() -> Versions:
     """Of Python, of packages, and of the egos that are installed, on this machine."""
     found = {"python": ".".join(map(str, sys.version_info[:3]))}
@@ -216,13 +188,3 @@ def differing(found: Versions, expected: Versions) -> str:
         if found.get(name, MISSING) != wanted
     ]
     return f"{', '.join(other)}, as on the server's machine" if other else ""
-
-
-def _raw(hear: Callable[[bytes], Heard[Any]]) -> Callable[[bytes], Heard[bytes]]:
-    """Understands a line as the server will, and hands it on as it is."""
-
-    def heard(line: bytes) -> Heard[bytes]:
-        understood = hear(line)
-        return Heard(None if understood.word is None else line, understood.progress, understood.last)
-
-    return heard

@@ -6,8 +6,9 @@ import psutil
 import pytest
 
 from risk_sac.config.campaign import Requirement
-from risk_sac.execution.executor import Cause, Exited, Heard, Program
+from risk_sac.execution.executor import Cause, Exited, Program
 from risk_sac.execution.local import LocalExecutor
+from risk_sac.execution.messages import Heard
 from tests.contract.executor_contract import ALIVE, SPEC, Runs, outcome
 
 
@@ -99,7 +100,7 @@ def large_run():
 
 
 def execute(code, folder, **program):
-    executor = LocalExecutor(Program(arguments=lambda spec, folder: ["-c", code], log="log", **program))
+    executor = LocalExecutor(Program(arguments=("-c", code), log="log", **program))
     executor.submit(1, 1, large_run(), folder)
     return executor
 

@@ -4,8 +4,7 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from risk_sac.execution.executor import Heard
-from risk_sac.execution.messages import Failed, Finished, Heartbeat, Started, decode, encode, hear
+from risk_sac.execution.messages import Failed, Finished, Heard, Heartbeat, Started, decode, encode, hear
 from risk_sac.records import Outcome
 
 

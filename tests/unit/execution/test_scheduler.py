@@ -4,10 +4,10 @@ import psutil
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import Program
+from risk_sac.execution.executor import FOLDER, Program
 from risk_sac.execution.jobs import ATTEMPTS, LOG, Job, execute
 from risk_sac.execution.local import LocalExecutor
-from risk_sac.execution.messages import Failed, hear
+from risk_sac.execution.messages import Failed
 
 SPEC = RunSpec(family="low", method="random", seed=0)
 BEGIN = """
@@ -31,7 +31,7 @@ def job(tmp_path):
 
 
 def run(code, job, progress=lambda jobs: None, stopping=lambda: False):
-    program = Program(arguments=lambda spec, folder: ["-c", BEGIN + code, str(folder)], log=LOG, hear=hear)
+    program = Program(arguments=("-c", BEGIN + code, FOLDER), log=LOG)
     execute([job], LocalExecutor(program), 1, progress, stopping)
 
 

@@ -1,12 +1,11 @@
 import math
 import queue
 import time
-from pathlib import Path
 
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.execution.executor import Cause, Exited
+from risk_sac.execution.executor import FOLDER, Cause, Exited
 from risk_sac.execution.messages import Failed, Finished
 from service.errors import OutdatedError
 from service.runs.manager import Manager, worker_program
@@ -111,5 +110,5 @@ def test_what_was_queued_before_it_was_refused_fails_and_holds_nobody_up(store, 
 def test_the_worker_is_the_one_of_the_settings_and_hears_its_folder_and_its_limits():
     settings = ServiceSettings(worker_module="other", worker_niceness=7, grace_s=1, lease_s=2, stall_s=3, replays=2)
     program = worker_program(settings)
-    assert program.arguments(SPEC.runs()[0], Path("/data/run")) == ["-m", "other", "/data/run", "7", str(4 << 30), "2"]
+    assert program.arguments == ("-m", "other", FOLDER, "7", str(4 << 30), "2")
     assert (program.linger_s, program.lease_s, program.stall_s, program.log) == (1, 2, 3, "worker.log")
