@@ -67,14 +67,9 @@ def without_folders(text: str, own: Path | None = None) -> str:
     return _FOLDERS.sub("", text)
 
 
-def signal_name(number: int) -> str:
-    """Name of a signal."""
-    return _SIGNAL_NAMES.get(number, f"signal {number}")
-
-
 def _reason(status: int, log: WorkerLog) -> str | None:
     if status < 0:
-        return f"worker was killed by {signal_name(-status)}"
+        return f"worker was killed by {_SIGNAL_NAMES.get(-status, f'signal {-status}')}"
     if status > 0:
         return f"worker exited with status {status}: {log.tail()}"
     return None

@@ -17,7 +17,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -171,7 +171,6 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
     with Recorder(spec, folder, reporter) as recorder:
         summary = train(spec, folder, recorder)
         recorder.finish(summary)
-    versions: Mapping[str, str] = summary.versions
     found, finished = dict[Path, Verified](), summary.finished
     if finished and replays:
         reporter.keep_going()
@@ -182,7 +181,7 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
         metrics=summary.metrics,
         evaluation=summary.evaluation,
         digest=summary.digest,
-        versions=versions,
+        versions=summary.versions,
         wall_s=summary.wall_s,
         repetitions=found[folder].episodes if folder in found else {},
     )

@@ -27,7 +27,7 @@ class Reused(RayExecutor):
     """One for all tests, since another client of Ray costs several seconds of a processor."""
 
     def begin_anew(self, program: Program) -> "Reused":
-        self._program, self._mailbox, self._ordered = program, Mailbox(), {}
+        self._program, self._mailbox, self._orders = program, Mailbox(), {}
         return self
 
     def close(self) -> None:

@@ -16,15 +16,15 @@ import ray
 from ray.exceptions import GetTimeoutError, RayError, RayTaskError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
+from risk_sac import __version__
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Node
 from risk_sac.execution.ray.caretaker import Caretaker
-from risk_sac.execution.ray.node import Versions, check, versions
-from risk_sac.execution.ray.settings import RaySettings, variable
+from risk_sac.execution.ray.node import check, versions
+from risk_sac.execution.ray.settings import ADDRESS, RaySettings, variable
 
 logger = logging.getLogger(__name__)
 
-ADDRESS = variable("ray_address")
 TOKEN_MODE = "RAY_AUTH_MODE"  # Ray's own
 HEAD_S = 10.0
 PROBE_S = 60.0
@@ -156,19 +156,17 @@ def _check_nodes(settings: RaySettings) -> None:
     if not able:
         got = f"{settings.ray_cpus_per_run:g} processors and {settings.ray_memory_bytes_per_run} bytes for a run"
         raise ConfigError(variable("ray_cpus_per_run"), f"{got}; no node of the cluster has as much")
-    expected = versions()
-    asked = [(node.address, _on_node(node.id).remote(settings.ray_scratch_dir, expected)) for node in able]
-    found = [_answers(address, reference, expected) for address, reference in asked]
-    if not any(found):
+    asked = {}
+    for node in able:
+        there = NodeAffinitySchedulingStrategy(node.id, soft=False)
+        task = ray.remote(check).options(num_cpus=0, max_retries=0, scheduling_strategy=there)
+        asked[task.remote(settings.ray_scratch_dir, versions())] = node.address
+    answered = [_answers(address, reference) for reference, address in asked.items()]
+    if not any(answered):
         raise ConfigError(ADDRESS, f"all nodes were lost: {', '.join(node.address for node in able)}")
 
 
-def _on_node(node: str) -> Any:
-    strategy = NodeAffinitySchedulingStrategy(node, soft=False)
-    return ray.remote(check).options(num_cpus=0, max_retries=0, scheduling_strategy=strategy)
-
-
-def _answers(address: str, reference: Any, expected: Versions) -> bool:
+def _answers(address: str, reference: Any) -> bool:
     """Passes on what a node refuses; False if it was lost, which the head tells after a while."""
     try:
         ray.get(reference, timeout=PROBE_S)
@@ -177,7 +175,7 @@ def _answers(address: str, reference: Any, expected: Versions) -> bool:
     except RayTaskError as error:
         if isinstance(error.cause, ConfigError):
             raise error.cause from None
-        wanted = f"risk-sac {expected['risk-sac']} and all that belongs to it, as on the server's machine"
+        wanted = f"risk-sac {__version__} and all that belongs to it, as on the server's machine"
         got = f"node {address}, which cannot run what is here ({_first(error.cause)})"
         raise ConfigError(ADDRESS, got, wanted) from error
     except RayError as error:

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -22,25 +22,13 @@ from risk_sac.execution.executor import Cause, Cluster, Exited, Program
 from risk_sac.execution.mailbox import Mailbox
 from risk_sac.execution.messages import Event
 from risk_sac.execution.ray.node import Order
-from risk_sac.execution.ray.settings import read_settings, variable
+from risk_sac.execution.ray.settings import ADDRESS, read_settings
 from risk_sac.scenario import library
 
 logger = logging.getLogger(__name__)
 
 FIRST_WAIT_S, LONGEST_WAIT_S = 1.0, 15.0  # between two attempts to reach a cluster that was lost
 CLOSE_S = 10.0
-ADDRESS = variable("ray_address")
-
-
-@dataclass(slots=True)
-class _Ordered:
-    """An attempt that has not ended."""
-
-    order: Order
-    number: int
-    attempt: int
-    sent: bool = False
-    told_to_stop: bool = False
 
 
 class RayExecutor:
@@ -68,7 +56,7 @@ class RayExecutor:
         self._program = program
         self._scratch = read_settings().ray_scratch_dir
         self._mailbox = Mailbox()
-        self._ordered: dict[str, _Ordered] = {}
+        self._orders: dict[str, Order] = {}  # whose attempts have not ended
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._bridge: _Bridge | None = _Bridge()
@@ -84,18 +72,18 @@ class RayExecutor:
         self._mailbox.admit(number, attempt)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            order = self._order(spec, folder.resolve())
+            order = self._order(number, attempt, spec, folder.resolve())
         except OSError:
             self._mailbox.dismiss(number)
             raise
         with self._lock:
-            for overtaken in [each for each in self._ordered.values() if each.number == number]:
-                del self._ordered[overtaken.order.id]
-                self._say("cancel", overtaken.order.id, 0)
-            self._ordered[order.id] = ordered = _Ordered(order, number, attempt)
-            ordered.sent = self._say("submit", order)
+            for overtaken in self._orders_of(number):
+                del self._orders[overtaken.id]
+                self._say("cancel", overtaken.id, 0)
+            self._orders[order.id] = order
+            self._say("submit", order)
 
-    def _order(self, spec: RunSpec, folder: Path) -> Order:
+    def _order(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> Order:
         """An attempt, with the egos that the server's operator has registered and the run's place."""
         id_ = secrets.token_hex(8)
         scratch = self._scratch / f"{folder.name}-{id_}"
@@ -109,7 +97,16 @@ class RayExecutor:
             beside |= {f"places/{spec.family}/{file.name}": file for file in place.iterdir()}
             environment[library.VARIABLE] = str(scratch / "places")
         program = replace(self._program, environment=environment)
-        return Order(id=id_, spec=spec, program=program, folder=folder, scratch=scratch, beside=beside)
+        return Order(
+            id=id_,
+            number=number,
+            attempt=attempt,
+            spec=spec,
+            program=program,
+            folder=folder,
+            scratch=scratch,
+            beside=beside,
+        )
 
     def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """See `Executor.events`."""
@@ -122,12 +119,11 @@ class RayExecutor:
     def cancel(self, number: int, grace_s: float) -> None:
         """See `Executor.cancel`."""
         with self._lock:
-            for ordered in [each for each in self._ordered.values() if each.number == number]:
-                ordered.told_to_stop = True
-                if ordered.sent:
-                    self._say("cancel", ordered.order.id, grace_s)
-                else:
-                    self._pass_on(ordered, Exited("stopped before it began"))
+            for order in self._orders_of(number):
+                order.told_to_stop = True
+                self._say("cancel", order.id, grace_s)
+                if self._bridge is None:
+                    self._pass_on(order, Exited("stopped before it began"))
 
     def close(self) -> None:
         """Leaves the cluster; actors that are still there end."""
@@ -137,12 +133,13 @@ class RayExecutor:
         if bridge is not None:
             bridge.close()
 
-    def _say(self, kind: str, *content: Any) -> bool:
-        """Tells the bridge something; False if there is none at present."""
-        with self._lock:
-            if self._bridge is not None:
-                self._bridge.say(kind, *content)
-            return self._bridge is not None
+    def _orders_of(self, number: int) -> list[Order]:
+        return [order for order in self._orders.values() if order.number == number]
+
+    def _say(self, kind: str, *content: Any) -> None:
+        """Tells the bridge something; the next one is told what is ordered then."""
+        if self._bridge is not None:
+            self._bridge.say(kind, *content)
 
     def _work(self, bridge: "_Bridge | None") -> None:
         """Listens to one bridge after the other."""
@@ -155,9 +152,9 @@ class RayExecutor:
             logger.error("the cluster is lost; runs go on from their checkpoints once there is one again")
             with self._lock:
                 self._bridge, self.cluster = None, Cluster()
-                for ordered in [each for each in self._ordered.values() if each.sent]:
-                    cause = Cause.ENDED if ordered.told_to_stop else Cause.LOST
-                    self._pass_on(ordered, Exited("the cluster was lost", cause))
+                for order in list(self._orders.values()):
+                    cause = Cause.ENDED if order.told_to_stop else Cause.LOST
+                    self._pass_on(order, Exited("the cluster was lost", cause))
             bridge = self._reached_again()
 
     def _hear(self, kind: str, *content: Any) -> None:
@@ -166,8 +163,8 @@ class RayExecutor:
                 before, (self.cluster,) = self.cluster.slots, content
                 if before != self.cluster.slots:
                     self._mailbox.wake()
-            elif content[0] in self._ordered:  # else another attempt has overtaken it
-                self._pass_on(self._ordered[content[0]], *content[1])
+            elif content[0] in self._orders:  # else another attempt has overtaken it
+                self._pass_on(self._orders[content[0]], *content[1])
 
     def _reached_again(self) -> "_Bridge | None":
         """Another bridge, once there is a cluster; None if this was closed."""
@@ -184,17 +181,17 @@ class RayExecutor:
                     bridge.close()
                     return None
                 self._bridge = bridge
-                for ordered in self._ordered.values():  # which were submitted meanwhile
-                    ordered.sent = self._say("submit", ordered.order)
+                for order in self._orders.values():  # which were submitted meanwhile
+                    bridge.say("submit", order)
             logger.info("there is a cluster again")
             return bridge
         return None
 
-    def _pass_on(self, ordered: _Ordered, *messages: Event | Exited) -> None:
+    def _pass_on(self, order: Order, *messages: Event | Exited) -> None:
         for message in messages:
-            self._mailbox.put(ordered.number, ordered.attempt, message)
+            self._mailbox.put(order.number, order.attempt, message)
             if isinstance(message, Exited):
-                del self._ordered[ordered.order.id]
+                del self._orders[order.id]
 
 
 class _Bridge:

@@ -22,7 +22,7 @@ from risk_sac.execution.local import LocalExecutor
 from risk_sac.execution.messages import Event
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.execution.ray.caretaker import Caretaker
-from risk_sac.execution.ray.settings import variable
+from risk_sac.execution.ray.settings import ADDRESS, variable
 from risk_sac.run_folder.durable import replace_file
 
 GATHER_S = 0.25  # words within it are handed on at once
@@ -36,16 +36,19 @@ MISSING = "missing"
 Versions = Mapping[str, str]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True)
 class Order:
     """An attempt at a run."""
 
     id: str  # of this attempt and no other, of this server or an earlier one
+    number: int
+    attempt: int
     spec: RunSpec
     program: Program
     folder: Path  # of the run, on the server's machine
     scratch: Path  # of the attempt, on its node
     beside: Mapping[str, Path]  # what the worker reads beside the run's folder, by its path in `scratch`
+    told_to_stop: bool = False
 
 
 class Attendant:
@@ -129,7 +132,7 @@ def check(scratch: Path, expected: Versions) -> None:
 
     node = f"node {ray.util.get_node_ip_address()}"
     if other := differing(versions(), expected):
-        raise ConfigError(variable("ray_address"), f"on {node}: {other}")
+        raise ConfigError(ADDRESS, f"on {node}: {other}")
     try:
         scratch.mkdir(parents=True, exist_ok=True, mode=0o700)
         tempfile.TemporaryFile(dir=scratch).close()

@@ -51,3 +51,6 @@ def read_settings() -> RaySettings:
 def variable(name: str) -> str:
     """The environment variable of a setting."""
     return f"RISK_SAC_{name.upper()}"
+
+
+ADDRESS = variable("ray_address")
