@@ -160,11 +160,11 @@ class Bridge:
                 continue
             match self._server.recv():
                 case "submit", Order() as order:
-                    attempt = self._attempts[order.id] = Attempt(order, self._settings, self.say)
-                    threading.Thread(target=self._follow, args=(attempt,), daemon=True).start()
+                    begun = self._attempts[order.id] = Attempt(order, self._settings, self.say)
+                    threading.Thread(target=self._follow, args=(begun,), daemon=True).start()
                 case "cancel", id_, grace_s:
-                    if id_ in self._attempts:
-                        self._attempts[id_].stop(grace_s)
+                    if attempt := self._attempts.get(id_):
+                        attempt.stop(grace_s)
                 case _:
                     return
         logger.error("nothing was heard of the cluster's head for %g s", self._settings.ray_lease_s)
