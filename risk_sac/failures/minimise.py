@@ -3,11 +3,11 @@
 Source: delta debugging, Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input" (IEEE TSE 28, 2002).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
 from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -25,9 +25,7 @@ SEGMENT = round(0.5 / STEP_S)  # steps
 AMPLITUDES = (0.5, 0.7, 0.85)  # of what is left, the least first
 
 Unit = TypeVar("Unit")
-Segment = tuple[int, int]  # an adversary, and a segment of its actions
-Channel = tuple[int, int]  # a column of the actions, and a segment
-Cell = tuple[slice, slice | int]  # steps and columns of the actions
+Cell = tuple[slice, slice]  # steps and columns of the actions
 
 
 def minimise(bundle: Bundle, most: int = MOST) -> Bundle:
@@ -126,31 +124,23 @@ def _grade(collision: Collision) -> Grade | None:
 def _active_adversaries(search: _Search) -> list[int]:
     """Returns the adversaries that act, the striker last."""
     names = search.stage.env.problem.family.adversaries
-    active = [k for k in range(len(names)) if search.left.actions[:, 2 * k : 2 * k + 2].any()]
+    active = [k for k in range(len(names)) if search.left.actions[:, _columns(k)].any()]
     return sorted(active, key=lambda k: names[k] == search.stage.collision.other_id)
 
 
-def _active_columns(search: _Search) -> list[int]:
-    return np.flatnonzero(search.left.actions.any(axis=0)).tolist()
-
-
-# What the adversaries may not need to do, the coarsest first: units that are there, and the actions of a unit.
-REDUCTIONS: tuple[tuple[Callable[[_Search], list[Any]], Callable[[Any], Cell]], ...] = (
-    (_active_adversaries, lambda k: (slice(None), slice(2 * k, 2 * k + 2))),
-    (_active_columns, lambda column: (slice(None), column)),
-    (lambda search: _segments_of(search.left), lambda unit: (_rows(unit[1]), slice(2 * unit[0], 2 * unit[0] + 2))),
-    (lambda search: _channels_of(search.left), lambda unit: (_rows(unit[1]), unit[0])),
-)
+def _units(search: _Search) -> Iterator[list[Cell]]:
+    """Yields what the adversaries may not need to do, the coarsest first, each time of what is left by then."""
+    always = slice(None)
+    yield [(always, _columns(k)) for k in _active_adversaries(search)]
+    yield [(always, slice(c, c + 1)) for c in np.flatnonzero(search.left.actions.any(axis=0)).tolist()]
+    yield [(_rows(s), _columns(k)) for k, s in _segments_of(search.left)]
+    yield [(_rows(s), slice(c, c + 1)) for c, s in _channels_of(search.left)]
 
 
 def _reduce_actions(search: _Search) -> None:
     """Leaves adversaries to SUMO: altogether, their drive or steering, or for 0.5 s; then weakens what is left."""
-
-    def unneeded(cell: Callable[[Any], Cell], chunk: Sequence[Any]) -> bool:
-        return search.take(_zeroed(search.left, [cell(unit) for unit in chunk]))
-
-    for units, cell in REDUCTIONS:
-        without(units(search), partial(unneeded, cell))
+    for units in _units(search):
+        without(units, lambda cells: search.take(_zeroed(search.left, cells)))
     while any(search.take(_weaker(search.left, factor)) for factor in AMPLITUDES):
         pass
 
@@ -196,14 +186,19 @@ def _rows(segment: int) -> slice:
     return slice(segment * SEGMENT, (segment + 1) * SEGMENT)
 
 
-def _channels_of(variant: Variant) -> list[Channel]:
-    """Those in which something is done, the earliest first."""
+def _columns(adversary: int) -> slice:
+    return slice(2 * adversary, 2 * adversary + 2)
+
+
+def _channels_of(variant: Variant) -> list[tuple[int, int]]:
+    """Returns the columns and segments in which something is done, the earliest first."""
     count = -(-len(variant.actions) // SEGMENT)
     columns = range(variant.actions.shape[1])
     return [(c, s) for s in range(count) for c in columns if variant.actions[_rows(s), c].any()]
 
 
-def _segments_of(variant: Variant) -> list[Segment]:
+def _segments_of(variant: Variant) -> list[tuple[int, int]]:
+    """Returns the adversaries and segments in which something is done."""
     return list(dict.fromkeys((column // 2, segment) for column, segment in _channels_of(variant)))
 
 

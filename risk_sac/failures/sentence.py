@@ -1,6 +1,7 @@
 """Describes a failure in one sentence: where the striker was, what it did, and how the ego responded."""
 
 import math
+from itertools import groupby
 
 import numpy as np
 
@@ -52,20 +53,17 @@ def _who(series: Series, striker: int, at: int) -> str:
 
 def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
     """Returns what a striker does of its own, and since which frame; None if it goes on as it did."""
-    parts: list[tuple[int, str]] = []
     accel, across = series["accel_mps2"][begins:, striker], series["lateral_mps"][begins:, striker]
-    if series["kind"][striker] == Kind.VEHICLE:
-        for way, sign in (("left", 1.0), ("right", -1.0)):
-            if frames := _lasting(sign * across, ACROSS_MPS):
-                peak = float((sign * across[frames]).max())
-                parts.append((frames[0], f"moves {way} at {peak:.1f} m/s for {len(frames) * STEP_S:.1f} s"))
-        limit = ACTS_MPS2
-    else:
-        limit = ACTS_MPS2 / 3
-    for verb, sign in (("brakes", -1.0), ("speeds up", 1.0)):
-        if frames := _lasting(sign * accel, limit):
-            peak = float((sign * accel[frames]).max())
-            parts.append((frames[0], f"{verb} at {peak:.1f} m/s² for {len(frames) * STEP_S:.1f} s"))
+    vehicle = series["kind"][striker] == Kind.VEHICLE
+    acts = ACTS_MPS2 if vehicle else ACTS_MPS2 / 3
+    motions = [("brakes", -accel, acts, "m/s²"), ("speeds up", accel, acts, "m/s²")]
+    if vehicle:
+        motions += [("moves left", across, ACROSS_MPS, "m/s"), ("moves right", -across, ACROSS_MPS, "m/s")]
+    parts = []
+    for verb, values, limit, unit in motions:
+        if frames := _lasting(values, limit):
+            lasts_s = len(frames) * STEP_S
+            parts.append((frames[0], f"{verb} at {values[frames].max():.1f} {unit} for {lasts_s:.1f} s"))
     if not parts:
         return None
     parts.sort()
@@ -74,15 +72,8 @@ def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
 
 def _lasting(values: Floats, limit: float) -> list[int]:
     """Returns the last stretch of two frames or more above a limit."""
-    frames: list[int] = []
-    for t in range(len(values) - 1, -1, -1):
-        if values[t] > limit:
-            frames.insert(0, t)
-        elif len(frames) >= 2:
-            break
-        else:
-            frames = []
-    return frames if len(frames) >= 2 else []
+    stretches = [list(frames) for above, frames in groupby(range(len(values)), lambda t: values[t] > limit) if above]
+    return next((frames for frames in reversed(stretches) if len(frames) >= 2), [])
 
 
 def _response(series: Series, began: int) -> str:
