@@ -57,24 +57,26 @@ def far(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Found, str]]
         yield found(folder, "far"), table
 
 
-def test_failures_of_an_ego_in_our_process_repeat(near: Found, tell: Tell) -> None:
-    assert tell("verify", near.run)[0] == 0
-    verified = read_verified(near.run, read_results(near.run).digest)
+def check_repeats(run: Path, tell: Tell) -> None:
+    assert tell("verify", run)[0] == 0
+    verified = read_verified(run, read_results(run).digest)
     assert verified is not None
     assert verified.episodes
     assert not verified.flaky
+
+
+def test_failures_of_an_ego_in_our_process_repeat(near: Found, tell: Tell) -> None:
+    check_repeats(near.run, tell)
     status, out, _ = tell("replay", near.bundle)
     assert status == 0
     assert "every array is as recorded" in out
 
 
 def test_they_have_pictures_twins_and_a_core(near: Found, tell: Tell, tmp_path: Path) -> None:
+    index = read_bundle(near.bundle).manifest.episode.index
     for twin in ("idle", "default", "r157"):
         file = tmp_path / f"{twin}.png"
-        assert (
-            tell("show", near.run, read_bundle(near.bundle).manifest.episode.index, "--twin", twin, "--out", file)[0]
-            == 0
-        )
+        assert tell("show", near.run, index, "--twin", twin, "--out", file)[0] == 0
         assert file.read_bytes().startswith(b"\x89PNG")
     minimal = minimise(read_bundle(near.bundle), most=3 * (COPIES + 1))
     assert minimal.manifest.core is not None
@@ -113,11 +115,7 @@ def test_failures_of_an_ego_in_another_process_repeat(
     failure, table = far
     register(monkeypatch, tmp_path, table)
     assert read_results(failure.run).digest == read_results(near.run).digest
-    assert tell("verify", failure.run)[0] == 0
-    verified = read_verified(failure.run, read_results(failure.run).digest)
-    assert verified is not None
-    assert verified.episodes
-    assert not verified.flaky
+    check_repeats(failure.run, tell)
     assert tell("replay", failure.bundle)[0] == 0
     with closing(Stage(read_bundle(failure.bundle)).env):
         pass  # it happens again

@@ -81,21 +81,27 @@ def test_every_distinct_failure_repeats_to_the_bit(run: Path, capsys: pytest.Cap
     assert (run / VERIFIED).stat().st_mtime_ns == noted
 
 
+def tampered_with(run: Path) -> int:
+    """Changes actions of the first distinct failure, and returns its index."""
+    index = distinct_failures(read_results(run))[0].index
+    file = run / FAILURES / series_name(index)
+    arrays = read_series(file)
+    arrays["actions"][-5:] *= -1.0
+    write_series(file, arrays)
+    return index
+
+
 def test_what_does_not_repeat_is_flaky_and_counts_as_no_failure(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shutil.copytree(run, tmp_path / "run", ignore=shutil.ignore_patterns(VERIFIED))
-    first = distinct_failures(read_results(tmp_path / "run"))[0]
-    file = tmp_path / "run" / FAILURES / series_name(first.index)
-    series = read_series(file)
-    series["actions"][-5:] *= -1.0
-    write_series(file, series)
+    first = tampered_with(tmp_path / "run")
     assert main(["verify", str(tmp_path / "run"), "--times", "2"]) == 1
-    assert f"flaky: episode {first.index}, 0 of 2 times the same" in capsys.readouterr().out
+    assert f"flaky: episode {first}, 0 of 2 times the same" in capsys.readouterr().out
     whole, tampered = read_run(run), read_run(tmp_path / "run")
     assert tampered.verified is not None
-    assert tampered.verified.flaky == {first.index}
-    assert tampered.found[first.index].distinct == whole.found[first.index].distinct - 1
+    assert tampered.verified.flaky == {first}
+    assert tampered.found[first].distinct == whole.found[first].distinct - 1
     refused = sum("repeats" in record.reason for record in tampered.records)
     assert refused >= 1
     assert tampered.metrics["search"].failures == whole.metrics["search"].failures - refused
@@ -173,17 +179,14 @@ def test_a_twin_is_drawn_beside_a_failure(twin: str, run: Path, tell: Tell) -> N
     picture.unlink()
 
 
-def regressed(tell, tmp_path: Path, *arguments: object) -> tuple[int, list[Verdict]]:
+def regressed(tell: Tell, tmp_path: Path, *arguments: object) -> tuple[int, list[Verdict]]:
     status, *_ = tell("regress", *arguments, "--out", tmp_path / "cases.json")
-    return status, [
-        case.verdict for case in Regression.model_validate_json((tmp_path / "cases.json").read_bytes()).cases
-    ]
+    cases = Regression.model_validate_json((tmp_path / "cases.json").read_bytes()).cases
+    return status, [case.verdict for case in cases]
 
 
 def test_with_its_own_ego_every_failure_still_fails_and_a_baseline_accepts_that(
-    failures: Path,
-    tmp_path: Path,
-    tell,
+    failures: Path, tmp_path: Path, tell: Tell
 ) -> None:
     status, verdicts = regressed(tell, tmp_path, "--failures", failures, "--ego", "default")
     assert status == 1
@@ -235,11 +238,7 @@ def test_what_is_flaky_or_of_another_net_never_counts_as_fixed(failure: Path, tm
     ids=["no ego", "no baseline"],
 )
 def test_what_is_missing_is_said_before_anything_is_played(
-    arguments: list[str],
-    complaint: str,
-    failures: Path,
-    tmp_path: Path,
-    tell,
+    arguments: list[str], complaint: str, failures: Path, tmp_path: Path, tell: Tell
 ) -> None:
     status, _, err = tell("regress", "--failures", failures, *arguments, "--out", tmp_path / "cases.json")
     assert status == 2
@@ -285,11 +284,7 @@ def test_what_does_not_happen_here_has_neither_core_nor_region(
 def test_a_run_whose_record_was_changed_has_a_flaky_case(run: Path, tmp_path: Path, tell: Tell) -> None:
     shutil.copytree(run, tmp_path / "run")
     assert main(["verify", str(tmp_path / "run"), "--times", "1"]) == 0  # so that it is known by which code
-    first = distinct_failures(read_results(tmp_path / "run"))[0]
-    file = tmp_path / "run" / FAILURES / series_name(first.index)
-    changed_series = read_series(file)
-    changed_series["actions"][-5:] *= -1.0
-    write_series(file, changed_series)
+    tampered_with(tmp_path / "run")
     _, verdicts = regressed(tell, tmp_path, "--failures", tmp_path / "run", "--ego", "default")
     assert verdicts[0] is Verdict.FLAKY
     assert set(verdicts[1:]) == {Verdict.STILL_FAILING}
