@@ -45,8 +45,9 @@ def _figure(net: Path, found: Survey) -> Figure:
         label = f"{TITLES[pattern]} ({len(spots)})"
         axis.scatter(x, y, s=16, color=colour, marker=marker, alpha=0.8, label=label, zorder=3)
     if len(found.fits) <= NAMED:
-        for x_m, y_m, names in _names(found):
-            axis.annotate(names, (x_m, y_m), (3, 3), textcoords="offset points", fontsize=5, zorder=4)
+        for id_, spot in {fit.spot.id: fit.spot for fit in found.fits}.items():  # once where several patterns fit
+            if np.isfinite((spot.x_m, spot.y_m)).all():
+                axis.annotate(id_, (spot.x_m, spot.y_m), (3, 3), textcoords="offset points", fontsize=5, zorder=4)
     axis.autoscale()
     axis.set_aspect("equal")
     axis.set(xlabel="x, m", ylabel="y, m")
@@ -58,9 +59,3 @@ def _height_in(ground: Sequence[Surface]) -> float:
     points = np.concatenate([surface.outline for surface in ground])
     wide_m, high_m = np.maximum(np.ptp(points, axis=0), 1.0)
     return float(np.clip(WIDTH_IN * high_m / wide_m, *HEIGHT_IN))
-
-
-def _names(found: Survey) -> list[tuple[float, float, str]]:
-    """Each id once where several patterns fit."""
-    points = {fit.spot.id: (fit.spot.x_m, fit.spot.y_m) for fit in found.fits}
-    return [(x, y, id_) for id_, (x, y) in points.items() if np.isfinite((x, y)).all()]

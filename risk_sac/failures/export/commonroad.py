@@ -33,7 +33,6 @@ LACKS = (
 WRITER = Path(__file__).with_name("commonroad_writer.py")
 WRITES_S = 120.0  # until the writer has long ended
 MADE = "2000-01-01"  # a date is required; with a true one the same failure would be another file
-TRUCK_FROM_M = 6.0
 # Values of commonroad-io's enumerations.
 LANELET_TYPES = {"road": "urban", "inside": "intersection", "sidewalk": "sidewalk", "crossing": "crosswalk"}
 DIRECTIONS = {"s": "straight", "l": "left", "r": "right"}
@@ -137,7 +136,6 @@ def _lanelets(failure: Recorded, numbers: dict[str, int], lights: dict[Head, dic
 
 
 def _actor(actor: Actor, number: int) -> dict[str, Any]:
-    kind = "pedestrian" if actor.pedestrian else "truck" if actor.length_m > TRUCK_FROM_M else "car"
     heading_rad = np.arctan2(np.sin(actor.heading_rad), np.cos(actor.heading_rad))  # within ±π
     states = [
         {
@@ -149,4 +147,10 @@ def _actor(actor: Actor, number: int) -> dict[str, Any]:
         }
         for frame in range(len(actor.time_s))
     ]
-    return {"number": number, "type": kind, "length_m": actor.length_m, "width_m": actor.width_m, "states": states}
+    return {
+        "number": number,
+        "type": actor.type,
+        "length_m": actor.length_m,
+        "width_m": actor.width_m,
+        "states": states,
+    }

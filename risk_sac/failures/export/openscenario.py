@@ -89,18 +89,16 @@ def _roads(failure: Recorded, roads: bytes) -> xosc.RoadNetwork:
 
 
 def _body(actor: Actor) -> xosc.Vehicle | xosc.Pedestrian:
+    height = HEIGHTS_M[actor.type]
     if actor.pedestrian:
-        height = HEIGHTS_M["pedestrian"]
         box = xosc.BoundingBox(actor.width_m, actor.length_m, height, 0, 0, height / 2)
         return xosc.Pedestrian("pedestrian", 75, xosc.PedestrianCategory.pedestrian, box)
-    truck = actor.length_m > 6.0
-    height = HEIGHTS_M["truck" if truck else "car"]
     box = xosc.BoundingBox(actor.width_m, actor.length_m, height, REAR_AXLE * actor.length_m, 0, height / 2)
-    wheel_m, track_m = (1.0, 2.0) if truck else (0.7, 1.6)
+    wheel_m, track_m = (1.0, 2.0) if actor.type == "truck" else (0.7, 1.6)
     base_m = (REAR_AXLE + FRONT_AXLE) * actor.length_m
     return xosc.Vehicle(
-        "truck" if truck else "car",
-        xosc.VehicleCategory.truck if truck else xosc.VehicleCategory.car,
+        actor.type,
+        getattr(xosc.VehicleCategory, actor.type),
         box,
         xosc.Axle(0.5, wheel_m, track_m, base_m, wheel_m / 2),
         xosc.Axle(0.0, wheel_m, track_m, 0.0, wheel_m / 2),

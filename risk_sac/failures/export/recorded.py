@@ -6,6 +6,7 @@ from functools import cached_property
 from importlib.resources import files
 from itertools import groupby
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from risk_sac.types import STEP_S, Floats, Kind, Role
 
 PER_FRAME = ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")
 PER_ACTOR = ("kind", "role", "length_m", "width_m")
+TRUCK_FROM_M = 6.0  # length
 BEYOND_M = 60.0  # into the last road, where a free ego has been through what the failure is about
 COLOURS = {"r": "red", "u": "red_yellow", "y": "yellow", "g": "green", "o": "off", "s": "green"}
 """SUMO's letter of a signal, in lower case → colour."""
@@ -41,6 +43,11 @@ class Actor:
     heading_rad: Floats  # without jumps of 2π
     speed_mps: Floats
     accel_mps2: Floats
+
+    @property
+    def type(self) -> Literal["pedestrian", "truck", "car"]:
+        """What other tools take it for."""
+        return "pedestrian" if self.pedestrian else "truck" if self.length_m > TRUCK_FROM_M else "car"
 
 
 @dataclass(frozen=True, kw_only=True)
