@@ -13,7 +13,13 @@ from risk_sac.errors import ConfigError
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, Map
 
-BUDGET = ("episodes", "evaluation_episodes", "cpu_s", "least_episodes")
+# Field of a budget → its flag's type, metavar and help.
+BUDGET: Mapping[str, tuple[type, str, str]] = {
+    "episodes": (int, "N", "search episodes of a run (default: 300)"),
+    "evaluation_episodes": (int, "N", "episodes of the frozen policy (default: 0)"),
+    "cpu_s": (float, "S", "processor time after which a search ends (default: none)"),
+    "least_episodes": (int, "N", "search episodes that --cpu-s does not cut off (default: 1)"),
+}
 
 
 def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, methods: str, seeds: int) -> None:
@@ -23,25 +29,16 @@ def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, method
     parser.add_argument("--seeds", type=int, metavar="N", help=f"how many (default: {seeds})")
     parser.add_argument("--first-seed", type=int, metavar="S", help="the N seeds begin here (default: 0)")
     add_budget_flags(parser)
-    parser.add_argument(
-        "--iid", type=int, metavar="N", help="end with N scenes that no search has chosen, for bounds (default: none)"
-    )
+    iid = "end with N scenes that no search has chosen, for bounds (default: none)"
+    parser.add_argument("--iid", type=int, metavar="N", help=iid)
     parser.add_argument("--iid-seed", type=int, metavar="S", help="of those scenes (default: 0)")
     parser.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags go first")
 
 
 def add_budget_flags(parser: argparse.ArgumentParser) -> None:
     """Adds the flags of a run's budget, which a campaign gives to each of its runs."""
-    parser.add_argument("--episodes", type=int, metavar="N", help="search episodes of a run (default: 300)")
-    parser.add_argument(
-        "--evaluation-episodes", type=int, metavar="N", help="episodes of the frozen policy (default: 0)"
-    )
-    parser.add_argument(
-        "--cpu-s", type=float, metavar="S", help="processor time after which a search ends (default: none)"
-    )
-    parser.add_argument(
-        "--least-episodes", type=int, metavar="N", help="search episodes that --cpu-s does not cut off (default: 1)"
-    )
+    for name, (type_, metavar, what) in BUDGET.items():
+        parser.add_argument(f"--{name.replace('_', '-')}", type=type_, metavar=metavar, help=what)
 
 
 def budget_flags(options: argparse.Namespace) -> dict[str, Any]:

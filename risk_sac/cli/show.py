@@ -7,7 +7,6 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.console import EGO, OK, Commands, add_command, console, in_words
-from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
@@ -38,19 +37,17 @@ def _show(options: argparse.Namespace) -> int:
     from risk_sac.failures.show import draw  # here, because loading matplotlib takes a second
 
     recording = Recording(contact, read_series(folder / contact.series))
-    twin = None if options.twin is None else _twin(results.spec, recording, options.twin)
+    twin = None
+    if options.twin is not None:
+        from risk_sac.failures.play import twin_recording
+
+        ego = None if options.twin == IDLE else read_ego(options.twin)
+        twin = twin_recording(results.spec, recording, ego, options.twin)
     stem = Path(contact.series).stem + ("" if options.twin is None else f"-{Path(options.twin).stem}")
     picture = options.out or (folder / contact.series).with_name(f"{stem}.png")
     draw(results.spec.family, recording, picture, twin)
     console.print(f"Drawn: {picture}", soft_wrap=True)
     return OK
-
-
-def _twin(spec: RunSpec, recording: Recording, name: str) -> Recording:
-    """The same scene with what the command line names changed."""
-    from risk_sac.failures.play import twin_recording
-
-    return twin_recording(spec, recording, None if name == IDLE else read_ego(name), name)
 
 
 def _contacts(results: Results) -> Table:

@@ -192,14 +192,14 @@ def _tested(tests: Sequence[PairedTest]) -> str:
 
 
 def _test(test: PairedTest) -> list[str]:
-    p_holm = _p(test.p_holm)
+    p_holm = number(test.p_holm, ".3g")
     return [
         symbol(test.metric) if test.metric in ROWS else test.metric,
         test.method,
         str(test.pairs),
         number(test.difference, "+.3f") + interval(test.low, test.high, "+.3f"),
         number(test.a12, ".2f"),
-        _p(test.p),
+        number(test.p, ".3g"),
         f"**{p_holm}**" if test.significant else p_holm,
     ]
 
@@ -271,7 +271,3 @@ def run_command(spec: RunSpec, spec_file: str, out: str) -> str:
     """The command of a single run of a campaign whose spec lies in a file."""
     picked = ["--family", spec.family, "--method", spec.method, "--seed", str(spec.seed)]
     return shlex.join(["risk-sac", "run", "--spec", spec_file, *picked, "--out", out])
-
-
-def _p(value: float | None) -> str:
-    return number(value, ".3g")

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from risk_sac.cli.campaigns.output import add_campaign_command, at_least_one, print_answer
 from risk_sac.cli.console import OK, Commands, in_words, notes, or_dash, printable
-from risk_sac.client import Client, Collision, Episode
+from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
 from risk_sac.records import Grade
@@ -104,17 +104,14 @@ def failures_table(failures: Sequence[Episode]) -> Table:
     for failure in failures:
         collision = failure.collision
         judgement = collision and collision.judgement
+        speeds = (collision.ego_speed_mps, collision.other_speed_mps) if collision else ()
         table.add_row(
             Text(printable(f"{failure.id}\n{judgement.signature if judgement else ''}")),
             f"{failure.outcome}\n{(judgement and judgement.grade) or ''}",
-            _speeds(collision) if collision else "",
+            ", ".join(or_dash(speed, ".1f") for speed in speeds),
             Text(printable(_wrong(failure))),
         )
     return table
-
-
-def _speeds(collision: Collision) -> str:
-    return f"{or_dash(collision.ego_speed_mps, '.1f')}, {or_dash(collision.other_speed_mps, '.1f')}"
 
 
 def _wrong(failure: Episode) -> str:

@@ -6,13 +6,12 @@ Where there are bounds, each family and method has one more case, which fails as
 from collections.abc import Mapping, Sequence
 
 from junitparser import Error, Failure, Skipped
-from junitparser.junitparser import FinalResult
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
 from risk_sac.cli.campaigns.failures import look_command
 from risk_sac.cli.campaigns.gate import Bounds, comparisons, excesses
 from risk_sac.cli.console import counted, printable
-from risk_sac.client import Episode, Results, RunMetrics, RunResult, Total
+from risk_sac.client import Episode, Results, RunResult, Total
 
 
 def junit(
@@ -46,21 +45,19 @@ def _case(run: RunResult, named: str) -> TestCase:
     for name, value in (("run", run.id), ("spec_digest", run.spec_digest), ("digest", run.digest)):
         if value is not None:
             case.add_property(name, printable(value))
-    if run.metrics is not None:
-        case.add_property("funnel", _funnel(run.metrics))
+    if (found := run.metrics) is not None:
+        funnel = (
+            f"{counted(found.raw_collisions, 'contact')}, {found.failures} valid, {found.distinct_failures} distinct, "
+            f"{found.distinct_preventable} preventable"
+        )
+        case.add_property("funnel", funnel)
     if named:
         case.system_out = named
-    result = _result(run)
-    if result is not None:
-        case.append(result)
-    return case
-
-
-def _result(run: RunResult) -> FinalResult | None:
-    """None where all of it was measured."""
     if run.state in ("failed", "cancelled"):
-        return Error(printable(f"{run.state}: {run.reason}" if run.reason else run.state), run.state)
-    return None if run.state == "succeeded" else Skipped(f"{run.state}: its rates can still change")
+        case.append(Error(printable(f"{run.state}: {run.reason}" if run.reason else run.state), run.state))
+    elif run.state != "succeeded":
+        case.append(Skipped(f"{run.state}: its rates can still change"))
+    return case
 
 
 def _gate(total: Total, results: Results, bounds: Bounds, named: Mapping[str, str]) -> TestCase:
@@ -73,9 +70,8 @@ def _gate(total: Total, results: Results, bounds: Bounds, named: Mapping[str, st
     if results.state != "succeeded":
         case.append(Skipped(f"the campaign is {results.state}: not all of it was measured"))
     elif broken or exceeded:
-        failure = Failure(
-            said, " ".join([*(each.name for each in broken), *(["failures"] if exceeded else [])]).lower()
-        )
+        kinds = [each.name.lower() for each in broken] + (["failures"] if exceeded else [])
+        failure = Failure(said, " ".join(kinds))
         runs = (run for run in results.runs if (run.family, run.method) == (total.family, total.method))
         failure.text = "\n\n".join(named[run.id] for run in runs if named[run.id])
         case.append(failure)
@@ -97,13 +93,6 @@ def _named(run: RunResult, service_url: str, url: str, campaign_id: str, failure
     lines.append(f"To have them again without the service: save {url}/spec?format=yaml as spec.yaml, then")
     lines.append(f"  risk-sac run --spec spec.yaml {pick}")
     return printable("\n".join(lines))
-
-
-def _funnel(metrics: RunMetrics) -> str:
-    return (
-        f"{counted(metrics.raw_collisions, 'contact')}, {metrics.failures} valid, "
-        f"{metrics.distinct_failures} distinct, {metrics.distinct_preventable} preventable"
-    )
 
 
 def _versions(runs: Sequence[RunResult]) -> dict[str, str]:

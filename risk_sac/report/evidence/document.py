@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from itertools import count
+from typing import NamedTuple
 
 from jinja2 import Environment, StrictUndefined, Template
 
@@ -37,6 +38,13 @@ class Commands:
     lines: Sequence[str]
 
 
+class Drawing(NamedTuple):
+    """An SVG, or why there is none."""
+
+    svg: bytes | None
+    missing: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class Card:
     """One kind of failure."""
@@ -44,8 +52,7 @@ class Card:
     title: str
     lines: Sequence[str]
     command: str
-    picture: bytes | None  # an SVG that the page holds itself
-    missing: str = ""  # why there is no picture
+    drawing: Drawing
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,6 @@ import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from risk_sac.failures.net import roads_of
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.report.comparison import Comparison
+from risk_sac.report.evidence.document import Drawing
 from risk_sac.report.markdown import run_command
 from risk_sac.report.runs import FinishedRun
 from risk_sac.run_folder.results import FAILURES, Contact, series_name
@@ -41,13 +41,6 @@ def again(comparison: Comparison, run: FinishedRun) -> str:
 def show_command(folder: Path, failure: str) -> str:
     """Draws a failure of a run whose folder lies here."""
     return shlex.join(["risk-sac", "show", str(folder), failure, "--out", "failure.png"])
-
-
-class Drawing(NamedTuple):
-    """An SVG, or why there is none."""
-
-    svg: bytes | None
-    missing: str = ""
 
 
 def draw(run: FinishedRun, folder: Path | None, index: int) -> Drawing:

@@ -110,15 +110,12 @@ def _redo(comparison: Comparison, origin: Origin) -> Section:
     else:
         blocks += ["The campaign's settings, to be put into spec.yaml:", Commands([_settings(comparison)])]
     if runs:
+        rows = [[run.spec.id, str(len(run.records)), run.digest[:16]] for run in runs]
         blocks += [
             f"One run. Its results.json then has the digest {runs[0].digest}:",
             Commands([again(comparison, runs[0])]),
             "The others go the same way, by their family, method and seed:",
-            Table(
-                "runs",
-                ["run", "episodes", "digest"],
-                [[run.spec.id, str(len(run.records)), run.digest[:16]] for run in runs],
-            ),
+            Table("runs", ["run", "episodes", "digest"], rows),
         ]
     return Section("again", "Each number again", blocks)
 

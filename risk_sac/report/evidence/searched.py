@@ -110,7 +110,6 @@ def _of_family(comparison: Comparison, family: FamilyName, origin: Origin) -> Se
 
 
 def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Origin) -> Card:
-    drawing = draw(run, origin.folders.get(run.spec.digest), record.index)
     return Card(
         title=cluster.name,
         lines=[
@@ -119,8 +118,7 @@ def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Ori
             *_told(run, record),
         ],
         command=origin.show(run, cluster.representative),
-        picture=drawing.svg,
-        missing=drawing.missing,
+        drawing=draw(run, origin.folders.get(run.spec.digest), record.index),
     )
 
 
