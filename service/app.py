@@ -44,6 +44,7 @@ from service.settings import ServiceSettings
 from service.store.database import READERS, held
 from service.store.reading import Store
 from service.store.server import cursor_secret
+from service.views.on_demand import Helper
 from service.views.pictures import pictures as pictures_of_contacts
 from service.views.reports import Reports
 from service.views.studies import Studies
@@ -107,43 +108,29 @@ def opened(
         held(store.engine),
         made.kept(store.engine, KeyFile(settings.keys_file)),
     ):
-        # Whoever plays or draws an episode, here or in a process started from here, looks for its place in our library.
+        # Everything that plays or draws an episode, here or in a helper process, finds its place in our library.
         os.environ[VARIABLE] = str(settings.places_dir.absolute())
-        manager = Manager(settings, store, executor)
+        manager, regression_queue, helper = Manager(settings, store, executor), Regressions(settings), Helper(settings)
+        shelf = Shelf(settings.networks_dir)
         manager.start()
-        gate, studies, tables = Regressions(settings), Studies(settings), Tables(settings)
         try:
-            gate.start()
-            yield _context(settings, store, manager, gate, studies, tables, latencies)
+            regression_queue.start()
+            yield Context(
+                settings=settings,
+                store=store,
+                manager=manager,
+                reports=Reports(settings),
+                pictures=pictures_of_contacts(settings),
+                studies=Studies(settings, helper),
+                tables=Tables(helper),
+                regressions=regression_queue,
+                networks=shelf,
+                surveys=Surveys(shelf, settings.places_dir),
+                streams=Streams(store),
+                cursors=Cursors(cursor_secret(store.engine)),
+                metrics=registry(latencies, store, manager),
+            )
         finally:
-            studies.stop()
-            tables.stop()
-            gate.stop()
+            helper.stop()
+            regression_queue.stop()
             manager.stop()
-
-
-def _context(
-    settings: ServiceSettings,
-    store: Store,
-    manager: Manager,
-    gate: Regressions,
-    studies: Studies,
-    tables: Tables,
-    latencies: Histogram,
-) -> Context:
-    shelf = Shelf(settings.networks_dir)
-    return Context(
-        settings,
-        store,
-        manager,
-        Reports(settings),
-        pictures_of_contacts(settings),
-        studies,
-        tables,
-        gate,
-        shelf,
-        Surveys(shelf, settings.places_dir),
-        Streams(store),
-        Cursors(cursor_secret(store.engine)),
-        registry(latencies, store, manager),
-    )

@@ -5,7 +5,6 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, Literal, Self, TypeVar
 from urllib.parse import quote
 from uuid import uuid4
@@ -43,7 +42,7 @@ R = TypeVar("R", bound=Record)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
-    """Something that happened to a campaign."""
+    """An event of a campaign."""
 
     id: str  # opaque; the stream goes on after it
     name: str  # episode | failure (instead of it) | state
@@ -82,8 +81,7 @@ class Client:
           ConfigError: the URL or the key cannot be one.
         """
         self.url = checked_url(url)
-        self._transport = Transport(self.url, None if key is None else checked_key(key), timeout_s)
-        self._patience_s = patience_s
+        self._transport = Transport(self.url, None if key is None else checked_key(key), timeout_s, patience_s)
 
     @classmethod
     def from_environment(cls, url: str | None = None) -> Self:
@@ -97,9 +95,7 @@ class Client:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, type_: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -120,9 +116,8 @@ class Client:
         """
         body = spec.model_dump_json(exclude_unset=True) if isinstance(spec, CampaignSpec) else json.dumps(spec)
         key = uuid4().hex if idempotency_key is None else idempotency_key
-        headers = {"Content-Type": "application/json", "Idempotency-Key": key}
-        answer = self._transport.ask("POST", "v1/campaigns", patience_s=self._patience_s, headers=headers, body=body)
-        return read(Campaign, answer)
+        headers = {"Idempotency-Key": key}
+        return read(Campaign, self._transport.ask("POST", "v1/campaigns", headers=headers, body=body))
 
     def campaigns(
         self,
@@ -175,9 +170,7 @@ class Client:
     def regress(self, campaign_id: str, ego: EgoConfig) -> CampaignRegression:
         """Has the distinct failures of a campaign played against another ego; the same again gives the one there is."""
         body = json.dumps({"campaign_id": campaign_id, "ego": ego.model_dump(mode="json", exclude_unset=True)})
-        headers = {"Content-Type": "application/json"}
-        answer = self._transport.ask("POST", "v1/regressions", patience_s=self._patience_s, headers=headers, body=body)
-        return read(CampaignRegression, answer)
+        return read(CampaignRegression, self._transport.ask("POST", "v1/regressions", body=body))
 
     def regression(self, regression_id: str) -> CampaignRegression:
         """What became of the failures, as far as it is known."""
@@ -192,25 +185,22 @@ class Client:
 
     def table(self, campaign_id: str, format_: Literal["json", "md", "csv"] = "md") -> str:
         """The methods compared over seeds by the runs that have finished."""
-        path, query = f"{_path(campaign_id)}/table", {"format": format_}
-        return self._transport.ask("GET", path, patience_s=self._patience_s, query=query).text
+        return self._transport.ask("GET", f"{_path(campaign_id)}/table", query={"format": format_}).text
 
     def report(
         self, campaign_id: str, format_: Literal["json", "md", "html"] = "md", regression_id: str | None = None
     ) -> str:
         """The report as a page or Markdown, with a regression if one is named; JSON has bounds and coverage alone."""
-        query = {"format": format_} | ({} if regression_id is None else {"regression": regression_id})
-        path = f"{_path(campaign_id)}/report"
-        return self._transport.ask("GET", path, patience_s=self._patience_s, query=query).text
+        query = {"format": format_, "regression": regression_id}
+        return self._transport.ask("GET", f"{_path(campaign_id)}/report", query=query).text
 
     def cancel(self, campaign_id: str) -> Campaign:
         """Stops a campaign, which takes a while, and keeps what it found; changes nothing once it has ended."""
-        path = f"{_path(campaign_id)}/cancel"
-        return read(Campaign, self._transport.ask("POST", path, patience_s=self._patience_s))
+        return read(Campaign, self._transport.ask("POST", f"{_path(campaign_id)}/cancel"))
 
     def delete(self, campaign_id: str) -> None:
         """Deletes a campaign that has ended, with all its files."""
-        self._transport.ask("DELETE", _path(campaign_id), patience_s=self._patience_s, repeatable=False)
+        self._transport.ask("DELETE", _path(campaign_id), repeatable=False)
 
     def events(self, campaign_id: str, last_event_id: str | None = None, *, away_s: float = AWAY_S) -> Iterator[Event]:
         """Finished episodes, failures and changes of state, until the campaign has ended.
@@ -222,7 +212,7 @@ class Client:
           last_event_id: `id` of an event; the stream starts after it.
           away_s: how long the service may be unreachable in between.
         """
-        path, patience_s = f"{_path(campaign_id)}/events", self._patience_s
+        path, patience_s = f"{_path(campaign_id)}/events", self._transport.patience_s
         while True:
             told = False
             try:
@@ -232,7 +222,7 @@ class Client:
                     yield event
                     if event.last:
                         return
-                # A stream also ends when the service is being stopped, and what it left out is told by the next one.
+                # A stream also ends when the service stops; the next one continues it.
                 if not told and self._get(Campaign, _path(campaign_id), away_s).ended:
                     return
             except StreamLost:
@@ -242,9 +232,7 @@ class Client:
 
     def follow(self, campaign_id: str, *, timeout_s: float | None = None, away_s: float = AWAY_S) -> Iterator[Campaign]:
         """A campaign now, and whenever it has changed, until it has ended; `Overdue` is raised after `timeout_s`."""
-        return Follower(
-            self._transport, _path(campaign_id), timeout_s=timeout_s, patience_s=self._patience_s, away_s=away_s
-        ).changes()
+        return Follower(self._transport, _path(campaign_id), timeout_s=timeout_s, away_s=away_s).changes()
 
     def wait(
         self,
@@ -261,11 +249,11 @@ class Client:
         return campaign
 
     def _get(self, record: type[R], path: str, patience_s: float | None = None) -> R:
-        return read(record, self._transport.ask("GET", path, patience_s=patience_s or self._patience_s))
+        return read(record, self._transport.ask("GET", path, patience_s=patience_s))
 
     def _items(self, page: type[Page[R]], path: str, query: Query) -> Iterator[R]:
         while True:
-            found = read(page, self._transport.ask("GET", path, patience_s=self._patience_s, query=query))
+            found = read(page, self._transport.ask("GET", path, query=query))
             yield from found.items
             if found.next is None:
                 return

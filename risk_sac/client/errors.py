@@ -1,4 +1,4 @@
-"""Why a call did not give what was asked for.
+"""Errors of the client.
 
 RiskSacError
 └── ClientError
@@ -10,7 +10,6 @@ RiskSacError
 """
 
 import math
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 
@@ -23,12 +22,12 @@ from risk_sac.errors import RiskSacError
 class ClientError(RiskSacError):
     """Root of the client's errors."""
 
-    passing: bool = False  # asking again may help, and can do no harm
-    retry_after_s: float | None = None  # when the service says that it may
+    passing: bool = False  # a retry may help and does no harm
+    retry_after_s: float | None = None  # the wait that the service asked for
 
 
 class Unreachable(ClientError):
-    """Nothing answered, or the connection broke before the answer was complete."""
+    """No answer, or an incomplete one."""
 
     def __init__(self, url: str, error: httpx.RequestError, *, passing: bool) -> None:
         super().__init__(f"{url} does not answer: {str(error) or type(error).__name__}")
@@ -36,7 +35,7 @@ class Unreachable(ClientError):
 
 
 class StreamLost(Unreachable):
-    """The stream of events broke after it had begun; it goes on after the last event that was heard."""
+    """The stream of events broke after it had begun; it continues after the last event that arrived."""
 
 
 class FieldProblem(BaseModel):
@@ -57,29 +56,20 @@ class _Problem(BaseModel):
 
 
 class Refused(ClientError):
-    """The service answered with a problem."""
+    """The service answered with a problem; of a proxy's own page only the status is known."""
 
-    def __init__(self, message: str, *, status: int, reason: str, detail: str, fields: Sequence[FieldProblem]) -> None:
-        super().__init__(message)
-        self.status = status  # of HTTP
-        self.reason = reason  # one word that is stable for each cause, such as `unknown_id`; empty if a proxy answered
-        self.detail = detail  # what was got and wanted, for people
-        self.fields = tuple(fields)  # to blame; may be none
-
-    @classmethod
-    def by(cls, response: httpx.Response, *, passing: bool) -> "Refused":
-        """The problem in an answer that has been read; a proxy's own page has nothing but its status."""
+    def __init__(self, response: httpx.Response, *, passing: bool) -> None:
         try:
             problem = _Problem.model_validate_json(response.content)
         except ValidationError:
             problem = _Problem(detail=response.reason_phrase)
-        message = f"{response.url} answered {response.status_code}: {problem.detail}"
-        error = cls(
-            message, status=response.status_code, reason=problem.reason, detail=problem.detail, fields=problem.errors
-        )
-        error.passing = passing
-        error.retry_after_s = retry_after_s(response)
-        return error
+        super().__init__(f"{response.url} answered {response.status_code}: {problem.detail}")
+        self.status = response.status_code
+        self.reason = problem.reason  # one word that is stable for each cause, such as `unknown_id`; empty from a proxy
+        self.detail = problem.detail  # what was got and wanted, for people
+        self.fields = problem.errors  # to blame; may be none
+        self.passing = passing
+        self.retry_after_s = retry_after_s(response)
 
 
 class UnexpectedAnswer(ClientError):

@@ -22,13 +22,11 @@ POLL_S, LONGEST_POLL_S = 1.0, 60.0  # between two looks without a stream: by def
 class Follower:
     """Looks at one campaign, again and again."""
 
-    def __init__(
-        self, transport: Transport, path: str, *, timeout_s: float | None, patience_s: float, away_s: float
-    ) -> None:
+    def __init__(self, transport: Transport, path: str, *, timeout_s: float | None, away_s: float) -> None:
         self._transport = transport
         self._path = path
         self._timeout_s = timeout_s
-        self._patience_s = patience_s  # until it was seen once
+        self._patience_s = transport.patience_s  # until it was seen once
         self._away_s = away_s  # from then on
         self._began = self._looked = time.monotonic()
         self._poll_s = POLL_S

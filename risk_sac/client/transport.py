@@ -28,11 +28,7 @@ _backoff = wait_exponential_jitter(multiplier=0.1, max=LONGEST_PAUSE_S, jitter=0
 
 
 def read(type_: type[R], response: httpx.Response) -> R:
-    """The record in an answer; fields that this version does not know are no error.
-
-    Raises:
-      UnexpectedAnswer: there is none.
-    """
+    """The record in an answer; fields that this version does not know are no error."""
     try:
         return type_.model_validate_json(response.content, extra="allow")
     except ValidationError as error:
@@ -42,13 +38,14 @@ def read(type_: type[R], response: httpx.Response) -> R:
 class Transport:
     """One service, under one key."""
 
-    def __init__(self, url: str, key: str | None, timeout_s: float) -> None:
+    def __init__(self, url: str, key: str | None, timeout_s: float, patience_s: float) -> None:
         headers = {"User-Agent": f"risk-sac/{__version__}"}
         if key is not None:
             headers["Authorization"] = f"Bearer {key}"
         self.url = url
         self._http = httpx.Client(base_url=url, headers=headers, timeout=timeout_s)
         self._timeout_s = timeout_s
+        self.patience_s = patience_s
 
     def close(self) -> None:
         """Closes the connections."""
@@ -59,9 +56,9 @@ class Transport:
         method: str,
         path: str,
         *,
-        patience_s: float,
+        patience_s: float | None = None,
         query: Mapping[str, str | int | None] | None = None,
-        headers: Mapping[str, str] | None = None,
+        headers: Mapping[str, str] = {},
         body: str | None = None,
         repeatable: bool = True,
     ) -> httpx.Response:
@@ -70,22 +67,23 @@ class Transport:
         Args:
           method: HTTP method.
           path: below the service's URL.
-          patience_s: no further attempt begins after this time.
+          patience_s: no further attempt begins after this time; by default the client's.
           query: parameters; None leaves one out.
           headers: of the request.
           body: JSON.
           repeatable: whether the request may be sent twice.
 
         Raises:
-          ClientError: the last attempt's.
-          ConfigError: HTTP has no way to say this.
+          ClientError: of the last attempt.
+          ConfigError: the request cannot be encoded.
         """
         given = {name: value for name, value in (query or {}).items() if value is not None}
+        content_type = {} if body is None else {"Content-Type": "application/json"}
         try:
-            request = self._http.build_request(method, path, params=given, headers=headers, content=body)
+            request = self._http.build_request(method, path, params=given, headers={**content_type, **headers}, content=body)
         except UnicodeEncodeError as error:
             raise ConfigError("", f"{error.object!r}", f"text in {error.encoding}") from error
-        return self._answer(request, patience_s, repeatable=repeatable)
+        return self._answer(request, self.patience_s if patience_s is None else patience_s, repeatable=repeatable)
 
     def listen(
         self, path: str, last_event_id: str | None, *, silence_s: float, patience_s: float
@@ -95,12 +93,8 @@ class Transport:
         Args:
           path: of the stream.
           last_event_id: of an earlier stream; this one starts after it.
-          silence_s: the stream is lost after so long without a byte.
+          silence_s: StreamLost is raised after so long without a byte.
           patience_s: within this time it has to begin.
-
-        Raises:
-          StreamLost: the connection broke; earlier events remain valid.
-          ClientError: there is no such stream.
         """
         headers = {"Accept": "text/event-stream", "Cache-Control": "no-store"}
         if last_event_id is not None:
@@ -141,7 +135,7 @@ class Transport:
         if response.is_success or response.status_code == httpx.codes.NOT_MODIFIED:
             return response
         if response.is_error:
-            raise Refused.by(response, passing=response.status_code in (PASSING if repeatable else NOT_BEGUN))
+            raise Refused(response, passing=response.status_code in (PASSING if repeatable else NOT_BEGUN))
         raise UnexpectedAnswer(response, "an answer")
 
 
@@ -151,7 +145,7 @@ def _pause_s(state: RetryCallState) -> float:
 
 
 def _say(state: RetryCallState) -> None:
-    if state.attempt_number == 2:  # what the second attempt mends is not worth a word
+    if state.attempt_number == 2:  # a first failure that passes is not worth a line
         logger.warning("%s; trying again", _error(state))
 
 

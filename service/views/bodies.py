@@ -33,11 +33,7 @@ def failure_body(campaign_id: str, contact: StoredContact, triage: Triage | None
 
 
 def series_file(campaign_id: str, contact: StoredContact, settings: ServiceSettings) -> tuple[Path, str | None]:
-    """Where a contact's time series lies, and its SHA-256.
-
-    Raises:
-      StorageError: none was recorded.
-    """
+    """Path and SHA-256 of a contact's time series; StorageError if none was recorded."""
     if contact.series is None:
         raise StorageError("no time series was recorded")
     folder = settings.run_folder(campaign_id, contact.episode.run_id) / FAILURES

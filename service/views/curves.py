@@ -53,13 +53,7 @@ class Curves(Record):
 
 
 def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: int) -> Curves:
-    """The curves of all searches.
-
-    Args:
-      campaign: whose runs they are.
-      episodes: all of the campaign, those of a run in their order.
-      points: of each curve, at most.
-    """
+    """Curves of all searches, with at most so many points each; episodes of a run come in their order."""
     searches = {run.number: _Search() for run in campaign.searches}
     for each in episodes:
         if each.phase == SEARCH:

@@ -1,6 +1,6 @@
 """The table of a campaign's failures. Pure.
 
-Ten thousand of them are to be there at once, so records are taken from their JSON without being validated.
+Records are taken from their JSON without validation, because a table may have ten thousand of them.
 """
 
 from collections import Counter, defaultdict
@@ -121,7 +121,7 @@ class FailureTable(Record):
     repeats: list[Repeats | None]
     """Whether it was the same each time that it was played again; null where it was not."""
     triage: list[TriageState]
-    """What people made of it; `new` if nobody has."""
+    """What people made of it; `new` at first."""
     kinds: list[FailureKind]
     """The most preventable failures first, then the most failures."""
     scenes: Mapping[FamilyName, FamilyScenes]
@@ -129,13 +129,13 @@ class FailureTable(Record):
 
 
 class Kinds:
-    """Tells which failures are the first of their kind, as `risk_sac.verdicts.distinct.DistinctFailures` does."""
+    """Finds the first failure of each kind, as `risk_sac.verdicts.distinct.DistinctFailures` does."""
 
     def __init__(self) -> None:
         self._found: set[tuple[str, Cell]] = set()
 
     def add(self, collision: Plain) -> bool:
-        """Whether none of those before was alike."""
+        """Adds a collision; returns whether it is the first of its kind."""
         niche = signature_of(collision), _cell(collision)
         new = niche not in self._found
         self._found.add(niche)
@@ -143,13 +143,10 @@ class Kinds:
 
 
 def signature_of(collision: Plain) -> str:
-    """Its judgement's; of one stored before contacts were judged, its striker."""
+    """The judgement's signature; of a contact stored before contacts were judged, its striker."""
     judged = collision.get("judgement")
-    signature: str = judged["signature"] if judged else _unjudged(collision)
-    return signature
-
-
-def _unjudged(collision: Plain) -> str:
+    if judged:
+        return str(judged["signature"])
     return f"unjudged {collision['other_role']} {collision['other_kind']}"
 
 
@@ -162,13 +159,7 @@ def _cell(collision: Plain) -> Cell:
 def failure_table(
     campaign: StoredCampaign, contacts: Iterable[PlainEpisode], triages: Mapping[int, TriageState]
 ) -> FailureTable:
-    """The table of these contacts of the campaign, in their order.
-
-    Args:
-      campaign: whose contacts they are.
-      contacts: by their numbers.
-      triages: states by the contacts' numbers; a contact without one is new.
-    """
+    """The table of these contacts of the campaign, in their order; a contact without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
     found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)
     rows = [_row(runs[each.run_number], each, found[each.run_number, each.phase]) for each in contacts]
@@ -248,6 +239,6 @@ def _family_scenes(scenes: Sequence[Plain], of: list[int]) -> FamilyScenes:
 
 
 def _rounded(values: Sequence[Any]) -> list[Any]:
-    """Numbers as they are shown; what is missing or a word for what is not finite becomes no finite number."""
+    """Numbers as they are shown; a missing one becomes NaN."""
     rounded: list[Any] = np.round(np.array(values, dtype=np.float64), DECIMALS).tolist()
     return rounded

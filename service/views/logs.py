@@ -1,4 +1,4 @@
-"""The end of what a run's worker printed, as anybody may read it."""
+"""The end of a worker's log, without what must not be shown."""
 
 import os
 import re
@@ -12,17 +12,9 @@ _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u206
 
 
 def log_tail(log: Path, lines: int) -> str:
-    """The last lines of a log, of those that are whole within `MOST_BYTES`.
+    """The last lines of a log, at most so many, of those that are whole within `MOST_BYTES`.
 
-    Args:
-      log: in the run's folder; there need be none yet.
-      lines: at most.
-
-    Returns:
-      No folders of this machine. U+FFFD stands for what is no UTF-8, and for what steers a terminal.
-
-    Raises:
-      StorageError: it cannot be read.
+    They name no folders of this machine. U+FFFD replaces what is not UTF-8 and what would control a terminal.
     """
     text = _UNSEEN.sub("\ufffd", _end(log).decode(errors="replace").replace("\r\n", "\n").replace("\r", "\n"))
     last = "\n".join(text.removesuffix("\n").split("\n")[-lines:])

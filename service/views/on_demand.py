@@ -1,19 +1,22 @@
 """A cache of what takes seconds to make: made on demand, one at a time, the newest kept."""
 
-from collections.abc import Callable, Hashable
+import threading
+from collections.abc import Callable, Hashable, Sequence
 from typing import Generic, TypeVar
 
 import anyio
 from anyio import to_thread
 from async_lru import alru_cache
 
-from service.errors import BusyError
+from risk_sac.execution.helper import HelperResult, run_helper
+from service.errors import BusyError, StorageError
+from service.settings import ServiceSettings
 
 AT_ONCE = 1  # of a kind
 MOST_WAITING = 16
 RETRY_AFTER_S = 2  # in which some of those that wait are made
 KEPT = 64  # of pictures and bundles, each of some 150 kB
-
+WALL_S = 300.0  # of a helper; a minimisation or a table of 100,000 episodes takes ten on an idle machine
 
 S = TypeVar("S", bound=Hashable)
 """What the content is made of; equal subjects have the same content."""
@@ -53,3 +56,28 @@ class OnDemandCache(Generic[S]):
             return await to_thread.run_sync(self._make, subject, limiter=self._threads)
         finally:
             self._begun -= 1
+
+
+class Helper:
+    """Runs helper processes until it is stopped."""
+
+    def __init__(self, settings: ServiceSettings) -> None:
+        self._niceness, self._stopping = settings.worker_niceness, threading.Event()
+
+    def stop(self) -> None:
+        """Ends the processes at work."""
+        self._stopping.set()
+
+    def run(self, program: str, arguments: Sequence[str], question: bytes = b"") -> HelperResult:
+        """Runs a program within `WALL_S`; StorageError if it cannot be started."""
+        try:
+            return run_helper(
+                program,
+                arguments,
+                question=question,
+                wall_s=WALL_S,
+                niceness=self._niceness,
+                stopping=self._stopping.is_set,
+            )
+        except OSError as error:
+            raise StorageError(f"no process can be started for it ({error.strerror})") from error

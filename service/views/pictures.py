@@ -47,11 +47,7 @@ class ContactOfARun:
 
 
 def recording_of(contact: ContactOfARun, settings: ServiceSettings) -> Recording:
-    """What is drawn of a contact.
-
-    Raises:
-      StorageError: the time series is lost.
-    """
+    """What is drawn of a contact; StorageError if its time series is lost."""
     episode = contact.episode
     path, sha256 = series_file(contact.campaign.id, contact.stored, settings)
     arrays = load_arrays(path, sha256)
@@ -103,39 +99,28 @@ class TwinPlay(Record):
     """The scene of a contact, played with one thing changed."""
 
     twin: Twin
-    """`idle`: nobody attacks; else the profile of another ego."""
+    """`idle`: no adversary attacks; else the profile of another ego."""
     outcome: str
-    """In words, such as "touches nobody"."""
+    """In words."""
     collision: Collision | None
-    """Null if the ego touches nobody."""
+    """Null without a contact."""
     series: Series
-    """From the same start as the contact's own, up to 3 s after it, or until the ego touches somebody."""
+    """From the same start as the contact's own, up to 3 s after it, or until a contact."""
 
 
 def roads_body(contact: ContactOfARun) -> Roads:
     """The surfaces of a contact's scene."""
-    surfaces = roads_of(contact.run.family, contact.episode.scene)
-    return Roads(
-        surfaces=[Surface(use=surface.use, outline=surface.outline.round(MM).tolist()) for surface in surfaces]
-    )
+    roads = roads_of(contact.run.family, contact.episode.scene)
+    return Roads(surfaces=[Surface(use=road.use, outline=road.outline.round(MM).tolist()) for road in roads])
 
 
 def thumbnail_of(contact: ContactOfARun, settings: ServiceSettings) -> str:
-    """A contact as a small SVG.
-
-    Raises:
-      StorageError: its time series is lost.
-    """
+    """A contact as a small SVG; StorageError if its time series is lost."""
     roads = roads_of(contact.run.family, contact.episode.scene)
     return thumbnail(recording_of(contact, settings), roads)
 
 
 def twin_body(twin: Twin, played: bytes) -> TwinPlay:
-    """A twin with its full time series.
-
-    Args:
-      twin: which.
-      played: as a study told it.
-    """
+    """A twin, as a study played it, with its full time series."""
     told, arrays = read_twin(played)
     return TwinPlay(twin=twin, outcome=told.outcome, collision=told.collision, series=series_body(arrays))

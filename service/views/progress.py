@@ -17,12 +17,7 @@ LEARNING = {name for name, method in METHODS.items() if method.learns}
 
 
 def progress(campaign: StoredCampaign, workers: int) -> Progress:
-    """Counts over all runs, present values of the runs at work, and the time left.
-
-    Args:
-      campaign: the campaign.
-      workers: runs that are executed at once; 0 while that is unknown.
-    """
+    """Counts over all runs, present values of the runs at work, and the time left; `workers` as in `eta_s`."""
     runs, searches = campaign.runs, campaign.searches
     present = _present(searches)
     sums = {name: sum(getattr(run, name) for run in runs) for name in OF_ALL}

@@ -21,9 +21,9 @@ class CampaignReport:
     """One edition of a campaign's report.
 
     Attributes:
-      comparison: what it says; its commands are the caller's to fill in.
+      comparison: its content, without commands.
       folders: of the runs, by the digest of their specs.
-      lasting: whether the same edition would say it again: not if a finished run's folder could not be read.
+      lasting: whether it may be kept: not if a finished run's folder could not be read.
     """
 
     def __init__(
@@ -42,11 +42,7 @@ class CampaignReport:
         return figure_names(self.comparison)
 
     def figure(self, name: str, format_: Format) -> bytes:
-        """One figure as a file, drawn once.
-
-        Raises:
-          NotFoundError: there is no such figure.
-        """
+        """One figure as a file, drawn once; NotFoundError if there is no such figure."""
         if name not in self.figures:
             message = f"campaign {self._campaign_id} has no figure {name!r}; GET its `figures` lists those there are"
             raise NotFoundError(message, field="name", got=name)
@@ -57,7 +53,7 @@ class CampaignReport:
 
 
 class Reports:
-    """Makes reports, and keeps the newest: a page with tables and figures asks for the same one many times."""
+    """Makes reports and keeps the newest, which a page asks for many times."""
 
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
@@ -65,10 +61,7 @@ class Reports:
         self._newest: tuple[str, CampaignReport] | None = None
 
     def edition(self, campaign: StoredCampaign) -> str:
-        """A name that changes whenever the report would.
-
-        A run has finished, why one is missing has changed, or something was noted of a failure in a run's folder.
-        """
+        """A name that changes whenever the report would."""
         lines = [__version__, campaign.id]
         for run in campaign.runs:
             lines.append(f"{run.id} {run.digest or _missing(run)}")

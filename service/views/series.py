@@ -19,11 +19,7 @@ _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 
 
 def load_series(path: Path, sha256: str | None) -> Series:
-    """The series as a body.
-
-    Raises:
-      StorageError: as `load_arrays`.
-    """
+    """The series as a body; raises what `load_arrays` does."""
     return series_body(load_arrays(path, sha256))
 
 
@@ -38,7 +34,7 @@ def load_arrays(path: Path, sha256: str | None) -> dict[str, NDArray[Any]]:
 
     Args:
       path: the file.
-      sha256: of its content, as its worker told; None for one that is older than that.
+      sha256: of its content, as its worker told; None: not checked.
 
     Raises:
       StorageError: the file is missing, is not the one that was written, or lacks an array.
