@@ -21,7 +21,7 @@ def _parsed(value: object) -> object:
     return from_json(value) if isinstance(value, str) else value
 
 
-# Parsed by us: what is no JSON, pydantic-settings would tell before it had looked at any other setting.
+# Parsed here: pydantic-settings would report invalid JSON before it checks any other setting.
 Names = Annotated[list[str], NoDecode, BeforeValidator(_parsed)]
 
 
@@ -35,7 +35,7 @@ def _most_workers(given: dict[str, Any]) -> int:
 
 
 class ServiceSettings(RaySettings, BaseSettings):
-    """Where the server listens, what it may use, whom it lets in, and how patient it is."""
+    """Settings of the server: addresses, resources, access and time limits."""
 
     model_config = SettingsConfigDict(
         env_prefix="RISK_SAC_", frozen=True, use_attribute_docstrings=True, secrets_dir=SECRETS

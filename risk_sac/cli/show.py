@@ -22,7 +22,7 @@ def add(commands: Commands) -> None:
     show.add_argument(
         "failure", nargs="?", metavar="FAILURE", help="id of a contact, or its number; default: list them"
     )
-    twin = f"draw beside it the same scene with nobody attacking (idle), or with this ego: {EGO}"
+    twin = f"draw beside it the same scene without an attack (idle), or with this ego: {EGO}"
     show.add_argument("--twin", metavar="TWIN", help=twin)
     show.add_argument("--out", type=Path, metavar="FILE.png", help="(default: failures/FAILURE.png beside RESULTS)")
 

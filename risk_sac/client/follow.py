@@ -1,7 +1,7 @@
 """A campaign as it changes: by its stream of events while there is one, by asking now and then otherwise.
 
-Events only say when to look; what is shown comes from the campaign itself, which any number of lost streams, restarts
-of the service and events heard twice cannot make wrong.
+Events only say when to look. What is shown comes from the campaign itself, so lost streams, restarts of the service
+and repeated events cannot make it wrong.
 """
 
 import math

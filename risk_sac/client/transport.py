@@ -78,9 +78,10 @@ class Transport:
           ConfigError: the request cannot be encoded.
         """
         given = {name: value for name, value in (query or {}).items() if value is not None}
-        content_type = {} if body is None else {"Content-Type": "application/json"}
+        if body is not None:
+            headers = {**headers, "Content-Type": "application/json"}
         try:
-            request = self._http.build_request(method, path, params=given, headers={**content_type, **headers}, content=body)
+            request = self._http.build_request(method, path, params=given, headers=headers, content=body)
         except UnicodeEncodeError as error:
             raise ConfigError("", f"{error.object!r}", f"text in {error.encoding}") from error
         return self._answer(request, self.patience_s if patience_s is None else patience_s, repeatable=repeatable)

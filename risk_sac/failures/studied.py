@@ -81,7 +81,7 @@ _NAME = re.compile(r"([0-9]{1,9})-(?:core|region)\.json", re.ASCII)
 
 
 class Studied(Record):
-    """Of one failure; what nobody asked for is null."""
+    """Studies of one failure; null where none was asked for."""
 
     core: Core | None = None
     region: Region | None = None

@@ -40,7 +40,7 @@ class Progress(Record):
 
 
 class Driver(Record):
-    """Who drives the ego. These are no enums: what an earlier version knew can still be listed."""
+    """The ego's driver. No enums, so that campaigns of earlier versions can be listed."""
 
     profile: str
     car_following: str
@@ -62,7 +62,7 @@ class CampaignHead(Record):
 
     @property
     def ended(self) -> bool:
-        """Whether nothing will change any more."""
+        """Whether the state is final."""
         return self.state.final
 
 
@@ -88,7 +88,7 @@ class Campaign(CampaignSummary):
 
 
 class StateChange(Record):
-    """A campaign, or one of its runs, came into another state."""
+    """A change of state of a campaign, or of one of its runs."""
 
     run_id: str | None
     """Null: the campaign itself."""
@@ -99,7 +99,7 @@ class StateChange(Record):
 
     @property
     def ends_campaign(self) -> bool:
-        """Whether this is the end of the campaign, which nothing follows."""
+        """Whether this is the campaign's last event."""
         return self.run_id is None and self.state.final
 
 

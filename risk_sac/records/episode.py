@@ -48,7 +48,7 @@ class ConflictType(StrEnum):
 
 
 class Grade(StrEnum):
-    """Who would have prevented a valid failure; PCR counts `CAREFUL`."""
+    """Which reference driver would have prevented a valid failure; PCR counts `CAREFUL`."""
 
     CAREFUL = "careful"  # the careful driver would not have touched: preventable
     IDEAL = "ideal"  # full braking at once alone would not have
@@ -64,13 +64,13 @@ class ReferenceOutcome(Record):
     """How a reference driver fares in the ego's place."""
 
     avoids: bool
-    """Does not touch, or stands when it is struck, or is struck from behind; who has passed by then has not."""
+    """No contact, or it stands when it is struck, or is struck from behind; false if it passed the striker before."""
     impact_speed_mps: Real
     """Of the reference driver at its contact, or where it has passed the ego; 0 if it avoids."""
 
 
 class Judgement(Record):
-    """How a contact came about, and who would have prevented it. Times count from the adversaries' release."""
+    """How a contact came about, and which reference driver would have prevented it. Times count from the release."""
 
     definitions: int
     """Version of the definitions it was judged by."""
@@ -79,7 +79,7 @@ class Judgement(Record):
     conflict_s: Real
     """When the conflict began; negative before the release."""
     noticed_s: float | None = None
-    """The same for a wary driver, to whom an actor that hangs over its line or could not stop gently is in conflict;
+    """The same for a wary driver, for which an actor that hangs over its line or could not stop gently is in conflict;
     `conflict_after_release` goes by it. Null in older records."""
     conflict_x_m: Real
     """Where the striker was then, on the map."""
@@ -99,7 +99,7 @@ class Judgement(Record):
     unresponsive: bool
     """A visible collision course of 1.5 s or more during which the ego never braked."""
     grade: Grade | None
-    """Who would have prevented it: the careful driver, only an ideal one, or nobody; null where it is not valid."""
+    """careful | ideal | unavoidable: the driver that would have prevented it; null where it is not valid."""
     drivers: Mapping[str, ReferenceOutcome]
     """Reference driver → how it fares; empty where the contact is not valid."""
     signature: str
@@ -200,7 +200,7 @@ class EpisodeRecord(Record):
     min_robustness: Least
     """Soft minimum of the requirements, over the whole episode too."""
     objective: float | None
-    """f_e; null until the scene optimiser was told."""
+    """f_e; null before the scene optimiser has it."""
     dual_variable: Real
     """λ after the episode."""
     temperature: Real
@@ -299,4 +299,4 @@ class Failure(Episode):
     """Null when the record is lost; `series_problem` says why."""
     series_problem: str | None
     triage: Triage | None = None
-    """What people made of it; null if nobody has."""
+    """What people made of it; null before that."""

@@ -62,7 +62,7 @@ class StoragePause:
 
 
 def refused(doing: str, folder: Path, error: OSError) -> str:
-    """What the disk said, in a line that anybody may read: the log has where the data lies."""
+    """What the disk said, in a line without paths, which the log has."""
     return f"storage failed while {doing}: {error.strerror} ({Path(error.filename or folder).name!r})"
 
 

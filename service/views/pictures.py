@@ -24,7 +24,7 @@ MM = 3  # decimals of a metre
 class ContactOfARun:
     """A contact; two with the same edition look the same."""
 
-    edition: str  # changes whenever what is told of it would
+    edition: str  # changes whenever its pictures would
     campaign: StoredCampaign = field(compare=False)
     run: StoredRun = field(compare=False)
     stored: StoredContact = field(compare=False)

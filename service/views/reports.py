@@ -88,7 +88,7 @@ class Reports:
                 reasons[run.spec_digest] = _missing(run)
                 continue
             try:
-                family_named(run.family)  # whose place on a map may be gone
+                family_named(run.family)  # raises where its place on a map is gone
                 found.append(read_run(self._settings.run_folder(campaign.id, run.id)))
             except (ConfigError, OSError) as error:
                 reasons[run.spec_digest] = f"it succeeded, but its results are lost: {error}"

@@ -39,7 +39,7 @@ def add(commands: Commands) -> None:
 
     parser = add_campaign_command(commands, "show", _show, "one failure in words and as a picture")
     _add_failure(parser)
-    twin = "draw beside it the same scene with nobody attacking (idle), or with another ego"
+    twin = "draw beside it the same scene without an attack (idle), or with another ego"
     parser.add_argument("--twin", choices=get_args(Twin), help=twin)
     parser.add_argument("--out", type=Path, metavar="FILE.png", help="the picture (default: FAILURE.png)")
 

@@ -35,7 +35,7 @@ class Drawn(Record):
     refused: int
     """By C_hard, before the first step: of these scenes nothing is said."""
     unended: int
-    """In which the simulator died, or the ego failed to drive: what would have happened, nobody knows."""
+    """In which the simulator died, or the ego failed to drive, so that the outcome is unknown."""
     played: int
     """All others."""
     contacts: Bound
@@ -46,7 +46,7 @@ class Drawn(Record):
 
 
 class FamilyCoverage(Record):
-    """What was looked at in one family, by whom."""
+    """What was searched in one family, and by which methods."""
 
     search: Coverage
     """By all searches together, the evaluation of frozen policies among them."""

@@ -135,7 +135,7 @@ def get_results(campaign_id: str, request: Request, service: Service, caller: Cu
 def get_failure_table(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, tier: Tier = "valid"
 ) -> Response:
-    """All failures at once, by columns: for whoever sorts, filters and plots them."""
+    """All failures at once, by columns, to sort, filter and plot them."""
     return _kept(
         campaign_id,
         request,

@@ -89,7 +89,7 @@ class NamedMethod(Method):
 
 
 class Ego(Record):
-    """Who can drive the ego."""
+    """Drivers of the ego."""
 
     name: str
     """Of kind sumo: what `ego.profile` of a campaign takes; else what `ego.driver` does."""
@@ -166,7 +166,7 @@ def list_formats() -> ExportFormats:
 
 @router.get("/egos")
 def list_egos() -> Egos:
-    """Who can drive: SUMO's models by profile, and the egos that the operator has registered."""
+    """Drivers of the ego: SUMO's models by profile, and the egos that the operator has registered."""
     models = [
         Ego(
             name=name,

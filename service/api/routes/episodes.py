@@ -24,7 +24,7 @@ class PostedTriage(Settings):
     """What to note of a failure."""
 
     state: TriageState
-    """new: nobody has decided; confirmed: the ego is to be mended; dismissed: it is not; fixed: it has been."""
+    """new: undecided; confirmed: the ego is to be mended; dismissed: it is not; fixed: it has been."""
     comment: Annotated[str, Field(max_length=2000, pattern=TEXT)] = ""
     """Why; plain text, which is shown as it is."""
 

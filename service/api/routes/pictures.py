@@ -112,7 +112,7 @@ async def get_region(contact: Asked, request: Request, service: Service) -> Resp
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=TWIN)
 async def get_twin(contact: Asked, twin: Twin, request: Request, service: Service) -> Response:
-    """One collision beside the same scene with nobody attacking (`idle`), or with another ego, on one clock."""
+    """One collision beside the same scene without an attack (`idle`), or with another ego, on one clock."""
 
     async def draw() -> bytes:
         return await service.pictures.get(Picture(contact, twin, await _played(contact, twin, service)))
@@ -122,7 +122,7 @@ async def get_twin(contact: Asked, twin: Twin, request: Request, service: Servic
 
 @router.get("/failures/{failure_id}/twins/{twin}", response_model=TwinPlay, responses=TOLD)
 async def get_twin_play(contact: Asked, twin: Twin, request: Request, service: Service) -> Response:
-    """What the same scene comes to with nobody attacking (`idle`), or with another ego, and its full time series."""
+    """What the same scene comes to without an attack (`idle`), or with another ego, and its full time series."""
 
     async def tell() -> bytes:
         played = await _played(contact, twin, service)
