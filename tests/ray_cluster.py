@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -35,6 +35,13 @@ FRUGAL = {
 
 # Of a head: nobody looks at its cluster, or makes it larger.
 HEAD_ALONE = ("--include-dashboard=false", "--no-monitor")
+
+
+def wait_until(holds: Callable[[], object]) -> None:
+    deadline = time.monotonic() + LONG_S
+    while not holds():
+        assert time.monotonic() < deadline, "it did not happen in time"
+        time.sleep(0.1)
 
 
 class Cluster:

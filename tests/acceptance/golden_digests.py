@@ -25,8 +25,8 @@ from risk_sac.config import (
     SceneOptimizerConfig,
     WarmStartConfig,
 )
-from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.train import train
+from tests.listener import Listener
 
 RECORDED = Path(__file__).with_suffix(".json")
 METHODS = ("random", "bo-only", "risk-sac")
@@ -40,13 +40,6 @@ LEARNER = LearnerConfig(
     warm_start=WarmStartConfig(episodes=1),
     scenes=SceneOptimizerConfig(initial_scenes=2, refit_every=1, candidates=32, exploration=0.0),
 )
-
-
-class Deaf:
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None: ...
-
-    def should_stop(self) -> bool:
-        return False
 
 
 def fingerprint() -> dict[str, str]:
@@ -65,7 +58,7 @@ def digest(family: str, method: str, folder: Path) -> str:
     spec = RunSpec.model_validate(
         {"family": family, "method": method, "seed": SEEDS[family], "budget": BUDGET, "learner": LEARNER}
     )
-    return train(spec, folder, Deaf()).digest
+    return train(spec, folder, Listener()).digest
 
 
 def read() -> list[dict[str, Any]]:

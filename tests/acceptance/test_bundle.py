@@ -211,13 +211,6 @@ def test_a_flipped_bit_is_noticed_or_makes_no_difference(seed: int, bundle: Path
     assert found.manifest == read_bundle(bundle).manifest
 
 
-def test_a_bundle_that_is_cut_short_is_refused(bundle: Path, tmp_path: Path, tell: Tell) -> None:
-    content = bundle.read_bytes()
-    for end in (len(content) // 2, len(content) - 1):
-        (tmp_path / "a.npz").write_bytes(content[:end])
-        assert tell("replay", tmp_path / "a.npz")[0] == 2
-
-
 def test_a_failure_that_does_not_repeat_gets_no_bundle(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tell: Tell
 ) -> None:

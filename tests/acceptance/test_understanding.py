@@ -281,15 +281,6 @@ def test_what_does_not_happen_here_has_neither_core_nor_region(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_run_whose_record_was_changed_has_a_flaky_case(run: Path, tmp_path: Path, tell: Tell) -> None:
-    shutil.copytree(run, tmp_path / "run")
-    assert main(["verify", str(tmp_path / "run"), "--times", "1"]) == 0  # so that it is known by which code
-    tampered_with(tmp_path / "run")
-    _, verdicts = regressed(tell, tmp_path, "--failures", tmp_path / "run", "--ego", "default")
-    assert verdicts[0] is Verdict.FLAKY
-    assert set(verdicts[1:]) == {Verdict.STILL_FAILING}
-
-
 def test_an_empty_set_is_refused(tmp_path: Path, tell: Tell) -> None:
     status, _, err = tell("regress", "--failures", tmp_path, "--ego", "default")
     assert status == 2

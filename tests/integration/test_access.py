@@ -351,9 +351,8 @@ def keys(world, content):
         world.file.path.write_bytes(whole)
 
 
-@pytest.mark.parametrize("content", [b"", b"{}", b'{"keys": [], "sha256": ""}', b"\x00" * 100], ids=len)
-def test_damaged_keys_let_nobody_in(world, content):
-    with keys(world, content):
+def test_damaged_keys_let_nobody_in(world):
+    with keys(world, b'{"keys": [], "sha256": ""}'):
         for key in (None, "own", "admin"):
             assert_refused(ask(world, "GET", CAMPAIGN, key), 503, "keys_unavailable")
             assert_refused(ask(world, "POST", "/v1/campaigns", key), 503, "keys_unavailable")
@@ -375,20 +374,15 @@ def test_with_its_keys_missing_a_service_lets_nobody_in_and_says_what_to_do(worl
     assert ask(world, "GET", CAMPAIGN, "own").status == 200
 
 
-def test_an_address_that_others_reach_is_never_open(world, tmp_path):
-    file = KeyFile(tmp_path / "keys.json")
-    file.open_all()
-    with keys(world, file.path.read_bytes()):
-        for key in (None, "own", "admin"):
-            assert_refused(ask(world, "GET", CAMPAIGN, key), 401, "unauthorized")
-
-
-def test_with_all_keys_revoked_nobody_gets_in(world, tmp_path):
+@pytest.mark.parametrize("opened", [True, False])
+def test_an_address_that_others_reach_is_never_open_nor_with_all_keys_revoked(world, tmp_path, opened):
     file = KeyFile(tmp_path / "keys.json")
     key, token = file.create("maps", "", Scope.ADMIN)
     file.revoke(key.id)
+    if opened:
+        file.open_all()
     with keys(world, file.path.read_bytes()):
-        for given in (None, "own", token):
+        for given in (None, "own", "admin", token):
             assert_refused(ask(world, "GET", CAMPAIGN, given), 401, "unauthorized")
 
 

@@ -10,7 +10,6 @@ import pytest
 
 from risk_sac.config import AgentConfig, Budget, EgoConfig, FamilyName, LearnerConfig, RunSpec, WarmStartConfig
 from risk_sac.env import Observation, RiskSacEnv, make_default
-from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import GRAVITY_MPS2, Limits, limits_from_odd
 from risk_sac.sim.control import Adversaries
@@ -18,6 +17,7 @@ from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.train import train
 from risk_sac.types import STEP_S, Floats, Frame
 from tests.builders import moved
+from tests.listener import Listener
 
 ROUNDING = 0.02  # of SUMO's positions and speeds, divided by the step where a derivative is taken
 WINDOW = 9  # steps, 0.8 s, over which an acceleration is fitted to positions: SUMO's lanes have corners
@@ -91,16 +91,8 @@ def by_a_learner(name: FamilyName, folder: Path, monkeypatch: pytest.MonkeyPatch
         learner=LearnerConfig(agent=agent, warm_start=WarmStartConfig(episodes=0)),
         budget=Budget(episodes=8, evaluation_episodes=2),
     )
-    train(spec, folder, Silent())
+    train(spec, folder, Listener())
     return episodes
-
-
-class Silent:
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
-        pass
-
-    def should_stop(self) -> bool:
-        return False
 
 
 Episodes = tuple[FamilyName, list[Driven]]

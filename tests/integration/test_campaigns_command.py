@@ -17,7 +17,6 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.client import Client
-from risk_sac.records import Grade
 from tests.server import LONG_S, Service
 
 SUBMIT = ["submit", "--families", "low", "--methods", "random", "--seeds", "2", "--episodes", "6"]
@@ -89,20 +88,6 @@ def test_rates_that_may_be_above_the_bound_are_exit_status_1_unless_the_rate_is_
     (failure,) = ElementTree.parse(file).getroot().iter("failure")
     assert failure.attrib["message"] == "PCR above 0.16: 0.167 (2 preventable failures in 12 episodes)"
     assert (failure.text or "").splitlines()[1] == "low-random-0-train-1: cut-in, straight; grade careful"
-
-
-def test_failures_are_filtered_by_their_judgement(finished: str, service: Service) -> None:
-    def found(**wanted: str) -> int:
-        url = f"/v1/campaigns/{finished}/failures"
-        return len(service.client.get(url, params=wanted).raise_for_status().json()["items"])
-
-    assert found() == found(tier="raw") == found(signature="cut-in, straight") == 6
-    assert found(grade="careful") == found(broke="red_light") == found(grade="careful", run="low-random-0") * 2 == 2
-    assert found(grade="ideal") == 4
-    assert found(grade="ideal", broke="red_light") == found(signature="cut-in") == 0
-    with Client(f"http://127.0.0.1:{service.port}") as client:
-        careful = list(client.failures(finished, grade=Grade.CAREFUL, broke="red_light", page=1))
-    assert [failure.index for failure in careful] == [1, 1]
 
 
 def test_results_and_metrics_tell_the_funnel(finished: str, service: Service) -> None:

@@ -136,6 +136,7 @@ def test_a_run_that_needs_too_much_memory_takes_one_attempt(serve):
     (run,) = service.wait(service.post(budget={"episodes": 1}))["runs"]
     assert (run["state"], run["attempts"]) == ("failed", 1)
     assert run["reason"].startswith("the run needs more than the 0.25 GiB of memory that a worker may take")
+    assert "RISK_SAC_WORKER_MEMORY_BYTES" in run["reason"]
 
 
 @pytest.mark.parametrize("relative", [True, False])

@@ -129,16 +129,6 @@ def test_the_broken_ego_is_caught(tmp_path):
     assert failures["broken"] >= failures["rss"] + 3
 
 
-def test_an_ego_in_another_process_drives_as_in_ours(tmp_path, monkeypatch):
-    pytest.importorskip("grpc")
-    with served("idm-aeb", tmp_path, deadline_s=60) as table:
-        register(monkeypatch, tmp_path, far=table)
-        far, _ = play(spec_of("far", episodes=3, family="dense"), tmp_path / "far")
-    near, _ = play(spec_of("idm-aeb", episodes=3, family="dense"), tmp_path / "near")
-    assert far.metrics.environment_steps > 100
-    assert far.digest == near.digest
-
-
 def test_a_process_that_dies_fails_the_run_and_the_same_run_goes_on_when_it_is_back(tmp_path, monkeypatch):
     pytest.importorskip("grpc")
     with served("idm-aeb", tmp_path, deadline_s=60) as table:

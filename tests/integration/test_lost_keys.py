@@ -65,11 +65,3 @@ def test_lost_keys_open_nothing(serve):
     assert [each["id"] for each in service.client.get("/v1/campaigns").json()["items"]] == [campaign]
     (service.data_dir / "keys.json").unlink()
     assert statuses(service.client, campaign) == {503}
-
-
-def test_keys_that_are_lost_before_the_first_start_open_nothing_either(serve):
-    service = serve(started=False)
-    create(service).close()
-    (service.data_dir / "keys.json").unlink()
-    service.start()
-    assert service.client.get("/v1/campaigns").status_code == 503

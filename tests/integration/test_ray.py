@@ -5,8 +5,7 @@ import json
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
@@ -15,12 +14,11 @@ import pytest
 from risk_sac.scenario import library
 from risk_sac.scenario.place import PLACES
 from tests.integration.scripted_worker import DIES, ONCE, WAITS, WELL_BEHAVED
-from tests.ray_cluster import ROOT, Cluster, needs_ray, running
+from tests.ray_cluster import LONG_S, ROOT, Cluster, needs_ray, running, wait_until
 from tests.server import servers
 
 pytestmark = needs_ray
 TINY = ["--methods", "random", "--seeds", "1", "--episodes", "3", "--verify", "0"]
-LONG_S = 300
 
 
 @pytest.fixture(scope="module")
@@ -62,13 +60,6 @@ def folder_beside(cluster: Cluster, run: str, *others: Path) -> Path:
 
     wait_until(there)
     return found[0]
-
-
-def wait_until(holds: Callable[[], object], seconds: float = LONG_S) -> None:
-    deadline = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.1)
 
 
 @pytest.fixture

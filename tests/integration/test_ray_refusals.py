@@ -3,8 +3,7 @@
 import os
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -14,9 +13,8 @@ import pytest
 from risk_sac.errors import ConfigError
 from risk_sac.execution.jobs import worker_program
 from risk_sac.execution.ray.executor import RayExecutor
-from tests.ray_cluster import ROOT, Cluster, needs_ray, running
+from tests.ray_cluster import LONG_S, ROOT, Cluster, needs_ray, running, wait_until
 
-LONG_S = 300
 TINY = ["--families", "low", "--methods", "random", "--seeds", "1", "--episodes", "1", "--out", "out"]
 # As if Ray were not installed, wherever it is.
 WITHOUT_RAY = """
@@ -74,13 +72,6 @@ def refusal() -> ConfigError:
     with pytest.raises(ConfigError) as caught:
         RayExecutor(worker_program()).close()
     return caught.value
-
-
-def wait_until(holds: Callable[[], object]) -> None:
-    deadline = time.monotonic() + LONG_S
-    while not holds():
-        assert time.monotonic() < deadline, "it did not happen in time"
-        time.sleep(0.1)
 
 
 @needs_ray

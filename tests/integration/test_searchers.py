@@ -1,6 +1,5 @@
 """Who makes which episode of a run: the method's own searcher or its guide, and when a search is over."""
 
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -9,23 +8,13 @@ from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, MethodName, RunSpec, WarmStartConfig
 from risk_sac.problem import Problem
-from risk_sac.records import EpisodeRecord, Grade, Outcome, RunMetrics, SeriesFile
+from risk_sac.records import EpisodeRecord, Grade, Outcome
 from risk_sac.searchers import GUIDE, OWN, Searchers, Turns
 from risk_sac.train import train
 from tests.builders import collision, episode_record, judgement
+from tests.listener import Listener
 
 WARM = 3
-
-
-@dataclass
-class Listener:
-    records: list[EpisodeRecord] = field(default_factory=list)
-
-    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
-        self.records.append(record)
-
-    def should_stop(self) -> bool:
-        return False
 
 
 def spec(method: MethodName, budget: Budget, warm_start: WarmStartConfig | None = None) -> RunSpec:

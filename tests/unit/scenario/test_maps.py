@@ -13,7 +13,7 @@ import sumo_nets
 from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, MapError
 from risk_sac.scenario import library
-from risk_sac.scenario.families import FAMILIES, SHIPPED, family_at, family_named
+from risk_sac.scenario.families import FAMILIES, family_at, family_named
 from risk_sac.scenario.maps.around import walk_over
 from risk_sac.scenario.maps.clearance import too_near, truck_reaches, waits_in_the_way
 from risk_sac.scenario.maps.convert import present_net
@@ -126,10 +126,6 @@ def test_a_kept_place_that_was_changed_is_refused(town: Map, tmp_path: Path, mon
         library.kept(name)
     with pytest.raises(ConfigError, match="there is no place 'junction_000000000000'"):
         family_named("junction_000000000000")
-
-
-def test_names_of_shipped_families_and_of_places_are_told_apart() -> None:
-    assert set(FAMILIES) == set(SHIPPED)
 
 
 def road(id_: str, a: str, b: str, metres: float, line: str) -> str:

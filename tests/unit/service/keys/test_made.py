@@ -11,7 +11,7 @@ import pytest
 from service.errors import KeysError, StorageError
 from service.host.data_folder import hold_data_folder
 from service.keys.__main__ import main
-from service.keys.file import Document, KeyFile
+from service.keys.file import KeyFile
 from service.keys.key import Scope
 from service.keys.made import AuthEnabledFlag, ever_made, noting
 from service.keys.ring import KeyRing
@@ -92,20 +92,6 @@ def test_the_command_takes_lost_keys_for_lost(
     assert main([*CREATE, "--anew"]) == 1
     assert "is whole" in capsys.readouterr().err
     assert file.read() == (new,)
-
-
-def test_the_command_opens_only_when_told_that_it_is_meant(file: KeyFile) -> None:
-    assert main(CREATE) == 0
-    with pytest.raises(SystemExit, match="2"):
-        main(["open"])
-    assert len(file.read()) == 1
-    assert main(["open", "--yes"]) == 0
-    assert file.load() == Document(keys=(), open=True)
-    assert main(CREATE) == 0
-    assert len(file.read()) == 1
-    document = file.load()
-    assert document is not None
-    assert not document.open
 
 
 def test_a_server_notes_keys_that_it_sees_and_heeds_what_is_noted(

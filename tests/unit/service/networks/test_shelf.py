@@ -40,12 +40,6 @@ def test_a_network_is_kept_as_it_was_described(shelf: Shelf, folder: Path) -> No
     assert Shelf(folder).get(network.id, None) == network  # another server, later
 
 
-def test_a_refused_upload_leaves_nothing(shelf: Shelf, folder: Path) -> None:
-    with pytest.raises(UploadError):
-        add(shelf, content="<evil/>")
-    assert list(folder.rglob("*")) == [folder / INCOMING]
-
-
 def test_lists_are_newest_first_and_stable_while_others_come(shelf: Shelf) -> None:
     ids = [add(shelf, label=str(i)).id for i in range(3)]
     first = shelf.list(2, None, "default")

@@ -119,16 +119,6 @@ def test_many_writers_and_readers_agree_on_one_order(store, ledger, episode, don
         assert story(store, campaign, position, 30)[0] == told[index:]
 
 
-def test_what_goes_on_has_not_ended(store, ledger, episode):
-    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
-    assert store.events(campaign.id, limit=100).items == ()
-    ledger.start_run(campaign.runs[0].number)
-    ledger.add_episodes([(campaign.runs[0].number, episode(0))])
-    page = store.events(campaign.id, limit=100)
-    assert short(page.items[-1]) == "low-random-0-train-0"
-    assert page.last is None
-
-
 def test_an_episode_that_comes_out_otherwise_keeps_its_place(store, ledger, episode):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
     number = campaign.runs[0].number

@@ -89,24 +89,6 @@ def test_a_pause_that_the_disk_refuses_to_note_is_shown_all_the_same(store, ledg
     assert store.revision(campaign.id) == before
 
 
-def test_another_project_sees_nothing(store, ledger, episode):
-    ours, theirs = ledger.create(SPEC, "ours"), ledger.create(SPEC, "theirs")
-    assert [item.id for item in store.campaigns(limit=5, project="ours").items] == [ours.id]
-    assert store.revision(ours.id, "ours") == ours.revision
-    for read in (
-        store.campaign,
-        store.revision,
-        lambda id_, project: store.episodes(id_, limit=1, project=project),
-        lambda id_, project: store.failure(id_, "x", project),
-        ledger.cancel,
-    ):
-        with pytest.raises(NotFoundError) as foreign:
-            read(theirs.id, "ours")
-        with pytest.raises(NotFoundError) as unknown:
-            read("c123", "ours")
-        assert str(foreign.value).replace(theirs.id, "c123") == str(unknown.value)
-
-
 def test_lists_are_filtered_by_state_family_method_and_label(store, ledger):
     low = ledger.create(SPEC)
     mixed = ledger.create(CampaignSpec(label="night", families=("low", "mixed"), methods=("sac",)))
