@@ -32,7 +32,7 @@ for _ in range(int(sys.argv[1])):
 """
 
 
-@pytest.mark.torture  # the suite has it happen in the service: tests/integration/test_crashes.py
+@pytest.mark.torture  # the suite has it happen in the service: tests/integration/test_campaigns.py
 def test_the_episode_is_left_out_and_counted(tmp_path: Path) -> None:
     command = ["run", "--family", "low", "--method", "random", "--episodes", "3", "--out", str(tmp_path / "run")]
     told = subprocess.run([sys.executable, "-c", RISK_SAC, str(FATAL + 1), *command], capture_output=True, text=True)

@@ -211,3 +211,14 @@ def test_a_project_without_worker_hours_left_waits(serve):
     refused = service.client.post("/v1/campaigns", json={"families": ["low"]})
     assert refused.status_code == 429
     assert int(refused.headers["retry-after"]) > 0
+
+
+def test_an_episode_that_crashes_its_worker_again_and_again_is_rejected_and_the_run_goes_on(serve):
+    service = serve("crashing_worker", lease_s=30)
+    campaign = service.wait(service.post(methods=["random"], budget={"episodes": 5}))
+    (run,) = campaign["runs"]
+    assert (run["state"], run["attempts"], run["episodes_done"], run["rejected"]) == ("succeeded", 3, 5, 1)
+    episodes = service.get(campaign["id"], "/episodes")["items"]
+    assert [(item["index"], item["reason"]) for item in episodes if item["outcome"] == "rejected"] == [(2, "sim_crash")]
+    metrics = service.client.get("/metrics").text
+    assert 'risk_sac_worker_restarts_total{cause="crashed"} 2.0' in metrics

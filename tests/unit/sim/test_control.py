@@ -89,7 +89,7 @@ frictions, radii, sides = st.floats(0.3, 1.0), st.floats(7, 40), st.booleans()
 
 @settings(max_examples=50)
 @given(sequences, frictions, radii, sides, st.floats(0, 16), st.floats(0.3, 5), odds)
-def test_a_vehicle_keeps_the_friction_circle_and_every_limit_inside_it(
+def test_a_vehicle_keeps_the_friction_circle_every_limit_inside_it_and_its_road(
     actions: Actions,
     friction: float,
     radius: float,
@@ -99,7 +99,13 @@ def test_a_vehicle_keeps_the_friction_circle_and_every_limit_inside_it(
     odd: dict[str, Interval],
 ) -> None:
     limits = limits_on(friction, **odd)
-    _, commands, stations, _ = drive(actions, limits, start_mps, road(radius, left=left), half_m)
+    _, commands, stations, offsets = drive(actions, limits, start_mps, road(radius, left=left), half_m)
+    for before, after in pairwise(commands):  # and it drives no tighter than a car can
+        if before.speed_mps > 0.1 and after.speed_mps > 0.1:
+            turned = after.lateral_mps / after.speed_mps - before.lateral_mps / before.speed_mps
+            tightest = max(limits.curvature_per_m, 1 / radius + CORRECTION_PER_M)
+            assert abs(turned) <= tightest * after.speed_mps * STEP_S + EPS
+    assert max(map(abs, offsets)) <= half_m
     begin, end = arc_m(radius)
     if start_mps**2 > limits.cornering_mps2 * radius + 2 * limits.approach_mps2 * (begin - 10):
         return  # nobody could slow down for the bend in time
@@ -114,27 +120,6 @@ def test_a_vehicle_keeps_the_friction_circle_and_every_limit_inside_it(
         assert abs(accels[step + 1] - accels[step]) <= limits.jerk_mps3 * STEP_S + 1e-6
         assert abs(after.lateral_mps) <= min(limits.lateral_mps, limits.slip * after.speed_mps) + EPS
         assert abs(across) <= limits.lateral_accel_mps2 + EPS
-
-
-@settings(max_examples=50)
-@given(sequences, frictions, radii, sides, st.floats(0, 16), st.floats(0.3, 5), odds)
-def test_a_vehicle_drives_no_tighter_than_a_car_can_and_stays_on_its_road(
-    actions: Actions,
-    friction: float,
-    radius: float,
-    left: bool,
-    start_mps: float,
-    half_m: float,
-    odd: dict[str, Interval],
-) -> None:
-    limits = limits_on(friction, **odd)
-    _, commands, _, offsets = drive(actions, limits, start_mps, road(radius, left=left), half_m)
-    for before, after in pairwise(commands):
-        if before.speed_mps > 0.1 and after.speed_mps > 0.1:
-            turned = after.lateral_mps / after.speed_mps - before.lateral_mps / before.speed_mps
-            tightest = max(limits.curvature_per_m, 1 / radius + CORRECTION_PER_M)
-            assert abs(turned) <= tightest * after.speed_mps * STEP_S + EPS
-    assert max(map(abs, offsets)) <= half_m
 
 
 @settings(max_examples=50)

@@ -9,6 +9,7 @@ import pytest
 
 from risk_sac.errors import ConfigError
 from service.host.environment import read_settings
+from service.settings import ServiceSettings
 
 RISK_SAC = [sys.executable, "-c", "import sys; from risk_sac.cli import main; sys.exit(main())"]
 PROGRAMS = {
@@ -75,3 +76,18 @@ def test_a_long_value_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RISK_SAC_MAX_WORKERS", "9" * 5000)
     with pytest.raises(ConfigError, match=r"^RISK_SAC_MAX_WORKERS: got '9{79}…; wanted integer"):
         read_settings()
+
+
+def test_every_setting_has_a_default_and_one_worker_per_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
+    settings = ServiceSettings()
+    assert (settings.host, settings.port) == ("127.0.0.1", 8000)
+    assert settings.max_workers == 3
+
+
+def test_the_environment_overrides(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RISK_SAC_DATA_DIR", "/srv/x")
+    monkeypatch.setenv("RISK_SAC_MAX_WORKERS", "7")
+    settings = ServiceSettings()
+    assert settings.max_workers == 7
+    assert settings.run_folder("c1", "low-sac-0") == Path("/srv/x/campaigns/c1/low-sac-0")
