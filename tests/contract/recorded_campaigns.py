@@ -4,7 +4,6 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ import pytest
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.metrics import results_digest
-from risk_sac.records import Collision, EpisodeRecord, Grade, Judgement, Outcome, SeriesFile, State
+from risk_sac.records import Collision, EpisodeRecord, Grade, Judgement, Outcome, State
 from risk_sac.report import FinishedRun
 from risk_sac.run_folder.results import (
     EPISODES,
@@ -83,11 +82,11 @@ def finished(spec: RunSpec, done: Sequence[EpisodeRecord]) -> FinishedRun:
     )
 
 
-def series(folder: Path, index: int) -> SeriesFile:
+def series_arrays() -> dict[str, np.ndarray]:
     """Three steps of two actors, one of which is absent in the second step."""
     rows = np.arange(6, dtype=float).reshape(3, 2)
     rows[1, 1] = np.nan
-    arrays = dict.fromkeys((*PER_ACTOR, *PER_OTHER), rows) | {
+    return dict.fromkeys((*PER_ACTOR, *PER_OTHER), rows) | {
         "time_s": np.arange(3) / 10,
         "ids": np.array(["ego", "lead"]),
         "kind": np.array([0, 1], dtype=np.int8),
@@ -101,7 +100,6 @@ def series(folder: Path, index: int) -> SeriesFile:
         "actions": np.zeros((3, 4), dtype=np.float32),
         "signal": np.array([0, 3, 1], dtype=np.int8),
     }
-    return write_series(folder / FAILURES / series_name(index), arrays)
 
 
 class Clock:
@@ -181,7 +179,8 @@ class Recorded:
         folder, spec = self._settings.run_folder(campaign.id, run.id), campaign.run_spec(run)
         for count, episode in enumerate(done, 1):
             self._clock.now += 1
-            kept = None if episode.collision is None else series(folder, episode.index)
+            file = folder / FAILURES / series_name(episode.index)
+            kept = None if episode.collision is None else write_series(file, series_arrays())
             metrics = finished(spec, done[:count]).metrics
             word = EpisodeDone(
                 record=episode,

@@ -12,10 +12,10 @@ from tests.server import LONG_S
 
 DATABASES = ["sqlite", "postgresql"]
 EACH_DATABASE = pytest.mark.parametrize("serve", DATABASES, indirect=True)
-SQLITE_FIRST = pytest.mark.parametrize(
-    "serve", ["sqlite", pytest.param("postgresql", marks=pytest.mark.torture)], indirect=True
-)
+FIRST = ["sqlite", pytest.param("postgresql", marks=pytest.mark.torture)]
+SQLITE_FIRST = pytest.mark.parametrize("serve", FIRST, indirect=True)
 EACH_DATABASE_SHARED = pytest.mark.parametrize("serve_shared", DATABASES, indirect=True)
+SQLITE_FIRST_SHARED = pytest.mark.parametrize("serve_shared", FIRST, indirect=True)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_a_campaign_runs_to_its_end_and_can_be_read(serve):
     assert service.get(first, "/failures", tier="raw")["items"] == []
 
 
-@EACH_DATABASE_SHARED
+@SQLITE_FIRST_SHARED
 @pytest.mark.parametrize(
     ("fault", "reason"),
     [
@@ -74,7 +74,7 @@ def test_a_run_whose_workers_break_in_a_row_fails_and_nothing_else(shared, scrip
     assert shared.wait(shared.post(budget={"episodes": 1}))["state"] == "succeeded"
 
 
-@EACH_DATABASE_SHARED
+@SQLITE_FIRST_SHARED
 def test_what_the_workers_of_a_run_printed_can_be_read_and_need_not_be_sent_twice(shared, scripted):
     campaign = shared.wait(shared.post(seeds=[scripted.EXITS, scripted.WELL_BEHAVED], budget={"episodes": 8}))
     path, silent = (f"/v1/campaigns/{campaign['id']}/runs/{run['id']}/log" for run in campaign["runs"])

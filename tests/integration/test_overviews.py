@@ -19,27 +19,6 @@ def campaign(service):
     return campaign_id
 
 
-def test_the_failure_table_has_what_the_list_of_failures_has(service, campaign):
-    table = service.get(campaign, "/failure-table")
-    listed = service.get(campaign, "/failures", limit=500)["items"]
-    assert table["ids"] == [each["id"] for each in listed]
-    assert len(table["ids"]) == EPISODES
-    assert table["grade"] == [each["collision"]["judgement"]["grade"] for each in listed]
-    assert table["relative_speed_mps"] == [each["collision"]["relative_speed_mps"] for each in listed]
-    lists = {name: len(values) for name, values in table.items() if name not in ("kinds", "scenes")}
-    assert lists == dict.fromkeys(lists, EPISODES)
-    assert sum(table["distinct"]) == 2, "the first of each run: all are alike"
-    assert [kind["failures"] for kind in table["kinds"]] == [EPISODES]
-
-
-def test_the_failure_table_is_kept_while_nothing_changes(service, campaign):
-    url = f"/v1/campaigns/{campaign}/failure-table"
-    first = service.client.get(url)
-    again = service.client.get(url, headers={"if-none-match": first.headers["etag"]})
-    assert (again.status_code, again.content) == (304, b"")
-    assert again.headers["etag"] == first.headers["etag"]
-
-
 def test_curves_follow_the_search_of_each_run(service, campaign):
     runs = service.get(campaign, "/curves")["runs"]
     assert [run["run_id"] for run in runs] == ["low-random-0", "low-random-1"]

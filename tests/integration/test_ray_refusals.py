@@ -81,7 +81,11 @@ def refusal() -> ConfigError:
         ({"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1"}, "RISK_SAC_RAY_ADDRESS", "nothing answers"),
         ({"RISK_SAC_RAY_ADDRESS": "somewhere"}, "RISK_SAC_RAY_ADDRESS", "wanted `auto` or HOST:PORT"),
         ({"RISK_SAC_RAY_ADDRESS": "auto", "RISK_SAC_RAY_JOIN": "1"}, "RISK_SAC_RAY_ADDRESS", "no cluster to join"),
-        ({"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1", "RISK_SAC_RAY_JOIN": "1"}, "RISK_SAC_RAY_ADDRESS", "nothing answers"),
+        pytest.param(
+            {"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1", "RISK_SAC_RAY_JOIN": "1"},
+            *("RISK_SAC_RAY_ADDRESS", "nothing answers"),
+            marks=pytest.mark.torture,
+        ),
         ({"RISK_SAC_RAY_CPUS_PER_RUN": "3"}, "RISK_SAC_RAY_CPUS_PER_RUN", "no node of the cluster has as much"),
         ({"RISK_SAC_RAY_CPUS_PER_RUN": "none"}, "RISK_SAC_RAY_CPUS_PER_RUN", 'got "none"'),
         ({"RISK_SAC_RAY_SCRATCH_DIR": "/proc/runs"}, "RISK_SAC_RAY_SCRATCH_DIR", "cannot write to"),
@@ -141,7 +145,7 @@ def test_a_node_with_another_python_and_other_packages_is_refused_before_any_run
 
 
 @needs_ray
-@pytest.mark.parametrize("killed", [False, True])
+@pytest.mark.parametrize("killed", [pytest.param(False, marks=pytest.mark.torture), True])
 def test_a_machine_that_joins_is_a_node_without_room_for_as_long_as_its_bridge_lives(cluster, monkeypatch, killed):
     monkeypatch.setenv("RISK_SAC_RAY_JOIN", "true")
     with closing(RayExecutor(worker_program())) as executor:

@@ -6,35 +6,16 @@ import pytest
 
 from risk_sac.failures.question import TwinPlay, twin_bytes
 from risk_sac.records import wire
-from risk_sac.run_folder.series import PER_ACTOR, PER_OTHER, write_series
+from risk_sac.run_folder.series import write_series
 from service.errors import StorageError
 from service.views.pictures import twin_body
 from service.views.series import load_series
 from tests.builders import collision, judgement
-
-
-def arrays(steps=3, actors=2):
-    rows = np.arange(steps * actors, dtype=float).reshape(steps, actors)
-    rows[1, 1] = np.nan
-    series = dict.fromkeys((*PER_ACTOR, *PER_OTHER), rows)
-    return series | {
-        "time_s": np.arange(steps) / 10,
-        "ids": np.array(["ego", "lead"]),
-        "kind": np.array([0, 1], dtype=np.int8),
-        "role": np.array([0, 1], dtype=np.int8),
-        "length_m": np.array([4.6, 0.5]),
-        "width_m": np.array([1.8, 0.5]),
-        "visible": np.array([[np.nan, 1.0], [np.nan, np.nan], [np.nan, 0.0]]),
-        "requirements": np.array(["safe_ttc"]),
-        "robustness": np.array([[1.0], [np.inf], [-1.0]]),
-        "soft_min": np.zeros(steps),
-        "actions": np.zeros((steps, 4), dtype=np.float32),
-        "signal": np.array([0, 3, 1], dtype=np.int8),
-    }
+from tests.contract.recorded_campaigns import series_arrays
 
 
 def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
-    write_series(tmp_path / "a.npz", arrays())
+    write_series(tmp_path / "a.npz", series_arrays())
     series = load_series(tmp_path / "a.npz", None)
     assert series.x_m == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
     assert series.visible == [[None, True], [None, None], [None, False]]
@@ -47,7 +28,7 @@ def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
 
 def test_a_series_from_before_the_release_was_recorded_lacks_it(tmp_path):
     new = ("lane_offset_m", "link")
-    write_series(tmp_path / "a.npz", {name: values for name, values in arrays().items() if name not in new})
+    write_series(tmp_path / "a.npz", {name: values for name, values in series_arrays().items() if name not in new})
     series = load_series(tmp_path / "a.npz", None)
     assert (series.released_s, series.lane_offset_m, series.link) == (None, None, None)
 
@@ -62,7 +43,7 @@ def test_a_series_from_before_the_release_was_recorded_lacks_it(tmp_path):
 )
 def test_a_series_says_when_the_release_was_and_which_signal_lies_ahead(tmp_path, link):
     rows = np.array([[0.1, np.nan], [0.2, 0.0], [0.3, 0.0]])
-    written = arrays() | {"released_s": np.array(1.5), "lane_offset_m": rows, "link": link}
+    written = series_arrays() | {"released_s": np.array(1.5), "lane_offset_m": rows, "link": link}
     write_series(tmp_path / "a.npz", written)
     series = load_series(tmp_path / "a.npz", None)
     assert series.released_s == 1.5
@@ -74,7 +55,7 @@ def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):
     path = tmp_path / "a.npz"
     with pytest.raises(StorageError, match=r"'a\.npz' is gone"):
         load_series(path, None)
-    write_series(path, arrays())
+    write_series(path, series_arrays())
     whole = path.read_bytes()
     for size in range(0, len(whole), 97):
         path.write_bytes(whole[:size])
@@ -87,21 +68,21 @@ def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):
 
 def test_a_series_that_is_not_the_one_that_was_written_is_never_shown(tmp_path):
     path = tmp_path / "a.npz"
-    sha256 = write_series(path, arrays()).sha256
+    sha256 = write_series(path, series_arrays()).sha256
     assert load_series(path, sha256) == load_series(path, None)
     whole = path.read_bytes()
     for bit in range(0, 8 * len(whole), 8 * len(whole) // 60):
         path.write_bytes(whole[: bit // 8] + bytes([whole[bit // 8] ^ 1 << bit % 8]) + whole[bit // 8 + 1 :])
         with pytest.raises(StorageError, match=f"'a.npz' is damaged: its SHA-256 is [0-9a-f]{{64}}, wanted {sha256}"):
             load_series(path, sha256)
-    write_series(path, arrays() | {"soft_min": np.ones(3)})  # undamaged, and another
+    write_series(path, series_arrays() | {"soft_min": np.ones(3)})  # undamaged, and another
     with pytest.raises(StorageError, match="damaged"):
         load_series(path, sha256)
 
 
 def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_is_not_finite():
     hit = collision(other_id="lead", ego_speed_mps=5.44, min_ttc_s=math.inf, judgement=judgement())
-    body = json.loads(wire(twin_body("idle", twin_bytes(TwinPlay.of(None, hit), arrays()))))
+    body = json.loads(wire(twin_body("idle", twin_bytes(TwinPlay.of(None, hit), series_arrays()))))
     assert (body["twin"], body["outcome"]) == ("idle", "touches lead at 5.4 m/s")
     assert body["collision"]["early_min_ttc_s"] is None
     assert body["collision"]["judgement"]["signature"] == hit.judgement.signature
@@ -110,7 +91,7 @@ def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_
 
 
 def test_what_is_not_told_of_a_series_is_left_out():
-    series = arrays() | {"least_ttc_s": arrays()["soft_min"]}
+    series = series_arrays() | {"least_ttc_s": series_arrays()["soft_min"]}
     body = twin_body("careful", twin_bytes(TwinPlay.of(None, None), series))
     assert (body.outcome, body.collision) == ("touches nobody", None)
     assert "least_ttc_s" not in body.series.model_dump()
