@@ -22,23 +22,8 @@ def effective_collision_rate(counts: Counts) -> float:
 
 
 def preventable_collision_rate(counts: Counts) -> float:
-    """PCR: valid collisions of grade `careful` per episode, rejected scenes included, invalid ones not; 0 without."""
+    """PCR: the preventable ones per episode."""
     return _share(counts.preventable, counts.driven)
-
-
-def avoidable_collision_rate(counts: Counts) -> float:
-    """ACR: valid collisions that were not unavoidable per episode, rejected scenes included, invalid ones not."""
-    return _share(counts.avoidable, counts.driven)
-
-
-def newest_effective_collision_rate(tally: Tally) -> float:
-    """ECR over the newest episodes."""
-    return _share(tally.newest_failures, tally.newest_episodes)
-
-
-def newest_preventable_collision_rate(tally: Tally) -> float:
-    """PCR over the newest episodes."""
-    return _share(tally.newest_preventable, tally.newest_episodes)
 
 
 def efficiency_score(tally: Tally) -> float:
@@ -78,21 +63,6 @@ def outcome_dispersion(tally: Tally) -> float | None:
     return tally.distance / pairs / math.sqrt(len(FEATURES)) if pairs else None
 
 
-def distinct_failure_rate(counts: Counts) -> float | None:
-    """Distinct failures per `PER_STEPS` environment steps; None without steps."""
-    return _per_steps(counts.distinct_failures, counts)
-
-
-def distinct_preventable_rate(counts: Counts) -> float | None:
-    """Distinct preventable failures per `PER_STEPS` environment steps; None without steps."""
-    return _per_steps(counts.distinct_preventable, counts)
-
-
-def coverage(tally: Tally) -> float:
-    """Kinds of failures found: cells of `risk_sac.verdicts.distinct`."""
-    return len(tally.kinds)
-
-
 def steps_per_distinct_failure(counts: Counts) -> float | None:
     """Environment steps per distinct failure; None without one."""
     return counts.environment_steps / counts.distinct_failures if counts.distinct_failures else None
@@ -106,10 +76,6 @@ def _share(count: int, of: int) -> float:
     return count / max(1, of)
 
 
-def _all(counts: Counts) -> int:
-    return counts.driven
-
-
 def _newest(counts: Counts) -> int:
     return min(WINDOW, counts.driven)
 
@@ -120,29 +86,29 @@ METRICS = (
         symbol="ECR",
         meaning="valid failures / episodes",
         figure=Kept(field="ecr", formula=effective_collision_rate, interval=True),
-        trials=_all,
+        trials=lambda counts: counts.driven,
     ),
     Metric(
         name="pcr",
         symbol="PCR",
         meaning="preventable failures / episodes: valid ones that the careful driver would have prevented",
         figure=Kept(field="pcr", formula=preventable_collision_rate, interval=True),
-        trials=_all,
+        trials=lambda counts: counts.driven,
     ),
     Metric(
         name="acr",
         symbol="ACR",
         meaning="avoidable failures / episodes: valid ones that the careful driver, or full braking at once, would "
         "have prevented",
-        figure=Derived(formula=avoidable_collision_rate),
-        trials=_all,
+        figure=Derived(formula=lambda counts: _share(counts.avoidable, counts.driven)),
+        trials=lambda counts: counts.driven,
         tested=False,
     ),
     Metric(
         name="ecr_last",
         symbol=f"ECR last {WINDOW}",
         meaning=f"ECR of the last {WINDOW} search episodes, or of all where there are fewer",
-        figure=Kept(field="window_ecr", formula=newest_effective_collision_rate),
+        figure=Kept(field="window_ecr", formula=lambda tally: _share(tally.newest_failures, tally.newest_episodes)),
         trials=_newest,
         search_only=True,
         tested=False,
@@ -151,7 +117,7 @@ METRICS = (
         name="pcr_last",
         symbol=f"PCR last {WINDOW}",
         meaning=f"PCR of the last {WINDOW} search episodes, or of all where there are fewer",
-        figure=Kept(field="window_pcr", formula=newest_preventable_collision_rate),
+        figure=Kept(field="window_pcr", formula=lambda tally: _share(tally.newest_preventable, tally.newest_episodes)),
         trials=_newest,
         search_only=True,
         tested=False,
@@ -181,7 +147,7 @@ METRICS = (
         name="distinct_per_1000_steps",
         symbol=f"distinct / {PER_STEPS} steps",
         meaning=f"distinct valid failures per {PER_STEPS} environment steps",
-        figure=Derived(formula=distinct_failure_rate),
+        figure=Derived(formula=lambda counts: _per_steps(counts.distinct_failures, counts)),
         search_only=True,
         tabled=False,  # its reciprocal is
     ),
@@ -189,7 +155,7 @@ METRICS = (
         name="preventable_per_1000_steps",
         symbol=f"preventable / {PER_STEPS} steps",
         meaning=f"distinct preventable failures per {PER_STEPS} environment steps",
-        figure=Derived(formula=distinct_preventable_rate),
+        figure=Derived(formula=lambda counts: _per_steps(counts.distinct_preventable, counts)),
         search_only=True,
         tested=False,
     ),
@@ -197,7 +163,7 @@ METRICS = (
         name="covered",
         symbol="kinds",
         meaning="cells of the fixed taxonomy of failures that a valid one lies in",
-        figure=Kept(field="covered", formula=coverage),
+        figure=Kept(field="covered", formula=lambda tally: len(tally.kinds)),
         search_only=True,
         tested=False,
     ),

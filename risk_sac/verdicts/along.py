@@ -34,16 +34,7 @@ class Along(NamedTuple, Generic[F]):
 
 @compiled
 def along(path: Path, first: int, s: float, speed: float, size: Size, other: Body[float]) -> Along[float]:
-    """Places a body along the ego's path.
-
-    Args:
-      path: of the ego.
-      first: the last of its points that the ego has passed.
-      s: where on it the ego is.
-      speed: of the ego.
-      size: of the ego.
-      other: the body.
-    """
+    """Places a body along the ego's path; the ego is at `s`, and `first` is the last point it has passed."""
     other_s, across, heading = project(path, first, other.x, other.y)
     turn = other.heading - heading
     cos, sin, (half_length, half_width) = abs(math.cos(turn)), abs(math.sin(turn)), other.size
@@ -75,12 +66,9 @@ def towards(across: float, offset: float, lane_width: float) -> float:
     """How far a vehicle is off the centre of the lane beside the ego's, towards the ego, m.
 
     SUMO's offset jumps by a lane's width when the vehicle passes to the next lane; where it stands across the ego's
-    path tells which lane's centre is meant. Without a recorded offset that place alone decides.
+    path tells which lane's centre is meant. Without a recorded offset (NaN) that place alone decides.
 
-    Args:
-      across: of its centre from the ego's path, positive to the left.
-      offset: from the centre of the lane SUMO has it on, positive to the left; or NaN.
-      lane_width: of the lanes.
+    `across` is its centre's distance from the ego's path, positive to the left, `offset` that from its lane's centre.
     """
     seen = lane_width - abs(across)
     if math.isnan(offset):
@@ -102,13 +90,7 @@ def lane_conflict(
     alongside comes nearer if the sides would touch within 4 s, or it is half in the ego's lane. Who merely hangs over
     the line does not.
 
-    Args:
-      other: the vehicle along the ego's path.
-      speed: of the ego.
-      offset: see `towards`.
-      accel: of the vehicle.
-      lane_width: of the lanes.
-      wary: whether whoever is alongside counts, if it comes nearer or not.
+    `speed` is the ego's, `accel` the vehicle's. For a wary driver a vehicle alongside counts if it comes nearer or not.
     """
     in_lane = abs(other.across_m) <= lane_width / 2
     coming = in_lane or towards(other.across_m, offset, lane_width) > WANDER_M

@@ -37,28 +37,14 @@ def collision_of(
     handling: Handling,
     striker: Acquaintance,
 ) -> Collision:
-    """The record of a contact.
-
-    Args:
-      contact: in `frame`.
-      frame: the last one.
-      released_s: `time_s` of the frame at which the adversaries were released.
-      evidence: up to it.
-      measures: from the release up to it.
-      handling: what the simulator and the control did.
-      striker: what was known of it.
-    """
+    """The record of a contact in `frame`, the last one; `measures` begin with the release at `released_s`."""
     other, warning = frame.ids[contact.other], measures[:-WARNING_STEPS]
     column = evidence.column(other)
     conflict = find_conflict(evidence, column)
     verdicts = {
         **artefact_verdicts(evidence, column, conflict, handling),
         **validity_verdicts(
-            evidence,
-            column,
-            contact,
-            visible_for_s=striker.visible_for_s,
-            ever_visible=striker.ever_visible,
+            evidence, column, contact, visible_for_s=striker.visible_for_s, ever_visible=striker.ever_visible
         ),
     }
     return Collision(

@@ -66,13 +66,7 @@ def touches(pose0: Pose, size0: Size, pose1: Pose, size1: Size) -> bool:
 def time_to_touch(path: Path, s: float, speed: float, size: Size, other: Body[float], horizon: float) -> float:
     """Time until the ego, keeping its speed along its path, touches a body that keeps its velocity, s; or inf.
 
-    Args:
-      path: of the ego.
-      s: where on it the ego is.
-      speed: of the ego.
-      size: of the ego, or of its corridor.
-      other: the other body.
-      horizon: how far to look ahead.
+    The ego is at `s` on its path; `size` is its own, or its corridor's.
     """
     for look in range(round(horizon / LOOK_S) + 1):
         t = look * LOOK_S

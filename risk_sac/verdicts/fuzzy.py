@@ -22,13 +22,7 @@ def proactive(gap: float, ego: float, leader: float) -> float:
 
     d_safe = u_e τ + u_e²/(2 b_comf) − u_l²/(2 b_lead),  d_unsafe = u_e τ + u_e²/(2 b_max) − u_l²/(2 b_lead)
 
-    Args:
-      gap: between the bodies, m; d1 of it is kept in reserve.
-      ego: speed u_e.
-      leader: speed u_l.
-
-    Returns:
-      In [0, 1], linear in between.
+    `gap` lies between the bodies, m; d1 of it is kept in reserve. In between PFS is linear.
     """
     leader_stops = leader * leader / (2 * LEADER_MPS2)
     safe = ego * REACTION_S + ego * ego / (2 * COMFORT_MPS2) - leader_stops
@@ -44,14 +38,7 @@ def critical(gap: float, ego: float, ego_accel: float, leader: float) -> float:
     d_safe = d_new + (u_next − u_l)²/(2 b_comf),  d_unsafe = d_new + (u_next − u_l)²/(2 b_max)
     and, where the ego is the slower one within the reaction already, d_safe = d_unsafe = (u_e − u_l)²/(2 |a'|).
 
-    Args:
-      gap: between the bodies, m.
-      ego: speed u_e.
-      ego_accel: a_e.
-      leader: speed u_l.
-
-    Returns:
-      In [0, 1], linear in between.
+    In between CFS is linear.
     """
     if ego <= leader:
         return 0.0

@@ -12,11 +12,8 @@ DEFINITIONS = 4  # raise it with whatever changes a verdict; what was judged bef
 def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflict | None = None) -> Judgement:
     """How the contact in the last frame came about, and, of a valid one, who would have prevented it.
 
-    Args:
-      evidence: up to and including the contact's frame.
-      striker_id: whom the ego touched.
-      valid: whether the contact passed every rule of `artefact_verdicts` and `validity_verdicts`.
-      conflict: as `find_conflict` found it for those rules already; found again if not given.
+    A valid contact passed every rule of `artefact_verdicts` and `validity_verdicts`. The conflict is found again if not
+    given.
 
     Raises:
       ValueError: the striker is not there in the last frame.
@@ -43,12 +40,6 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
         grade=grade(drivers) if valid else None,
         drivers=drivers,
         signature=signature(
-            evidence,
-            striker,
-            conflict,
-            manoeuvre=ego_manoeuvre,
-            response=ego_response,
-            ground=where,
-            broke=broke,
+            evidence, striker, conflict, manoeuvre=ego_manoeuvre, response=ego_response, ground=where, broke=broke
         ),
     )

@@ -30,12 +30,8 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, war
     A crossing vehicle that has to stop or to yield, and still can at 3.4 m/s², is expected to: in a record the contact
     tells that it did not.
 
-    Args:
-      frame: all actors now.
-      path: the ego's path ahead, from its centre; see `risk_sac.verdicts.path.polyline`.
-      known: `n`, whom the ego knows of.
-      ground: where it takes place.
-      wary: whether whoever hangs over beside the ego counts, if it comes nearer or not, and who brakes is not trusted.
+    `path` is the ego's path ahead, from its centre; `known` says whom the ego knows of, `n`. For a wary driver whoever
+    hangs over beside the ego counts, if it comes nearer or not, and who brakes is not trusted.
 
     Returns:
       `n`; False for the ego.
@@ -43,9 +39,9 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, war
     found = np.zeros(len(frame.ids), dtype=np.bool_)
     apart_m = np.hypot(frame.x_m - frame.x_m[0], frame.y_m - frame.y_m[0]) - (frame.length_m + frame.length_m[0])
     within_reach = apart_m <= HORIZON_S * (frame.speed_mps + frame.ego_speed_mps)
+    within_reach[0] = False
     for i in np.flatnonzero(known & within_reach):
-        if i > 0:
-            found[i] = _in_conflict(frame, path, int(i), ground, wary)
+        found[i] = _in_conflict(frame, path, int(i), ground, wary)
     return found
 
 
@@ -114,13 +110,7 @@ class CarefulReflex:
         self._last_s = 0.0
 
     def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
-        """How hard it brakes now, m/s²; 0 while it perceives no conflict.
-
-        Args:
-          frame: all actors now.
-          path: the ego's way ahead, from its centre.
-          seen: `n`, who of the frame is in its sight.
-        """
+        """How hard it brakes now, m/s²; 0 while it perceives no conflict. Arguments as of `conflicts_now`."""
         now = frame.time_s
         if conflicts_now(frame, path, seen, self._ground).any():
             self._since_s, self._last_s = (now if self._since_s is None else self._since_s), now

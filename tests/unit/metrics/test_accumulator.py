@@ -151,12 +151,6 @@ def test_incremental_equals_batch(records):
     assert metrics.dispersion == pytest.approx(outcome_dispersion(counted(records)), abs=1e-12)
 
 
-@settings(deadline=None)
-@given(any_run)
-def test_adding_stored_records_again_restores_the_same_figures(records):
-    assert feed(records) == feed(records)
-
-
 def test_the_dispersion_of_many_failures():
     random = np.random.default_rng(0)
     records = [

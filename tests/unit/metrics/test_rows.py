@@ -8,19 +8,17 @@ from hypothesis import strategies as st
 from risk_sac.metrics import COUNTS, METRICS, RATIOS, Counts, Kept, Tally, outcome_features, wilson_interval
 from risk_sac.metrics.features import Spread
 from risk_sac.metrics.rows import (
-    avoidable_collision_rate,
     cost_rate,
-    distinct_failure_rate,
     effective_collision_rate,
     efficiency_score,
-    newest_effective_collision_rate,
-    newest_preventable_collision_rate,
     outcome_dispersion,
     preventable_collision_rate,
     steps_per_distinct_failure,
 )
 from risk_sac.records import RunMetrics
 from tests.unit.metrics.episodes import JUDGED, any_collision, feed
+
+FORMULAS = {metric.name: metric.figure.formula for metric in METRICS}
 
 
 def dispersion_of(features):
@@ -47,20 +45,20 @@ def test_formula_literals():
         newest_preventable=1,
     )
     assert (effective_collision_rate(tally), preventable_collision_rate(tally)) == (0.5, 0.25)
-    assert avoidable_collision_rate(tally) == 0.375
-    assert (newest_effective_collision_rate(tally), newest_preventable_collision_rate(tally)) == (0.6, 0.2)
+    assert FORMULAS["acr"](tally) == 0.375
+    assert (FORMULAS["ecr_last"](tally), FORMULAS["pcr_last"](tally)) == (0.6, 0.2)
     assert efficiency_score(tally) == 1 - 900 / (8 * 150) == 0.25
     assert cost_rate(tally) == 0.25
     assert outcome_dispersion(tally) == 0.5  # 6 over six pairs, over √4
-    assert (distinct_failure_rate(tally), steps_per_distinct_failure(tally)) == (5, 200)
+    assert (FORMULAS["distinct_per_1000_steps"](tally), steps_per_distinct_failure(tally)) == (5, 200)
 
 
 def test_formulas_of_a_run_without_episodes():
     tally = Tally(horizon_steps=150)
-    assert effective_collision_rate(tally) == preventable_collision_rate(tally) == avoidable_collision_rate(tally) == 0
-    assert newest_effective_collision_rate(tally) == newest_preventable_collision_rate(tally) == 0
-    assert efficiency_score(tally) == cost_rate(tally) == 0
-    assert outcome_dispersion(tally) is distinct_failure_rate(tally) is None
+    without = ("ofd", "distinct_per_1000_steps", "preventable_per_1000_steps")
+    assert {name: formula(tally) for name, formula in FORMULAS.items()} == {
+        name: None if name in without else 0 for name in FORMULAS
+    }
     assert {ratio.name: ratio.formula(Counts()) for ratio in RATIOS} == {
         "steps_per_distinct_failure": None,
         "raw_rate": 0,
@@ -119,10 +117,6 @@ def test_dispersion_literals():
     assert dispersion_of(np.array([[0.0] * 4, [1.0] * 4])) == pytest.approx(1.0)
     corners = np.array([[0.0, 0, 0, 0], [0.6, 0, 0, 0], [0.6, 0.8, 0, 0]])
     assert dispersion_of(corners) == pytest.approx((0.6 + 0.8 + 1.0) / 3 / 2)
-
-
-def test_one_failure_has_no_dispersion():
-    assert dispersion_of(np.zeros((1, 4))) is None
 
 
 @settings(deadline=None)
