@@ -11,8 +11,7 @@ and nobody cuts in from behind.
 """
 
 from bisect import bisect_right
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from risk_sac.errors import NotFinite
@@ -84,11 +83,6 @@ class DistinctFailures:
     def count(self) -> int:
         """Distinct failures so far; the same whatever their order."""
         return len(self._found)
-
-    @property
-    def signatures(self) -> Mapping[str, int]:
-        """Distinct failures by signature, sorted."""
-        return dict(sorted(Counter(signature for signature, _ in self._found).items()))
 
     def add(self, collision: Collision) -> bool:
         """Whether a failure is distinct from all before it; it then counts among them.

@@ -1,7 +1,7 @@
 """What is recorded of an episode up to its contact, as arrays: all that a judge may look at."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -60,18 +60,14 @@ class Evidence:
     link: Letters  # SUMO's letter of the signal ahead, of the crossing for a pedestrian; 0: none
     known: Bools  # in the ego's sight
     ground: Ground = Ground()
-    lane_heading_rad: Floats | None = None  # T x n: the direction of the lane an actor is on, where it is known
     step_s: float = STEP_S
 
     @classmethod
     def of(cls, frames: Sequence[Frame], known: Sequence[Bools], released_s: float, ground: Ground) -> "Evidence":
-        """From the frames of an episode; actors may leave, but none may come.
+        """From the frames of an episode, from the lead-in to the contact's; actors may leave, but none may come.
 
-        Args:
-          frames: from the lead-in to the contact's frame, at least one.
-          known: per frame, who of `frame.ids` the ego knows of, itself included.
-          released_s: `time_s` at which the adversaries were released.
-          ground: where it takes place.
+        `known` says per frame who of `frame.ids` the ego knows of, itself included. The adversaries were released at
+        `released_s`.
 
         Raises:
           ValueError: there is no frame, or `known` does not go with them.
@@ -103,41 +99,19 @@ class Evidence:
         )
 
     @classmethod
-    def from_series(cls, series: Mapping[str, NDArray[Any]], ground: Ground, released_s: float = 0.0) -> "Evidence":
-        """From a stored time series, so that a failure can be judged anew by other definitions.
-
-        What an older series lacks is filled in: velocities from positions, no signals, no lane offsets, and what the
-        ego knew from what it saw.
-        """
-        x, y = series["x_m"], series["y_m"]
-        shape = x.shape
-        time_s = np.asarray(series["time_s"], dtype=np.float64)
-        known = np.array(series["known"] if "known" in series else series["visible"] == 1.0, dtype=np.bool_)
+    def from_series(cls, series: Mapping[str, NDArray[Any]], ground: Ground, released_s: float) -> "Evidence":
+        """From a stored time series, so that a failure can be judged anew by other definitions."""
+        known = np.asarray(series["visible"] == 1.0)
         known[:, 0] = True
-        filled: dict[str, Any] = {
-            "vx_mps": _rate(x, time_s),
-            "vy_mps": _rate(y, time_s),
-            "lane_offset_m": np.full(shape, np.nan),
-            "link": np.zeros(shape, dtype=np.uint8),
-        }
+        names = (*PER_ACTOR, "link", "kind", "role", "length_m", "width_m")
+        values: dict[str, Any] = {name: series[name] for name in names}
         return cls(
-            time_s=time_s - released_s,
-            ids=tuple(str(id_) for id_ in series["ids"]),
-            kind=series["kind"],
-            role=series["role"],
-            length_m=series["length_m"],
-            width_m=series["width_m"],
+            time_s=series["time_s"] - released_s,
+            ids=tuple(map(str, series["ids"])),
             known=known,
             ground=ground,
-            lane_heading_rad=series.get("lane_heading_rad"),
-            **(filled | {name: series[name] for name in (*PER_ACTOR, "link") if name in series}),
+            **values,
         )
-
-    def series(self) -> dict[str, NDArray[Any]]:
-        """The arrays by name, as `from_series` takes them."""
-        names = [each.name for each in fields(self) if each.name not in ("ids", "ground", "step_s")]
-        result = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-        return result | {"ids": np.array(self.ids)}
 
     def column(self, id_: str) -> int:
         """Column of an actor that is there in the last frame.
@@ -195,11 +169,3 @@ def _runs(frames: Sequence[Frame]) -> Iterator[tuple[int, int]]:
         if i == len(frames) or frames[i].ids != frames[start].ids:
             yield start, i
             start = i
-
-
-def _rate(values: Floats, time_s: Floats) -> Floats:
-    """Change per second over the step before; of the first frame over the one after."""
-    if len(values) < 2:
-        return np.zeros_like(values)
-    steps: Floats = np.diff(values, axis=0) / np.diff(time_s)[:, None]
-    return np.vstack((steps[:1], steps))

@@ -84,15 +84,10 @@ def took_priority(evidence: Evidence, striker: int, conflict: Conflict) -> bool:
 
 
 def wrong_direction(evidence: Evidence, striker: int) -> bool:
-    """Whether the vehicle moves by more than 90 degrees off its lane's direction when it strikes.
-
-    Where the lane's direction is not on record it is the vehicle's heading, which SUMO takes from the lane: what is
-    found then is a vehicle that goes backwards.
-    """
+    """Whether the vehicle goes backwards when it strikes; SUMO takes its heading from the lane."""
     e = evidence
-    lane = e.heading_rad if e.lane_heading_rad is None else e.lane_heading_rad
-    along = lane[-1, striker]
-    speed = e.vx_mps[-1, striker] * math.cos(along) + e.vy_mps[-1, striker] * math.sin(along)
+    heading = e.heading_rad[-1, striker]
+    speed = e.vx_mps[-1, striker] * math.cos(heading) + e.vy_mps[-1, striker] * math.sin(heading)
     return bool(speed < -STANDING_MPS)
 
 

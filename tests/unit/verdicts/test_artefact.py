@@ -1,12 +1,22 @@
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from risk_sac.records import ARTEFACT_RULES, REPEATS
-from risk_sac.verdicts.artefact import Handling, artefact_verdicts
+from risk_sac.verdicts.artefact import Handling, artefact_verdicts, inside_grip, used_grip
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
-from tests.unit.verdicts.staged import cut_in, hangs_over, leader_brakes
+from tests.unit.verdicts.staged import (
+    cut_in,
+    hangs_over,
+    leader_brakes,
+    mirrored,
+    pedestrian_crosses,
+    stage,
+    straight,
+)
 
 CLEAN = Handling(teleported=False, spawn_overlap=False, inside_limits=True, touched_before=False, ego_model_saw=True)
 
@@ -48,3 +58,73 @@ def test_a_conflict_of_the_first_second_was_inherited(at_s: float, rules: set[st
 @pytest.mark.parametrize(("at_s", "rules"), [(0.5, {"conflict_after_release"}), (0.8, set())])
 def test_who_hung_over_in_the_first_second_was_inherited_whenever_it_comes(at_s: float, rules: set[str]) -> None:
     assert broken(hangs_over(at_s=at_s, comes_at_s=2.5)) == rules
+
+
+def on(friction: float, evidence: Evidence) -> bool:
+    slippery = replace(evidence, ground=replace(evidence.ground, friction=friction))
+    found, again = inside_grip(slippery, 1), inside_grip(mirrored(slippery), 1)
+    assert found == again
+    return found
+
+
+def driving(path: object, until_s: float = 4.0) -> Evidence:
+    """A striker with this motion; the ego stands beside the way, and the contact does not matter here."""
+    evidence = stage(straight(0.0, 0.0, 0.0, 0.0), straight(3.0, 0.0, 0.0, 0.0))
+    times = np.arange(0, until_s, 0.1)
+    poses = np.array([path(t) for t in times])  # type: ignore[operator]
+    columns = {
+        name: np.stack((np.zeros(len(times)), poses[:, i]), axis=1)
+        for i, name in enumerate(("x_m", "y_m", "heading_rad"))
+    }
+    return replace(evidence, time_s=times, **columns)
+
+
+def circle(speed: float, radius: float, jitter_s: float = 0.0) -> object:
+    def at(t: float) -> tuple[float, float, float]:
+        a = speed * t / radius
+        seen = round(a / 0.2) * 0.2 if jitter_s else a  # headings of a polyline with kinks of 11 degrees
+        return radius * math.sin(a), radius * (1 - math.cos(a)), seen
+
+    return at
+
+
+def test_cornering_takes_v_squared_over_r() -> None:
+    # The front, half a length ahead of the centre, goes round on a circle of √(20² + 2.3²) m.
+    used = used_grip(driving(circle(10.0, 20.0)), 1)
+    assert used.max() == pytest.approx(5.0 * math.hypot(20.0, 2.3) / 20.0, rel=0.03)
+
+
+def test_braking_takes_its_deceleration() -> None:
+    assert used_grip(leader_brakes(gap=15.0, braking=6.0), 1).max() == pytest.approx(6.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("speed", "friction", "inside"), [(10.0, 1.0, True), (10.0, 0.45, False), (14.5, 1.0, False)])
+def test_a_turn_faster_than_the_road_bears_is_outside(speed: float, friction: float, inside: bool) -> None:
+    assert on(friction, driving(circle(speed, 20.0))) is inside
+
+
+def test_cornering_and_braking_share_the_circle() -> None:
+    def brakes_in_a_turn(t: float) -> tuple[float, float, float]:
+        gone = 16.0 * t - 2.5 * t * t  # 5 m/s², at 8 to 16 m/s
+        a = gone / 40.0
+        return 40.0 * math.sin(a), 40.0 * (1 - math.cos(a)), a
+
+    evidence = driving(brakes_in_a_turn, until_s=1.6)
+    assert 6.0 < used_grip(evidence, 1).max() < 8.5  # 5 and 3 to 6 across
+    assert on(1.0, evidence)
+    assert not on(0.55, evidence)
+
+
+def test_kinks_of_a_lane_are_no_cornering() -> None:
+    assert on(0.9, driving(circle(10.0, 20.0, jitter_s=0.1)))
+
+
+def test_a_sudden_lane_change_is_inside() -> None:
+    assert on(0.6, cut_in(rate=1.2))
+
+
+def test_pedestrians_and_short_records_pass() -> None:
+    assert on(0.01, pedestrian_crosses())
+    short = stage(straight(0.0, 0.0, 0.0, 10.0), straight(3.0, 0.0, 0.0, 0.0))
+    assert used_grip(short, 1).size == 0
+    assert on(0.01, short)

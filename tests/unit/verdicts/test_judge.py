@@ -144,11 +144,6 @@ def test_grounds(x: float, where: str) -> None:
     assert judged(replace(evidence, ground=replace(evidence.ground, junctions=junctions))).ground == where
 
 
-def test_a_striker_must_be_there() -> None:
-    with pytest.raises(ValueError, match="'ghost' is not among"):
-        judge(cut_in(), "ghost", valid=True)
-
-
 def test_contact_in_the_only_frame() -> None:
     found = judged(stage(straight(0.0, 0.0, 0.0, 10.0), straight(3.0, 0.0, 0.0, 0.0)))
     assert (found.conflict_s, found.grade, found.unresponsive) == (-1.5, Grade.UNAVOIDABLE, False)

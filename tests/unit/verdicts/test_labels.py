@@ -89,11 +89,10 @@ def test_who_has_braked_down_three_seconds_ago_does_not_speed() -> None:
     assert labels(stage(straight(0.0, 0.0, 0.0, 10.0), striker)) == ()
 
 
-def test_a_vehicle_against_its_lane_is_in_the_wrong_direction() -> None:
+def test_a_vehicle_that_goes_backwards_is_in_the_wrong_direction() -> None:
     head_on = stage(straight(0.0, 0.0, 0.0, 8.0), straight(60.0, 0.0, np.pi, 8.0))
-    assert labels(head_on) == ()  # where the lane leads is not on record
-    against = replace(head_on, lane_heading_rad=np.zeros_like(head_on.heading_rad))
-    assert labels(against) == ("wrong_direction",)
+    assert labels(head_on) == ()
+    assert labels(replace(head_on, heading_rad=np.zeros_like(head_on.heading_rad))) == ("wrong_direction",)
 
 
 @pytest.mark.parametrize("evidence", [cut_in(), leader_brakes()])
