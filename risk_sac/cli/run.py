@@ -134,7 +134,7 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
 
 def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
     """What a metric is called, and what it is."""
-    name, value = f"{metric.words} {metric.heading}".strip(), metric.value(metrics)
+    name, value = f"{metric.words} {metric.symbol}".strip(), metric.value(metrics)
     interval = None if value is None else metric.interval(value, pooled_counts([metrics]))
     text = or_dash(value, ".3f")
     return (name, text) if interval is None else (f"{name} (95 %)", "{} ({:.3f} to {:.3f})".format(text, *interval))

@@ -30,12 +30,7 @@ class MetricsAccumulator:
         return self._tally.episodes
 
     def add(self, record: EpisodeRecord) -> RunMetrics:
-        """Count one more episode.
-
-        Raises:
-            NotFinite: as `Tally.add`.
-            ValueError: as `Tally.add`.
-        """
+        """Count one more episode; raises what `Tally.add` raises."""
         self._tally.add(record)
         self._dual_variable, self._temperature = record.dual_variable, record.temperature
         return self.metrics()

@@ -27,10 +27,7 @@ FEATURES = (
 
 
 def outcome_features(collision: Collision) -> Floats:
-    """Outcome features of one failure, each scaled to [0, 1] and clipped.
-
-    Returns:
-        `FEATURES`.
+    """The outcome features of one failure, in the order of `FEATURES`, each scaled to [0, 1] and clipped.
 
     Raises:
         NotFinite: a feature is NaN; infinite ones are clipped.

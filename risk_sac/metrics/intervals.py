@@ -16,12 +16,7 @@ RESAMPLING_SEED = 0
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     """Wilson's 95 % interval of a rate.
 
-    Args:
-        successes: k, 0 <= k <= n.
-        trials: n; with 0 nothing is known and the interval is [0, 1].
-
-    Returns:
-        (low, high) within [0, 1]; contains k/n.
+    It lies within [0, 1] and contains k/n; without trials nothing is known and it is [0, 1].
 
     Source: Wilson 1927, Probable inference, the law of succession, and statistical inference.
     """
@@ -41,12 +36,7 @@ def clopper_pearson(successes: int, trials: int) -> tuple[float, float]:
     With the upper bound as the rate, no more than k successes come in 5 % of all cases; with the lower one, no fewer.
     The rate is below the one with 95 % confidence, and above the other with 95 %; between both with 90 %.
 
-    Args:
-        successes: k, 0 <= k <= n.
-        trials: n; with 0 nothing is known.
-
-    Returns:
-        (low, high) within [0, 1]; 0 of 300 gives (0, 0.00994).
+    0 of 300 gives (0, 0.00994); without trials nothing is known and the bounds are (0, 1).
 
     Source: Clopper & Pearson 1934, The use of confidence or fiducial limits illustrated in the case of the binomial.
     """
@@ -60,14 +50,8 @@ def clopper_pearson(successes: int, trials: int) -> tuple[float, float]:
 def bootstrap_interval(values: Sequence[float], seed: int) -> tuple[float, float]:
     """Percentile bootstrap 95 % interval of the mean over seeds.
 
-    With fewer than about ten seeds it is narrower than its name; one seed gives a point.
-
-    Args:
-        values: one figure per seed, at least one.
-        seed: of the resampling; the same seed gives the same interval.
-
-    Returns:
-        (low, high) within [min, max] of the values.
+    With fewer than about ten seeds it is narrower than its name; one seed gives a point. It stays within the values'
+    range. `seed` is that of the resampling; the same seed gives the same interval.
 
     Raises:
         ValueError: there are no values.

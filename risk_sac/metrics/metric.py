@@ -1,4 +1,4 @@
-"""What a row of the metrics says: names, unit, formula, and how runs are pooled. Pure."""
+"""What a row of the metrics says: names, formula, and how runs are pooled. Pure."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -44,16 +44,10 @@ class Metric:
     meaning: str  # the formula in words
     figure: Kept | Derived
     words: str = ""  # before the symbol, where there is room
-    unit: str = ""  # none: a pure number
     trials: Callable[[Counts], int] | None = None  # of a rate: one run has a Wilson interval over so many
     search_only: bool = False  # or of the evaluation as well
     tested: bool = True  # whether methods are compared by it
     tabled: bool = True  # whether the table of methods shows it
-
-    @property
-    def heading(self) -> str:
-        """The symbol and, where there is one, the unit."""
-        return f"{self.symbol}, {self.unit}" if self.unit else self.symbol
 
     def value(self, metrics: RunMetrics) -> float | None:
         """Its value for a run."""

@@ -140,7 +140,7 @@ def _bars(comparison: Comparison, drawn: Bars) -> Figure:
     axes.set_xticks(range(len(families)), families)
     axes.tick_params(axis="x", length=0)
     axes.grid(visible=False, axis="x")
-    axes.set_ylabel(f"{metric.heading} ({phase})")
+    axes.set_ylabel(f"{metric.symbol} ({phase})")
     axes.set_ylim(bottom=0)
     interval = "; lines: 95 % bootstrap interval" if max(counts, default=0) > 1 else ""
     axes.set_title(f"mean over {_seeds(counts)}{interval}; –: no value", fontsize=9, loc="left")

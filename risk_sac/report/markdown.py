@@ -77,7 +77,7 @@ def _missing(comparison: Comparison) -> str:
 
 def _cells(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     seeds = len(comparison.spec.seeds)
-    columns = ["method", "seeds", *(metric.heading for metric in metrics_of(phase) if metric.tabled)]
+    columns = ["method", "seeds", *(metric.symbol for metric in metrics_of(phase) if metric.tabled)]
     columns += [symbol("steps_per_distinct_failure"), *(["CPU s / distinct"] if phase == "search" else [])]
     columns += map(symbol, SHARES)
     rows = [_cell(cell, seeds) for cell in comparison.group(family, phase)]
