@@ -49,14 +49,8 @@ def evaluate(
 
     SIGINT, SIGTERM or SIGHUP stop it: the runs save a checkpoint, and the same call goes on with them.
 
-    Args:
-      spec: the campaign.
-      folder: gets everything; may hold an earlier part of the same campaign.
-      command: what the user typed, for the report.
-      jobs: processes at a time.
-      progress: told how the runs go.
-      executor: where they execute, by its name in `risk_sac.execution.executor`.
-      times: how often each distinct failure is replayed, see `risk_sac.execution.verify`; 0: not at all.
+    The folder may hold an earlier part of the same campaign. `command` is what the user typed, for the report. `jobs`
+    processes work at a time, and replay each distinct failure `times` times.
 
     Raises:
       ConfigError: a family's settings pose no problem that can be run, there is no such executor, or the folder

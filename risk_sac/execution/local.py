@@ -2,22 +2,24 @@
 
 import logging
 import math
+import signal
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from risk_sac.config import RunSpec
 from risk_sac.execution.executor import Cause, Exited, Program
 from risk_sac.execution.mailbox import Mailbox
 from risk_sac.execution.messages import Event
-from risk_sac.execution.postmortem import exited
+from risk_sac.execution.postmortem import reason_of
 from risk_sac.execution.process import Subprocess
 
 logger = logging.getLogger(__name__)
 
 LOOK_S = 0.2  # between two looks at a worker
 HELD_UP_S = 1.0  # longer between them, and it was this process that was held up
+OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP}  # signals of the kernel or an operator
 SHOWN = 80  # characters shown of a line that is none
 
 
@@ -44,12 +46,7 @@ class Lease:
         self._silent_s = self._stalled_s = 0.0
 
     def passed(self, watched_s: float, signs: Signs) -> str | None:
-        """Counts the time since the last call; returns the reason why the worker is lost, if it is.
-
-        Args:
-          watched_s: how much of that time this process watched, s.
-          signs: what there are now.
-        """
+        """Adds `watched_s`, of the time since the last call, s; returns the reason why the worker is lost, if it is."""
         before, self._signs = self._signs, signs
         self._silent_s = 0.0 if signs != before else self._silent_s + watched_s
         self._stalled_s = 0.0 if signs.episodes != before.episodes else self._stalled_s + watched_s
@@ -199,5 +196,10 @@ class _Worker:
 
     def exited(self, status: int) -> Exited:
         """Describes its end."""
-        done = self._last or self._told_to_stop
-        return exited(status, self.process.log, done=done, given_up=self._given_up)
+        reason = reason_of(status, self.process.log)
+        if self._last or self._told_to_stop:
+            return Exited(reason, Cause.ENDED, status)
+        if self._given_up is not None:
+            return replace(self._given_up, status=status)
+        cause = Cause.KILLED if -status in OUTSIDE else Cause.CRASHED
+        return Exited(reason or "worker left without a word", cause, status)

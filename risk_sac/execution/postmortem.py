@@ -1,12 +1,10 @@
-"""Finds out why a worker is gone, from its exit status, its last word and its log."""
+"""Describes the end of a worker from its exit status and its log."""
 
 import os
 import re
 import signal
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-
-from risk_sac.execution.executor import Cause, Exited
 
 TAIL_BYTES = 2000  # of a log, at most
 TAIL_LINES = 5
@@ -14,7 +12,6 @@ TAIL_LINES = 5
 # Of an absolute path; URLs stay. No path is deeper, and without a bound a log made for it takes minutes.
 _FOLDERS = re.compile(r"""(?<![\w./:])/(?:[^\s/'"|]+/){0,30}(?=[\w.])""")
 _SIGNAL_NAMES = {item.value: item.name for item in signal.Signals}  # real-time signals have none
-_OUTSIDE = {signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,22 +34,13 @@ class WorkerLog:
         return without_folders(said, self.path.parent) or "it left no message"
 
 
-def exited(status: int, log: WorkerLog, *, done: bool, given_up: Exited | None) -> Exited:
-    """Describes the end of a worker.
-
-    Args:
-      status: of its process, negative for a signal.
-      log: what it printed.
-      done: whether it had said its last word or was asked to stop.
-      given_up: what its executor killed it for, if it did.
-    """
-    reason = _reason(status, log)
-    if done:
-        return Exited(reason, Cause.ENDED, status)
-    if given_up is not None:
-        return replace(given_up, status=status)
-    cause = Cause.KILLED if -status in _OUTSIDE else Cause.CRASHED
-    return Exited(reason or "worker left without a word", cause, status)
+def reason_of(status: int, log: WorkerLog) -> str | None:
+    """Describes an exit status, negative for a signal; None for 0."""
+    if status < 0:
+        return f"worker was killed by {_SIGNAL_NAMES.get(-status, f'signal {-status}')}"
+    if status > 0:
+        return f"worker exited with status {status}: {log.tail()}"
+    return None
 
 
 def without_folders(text: str, own: Path | None = None) -> str:
@@ -65,11 +53,3 @@ def without_folders(text: str, own: Path | None = None) -> str:
     if own is not None:
         text = text.replace(f"{own}/", "").replace(str(own), own.name)
     return _FOLDERS.sub("", text)
-
-
-def _reason(status: int, log: WorkerLog) -> str | None:
-    if status < 0:
-        return f"worker was killed by {_SIGNAL_NAMES.get(-status, f'signal {-status}')}"
-    if status > 0:
-        return f"worker exited with status {status}: {log.tail()}"
-    return None

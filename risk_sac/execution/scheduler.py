@@ -80,13 +80,7 @@ class Scheduler:
     """
 
     def __init__(self, executor: Executor, store: RunStore, attempts: int) -> None:
-        """Starts nothing yet.
-
-        Args:
-          executor: where runs execute.
-          store: keeps them.
-          attempts: workers that a run may lose in a row without a new episode.
-        """
+        """Starts nothing yet; `attempts` are the workers that a run may lose in a row without a new episode."""
         self.active: dict[int, Active] = {}
         self.restarts: Counter[str] = Counter()
         self.stopping = False

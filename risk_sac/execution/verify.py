@@ -1,4 +1,4 @@
-"""Whether failures repeat: a failure that does not is nobody's time worth."""
+"""Replays failures to find those that do not repeat."""
 
 import json
 import logging
@@ -25,14 +25,7 @@ def verify(
     What was verified as often before, by the same code, is not replayed again. Of a run whose series cannot be read
     nothing is noted, and of none whose replay was interrupted; the log says so.
 
-    Args:
-      folders: of the runs.
-      times: how often.
-      jobs: processes at a time.
-      stopping: whether to leave off, asked again and again.
-
-    Returns:
-      What is noted, by folder.
+    `jobs` replay at a time, until `stopping`. Returns what is noted, by folder.
 
     Raises:
       ConfigError: a folder holds no run, or `times` is not positive.
@@ -57,17 +50,16 @@ def verify(
     told = _replayed(failed, times, max(jobs, 1), stopping) if failed else {}
     for folder in failed:
         if len(told[folder]) == times:
-            missing[folder] = replace(missing[folder], episodes=_counted(missing[folder].episodes, told[folder]))
+            same = {
+                index: Repetition(times=times, same=sum(index in each for each in told[folder]))
+                for index in missing[folder].episodes
+            }
+            missing[folder] = replace(missing[folder], episodes=same)
         else:
             del missing[folder]
     for folder, verified in missing.items():
         write_verified(folder, verified)
     return found | missing
-
-
-def _counted(episodes: Collection[int], told: Sequence[Collection[int]]) -> Mapping[int, Repetition]:
-    """How often each episode was the same; `told` are those that were, by replay."""
-    return {index: Repetition(times=len(told), same=sum(index in same for same in told)) for index in episodes}
 
 
 def _replayed(
