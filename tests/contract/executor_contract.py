@@ -77,7 +77,9 @@ class Runs:
 
     def submit(self, code: str, number: int = 1, attempt: int = 1) -> None:
         folder = self.folder(number, attempt)
-        folder.with_name(f"{folder.name}.py").write_text(WORKER + code)
+        file = folder.with_name(f"{folder.name}.py")
+        if not file.exists():  # an attempt that is refused leaves the one at work alone
+            file.write_text(WORKER + code)
         self.executor.submit(number, attempt, SPEC, folder)
         self._numbers.add(number)
 
