@@ -48,25 +48,17 @@ class Look:
 # what a grey print does not.
 _MUTED = ("#CC6677", "#332288", "#117733", "#882255", "#88CCEE", "#44AA99", "#DDCC77", "#AA4499", "#999933")
 _DASHES = ("-", "--", "-.")
-_OWN = {
+_OWN: dict[RunMethod, Look] = {
     REFERENCE: Look("#000000", "-", 2.0),
     "bo-only": Look("#555555", "-."),
     "random": Look("#777777", ":"),
     "no-adversary": Look("#BBBBBB", ":"),
 }
-
-
-def _looks() -> dict[RunMethod, Look]:
-    """By the table of methods, so that a method looks the same whichever others are compared."""
-    others = [method for method in METHODS if method not in _OWN]
-    drawn = {
-        method: Look(_MUTED[place % len(_MUTED)], _DASHES[(place + place // len(_MUTED)) % len(_DASHES)])
-        for place, method in enumerate(others)
-    }
-    return {method: _OWN.get(method) or drawn[method] for method in METHODS}
-
-
-LOOKS = _looks()
+# By the table of methods, so that a method looks the same whichever others are compared.
+LOOKS: dict[RunMethod, Look] = _OWN | {
+    method: Look(_MUTED[place % len(_MUTED)], _DASHES[(place + place // len(_MUTED)) % len(_DASHES)])
+    for place, method in enumerate(method for method in METHODS if method not in _OWN)
+}
 
 
 def draw(comparison: Comparison, figure: Curves | Times | Bars, formats: Sequence[Format]) -> list[bytes]:

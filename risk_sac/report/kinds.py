@@ -76,9 +76,7 @@ def studies(comparison: Comparison, family: FamilyName) -> str:
 def signatures(comparison: Comparison, family: FamilyName, phase: Phase) -> str:
     """How often each class of failures was found, the most frequent first."""
     cells = [cell for cell in comparison.group(family, phase) if cell.signatures]
-    total: Counter[str] = Counter()
-    for cell in cells:
-        total.update(cell.signatures)
+    total = sum((Counter(cell.signatures) for cell in cells), Counter[str]())
     if not total:
         return ""
     columns = ["signature", *(cell.method for cell in cells)]

@@ -102,9 +102,9 @@ def _of_family(comparison: Comparison, family: FamilyName, origin: Origin) -> Se
         if record.collision is not None
     }
     rest = len(found.clusters) - len(shown)
-    said = f"{_counted(len(found.clusters), 'kind')} by all methods together." + (
-        f" {_counted(rest, 'more kind')}, with the fewest preventable failures, left out here." if rest else ""
-    )
+    said = f"{_counted(len(found.clusters), 'kind')} by all methods together."
+    if rest:
+        said += f" {_counted(rest, 'more kind')}, with the fewest preventable failures, left out here."
     cards = [_card(each, *episodes[each.representative], origin) for each in shown]
     return Section(f"failures-{family}", family, [said, Cards(cards)])
 
