@@ -1,4 +1,4 @@
-"""The families that are shipped: each pattern at a place on a net of ours. And what any other name stands for."""
+"""The families by name: those that are shipped, and those at places that the library keeps."""
 
 from functools import cache
 from importlib.resources import files
@@ -30,11 +30,7 @@ FAMILIES: dict[str, Family] = {name: _shipped(name) for name in SHIPPED}
 
 
 def family_named(name: str) -> Family:
-    """A shipped family, or one at a place that the library keeps.
-
-    Raises:
-      ConfigError: the library keeps none of this name.
-    """
+    """A shipped family, or one of the library; raises `ConfigError` if there is none of this name."""
     return FAMILIES[name] if name in FAMILIES else _kept(name)
 
 

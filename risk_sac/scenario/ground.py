@@ -1,12 +1,10 @@
-"""Pieces of ground: convex polygons in any orientation. Whatever is bent or hollow is made of several."""
+"""Convex polygons on the ground; a bent or hollow shape is made of several."""
 
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
-from risk_sac.types import Floats
 
 Point = tuple[float, float]
 SAME_POINT_M = 1e-6
@@ -46,12 +44,7 @@ class Area:
 
 
 def ribbon(line: Sequence[Point], width_m: float) -> list[list[Point]]:
-    """The quadrangles, counter-clockwise, of a ribbon along a line; at bends they share a slanting side.
-
-    Args:
-      line: its middle, two points or more.
-      width_m: from side to side.
-    """
+    """The quadrangles, counter-clockwise, of a ribbon along a line; at bends they share a slanting side."""
     points = np.array(_without_repeats(line), dtype=np.float64)
     if len(points) < 2:
         return []
@@ -59,12 +52,12 @@ def ribbon(line: Sequence[Point], width_m: float) -> list[list[Point]]:
     steps /= np.hypot(*steps.T)[:, None]
     left = np.column_stack((-steps[:, 1], steps[:, 0]))
     across = np.concatenate((left[:1], (left[:-1] + left[1:]) / 2, left[-1:]))
-    # So that the ribbon keeps its width round a bend; a hairpin's corner would run away.
+    # Keeps the width round a bend; bounded, or a hairpin's corner would run away.
     across /= np.maximum((across * across).sum(axis=1), 0.25)[:, None]
     a, b = points + across * width_m / 2, points - across * width_m / 2
     quads = []
     for i in range(len(points) - 1):
-        corners = [_point(b[i]), _point(b[i + 1]), _point(a[i + 1]), _point(a[i])]
+        corners: list[Point] = [(float(x), float(y)) for x, y in (b[i], b[i + 1], a[i + 1], a[i])]
         quads += [corners] if is_convex(corners) else triangles(corners)
     return quads
 
@@ -82,7 +75,7 @@ def triangles(outline: Sequence[Point]) -> list[list[Point]]:
     found = []
     while len(ring) > 2:
         ear = next((i for i in range(len(ring)) if _is_ear(ring, i)), None)
-        if ear is None:  # it crosses itself: what is left has no inside that all would agree on
+        if ear is None:  # it crosses itself, so what is left has no inside
             break
         corner = [ring[ear - 1], ring[ear], ring[(ear + 1) % len(ring)]]
         if _doubled_area(corner) > ON_THE_EDGE_M2:
@@ -122,7 +115,3 @@ def _without_repeats(line: Sequence[Point]) -> list[Point]:
         if not kept or math.dist(kept[-1], point) >= SAME_POINT_M:
             kept.append(point)
     return kept
-
-
-def _point(values: Floats) -> Point:
-    return float(values[0]), float(values[1])

@@ -1,6 +1,6 @@
-"""The folder of places on nets of users': each with a piece of its net, under a name that holds both's digest.
+"""The folder of places on users' nets: each with a piece of its net, under a name that holds the digest of both.
 
-`RISK_SAC_PLACES` says where it is. Campaigns name the places of maps like families, so whoever plays or draws an
+`RISK_SAC_PLACES` says where it is. Campaigns name the places of maps like families, so a process that plays or draws an
 episode needs the folder that its place was kept in.
 """
 
@@ -32,18 +32,7 @@ def library() -> Path:
 
 
 def keep(place: Place, net: bytes) -> str:
-    """Puts a place into the library, unless it is there.
-
-    Args:
-      place: to be kept; the file that it names is not.
-      net: the piece of a net around it, which takes that file's place.
-
-    Returns:
-      The name of the family that it is.
-
-    Raises:
-      OSError: the folder cannot be written.
-    """
+    """Puts a place and the piece of net around it into the library; returns the name of its family."""
     text = place.model_copy(update={"net": NET}).model_dump_json().encode()
     name = f"{place.pattern}_{_digest(text, net)}"
     put(name, text, net)
@@ -51,11 +40,10 @@ def keep(place: Place, net: bytes) -> str:
 
 
 def put(name: str, text: bytes, net: bytes) -> None:
-    """Puts what `files_of` has told of a place into the library, unless it is there.
+    """Puts what `files_of` returned into the library, unless it is there.
 
     Raises:
       ConfigError: it is not what its name says.
-      OSError: the folder cannot be written.
     """
     if not name.endswith(f"_{_digest(text, net)}"):
         raise ConfigError("family", f"the place {name!r} is not what its name says")
@@ -70,18 +58,14 @@ def put(name: str, text: bytes, net: bytes) -> None:
     (new / PLACE).write_bytes(text)
     try:
         new.rename(folder)
-    except OSError:  # somebody else was quicker
+    except OSError:  # another process was quicker
         shutil.rmtree(new)
         if not folder.is_dir():
             raise
 
 
 def files_of(name: str) -> tuple[bytes, bytes]:
-    """A place of the library and the piece of net around it, as they are kept.
-
-    Raises:
-      ConfigError: it keeps none of this name, or what it keeps is not what was put there.
-    """
+    """A place and the piece of net around it, as they are kept; raises `ConfigError` if missing or damaged."""
     folder = library() / name
     try:
         if not FAMILY_NAME.fullmatch(name):
@@ -102,21 +86,18 @@ def kept(name: str) -> Place:
 
 
 def prune(folder: Path, named: Collection[str], unused_s: float) -> list[str]:
-    """Removes the places that nobody names; returns their names.
+    """Removes the places of a service's library that were put there long ago and are not named; returns their names.
 
     Args:
-      folder: the library; never that of a person, whose run folders nobody knows.
+      folder: the library; never that of a person, whose run folders are unknown.
       named: families that stay.
-      unused_s: how long ago a place must have been put there last, so that whoever is about to name it can.
-
-    Raises:
-      OSError: the folder cannot be written.
+      unused_s: least time since a place was last put there.
     """
     removed = []
     for path in sorted(folder.glob("*")):
         ours = FAMILY_NAME.fullmatch(path.name) is not None and path.name not in named
         if (ours or path.name.startswith(_NEW)) and path.stat().st_mtime < time.time() - unused_s:
-            path.rename(path.with_name(f"{_GONE}{path.name}"))  # nobody may find half of it
+            path.rename(path.with_name(f"{_GONE}{path.name}"))  # so that half of it is never found
             removed += [path.name] if ours else []
     for path in folder.glob(f"{_GONE}*"):
         shutil.rmtree(path)
@@ -124,7 +105,4 @@ def prune(folder: Path, named: Collection[str], unused_s: float) -> list[str]:
 
 
 def _digest(text: bytes, net: bytes) -> str:
-    digest = hashlib.sha256(text)
-    digest.update(b"\0")
-    digest.update(net)
-    return digest.hexdigest()[:DIGITS]
+    return hashlib.sha256(text + b"\0" + net).hexdigest()[:DIGITS]

@@ -56,12 +56,7 @@ class Limits:
 
 
 def limits_from_odd(odd: Odd, friction: float) -> Limits:
-    """The ODD's bounds, with vehicle acceleration further bounded by friction · g.
-
-    Args:
-      odd: complete, as a family's default or an intersection with it.
-      friction: of this scene's road surface.
-    """
+    """The bounds of a complete ODD, with vehicle acceleration further bounded by friction · g."""
     dynamic = odd.dynamic
     if not (
         dynamic.vehicle_speed_mps

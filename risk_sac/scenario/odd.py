@@ -52,11 +52,9 @@ Branch = TypeVar("Branch", bound=Settings)
 
 
 def intersect(default: Odd, user: Odd) -> Odd:
-    """The ODD that both allow, field by field.
+    """The ODD that a family's default and a user's both allow, field by field.
 
-    Args:
-      default: the family's, complete.
-      user: narrows it, or widens a field of `EXTREME` up to that; a field left out keeps the default's.
+    The user's narrows the default, or widens a field of `EXTREME` up to that; a field left out keeps the default's.
 
     Raises:
       OddError: a field of the user's is physically senseless or leaves nothing of the default's.
@@ -79,11 +77,7 @@ def widest(default: Odd) -> Odd:
 
 
 def check(odd: Odd) -> None:
-    """Refuse an ODD that contradicts physics, whatever the family.
-
-    Raises:
-      OddError: naming the field.
-    """
+    """Raises `OddError` for an ODD that contradicts physics, whatever the family."""
     for path, sensible in SENSIBLE.items():
         interval = field(odd, path)
         if interval is not None and not (interval.low in sensible and interval.high in sensible):
@@ -105,15 +99,7 @@ def check(odd: Odd) -> None:
 
 
 def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
-    """The scenes that lie in the ODD.
-
-    Args:
-      space: the family's scenes; each parameter may name an ODD field as a further bound.
-      odd: complete for the fields that are named; a field left out bounds nothing.
-
-    Raises:
-      OddError: naming the parameter that is left without a value.
-    """
+    """The scenes that lie in the ODD; raises `OddError` if a parameter is left without a value."""
     bounds = {}
     for parameter in space.parameters:
         allowed = field(odd, parameter.odd) if parameter.odd else None
@@ -142,21 +128,16 @@ def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...
       encounter, in which near misses count: the bare TTC is flat at its cap until a collision course begins, and then
       jumps.
     - RSS: the signal is scaled already, and is negative where the situation is dangerous.
-    - Pedestrians: a minimum gap that grows with the ego's speed, unless the ego stands and lets them pass; a standing
-      ego has the margin of a gap of STANDING_M, whoever walks past it.
+    - Pedestrians: a minimum gap that grows with the ego's speed; a standing ego has the margin of a gap of STANDING_M.
     - Red light: the braking that it takes to stop at the line must be within what the car, or the worst friction of
       the ODD, friction · g, can give; the step that crosses the line on red is far beyond it. That is held for
-      RED_LIGHT_HOLD_S, not for good, or it would stay the worst margin of the episode. A car that waits at the
-      line needs no braking and has the whole margin, however near it stopped.
+      RED_LIGHT_HOLD_S, not for good, or it would stay the worst margin of the episode.
     - Braking: BRAKING_HOLD_S on end at nine tenths of what car and road can give means that the ego had no reserve
       left. It is flat until then, and so no part of φ.
 
     Args:
-      odd: complete, as `intersect` returns it.
+      odd: complete, as `intersect` returns it; pedestrians and red light count where it has them.
       response_s: within which the ego responds.
-
-    Returns:
-      TTC, RSS and braking always; pedestrians and red light where the ODD has them.
 
     Source: Hayward 1972 for TTC; the scales are medians over episodes that nobody disturbs.
     """

@@ -42,7 +42,7 @@ class Track(Settings):
     def start(self, before_m: float, lead_m: float = 0.0) -> tuple[tuple[str, ...], Piece, float]:
         """Route, lane, and position on it of a front bumper `before_m`, and `lead_m` more, before the reference.
 
-        Nobody can start inside a junction: who would, starts at its entry.
+        A vehicle that would start inside a junction starts at its entry.
         """
         first = len(self.pieces) - 1
         while first > 0 and self.pieces[first].reach_m - before_m - lead_m < 0.0:

@@ -64,14 +64,7 @@ class SceneSpace:
         return np.array([parameter.high for parameter in self.parameters])
 
     def from_unit(self, point: Floats) -> Scene:
-        """The scene at a point of the unit cube.
-
-        Args:
-          point: `d`, each in [0, 1].
-
-        Raises:
-          SceneError: the point lies outside the cube or has another dimension.
-        """
+        """The scene at a point of the unit cube, `d`; raises `SceneError` for any other point."""
         point = np.asarray(point, dtype=np.float64)
         if point.shape != (self.dimension,):
             raise SceneError(f"point has shape {point.shape}; the {self.family!r} family wants ({self.dimension},)")
@@ -81,22 +74,14 @@ class SceneSpace:
         return Scene(self.family, dict(zip(self.names, values.tolist(), strict=True)))
 
     def to_unit(self, scene: Scene) -> Floats:
-        """The point of the unit cube at which a scene lies, `d`; a parameter without room lies at 0.
-
-        Raises:
-          SceneError: see `check`.
-        """
+        """The point of the unit cube at which a scene lies, `d`; a parameter without room lies at 0."""
         self.check(scene)
         offset = np.array([scene.values[name] for name in self.names]) - self.low
         width = self.high - self.low
         return np.clip(np.divide(offset, width, out=np.zeros_like(offset), where=width > 0), 0.0, 1.0)
 
     def check(self, scene: Scene) -> None:
-        """Refuse a scene that is no point of this space.
-
-        Raises:
-          SceneError: another family, unknown or missing names, a value out of bounds or not finite.
-        """
+        """Raises `SceneError` for a scene that is no point of this space."""
         if scene.family != self.family:
             raise SceneError(f"scene is of family {scene.family!r}; wanted {self.family!r}")
         if scene.values.keys() != set(self.names):
@@ -111,14 +96,7 @@ class SceneSpace:
                 )
 
     def narrow(self, bounds: Mapping[str, Interval]) -> "SceneSpace":
-        """The part of this space inside further bounds.
-
-        Args:
-          bounds: parameter name -> interval; parameters left out keep theirs.
-
-        Raises:
-          SceneError: an unknown name, or bounds that leave a parameter no value.
-        """
+        """The part of this space inside further bounds, by parameter; raises `SceneError` if none is left."""
         if unknown := sorted(bounds.keys() - set(self.names)):
             raise SceneError(f"unknown parameters {unknown}; the {self.family!r} family has {list(self.names)}")
         return replace(self, parameters=tuple(_narrowed(p, bounds.get(p.name)) for p in self.parameters))

@@ -9,7 +9,7 @@ from risk_sac.scenario.family import WALK_OFFSET_M
 from risk_sac.scenario.ground import Point, ribbon, triangles
 from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M
 from risk_sac.scenario.maps.clearance import is_near, outlines
-from risk_sac.scenario.maps.net import Crossing, Lane, Net
+from risk_sac.scenario.maps.net import Crossing, Net
 from risk_sac.scenario.place import Ground, Signal, Walk
 
 CROSSINGS_M = 60.0  # so far from a place a crossing is told of
@@ -22,7 +22,7 @@ LEGS = 3  # of a junction where ways can cross
 
 
 def ground_around(net: Net, x_m: float, y_m: float, *, walked: bool) -> Ground:
-    """What verdicts have to know of the ground around a point; without pedestrians, the junctions alone."""
+    """The ground around a point that verdicts look at; where no pedestrian walks, the junctions alone."""
     junctions = [
         triangle
         for junction in net.junctions.values()
@@ -41,11 +41,9 @@ def ground_around(net: Net, x_m: float, y_m: float, *, walked: bool) -> Ground:
     for junction in net.junctions.values():
         if math.hypot(junction.x_m - x_m, junction.y_m - y_m) <= 3 * WALKED_M:
             lanes += [lane for lane in net.inside.get(junction.id, ()) if is_near(lane.line, x_m, y_m, WALKED_M)]
-    return Ground(
-        crossings=_rounded(crossings),
-        roadway=_rounded(_roadway(lanes, x_m, y_m)),
-        junctions=_rounded(junctions),
-    )
+    quads = (quad for lane in lanes for quad in ribbon(lane.line, lane.width_m))
+    roadway = [quad for quad in quads if is_near((*quad, quad[0]), x_m, y_m, WALKED_M)]
+    return Ground(crossings=_rounded(crossings), roadway=_rounded(roadway), junctions=_rounded(junctions))
 
 
 def walk_over(net: Net, crossing: Crossing, driven_rad: float) -> Walk:
@@ -78,15 +76,8 @@ def _turned_over_m(net: Net, junction: str, kerb: Walk) -> float:
 
 def signal_of(net: Net, ids: Iterable[str | None]) -> Signal | None:
     """The first of the signals that are there."""
-    for id_ in ids:
-        if id_ is not None and net.cycles_s.get(id_, 0.0) > 0.0:
-            return Signal(id=id_, cycle_s=net.cycles_s[id_])
-    return None
-
-
-def _roadway(lanes: Sequence[Lane], x_m: float, y_m: float) -> list[list[Point]]:
-    quads = (quad for lane in lanes for quad in ribbon(lane.line, lane.width_m))
-    return [quad for quad in quads if is_near((*quad, quad[0]), x_m, y_m, WALKED_M)]
+    found = (Signal(id=id_, cycle_s=net.cycles_s[id_]) for id_ in ids if id_ and net.cycles_s.get(id_, 0.0) > 0.0)
+    return next(found, None)
 
 
 def _rounded(polygons: Iterable[Sequence[Point]]) -> tuple[tuple[Point, ...], ...]:

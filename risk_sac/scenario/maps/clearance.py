@@ -108,29 +108,25 @@ def _off_m(waiting: Lane, other: Lane) -> float:
     """How far a lane comes from a car whose front is at the end of another; 0 if it comes within it."""
     (x, y), heading = waiting.line[-1], waiting.way_out_rad
     cos, sin = math.cos(heading), math.sin(heading)
-    least_m = math.inf
-    for px, py in _sampled(other):
-        ahead_m = (px - x) * cos + (py - y) * sin
-        aside_m = abs((py - y) * cos - (px - x) * sin)
-        off_m = math.hypot(max(ahead_m, -CAR_LENGTH_M - ahead_m, 0.0), max(aside_m - CAR_WIDTH_M / 2, 0.0))
-        least_m = min(least_m, off_m)
-    return least_m
+    dx, dy = _sampled(np.array(other.line)) - np.array([[x], [y]])
+    ahead_m, aside_m = dx * cos + dy * sin, np.abs(dy * cos - dx * sin)
+    off_x = np.maximum(np.maximum(ahead_m, -CAR_LENGTH_M - ahead_m), 0.0)
+    return float(np.hypot(off_x, np.maximum(aside_m - CAR_WIDTH_M / 2, 0.0)).min())
 
 
-def _sampled(lane: Lane) -> list[Point]:
-    found = []
-    for (ax, ay), (bx, by) in pairwise(lane.line):
-        steps = max(math.ceil(math.hypot(bx - ax, by - ay) / SAMPLED_M), 1)
-        found += [(ax + i / steps * (bx - ax), ay + i / steps * (by - ay)) for i in range(steps + 1)]
-    return found
+def _sampled(line: Floats) -> Floats:
+    """Points along a line, its corners included; x and y in rows, m."""
+    station_m = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    stations_m = np.union1d(station_m, np.arange(0.0, station_m[-1], SAMPLED_M))
+    return np.array([np.interp(stations_m, station_m, each) for each in line.T])
 
 
 def _cross(line: Sequence[Point], other: Sequence[Point]) -> bool:
-    return any(_segments_cross(*a, *b) for a in pairwise(line) for b in pairwise(other))
-
-
-def _segments_cross(a: Point, b: Point, c: Point, d: Point) -> bool:
-    return _side(a, b, c) * _side(a, b, d) < 0.0 and _side(c, d, a) * _side(c, d, b) < 0.0
+    return any(
+        _side(a, b, c) * _side(a, b, d) < 0.0 and _side(c, d, a) * _side(c, d, b) < 0.0
+        for a, b in pairwise(line)
+        for c, d in pairwise(other)
+    )
 
 
 def _side(a: Point, b: Point, c: Point) -> float:

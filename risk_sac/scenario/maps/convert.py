@@ -57,13 +57,10 @@ class Converted:
 def present_net(file: Path, folder: Path) -> Converted:
     """The map as a net of the present format: itself, where it is one, or a file in `folder`.
 
-    Args:
-      file: a net, an OSM extract or OpenDRIVE; by its content, gzipped or not, and not by its name.
-      folder: an existing one, to write to.
+    It may be a net, an OSM extract or OpenDRIVE, gzipped or not; its content tells, not its name.
 
     Raises:
       MapError: it is none of them, or has left-hand traffic, or netconvert refuses it or is not there.
-      OSError: it cannot be read.
     """
     plain = _unpacked(file, folder)
     format_, version = _told(plain)
@@ -87,11 +84,7 @@ def remarks(said: str, severity: str) -> list[str]:
 
 
 def netconvert() -> tuple[str, dict[str, str]]:
-    """The program, and the environment in which it finds its own files.
-
-    Raises:
-      MapError: it is not installed.
-    """
+    """The program, and the environment in which it finds its own files; raises `MapError` if it is not installed."""
     package = importlib.util.find_spec("sumo")
     for home in package.submodule_search_locations or () if package else ():
         if program := shutil.which("netconvert", path=str(Path(home) / "bin")):
@@ -125,9 +118,8 @@ def _told(file: Path) -> tuple[Format, tuple[int, ...]]:
     """Format and version, by the root element."""
     with file.open("rb") as stream:
         head = stream.read(HEAD_BYTES).decode("utf-8", "replace")
-        while (
-            "-->" not in head and "<!--" in head and (more := stream.read(HEAD_BYTES))
-        ):  # netconvert's own long header
+        # Netconvert writes a long comment first.
+        while "-->" not in head and "<!--" in head and (more := stream.read(HEAD_BYTES)):
             head += more.decode("utf-8", "replace")
         head += stream.read(HEAD_BYTES).decode("utf-8", "replace")
     root = re.search(r"<([A-Za-z_][\w.-]*)([^>]*)", re.sub(r"<!--.*?-->", "", head, flags=re.DOTALL))

@@ -1,8 +1,8 @@
 """Cuts the piece of a net around a place out of it, so that an episode does not load a town.
 
-Every junction that somebody may come to stays as it is, with all its roads, ways and signals; where the piece ends,
-junctions become dead ends. Nothing is computed anew, so who yields to whom is what it was. Signals keep to their
-programme, also those that would count vehicles: an episode sets where in its cycle a signal is.
+Every junction that vehicles may come to stays as it is, with all its roads, ways and signals; where the piece ends,
+junctions become dead ends. Nothing is computed anew, so the right of way is unchanged. Signals get a fixed programme,
+also those that would count vehicles: an episode sets where in its cycle a signal is.
 """
 
 import math
@@ -77,12 +77,12 @@ def _inside_of(id_: str, colon: str = ":") -> str:
 
 
 def _alone(element: ET.Element) -> ET.Element:
-    """Without what it has inside: parameters of other tools, and of lanes the lanes of others, which may be cut off."""
+    """The element without its children, which may name what is cut off."""
     return ET.Element(element.tag, element.attrib)
 
 
 def _with(element: ET.Element, inside: str) -> ET.Element:
-    """With the elements of one kind that it has inside, and those alone."""
+    """The element with its children of one kind alone."""
     out = _alone(element)
     out.extend(map(_alone, element.iter(inside)))
     return out

@@ -32,11 +32,7 @@ def survey(net: Net, patterns: Collection[Pattern] = tuple(FINDERS)) -> Survey:
 
 
 def place_at(net: Net, pattern: Pattern, id_: str) -> Fit:
-    """One place, with its ground.
-
-    Raises:
-      MapError: the map has no such spot, or the pattern does not fit there; the message says why.
-    """
+    """One place, with its ground; raises `MapError` if the map has no such spot or the pattern does not fit there."""
     spot = next((spot for spot in _spots(net, (pattern,)) if spot.id == id_), None)
     if spot is None:
         raise MapError("place", _nowhere(net, pattern, id_))
@@ -74,28 +70,15 @@ class Map:
     """A net, read once."""
 
     def __init__(self, file: Path) -> None:
-        """Reads it.
-
-        Raises:
-          MapError: no pattern could be placed on it; the message says why.
-          OSError: it cannot be read.
-        """
+        """Reads it; raises `MapError` if no pattern could be placed on it."""
         self._root = read_tree(file)
         self.net: Net = read_net(file, self._root)
 
     def fits(self, pattern: Pattern, place: str | None) -> Sequence[Fit]:
-        """One place, or all at which a pattern fits.
-
-        Raises:
-          MapError: it does not fit there.
-        """
+        """One place, or all at which a pattern fits; raises `MapError` if it does not fit at the one."""
         return [place_at(self.net, pattern, place)] if place is not None else survey(self.net, (pattern,)).fits
 
     def keep(self, fit: Fit) -> str:
-        """Puts a place into the library; returns the name of the family that it is.
-
-        Raises:
-          OSError: the library cannot be written.
-        """
+        """Puts a place into the library; returns the name of its family."""
         fit = with_ground(self.net, fit)
         return library.keep(fit.place, cut(self.net, self._root, fit))

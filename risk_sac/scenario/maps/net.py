@@ -1,6 +1,6 @@
-"""A SUMO net as the finders need it: lanes, how they lead on, and who has to watch out for whom.
+"""A SUMO net as the finders need it: lanes, how they lead on, and right of way.
 
-Only what is said in the file is read, so it has to be a net of the present format, as netconvert writes it.
+The file has to be in the present format, as netconvert writes it.
 Source: https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html
 """
 
@@ -116,7 +116,7 @@ class Net:
     back: dict[str, list[Link]] = field(default_factory=lambda: defaultdict(list))  # by the lane they lead to
     cycles_s: dict[str, float] = field(default_factory=dict)  # of the signals
     inside: dict[str, list[Lane]] = field(default_factory=lambda: defaultdict(list))  # drivable, by junction
-    # Inside junctions, by a lane's id: the lanes of those whom one lets pass before one drives onto it.
+    # Inside junctions, by a lane's id: the lanes that vehicles wait for before they drive onto it.
     waits_for: dict[str, tuple[Lane, ...]] = field(default_factory=dict)
 
     @cached_property
@@ -139,10 +139,11 @@ class Net:
 
     def are_foes(self, one: Link, other: Link) -> bool:
         """Whether two links of a junction cross or meet, by what the net says."""
-        junction = self.junctions[self.edges[one.source.edge].end]
         if one.index is None or other.index is None:
             return False
-        return _bit(junction.foes, one.index, other.index) or _bit(junction.foes, other.index, one.index)
+        foes = self.junctions[self.edges[one.source.edge].end].foes
+        pairs = ((one.index, other.index), (other.index, one.index))
+        return any(foes.get(row, "")[::-1][column : column + 1] == "1" for row, column in pairs)
 
     def lane(self, id_: str) -> Lane:
         """A lane outside junctions."""
@@ -287,8 +288,3 @@ def _line(shape: str) -> tuple[Point, ...]:
 
 def _direction(a: Point, b: Point) -> float:
     return math.atan2(b[1] - a[1], b[0] - a[0])
-
-
-def _bit(rows: Mapping[int, str], row: int, column: int) -> bool:
-    bits = rows.get(row, "")
-    return column < len(bits) and bits[-1 - column] == "1"

@@ -20,16 +20,12 @@ UNKNOWN = "the map does not say on which side people drive: it is read as right-
 
 
 def side_remarks(file: Path) -> list[str]:
-    """What whoever reads a map as right-hand traffic should know.
+    """What a user of a map that is read as right-hand traffic should know.
 
     Choice: where the evidence contradicts itself, as where one road has its sides swapped, most of it decides.
 
-    Args:
-      file: read as a stream: once, and once more where there are roundabouts.
-
     Raises:
       MapError: people drive on the left; or it is no XML without a document type.
-      OSError: it cannot be read.
     """
     said = _said(file)
     left = [where for where, side in said if side == LEFT]
