@@ -51,11 +51,7 @@ class Gauge:
     """
 
     def __init__(
-        self,
-        requirements: Sequence[Requirement],
-        horizon_steps: int,
-        rss: RssParameters,
-        softmin_sharpness: float,
+        self, requirements: Sequence[Requirement], horizon_steps: int, rss: RssParameters, softmin_sharpness: float
     ) -> None:
         """Compiles the requirements; `softmin_sharpness` is β of (7)."""
         self._monitor = Monitor(requirements, STEP_S, horizon_steps)
@@ -68,13 +64,7 @@ class Gauge:
         self._monitor.reset()
 
     def measure(self, frame: Frame, before: Frame | None, seen: Bools) -> Measures:
-        """Measures the next frame.
-
-        Args:
-          frame: all actors now.
-          before: the previous frame, None at the start.
-          seen: which of the others the ego sees.
-        """
+        """Measures the next frame, given the one before and which of the others the ego sees."""
         assessment = assess(frame, self._rss, seen)
         signals = publish(frame, before, assessment.least)
         robustness = self._monitor.update(signals)

@@ -119,13 +119,7 @@ def worst_rss_margin(assessment: Assessment) -> float:
 
 
 def publish(frame: Frame, before: Frame | None, least: LeastMargins) -> dict[str, float]:
-    """The value of every signal in `risk_sac.risk.signals.SIGNALS`.
-
-    Args:
-      frame: all actors now; index 0 is the ego.
-      before: the previous frame, None at the start.
-      least: of `frame`.
-    """
+    """The value of every signal in `SIGNALS`; `before` is the previous frame, `least` is of `frame`."""
     return {
         "ttc_s": least.ttc_s,
         "encounter_s": least.encounter_s,

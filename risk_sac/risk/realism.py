@@ -40,13 +40,7 @@ def jerk_term(accel_mps2: float, previous_accel_mps2: float, limit_mps2: float, 
     """Abrupt control of one adversary, max(|Δa| / dt - ordinary, 0) / (greatest - ordinary), at most 1.
 
     Choice: the greatest jerk is the actor's own, limit / BUILD_UP_S, and three quarters of it are free, as ordinary
-    drivers need them at a light or behind a leader.
-
-    Args:
-      accel_mps2: its acceleration.
-      previous_accel_mps2: in the step before.
-      limit_mps2: greatest absolute acceleration that it is capable of, above 0.
-      step_s: dt.
+    drivers need them at a light or behind a leader. The limit is the greatest absolute acceleration, above 0.
     """
     greatest = limit_mps2 / BUILD_UP_S
     ordinary = ORDINARY_JERK * greatest
@@ -138,13 +132,13 @@ def adversaries_cost(
     previous_gap_m: Floats,
     step_s: float,
 ) -> float:
-    """C_soft of the adversaries between two frames of the same actors.
+    """C_soft of the adversaries, in columns `rows`, between two frames of the same `n` actors.
 
     Args:
-      rows: columns of the adversaries in the frames.
+      rows: columns of the adversaries.
       limit_mps2: greatest absolute acceleration of each adversary.
-      kind: `n`, of every actor.
-      state: of the frame now.
+      kind: `n`.
+      state: now.
       gap_m: `n - 1`, from the ego's body to the others'.
       previous: state one step before.
       previous_gap_m: the gaps one step before.
@@ -171,12 +165,8 @@ def broken_hard_rule(
 ) -> HardRule | None:
     """C_hard of (5): the rule that the frame of the release breaks, or None.
 
-    Args:
-      overlaps: whether any two bodies overlap.
-      gap_m: smallest distance between the ego's body and another.
-      ttc_s: smallest time to collision of the ego.
-      rss_margin: smallest RSS margin of the ego; below 0 the situation is dangerous.
-      in_conflict: whether the careful driver in the ego's place is in a conflict already.
+    `overlaps` holds for any two bodies, `in_conflict` for the careful driver in the ego's place; the rest are the ego's
+    smallest measures.
     """
     if overlaps:
         return "initial_overlap"

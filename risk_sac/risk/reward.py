@@ -27,7 +27,7 @@ def collision_bonus(valid: Value, bonus: float) -> Value:
     user wants to know.
 
     Args:
-      valid: in the step of a valid collision 1, or less where nobody would have prevented it; else 0.
+      valid: in the step of a valid collision 1, or less where no driver would have prevented it; else 0.
       bonus: its size, at least 0.
     """
     return bonus * valid

@@ -44,13 +44,7 @@ def stopping(speed_mps: float, response_s: float, accel_mps2: float, brake_mps2:
 
 @compiled
 def same_direction(rear_mps: float, front_mps: float, parameters: RssParameters) -> float:
-    """d_min = [v_r ρ + a ρ²/2 + (v_r + ρ a)² / (2 b_min) − v_f² / (2 b_max)]_+ , m  (Def. 1).
-
-    Args:
-      rear_mps: v_r, speed of the vehicle behind.
-      front_mps: v_f, speed of the one ahead.
-      parameters: see `RssParameters`.
-    """
+    """d_min = [v_r ρ + a ρ²/2 + (v_r + ρ a)² / (2 b_min) − v_f² / (2 b_max)]_+ , m  (Def. 1)."""
     p = parameters
     way = stopping(rear_mps, p.response_s, p.accel_mps2, p.brake_min_mps2)
     return behind(way, front_mps, p)
@@ -81,7 +75,7 @@ def lateral(closing_ego_mps: float, closing_other_mps: float, parameters: RssPar
     Args:
       closing_ego_mps: the ego's lateral speed towards the other; negative when it moves away.
       closing_other_mps: the other's towards the ego.
-      parameters: see `RssParameters`.
+      parameters: of both.
     """
     p = parameters
     ego = stopping(closing_ego_mps, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2)
@@ -114,10 +108,7 @@ def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Marg
 
     Choice: the lateral scale grows to the longitudinal one with the angle between the courses.
 
-    Args:
-      view: the scene.
-      walks: `n`; which are pedestrians.
-      parameters: see `RssParameters`.
+    `walks` says which of the `n` others are pedestrians.
     """
     p = parameters
     n = len(view.x)
@@ -129,12 +120,10 @@ def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Marg
         cos, sin = abs(view.cos[i]), abs(view.sin[i])
         lengthwise = LONGITUDINAL_SCALE_S * max(ego + max(-along, 0.0), SLOW_MPS)
         crosswise = LONGITUDINAL_SCALE_S * max(ego, abs(across), SLOW_MPS) * sin + LATERAL_SCALE_M * cos
-        accel_x, brake_x, accel_y, brake_y = (
-            p.accel_mps2 * cos + p.lateral_accel_mps2 * sin,
-            p.brake_min_mps2 * cos + p.lateral_brake_mps2 * sin,
-            p.accel_mps2 * sin + p.lateral_accel_mps2 * cos,
-            p.brake_min_mps2 * sin + p.lateral_brake_mps2 * cos,
-        )
+        accel_x = p.accel_mps2 * cos + p.lateral_accel_mps2 * sin
+        brake_x = p.brake_min_mps2 * cos + p.lateral_brake_mps2 * sin
+        accel_y = p.accel_mps2 * sin + p.lateral_accel_mps2 * cos
+        brake_y = p.brake_min_mps2 * sin + p.lateral_brake_mps2 * cos
         if walks[i]:
             accel_x = accel_y = p.walk_accel_mps2
             brake_x = brake_y = p.walk_brake_mps2

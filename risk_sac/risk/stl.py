@@ -113,11 +113,7 @@ class Monitor:
 
 
 def check_requirements(requirements: Sequence[Requirement], step_s: float, horizon_steps: int) -> None:
-    """Refuses requirements that cannot be monitored online.
-
-    Raises:
-      FormulaError: its `field` is `requirements[i].formula`.
-    """
+    """Raises `FormulaError`, with its `field`, for requirements that cannot be monitored online."""
     Monitor(requirements, step_s, horizon_steps)
 
 

@@ -48,11 +48,8 @@ def time_to_encounter(view: RelativeView, walks: Bools) -> Floats:
     the speeds u along the headings h, and c. On a collision course τ ≤ TTC. Every term is convex in t, so the minimum
     is where the lines that fall by more than 1 a second meet the others, or at t = 0.
 
-    Choice: an actor from behind has to keep the distance, so it fades out behind the ego's rear bumper.
-
-    Args:
-      view: the scene.
-      walks: `n`; which are pedestrians.
+    Choice: an actor from behind has to keep the distance, so it fades out behind the ego's rear bumper. `walks` says
+    which of the `n` are pedestrians.
     """
     n = len(view.x)
     encounter = np.empty(n)

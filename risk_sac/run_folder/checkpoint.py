@@ -33,11 +33,6 @@ def save(path: Path, state: State, run_digest: str) -> None:
 
     One writer per path. Tensors are stored as they are on the CPU, views without the storage they look into.
 
-    Args:
-        path: in an existing folder.
-        state: what to store; keys are str or int.
-        run_digest: `RunSpec.digest` of the run it belongs to.
-
     Raises:
         OSError: the folder is missing, unwritable or full; an old checkpoint stays as it was.
         TypeError: the state holds something `load` could not read back; the message says where.
@@ -120,7 +115,8 @@ def _encode(value: object, where: str) -> object:
     if type(value) in _PLAIN:  # exact: a subclass such as numpy.float64 or an enum would not load
         return value
     if isinstance(value, torch.Tensor):
-        return _compact(value.detach().cpu())
+        tensor = value.detach().cpu()
+        return tensor if tensor.untyped_storage().nbytes() == tensor.nbytes else tensor.clone()
     if isinstance(value, np.ndarray):
         return {_ARRAY: _tensor_of(value, where)}
     if isinstance(value, list | tuple) and type(value) in (list, tuple):  # a named tuple would come back as a tuple
@@ -131,10 +127,6 @@ def _encode(value: object, where: str) -> object:
             raise TypeError(f"{where} has keys {list(value)}; wanted str or int, none of them {_ARRAY!r}")
         return {key: _encode(item, f"{where}[{key!r}]") for key, item in value.items()}
     raise TypeError(f"{where} is a {type(value).__name__}; a checkpoint holds tensors, arrays and plain values only")
-
-
-def _compact(tensor: torch.Tensor) -> torch.Tensor:
-    return tensor if tensor.untyped_storage().nbytes() == tensor.nbytes else tensor.clone()
 
 
 def _tensor_of(array: np.ndarray[Any, Any], where: str) -> torch.Tensor:

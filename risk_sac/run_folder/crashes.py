@@ -46,11 +46,7 @@ class CrashGuard:
     """Counts the crashes of a run's episodes, and notes how far the one being played is."""
 
     def __init__(self, folder: Path) -> None:
-        """Counts a crash of the last process.
-
-        Raises:
-          OSError: the folder cannot be written.
-        """
+        """Counts a crash of the last process."""
         self._folder = folder
         self._crashes = _read(folder / COUNTS)
         self._playing: int | None = None

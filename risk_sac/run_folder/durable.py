@@ -59,11 +59,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def set_aside(path: Path) -> Path:
-    """Renames a damaged file, so that nothing takes it for a good one; returns its new path.
-
-    Raises:
-      OSError: the folder cannot be written.
-    """
+    """Renames a damaged file, so that nothing takes it for a good one; returns its new path."""
     return path.replace(path.with_name(f"{path.name}.damaged"))
 
 
@@ -77,21 +73,12 @@ def sha256(path: Path) -> str | None:
 
 
 def write_sealed(path: Path, document: object, *, mode: int = 0o666) -> None:
-    """Replaces a sealed file in one step.
-
-    Raises:
-      OSError: the folder cannot be written; an old file stays as it was.
-    """
+    """Replaces a sealed file in one step, as `replace_file` does."""
     replace_file(path, seal(document), mode=mode)
 
 
 def read_sealed(path: Path, kind: type[T]) -> T:
-    """Reads what `write_sealed` wrote.
-
-    Raises:
-      DamagedError: it is not as it was written, or it is something else.
-      OSError: it cannot be read.
-    """
+    """Reads what `write_sealed` wrote; raises `DamagedError` if it is not as it was written."""
     try:
         return unseal(path.read_bytes(), kind)
     except DamagedError as error:
@@ -106,11 +93,7 @@ def seal(document: Any) -> bytes:
 
 
 def unseal(content: bytes, kind: type[T]) -> T:
-    """The document that was sealed.
-
-    Raises:
-      DamagedError: the content is not as it was sealed, or it is something else.
-    """
+    """The document that was sealed; raises `DamagedError` if the content is not as it was sealed."""
     found = _SEAL.search(content)
     if found is None:
         raise DamagedError("it does not end in its SHA-256: it was cut short, or something else wrote it")

@@ -61,11 +61,7 @@ class Results:
     contacts: tuple[Contact, ...] = ()  # in the order of the episodes
 
     def contact(self, id_: str) -> Contact:
-        """The contact with this id, with or without the run's before it, or with this number of an episode.
-
-        Raises:
-          ConfigError: there is none.
-        """
+        """The contact with this id, with or without the run's before it, or with this number of an episode."""
         for contact in self.contacts:
             episode = contact.episode
             known = (contact.id, episode.id_in(self.spec.id), f"{episode.phase}-{episode.index}")
@@ -79,20 +75,12 @@ _RECORDS = TypeAdapter(list[EpisodeRecord])
 
 
 def write_results(folder: Path, results: Results) -> None:
-    """Replaces results.json in one step.
-
-    Raises:
-      OSError: the folder cannot be written.
-    """
+    """Replaces results.json in one step."""
     write_sealed(folder / RESULTS, results)
 
 
 def read_results(path: Path) -> Results:
-    """Reads results.json, or the one in a folder.
-
-    Raises:
-      ConfigError: there is none, it is damaged, or it is something else.
-    """
+    """Reads results.json, or the one in a folder; raises `ConfigError` if it is missing or damaged."""
     file = path / RESULTS if path.is_dir() else path
     try:
         return read_sealed(file, Results)

@@ -119,11 +119,7 @@ class Trace:
 
 
 def write_series(path: Path, series: dict[str, NDArray[np.generic]]) -> SeriesFile:
-    """Writes an .npz that is either complete or absent; the same arrays give the same bytes.
-
-    Raises:
-      OSError: the disk is full or the folder cannot be written.
-    """
+    """Writes an .npz that is either complete or absent; the same arrays give the same bytes."""
     archive = io.BytesIO()
     np.savez_compressed(archive, allow_pickle=False, **series)
     content = archive.getbuffer()
@@ -133,12 +129,7 @@ def write_series(path: Path, series: dict[str, NDArray[np.generic]]) -> SeriesFi
 
 
 def read_series(path: Path) -> dict[str, NDArray[np.generic]]:
-    """Reads what `write_series` wrote.
-
-    Raises:
-      DamagedError: it is not as it was written.
-      OSError: it is gone.
-    """
+    """Reads what `write_series` wrote; raises `DamagedError` if it is not as it was written."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}

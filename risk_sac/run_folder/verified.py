@@ -64,11 +64,7 @@ def distinct_failures(results: Results) -> list[EpisodeRecord]:
 
 
 def write_verified(folder: Path, verified: Verified) -> None:
-    """Replaces the file in one step.
-
-    Raises:
-      OSError: the folder cannot be written.
-    """
+    """Replaces the file in one step."""
     write_sealed(folder / VERIFIED, verified)
 
 

@@ -5,7 +5,7 @@ Source: RISK-SAC, Sec. IV-A.2.
 
 from collections.abc import Mapping
 
-from risk_sac.scenario.family import EGO, HORIZON_STEPS, Family, at_most, friction, initial_speed, offset_of, road_odd
+from risk_sac.scenario.family import EGO, Family, at_most, friction, initial_speed, offset_of, road_odd
 from risk_sac.scenario.layout import CAR_LENGTH_M, Layout, VehicleStart, layout_at, vehicle
 from risk_sac.scenario.place import Stretch, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
@@ -43,7 +43,6 @@ def family(name: str, place: Stretch) -> Family:
     return Family(
         name=name,
         summary=place.summary,
-        horizon_steps=HORIZON_STEPS,
         space=SceneSpace(name, _parameters(place, beside, followed=followed)),
         odd=road_odd(place, ("none",) if place.signal is None else ("fixed_time",), ("none",)),
         vehicles=("lead", *beside),

@@ -10,22 +10,21 @@ from risk_sac.scenario.place import Place, Signal
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 EGO = "ego"
-HORIZON_STEPS = 150
 WALK_OFFSET_M = 1.9  # of a pedestrian from the middle of its way, along the road, at most
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
     """One scenario family."""
 
     name: FamilyName
     summary: str
-    horizon_steps: int  # of 0.1 s
     space: SceneSpace
     odd: Odd  # complete: every field is set
     vehicles: tuple[str, ...]  # adversary vehicles, in the order of the action vector
     pedestrians: tuple[str, ...]  # adversary pedestrians, after the vehicles
     layout: Callable[[Mapping[str, float]], Layout]
+    horizon_steps: int = 150  # of 0.1 s
 
     @property
     def adversaries(self) -> tuple[str, ...]:

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from risk_sac.config import CrossingType, SignalType
 from risk_sac.scenario.family import (
     EGO,
-    HORIZON_STEPS,
     Family,
     at_most,
     friction,
@@ -51,7 +50,6 @@ def family(name: str, place: CrossingPlace) -> Family:
     return Family(
         name=name,
         summary=place.summary,
-        horizon_steps=HORIZON_STEPS,
         space=SceneSpace(name, _parameters(place)),
         odd=road_odd(
             place,

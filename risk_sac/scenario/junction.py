@@ -6,7 +6,6 @@ Source: RISK-SAC, Sec. IV-A.2.
 from collections.abc import Mapping
 
 from risk_sac.scenario.family import (
-    HORIZON_STEPS,
     Family,
     at_most,
     friction,
@@ -50,7 +49,6 @@ def family(name: str, place: JunctionPlace) -> Family:
     return Family(
         name=name,
         summary=place.summary,
-        horizon_steps=HORIZON_STEPS,
         space=SceneSpace(name, _parameters(place)),
         odd=road_odd(
             place,

@@ -29,10 +29,8 @@ class Parameter:
             raise SceneError(
                 f"parameter {self.name!r} has bounds [{self.low:g}, {self.high:g}]; wanted finite low <= high"
             )
-        if len(self.categories) not in (
-            0,
-            2,
-        ):  # of three, an ODD could leave out the middle one, and a box has no holes
+        # Of three, an ODD could leave out the middle one, and a box has no holes.
+        if len(self.categories) not in (0, 2):
             raise SceneError(f"parameter {self.name!r} has categories {self.categories}; wanted none or two")
 
 

@@ -34,13 +34,7 @@ class Contact:
 
 
 def find_contact(before: Frame | None, frame: Frame, view: RelativeView) -> Contact | None:
-    """The ego's first contact in the step from `before` to `frame`, or None.
-
-    Args:
-      before: the previous frame; None when `frame` is the first.
-      frame: all actors now.
-      view: `relative_view(frame)`.
-    """
+    """The ego's first contact in the step from `before` to `frame`, or None; `view` is `relative_view(frame)`."""
     if not view.overlap.any():
         return None
     touching = np.flatnonzero(view.overlap)

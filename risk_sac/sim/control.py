@@ -34,12 +34,7 @@ class PedestrianControl:
     across_mps2: float = 0.0
 
     def step(self, drive: float, turn: float) -> Walker:
-        """One step of 0.1 s.
-
-        Args:
-          drive: acceleration as a share of the limit, -1 to 1.
-          turn: heading rate as a share of what the speed allows, -1 (clockwise) to 1.
-        """
+        """One step; acceleration and heading rate (clockwise below 0) are shares of what is allowed, -1 to 1."""
         limits, state = self.limits, self.state
         accel, self.across_mps2 = self._accelerate(drive, turn)
         speed = clip(state.speed_mps + accel * STEP_S, 0.0, limits.walk_speed_mps)

@@ -33,20 +33,13 @@ class Driver:
     Attributes:
       telling: whether it is held to a speed at present.
       cruise_mps: the speed it is told to keep where nothing else binds; below 0 SUMO chooses.
-      wanted_mps2: the acceleration that it decided on; None: it has nothing to be told.
+      wanted_mps2: the acceleration that it decided on; None if nothing binds it.
     """
 
     def __init__(
         self, vehicle: str, reaction_s: float, emergency_mps2: float, cruise_mps: float = OWN_CHOICE_MPS
     ) -> None:
-        """Looks up the vehicle's model.
-
-        Args:
-          vehicle: its id.
-          reaction_s: time between two decisions.
-          emergency_mps2: the hardest it can brake.
-          cruise_mps: the speed it is told to keep where nothing else binds.
-        """
+        """Looks up the model of the vehicle, which can brake by at most `emergency_mps2`."""
         self._vehicle = vehicle
         self.cruise_mps = cruise_mps
         self._period = round(reaction_s / STEP_S)
@@ -90,16 +83,7 @@ class Driver:
     def decide(
         self, own: int, speed: float, along: Along, state: Floats, vehicle: Bools, candidate: Bools
     ) -> float | None:
-        """The acceleration that its model wants for the nearest of the targets; None where none binds.
-
-        Args:
-          own: its column among the actors.
-          speed: its own, m/s.
-          along: the vehicle on its path.
-          state: of all `n` actors.
-          vehicle: `n`, which are vehicles.
-          candidate: `n`, which it looks out for.
-        """
+        """The acceleration that its model wants for the nearest of its `targets`; None where none binds."""
         path, station_m, offset_m = along
         found = targets(path.points, station_m, offset_m, own, self._accel, state, vehicle, candidate)
         if not len(found):
@@ -124,13 +108,7 @@ class Drivers:
     """Tells the ego of all actors it knows of, and the others that SUMO drives of the pedestrians near them."""
 
     def __init__(self, layout: Layout, reaction_time_s: float, roads: Roads) -> None:
-        """Makes a driver for every vehicle; all have been inserted.
-
-        Args:
-          layout: of the episode.
-          reaction_time_s: the ego's.
-          roads: that they drive on.
-        """
+        """Makes a driver for every vehicle; all have been inserted. The reaction time is the ego's."""
         emergency = emergency_decel_mps2(layout.friction)
         cruise = {start.id: start.speed_mps for start in layout.vehicles if start.role is Role.ADVERSARY}
         self._others = {

@@ -16,12 +16,7 @@ VEHICLE = int(Kind.VEHICLE)  # compiled code knows no enums of int8
 
 
 def sight(sensor: SensorConfig | None, visibility_m: float) -> Sight:
-    """The best the ego can see; None sees everything.
-
-    Args:
-      sensor: its range, opening angle and whether bodies occlude.
-      visibility_m: the weather's bound on the range.
-    """
+    """The best the ego can see with a sensor in some weather; None sees everything."""
     if sensor is None:
         return EVERYTHING
     return Sight(min(sensor.range_m, visibility_m), sensor.field_of_view_rad / 2, sensor.occlusion)

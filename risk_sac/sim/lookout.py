@@ -47,13 +47,8 @@ def near_pedestrians(state: Floats, vehicle: Bools) -> Bools:
 @compiled
 def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
     """Station, offset to the left, and heading of the nearest place on a path; its ends go on straight."""
-    path_x, path_y, path_station, path_cos, path_sin = (
-        points[PATH_X],
-        points[PATH_Y],
-        points[STATION],
-        points[PATH_COS],
-        points[PATH_SIN],
-    )
+    path_x, path_y, path_station = points[PATH_X], points[PATH_Y], points[STATION]
+    path_cos, path_sin = points[PATH_COS], points[PATH_SIN]
     best, nearest, station, offset = math.inf, 0, 0.0, 0.0
     last = points.shape[1] - 2
     for i in range(last + 1):
@@ -82,11 +77,7 @@ def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
 
 @compiled
 def stretch(points: Floats, first_m: float, last_m: float) -> Floats:
-    """The segments of a path between two stations.
-
-    A path may come back beside itself, as behind a roundabout, so the whole path would place an actor where the ego
-    passes much later.
-    """
+    """The segments of a path between two stations; the rest may come back beside them, as behind a roundabout."""
     stations, first, last = points[STATION], 0, points.shape[1] - 1
     while first + 1 < last and stations[first + 1] <= first_m:
         first += 1
@@ -97,10 +88,7 @@ def stretch(points: Floats, first_m: float, last_m: float) -> Floats:
 
 @compiled
 def foreseen(points: Floats, front_m: float, speed_mps: float, accel_mps2: float) -> Floats:
-    """Where a driver's front bumper will be at each tick of LOOK_S if it speeds up by `accel_mps2`, `ticks`.
-
-    It goes no faster than SUMO's drivers take the path, and so slowly through a bend.
-    """
+    """Stations of a front bumper at each tick of LOOK_S if it speeds up by `accel_mps2`, `ticks`; slow in bends."""
     ticks = round(LOOK_S / TICK_S) + 1
     front = np.empty(ticks)
     stations, limit_mps = points[STATION], points[LIMIT]
@@ -142,8 +130,8 @@ def targets(
       own: its column among the actors.
       accel_mps2: the most it accelerates.
       state: of all `n` actors of a frame.
-      vehicle: `n`, who is a vehicle; the rest are pedestrians.
-      candidate: `n`, whom the driver knows of and looks out for.
+      vehicle: `n`; which are vehicles, the rest are pedestrians.
+      candidate: `n`; which the driver knows of and looks out for.
 
     Returns:
       `targets x 3`: column of the actor; distance from the front bumper to the body, m; and the speed at which it
@@ -167,7 +155,7 @@ def targets(
         v_along = vx[i] * math.cos(way) + vy[i] * math.sin(way)
         same_way = vehicle[i] and v_along > MOVING_MPS and abs(math.cos(heading[i] - way)) > SAME_WAY_COS
         if same_way and s_now < front_m - length_m / 2:
-            continue  # whoever comes from behind, or is overtaken, keeps the distance itself
+            continue  # a vehicle from behind, or one that is overtaken, keeps the distance itself
         look = CUT_IN_LOOK_S if same_way else LOOK_S
         inside_since, nearest = -1.0, math.inf
         cos, sin = _turned(heading[i] - way)

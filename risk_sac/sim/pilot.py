@@ -36,23 +36,10 @@ class Pilot(Protocol):
     """Drives the ego from the adversaries' release on."""
 
     def begin(self, layout: Layout, seed: int, frame: Frame) -> Motion:
-        """Takes the ego over as it moves in the latest frame.
-
-        Raises:
-          EgoFailed: it cannot.
-        """
+        """Takes the ego over as it moves in the latest frame; raises `EgoFailed` if it cannot."""
 
     def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
-        """Its motion after the next step.
-
-        Args:
-          frame: all actors now.
-          belief: what the ego makes of it.
-          along: the ego on its path.
-
-        Raises:
-          EgoFailed: it does not know.
-        """
+        """The ego's motion after the next step, given where it is on its path; raises `EgoFailed`."""
 
 
 class MovedEgo:

@@ -91,12 +91,7 @@ class Reader:
         self._describe()
 
     def read(self, walkers: Mapping[str, Walker], ego: EgoTold | None = None) -> Reading:
-        """Reads all actors.
-
-        Args:
-          walkers: all pedestrians; SUMO does not know them.
-          ego: what SUMO would tell of an ego that it does not drive.
-        """
+        """Reads all actors; `ego` is what SUMO would tell of an ego that a pilot drives."""
         get_position, get_angle = libsumo.vehicle.getPosition, libsumo.vehicle.getAngle
         get_speed, get_lateral = libsumo.vehicle.getSpeed, libsumo.vehicle.getLateralSpeed
         get_accel = libsumo.vehicle.getAcceleration

@@ -84,7 +84,7 @@ class VehicleControl:
           steer: lateral velocity as a share of the limit, -1 (right) to 1 (left).
           room: what is left of the road on both sides.
           along: where it is on the path it takes if it does not steer.
-          intended_mps2: what its driver would do if nobody commanded it.
+          intended_mps2: acceleration that its driver would choose without a command.
         """
         if along.path is not self._path:
             if self._path is not None:
@@ -147,8 +147,8 @@ def _accelerate(
     ahead: float,
     cap_mps: float,
 ) -> float:
-    # Choice: the less a command says, the more the driver's own intention counts. Doing nothing is then to drive on
-    # as anybody would, and not to run into whoever stands ahead or over a red light.
+    # Choice: the less a command says, the more the driver's own intention counts. Without a command it drives on as
+    # traffic does, and stops behind others and at a red light.
     wanted = drive * (limits.accel_mps2 if drive >= 0 else limits.brake_mps2) + (1.0 - abs(drive)) * intended
     bend = max(curvature * speed**2, min(ahead * speed**2, limits.cornering_mps2))
     across = min(bend + limits.lateral_accel_mps2, SKID * limits.grip_mps2)

@@ -54,11 +54,7 @@ def _close_to_others(folder: Path) -> None:
 
 
 def create_private(path: Path) -> None:
-    """Makes an empty private file where there is none.
-
-    Raises:
-      StorageError: it cannot be made.
-    """
+    """Makes an empty private file where there is none."""
     try:
         os.close(os.open(path, os.O_WRONLY | os.O_CREAT, FILE_MODE))
     except OSError as error:

@@ -62,17 +62,12 @@ def _variable(name: str) -> str:
 
 def table() -> str:
     """The settings as a markdown table: variable, what it takes, its default, its meaning."""
-    prefix = ServiceSettings.model_config["env_prefix"]
+    settings = ServiceSettings.model_json_schema()["properties"]
     rows = [
-        f"| `{prefix}{name.upper()}` | {takes(field)} | {_default(field)} | {' '.join(field['description'].split())} |"
-        for name, field in sorted(ServiceSettings.model_json_schema()["properties"].items(), key=_of_ray)
+        f"| `{_variable(name)}` | {takes(field)} | {_default(field)} | {' '.join(field['description'].split())} |"
+        for name, field in sorted(settings.items(), key=lambda setting: setting[0].startswith("ray_"))  # they come last
     ]
     return "\n".join(["| variable | takes | default | meaning |", "|---|---|---|---|", *rows])
-
-
-def _of_ray(setting: tuple[str, dict[str, Any]]) -> bool:
-    """They come last; all others stay in their order."""
-    return setting[0].startswith("ray_")
 
 
 def with_table(text: str) -> str:
