@@ -13,12 +13,7 @@ import math
 import numpy as np
 
 from risk_sac.jit import compiled
-from risk_sac.sim.paths import COS as PATH_COS
-from risk_sac.sim.paths import HEADING as PATH_HEADING
-from risk_sac.sim.paths import LIMIT, STATION
-from risk_sac.sim.paths import SIN as PATH_SIN
-from risk_sac.sim.paths import X as PATH_X
-from risk_sac.sim.paths import Y as PATH_Y
+from risk_sac.sim import paths
 from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
 
 LOOK_S = 4.0  # how far ahead a collision course counts
@@ -47,8 +42,8 @@ def near_pedestrians(state: Floats, vehicle: Bools) -> Bools:
 @compiled
 def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
     """Station, offset to the left, and heading of the nearest place on a path; its ends go on straight."""
-    path_x, path_y, path_station = points[PATH_X], points[PATH_Y], points[STATION]
-    path_cos, path_sin = points[PATH_COS], points[PATH_SIN]
+    path_x, path_y, path_station = points[paths.X], points[paths.Y], points[paths.STATION]
+    path_cos, path_sin = points[paths.COS], points[paths.SIN]
     best, nearest, station, offset = math.inf, 0, 0.0, 0.0
     last = points.shape[1] - 2
     for i in range(last + 1):
@@ -72,13 +67,13 @@ def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
                 along = min(along, length)
             station = path_station[i] + along
             offset = across
-    return station, offset, points[PATH_HEADING, nearest]
+    return station, offset, points[paths.HEADING, nearest]
 
 
 @compiled
 def stretch(points: Floats, first_m: float, last_m: float) -> Floats:
     """The segments of a path between two stations; the rest may come back beside them, as behind a roundabout."""
-    stations, first, last = points[STATION], 0, points.shape[1] - 1
+    stations, first, last = points[paths.STATION], 0, points.shape[1] - 1
     while first + 1 < last and stations[first + 1] <= first_m:
         first += 1
     while last - 1 > first and stations[last - 1] >= last_m:
@@ -91,7 +86,7 @@ def foreseen(points: Floats, front_m: float, speed_mps: float, accel_mps2: float
     """Stations of a front bumper at each tick of LOOK_S if it speeds up by `accel_mps2`, `ticks`; slow in bends."""
     ticks = round(LOOK_S / TICK_S) + 1
     front = np.empty(ticks)
-    stations, limit_mps = points[STATION], points[LIMIT]
+    stations, limit_mps = points[paths.STATION], points[paths.LIMIT]
     station, speed, point, last = front_m, speed_mps, 0, len(stations) - 1
     for k in range(ticks):
         front[k] = station
