@@ -169,8 +169,9 @@ def boundaries(centre: Floats, width_m: float) -> tuple[Floats, Floats]:
 
 
 def roads_of(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Surface]:
-    """Returns the surfaces of a scene's net."""
-    return _shipped(family_named(family).layout(scene).net)
+    """Returns the surfaces of a scene's net; none where the scene lacks parameters that its family has now."""
+    found = family_named(family)
+    return _shipped(found.layout(scene).net) if set(found.space.names) <= scene.keys() else ()
 
 
 @cache  # there are a few nets, and they stay as they are

@@ -88,6 +88,7 @@ def series_arrays() -> dict[str, np.ndarray]:
     rows[1, 1] = np.nan
     return dict.fromkeys((*PER_ACTOR, *PER_OTHER), rows) | {
         "time_s": np.arange(3) / 10,
+        "released_s": np.array(0.0),
         "ids": np.array(["ego", "lead"]),
         "kind": np.array([0, 1], dtype=np.int8),
         "role": np.array([0, 1], dtype=np.int8),

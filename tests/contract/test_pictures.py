@@ -194,7 +194,7 @@ def test_the_client_has_the_picture_and_the_series_as_arrays_with_units(client):
         assert failure.series.ids == ["ego", "lead"]
         assert failure.series.x_m == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
         assert failure.series.visible == [[None, True], [None, None], [None, False]]
-        assert failure.series.released_s is None
+        assert failure.series.released_s == 0.0
         assert json.loads(wire(failure)) == client.get(f"{FOLDER}/{RUN}-train-1").json()
         assert remote.picture(ENDED_ID, failure.id) == client.get(f"{FOLDER}/{RUN}-train-1/picture.png").content
         with pytest.raises(Refused) as refused:

@@ -27,7 +27,7 @@ def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
 
 
 def test_a_series_from_before_the_release_was_recorded_lacks_it(tmp_path):
-    new = ("lane_offset_m", "link")
+    new = ("released_s", "lane_offset_m", "link")
     write_series(tmp_path / "a.npz", {name: values for name, values in series_arrays().items() if name not in new})
     series = load_series(tmp_path / "a.npz", None)
     assert (series.released_s, series.lane_offset_m, series.link) == (None, None, None)
