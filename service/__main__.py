@@ -12,7 +12,7 @@ from service.api.guards.connections import Server
 from service.app import create_app
 from service.host.environment import MISUSED, read_settings
 from service.host.logs import set_up_logs
-from service.keys.exposure import check_exposure
+from service.keys.ring import check_exposure
 from service.runs.manager import worker_program
 
 ANSWERS_END_S = 2  # for answers and streams at work when the server is told to stop; workers are stopped after that

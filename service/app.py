@@ -33,10 +33,10 @@ from service.api.routes import (
 )
 from service.api.stream import Streams
 from service.host.data_folder import hold_data_folder
-from service.keys.exposure import check_exposure
 from service.keys.file import KeyFile
 from service.keys.made import AuthEnabledFlag
-from service.networks.shelf import Shelf
+from service.keys.ring import check_exposure
+from service.networks.network_store import NetworkStore
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager, worker_program
 from service.runs.regressions import Regressions
@@ -111,7 +111,7 @@ def opened(
         # Everything that plays or draws an episode, here or in a helper process, finds its place in our library.
         os.environ[VARIABLE] = str(settings.places_dir.absolute())
         manager, regression_queue, helper = Manager(settings, store, executor), Regressions(settings), Helper(settings)
-        shelf = Shelf(settings.networks_dir)
+        uploaded = NetworkStore(settings.networks_dir)
         manager.start()
         try:
             regression_queue.start()
@@ -124,8 +124,8 @@ def opened(
                 studies=Studies(settings, helper),
                 tables=Tables(helper),
                 regressions=regression_queue,
-                networks=shelf,
-                surveys=Surveys(shelf, settings.places_dir),
+                networks=uploaded,
+                surveys=Surveys(uploaded, settings.places_dir),
                 streams=Streams(store),
                 cursors=Cursors(cursor_secret(store.engine)),
                 metrics=registry(latencies, store, manager),

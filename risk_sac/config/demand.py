@@ -15,17 +15,7 @@ IN_CHECKPOINT = 3  # what lives, its copy, and the archive of it
 
 
 def check_demand(spec: RunSpec, observation_size: int, action_size: int, horizon_steps: int) -> None:
-    """Refuses a run that takes more than `MOST_BYTES`.
-
-    Args:
-      spec: the run.
-      observation_size: entries of an observation.
-      action_size: entries of an action.
-      horizon_steps: steps of the longest episode.
-
-    Raises:
-      ConfigError: naming the field that takes most of it.
-    """
+    """Refuses a run that takes more than `MOST_BYTES`; the ConfigError names the field that takes most of it."""
     demand = demand_bytes(spec, observation_size, action_size, horizon_steps)
     if (total := sum(demand.values())) > MOST_BYTES:
         field, most = max(demand.items(), key=lambda item: item[1])

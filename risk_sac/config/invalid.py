@@ -44,12 +44,7 @@ def causes(found: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
 
 
 def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -> ConfigError:
-    """Translates one of `ValidationError.errors()`.
-
-    Args:
-      item: the error.
-      model: what was validated; its fields are listed where a field is unknown.
-    """
+    """Translates one of `ValidationError.errors()`; fields of `model` are listed where one is unknown."""
     location: Location = item["loc"]
     field = dotted(location)
     cause = item.get("ctx", {}).get("error")

@@ -19,14 +19,11 @@ CAMPAIGN_ONLY = {"family": "families", "method": "methods", "seed": "seeds"}  # 
 
 
 def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
-    """The run described by a file, overridden by flags.
+    """Returns the run described by a file, overridden by flags.
 
     Args:
       file: YAML of a RunSpec, or of a CampaignSpec with a single run once the flags have picked one.
       flags: fields of RunSpec, those of its budget under their own names; None where a flag was not given.
-
-    Raises:
-      ConfigError: the first wrong field.
     """
     given = {name: value for name, value in flags.items() if value is not None}
     data = _with_budget({"method": "risk-sac", "seed": 0} if file is None else _read_yaml(file), given)
@@ -36,28 +33,16 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
 
 
 def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping[str, Any]) -> CampaignSpec:
-    """The campaign described by a file, overridden by flags.
-
-    Args:
-      file: YAML of a CampaignSpec.
-      flags: fields of CampaignSpec, those of its budget under their own names; None where a flag was not given.
-      defaults: fields that neither file nor flags may give.
-
-    Raises:
-      ConfigError: the first wrong field.
-    """
+    """Returns the campaign described by a YAML file, overridden by flags as `read_spec` has them, else by defaults."""
     given = {name: value for name, value in flags.items() if value is not None}
     data = _with_budget({} if file is None else _read_yaml(file), given)
     return _validate(CampaignSpec, {**defaults, **data, **given})
 
 
 def read_ego(text: str) -> EgoConfig:
-    """The ego that a command line names: a profile, a registered ego, or a file with its fields.
+    """Returns the ego that a command line names: a profile, a registered ego, or a file with its fields.
 
     Whether an ego of this name is registered is found out later.
-
-    Raises:
-      ConfigError: it is none of these.
     """
     if text in get_args(EgoConfig.model_fields["profile"].annotation):
         return _validate(EgoConfig, {"profile": text})

@@ -12,7 +12,7 @@ from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
 from service.api.stream import Streams
 from service.keys.key import Scope
-from service.networks.shelf import Shelf
+from service.networks.network_store import NetworkStore
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager
 from service.runs.regressions import Regressions
@@ -37,7 +37,7 @@ class Context:
     studies: Studies
     tables: Tables
     regressions: Regressions
-    networks: Shelf
+    networks: NetworkStore
     surveys: Surveys
     streams: Streams
     cursors: Cursors
@@ -72,11 +72,7 @@ LOCAL = Caller("default", Scope.ADMIN, None)
 
 
 def check_scope(caller: Caller, scope: Scope) -> None:
-    """Refuses a caller whose key does not reach so far.
-
-    Raises:
-      ProblemError: 403.
-    """
+    """Refuses a caller whose key does not reach so far."""
     if not caller.scope.includes(scope):
         detail = f"scope of this key is {caller.scope}; wanted {scope}: ask for another key"
         raise ProblemError(HTTPStatus.FORBIDDEN, Reason.FORBIDDEN, detail)

@@ -19,12 +19,9 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 async def read_posted(request: Request, model: type[Model]) -> Model:
-    """The body of a request.
+    """Reads the body of a request.
 
     Not a body parameter: FastAPI validates the parsed JSON, where strictness would refuse arrays for tuples.
-
-    Raises:
-      ProblemError, RequestValidationError: it is no JSON, or something in it is wrong.
     """
     media_type(request, ["application/json"])
     return read_content(await request.body(), model)
@@ -45,11 +42,7 @@ def read_content(content: bytes, model: type[Model]) -> Model:
 
 
 def refuse_repeats(content: bytes) -> None:
-    """Refuses JSON that has a field twice in one object.
-
-    Raises:
-      ProblemError: naming it.
-    """
+    """Refuses JSON that has a field twice in one object."""
     json.loads(content, object_pairs_hook=_without_repeats)
 
 
@@ -77,15 +70,7 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> None:
 
 
 def media_type(request: Request, wanted: Collection[str]) -> str:
-    """The media type of a body.
-
-    Args:
-      request: which has the body.
-      wanted: media types that the route reads, the one to recommend first.
-
-    Raises:
-      ProblemError: 415, it is none of them, or the body is packed for the way.
-    """
+    """Returns the media type of a body; raises a 415 unless it is wanted, and one for a packed body."""
     given = request.headers.get("content-type", "")
     declared = given.partition(";")[0].strip().lower()
     if declared not in wanted:

@@ -95,12 +95,7 @@ class Streams:
 
 
 def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None:
-    """The position that an id of this campaign's events was made of; None if it never was.
-
-    Raises:
-      NotFoundError: there is no such campaign.
-      StorageError: it cannot be read.
-    """
+    """Returns the position that an id of this campaign's events was made of; None if it never was."""
     try:
         text = base64.b64decode(event_id.encode("ascii"), altchars=b"-_", validate=True).decode("ascii")
     except (UnicodeError, binascii.Error):

@@ -105,12 +105,7 @@ def _open(settings: ServiceSettings, options: argparse.Namespace) -> None:
 
 
 def _file(settings: ServiceSettings) -> KeyFile:
-    """The file of keys.
-
-    Raises:
-      KeysError: it is missing although keys were made.
-      StorageError: that cannot be known.
-    """
+    """Returns the file of keys; raises a KeysError if it is missing although keys were made."""
     file = KeyFile(settings.keys_file)
     if not file.path.exists() and ever_made(settings):
         raise missing(file.path)

@@ -47,11 +47,7 @@ class KeyFile:
         self.path = path
 
     def load(self) -> Document | None:
-        """What the file says; None where there is none.
-
-        Raises:
-          KeysError: the file cannot be read, or is damaged.
-        """
+        """Reads the file; None where there is none. Raises a KeysError if it is damaged."""
         try:
             return _parse(self.path.read_bytes(), self.path)
         except FileNotFoundError:
@@ -60,29 +56,17 @@ class KeyFile:
             raise KeysError(f"keys file {str(self.path)!r} cannot be read: {error.strerror}") from error
 
     def read(self) -> tuple[Key, ...]:
-        """All keys, in the order of their creation; none where there is no file.
-
-        Raises:
-          KeysError: the file cannot be read, or is damaged.
-        """
+        """Returns all keys, in the order of their creation; none where there is no file."""
         document = self.load()
         return () if document is None else document.keys
 
     def create(self, project: str, name: str, scope: Scope) -> tuple[Key, str]:
-        """Adds a key; returns it with the token that its holder needs. From now on everybody needs a key.
-
-        Raises:
-          KeysError: the file cannot be read, is damaged, or cannot be written.
-        """
+        """Adds a key; returns it with the token that its holder needs. From now on every caller needs a key."""
         with self._changing() as keys:
             return _add(keys, project, name, scope)
 
     def create_anew(self, project: str, name: str, scope: Scope) -> tuple[Key, str]:
-        """The same as the first key of a new file, in place of one that is lost or damaged: others are worthless then.
-
-        Raises:
-          KeysError: the file is whole, or cannot be written.
-        """
+        """Makes the first key of a new file in place of a lost or damaged one; refuses to replace a whole one."""
         with self._turn():
             if self._whole():
                 raise KeysError(f"keys file {str(self.path)!r} is whole; wanted a lost or damaged one: `revoke` keys")
@@ -92,20 +76,12 @@ class KeyFile:
         return made
 
     def open_all(self) -> None:
-        """Forgets all keys, also lost and damaged ones, and lets in every process of this machine without one.
-
-        Raises:
-          KeysError: the file cannot be written.
-        """
+        """Forgets all keys, also lost and damaged ones, and lets in every process of this machine without one."""
         with self._turn():
             self._write(Document(keys=(), open=True))
 
     def revoke(self, key_id: str) -> Key:
-        """Makes a key worthless; does nothing to one that is already.
-
-        Raises:
-          KeysError: no key has this id; or as `create`.
-        """
+        """Makes a key worthless; does nothing to one that is already."""
         with self._changing() as keys:
             for index, key in enumerate(keys):
                 if key.id == key_id:

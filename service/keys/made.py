@@ -35,11 +35,7 @@ class AuthEnabledFlag:
 
     @contextmanager
     def kept(self, engine: Engine, file: KeyFile) -> Iterator[None]:
-        """Keeps this and the database in step.
-
-        Raises:
-          StorageError: the database cannot be read or written at the start.
-        """
+        """Keeps this and the database in step."""
         over = threading.Event()
         if self._settle(engine, file):
             yield
@@ -75,22 +71,14 @@ class AuthEnabledFlag:
 
 
 def ever_made(settings: ServiceSettings) -> bool:
-    """Whether the database says that a key was ever made; one that there is not yet says nothing.
-
-    Raises:
-      StorageError: it cannot be read.
-    """
+    """Returns whether the database says that a key was ever made; a missing one says nothing."""
     with _database(settings) as engine:
         return engine is not None and present_step(engine) == newest_step() and keys_were_made(engine)
 
 
 @contextmanager
 def noting(settings: ServiceSettings) -> Iterator[None]:
-    """Notes that a key was made, if making it succeeds; a database that there is not yet is made.
-
-    Raises:
-      StorageError: the database cannot be written, or has to be brought up to date while a server uses it.
-    """
+    """Notes that a key was made, if making it succeeds; makes the database where there is none."""
     with _database(settings, make=True) as engine:
         assert engine is not None
         if present_step(engine) != newest_step():

@@ -1,14 +1,17 @@
-"""The keys as a running server sees them."""
+"""The keys as a running server sees them, and where it may listen."""
 
+import ipaddress
 import logging
 import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from risk_sac.errors import ConfigError
 from service.errors import KeysError
 from service.keys.file import Document, KeyFile, missing
 from service.keys.key import Key, split
 from service.keys.made import AuthEnabledFlag
+from service.settings import ServiceSettings
 
 logger = logging.getLogger(__name__)
 
@@ -32,20 +35,12 @@ class KeyRing:
 
     @property
     def open(self) -> bool:
-        """Whether a process of this machine needs no key: none was ever made, or an administrator has said so.
-
-        Raises:
-          KeysError: the file cannot be read, is damaged, or is missing.
-        """
+        """Whether a process of this machine needs no key: none was ever made, or an administrator has said so."""
         self.keys()
         return self._document is None or self._document.open
 
     def keys(self) -> Mapping[str, Key]:
-        """All keys by id, revoked ones too.
-
-        Raises:
-          KeysError: the file cannot be read, is damaged, or is missing although keys were made.
-        """
+        """All keys by id, revoked ones too; raises a KeysError if the file is unreadable, damaged, or lost."""
         # Before the file is looked at, since it is there before anybody can know of its keys; and before it is read: a
         # change that comes between shows as another signature the next time.
         made = self._made.known
@@ -66,11 +61,7 @@ class KeyRing:
         return self._keys
 
     def find(self, token: str) -> Key | None:
-        """The key that this is the token of; None if there is none that still counts.
-
-        Raises:
-          KeysError: the file cannot be read, is damaged, or is missing although keys were made.
-        """
+        """Returns the key that this is the token of; None if there is none that still counts."""
         keys = self.keys()
         parts = split(token)
         if parts is None:
@@ -101,3 +92,20 @@ def _signature(path: Path) -> _Signature:
     except OSError as error:
         return (error.errno or 0,)
     return status.st_ino, status.st_mtime_ns, status.st_ctime_ns, status.st_size
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only processes of this machine reach a server that listens there."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def check_exposure(settings: ServiceSettings) -> None:
+    """Refuses to serve other machines without keys, and anybody with keys that cannot be read."""
+    keys = KeyFile(settings.keys_file).read()
+    if is_loopback(settings.host) or any(key.revoked_at is None for key in keys):
+        return
+    remedy = "create one with `risk-sac keys create`"
+    raise ConfigError("host", repr(settings.host), "a loopback address, or API keys", remedy)

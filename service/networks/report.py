@@ -76,15 +76,7 @@ _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
 def sniff(start: bytes, packaging: Packaging) -> None:
-    """Refuse at once what cannot be what it is called, so that no process is started for it.
-
-    Args:
-      start: the first SNIFFED_BYTES of the upload.
-      packaging: what its Content-Type says.
-
-    Raises:
-      UploadError: it is empty, or something else.
-    """
+    """Refuses at once what cannot be what its Content-Type says, by its first `SNIFFED_BYTES`."""
     if not start:
         raise UploadError("the upload is empty; wanted a network")
     text = start.removeprefix(_BYTE_ORDER_MARK).lstrip() if packaging is Packaging.XML else start

@@ -34,11 +34,7 @@ class Incoming:
         self._file = (folder / UPLOAD).open("wb")
 
     def write(self, chunk: bytes) -> None:
-        """One more piece of the upload.
-
-        Raises:
-          StorageError: the disk refuses.
-        """
+        """Writes one more piece of the upload."""
         self.bytes += len(chunk)
         self._start += chunk[: SNIFFED_BYTES - len(self._start)]
         self._hash.update(chunk)
@@ -48,12 +44,7 @@ class Incoming:
             raise StorageError(f"an upload cannot be received ({error.strerror})") from error
 
     def complete(self, packaging: Packaging) -> str:
-        """SHA-256 of the upload, now that it is there.
-
-        Raises:
-          UploadError: it is not what it is called.
-          OSError: the disk refuses.
-        """
+        """Returns the SHA-256 of the upload, now that it is there."""
         self._file.close()
         sniff(self._start, packaging)
         return self._hash.hexdigest()
@@ -70,18 +61,7 @@ class Incoming:
 
 
 def inspect(folder: Path, packaging: Packaging, checker: str = CHECKER, wall_s: float = WALL_S) -> CheckReport:
-    """Check the file `upload` in a folder, in a process of its own, and wait for the report.
-
-    Args:
-      folder: where the checker works and leaves what it wrote anew.
-      packaging: what the upload is.
-      checker: the program.
-      wall_s: how long it may take, s.
-
-    Raises:
-      UploadError: the upload is refused, cannot be checked in time, or breaks the simulator.
-      StorageError: the checker cannot be started or cannot write.
-    """
+    """Checks the file `upload` in a folder, in a process of its own that writes it anew, and waits for the report."""
     try:
         result = run_helper(
             checker,

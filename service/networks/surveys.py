@@ -13,9 +13,9 @@ from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.scenario.library import VARIABLE
 from service.errors import BusyError, StorageError
 from service.networks.limits import SURVEY_MEMORY_BYTES, SURVEY_S
+from service.networks.network_store import NetworkStore
 from service.networks.report import PICTURE, PLACES
 from service.networks.schemas import Places
-from service.networks.shelf import Shelf
 
 SURVEYOR = "service.networks.surveyor"
 NICENESS = 5
@@ -26,16 +26,11 @@ MOST_KEPT = 200  # answers that are remembered; what a network is never changes
 
 
 class Surveys:
-    """Finds places on the networks of a shelf; used by many threads."""
+    """Finds places on networks; used by many threads."""
 
-    def __init__(self, shelf: Shelf, library: Path) -> None:
-        """Starts nothing.
-
-        Args:
-          shelf: of networks.
-          library: the folder of places that campaigns are run at.
-        """
-        self._shelf = shelf
+    def __init__(self, networks: NetworkStore, library: Path) -> None:
+        """Starts nothing; `library` is the folder of places that campaigns are run at."""
+        self._networks = networks
         self._library = library
         self._room = threading.BoundedSemaphore(AT_ONCE)
         self._asking = threading.BoundedSemaphore(MOST_ASKING)
@@ -44,14 +39,7 @@ class Surveys:
         self._kept: dict[tuple[str, str, str | None], list[str]] = {}  # a form asks after each key that is pressed
 
     def places(self, network_id: str, project: str | None) -> Places:
-        """Where the patterns fit on a network, and why elsewhere they do not.
-
-        Raises:
-          NotFoundError: there is no such network.
-          ConfigError: nothing can be found on it; the message says why.
-          BusyError: too many searches are at work.
-          StorageError: the disk refuses.
-        """
+        """Finds where the patterns fit on a network, and why elsewhere not; a ConfigError says why it cannot."""
         return Places.model_validate_json((self._searched(network_id, project) / PLACES).read_bytes())
 
     def picture(self, network_id: str, project: str | None) -> bytes:
@@ -59,12 +47,8 @@ class Surveys:
         return (self._searched(network_id, project) / PICTURE).read_bytes()
 
     def keep(self, network_id: str, project: str | None, pattern: str, place: str | None) -> list[str]:
-        """Names of the families that a place is, or all places of a pattern are; they can be run from now on.
-
-        Raises:
-          ConfigError: the pattern does not fit there; and what `places` raises.
-        """
-        folder = self._shelf.folder(network_id, project)
+        """Makes families of a place, or of all places of a pattern, that can be run; returns their names."""
+        folder = self._networks.folder(network_id, project)
         asked = network_id, pattern, place
         with self._alone(asked):
             families = self._kept.get(asked)
@@ -87,7 +71,7 @@ class Surveys:
         return True
 
     def _searched(self, network_id: str, project: str | None) -> Path:
-        folder = self._shelf.folder(network_id, project)
+        folder = self._networks.folder(network_id, project)
         with self._alone((network_id,)):
             if not (folder / PLACES).exists():
                 self._run(folder, ["survey"])

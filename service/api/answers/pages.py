@@ -33,23 +33,13 @@ class Cursors:
         self._cipher = AESSIV(secret)
 
     def encode(self, number: int | None, listed: str, project: str | None) -> str | None:
-        """Makes the cursor for the number of the last item on a page; None for none.
-
-        Args:
-          number: of the row, at least 0 and below 2⁶⁴.
-          listed: names the list.
-          project: the only one that the reader sees; None: all.
-        """
+        """Makes the cursor for the number of the last item on a page, for one list and what its reader sees."""
         if number is None:
             return None
         return base64.urlsafe_b64encode(self._cipher.encrypt(number.to_bytes(8), _bound(listed, project))).decode()
 
     def decode(self, cursor: str | None, listed: str, project: str | None) -> int | None:
-        """Reads the number in a cursor; None for none.
-
-        Raises:
-          ProblemError: 422, it was not made by `encode` for this list and this reader.
-        """
+        """Reads the number in a cursor; raises a 422 unless `encode` made it for this list and this reader."""
         if cursor is None:
             return None
         try:

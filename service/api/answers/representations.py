@@ -13,11 +13,7 @@ _QUALITY = re.compile(r"\s*q\s*=\s*([01](?:\.\d{0,3})?)\s*", re.IGNORECASE)
 
 
 def accepted(accept: str, offered: Sequence[str]) -> str:
-    """The offered media type that an Accept header likes best, the first among equals; anything will do without one.
-
-    Raises:
-      HTTPException: 406, it likes none.
-    """
+    """Returns the offered media type that an Accept header likes best, the first among equals; 406 for none."""
     liked = dict(_range(part) for part in accept.split(",") if part.strip()) or {"*/*": 1.0}
 
     def quality(media_type: str) -> float:

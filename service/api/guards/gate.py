@@ -15,11 +15,10 @@ from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError, problem_response
 from service.api.context import CALLER, LOCAL, Caller, check_scope
 from service.errors import KeysError
-from service.keys.exposure import is_loopback
 from service.keys.file import REMEDY
 from service.keys.key import Scope as KeyScope
 from service.keys.made import AuthEnabledFlag
-from service.keys.ring import KeyRing
+from service.keys.ring import KeyRing, is_loopback
 from service.settings import ServiceSettings
 
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # methods that change nothing
@@ -96,11 +95,7 @@ class Gate:
             return False
 
     def _caller(self, headers: RequestHeaders) -> Caller:
-        """Finds the caller by the key that a request carries.
-
-        Raises:
-          ProblemError: 401, or 503 where that cannot be known.
-        """
+        """Finds the caller by the key that a request carries; raises a 401, or a 503 where that cannot be known."""
         try:
             if self._keys.open and self._keyless:
                 return LOCAL
@@ -127,11 +122,7 @@ class RateLimit:
         self._counts = Counter[tuple[str, ...]]()
 
     def count(self, *who: str) -> None:
-        """Counts a request.
-
-        Raises:
-          ProblemError: 429, too many.
-        """
+        """Counts a request; refuses it where there are too many."""
         window = int(time.monotonic())
         if window != self._window:
             self._window = window
@@ -152,9 +143,6 @@ def check_host(scope: Scope, headers: RequestHeaders, allowed: frozenset[str]) -
 
     Not Starlette's TrustedHostMiddleware: any address that the connection was made to is allowed, and a refusal is a
     problem.
-
-    Raises:
-      ProblemError: 421.
     """
     given = headers.get(b"host", b"").decode("latin-1")
     server = scope.get("server")
@@ -173,11 +161,7 @@ def _host_name(host: str) -> str:
 
 
 def check_origin(method: str, headers: RequestHeaders, allowed: frozenset[str]) -> None:
-    """Refuses a change that a foreign web page asks for; programs send no Origin.
-
-    Raises:
-      ProblemError: 403.
-    """
+    """Refuses a change that a foreign web page asks for; programs send no Origin."""
     given = headers.get(b"origin")
     if given is None or "*" in allowed or method in SAFE:
         return

@@ -69,12 +69,7 @@ def get_report(
 
 
 def _played(service: Context, campaign: StoredCampaign, regression_id: str) -> StoredRegression:
-    """A regression of the campaign.
-
-    Raises:
-      NotFoundError: there is none with this id.
-      ConflictError: it has not ended, or has failed.
-    """
+    """Returns a regression of the campaign that has succeeded."""
     if campaign_of(regression_id) != campaign.id:
         message = f"campaign {campaign.id} has no regression {regression_id!r}"
         raise NotFoundError(message, field="regression", got=regression_id)

@@ -24,11 +24,7 @@ router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], respo
 
 
 def check_installed(format: FormatName, of: Literal["failure", "episodes"]) -> None:
-    """Refuses a format whose packages the service lacks: that is no mistake of who asks.
-
-    Raises:
-      ProblemError: naming them, and what brings them.
-    """
+    """Answers 501 where the service lacks a package of the format: that is no mistake of the client."""
     row = FORMATS[format]
     if row.of == of and row.missing:
         lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: {row.remedy}"

@@ -28,11 +28,7 @@ _DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OSErr
 
 
 def documents(upload: Path, packaging: Packaging) -> list[bytes]:
-    """The documents of an upload in the order in which they lie in it.
-
-    Raises:
-      UploadError: it is damaged, too large once unpacked, or holds what no archive of XML files needs.
-    """
+    """Unpacks the documents of an upload, in their order; refuses what no archive of XML files needs."""
     unpack = _Unpacking(upload.stat().st_size)
     try:
         match packaging:

@@ -17,11 +17,7 @@ MOST_WARNINGS = 20
 
 
 def check(upload: Path, packaging: Packaging) -> CheckReport:
-    """Read the upload, write anew what it says, and let the simulator load that.
-
-    Raises:
-      UploadError: it breaks a rule, or the simulator refuses it.
-    """
+    """Reads the upload, writes anew what it says, and lets the simulator load that."""
     found, remarks = _converted(documents(upload, packaging))
     files, summary, more = rewrite(found)
     simulator.bind_simulator()
@@ -46,11 +42,7 @@ def _converted(found: Sequence[bytes]) -> tuple[Sequence[bytes], list[str]]:
 
 
 def rewrite(found: Sequence[bytes]) -> tuple[list[NetworkFile], Summary, list[str]]:
-    """Write each document anew in the current folder, under a name of ours; the net is the first. Its remarks are last.
-
-    Raises:
-      UploadError: a document breaks a rule; the message says which and where.
-    """
+    """Writes each document anew in the current folder, under a name of ours, the net first; its remarks are last."""
     kinds = [_kind(number, data) for number, data in enumerate(found)]
     if kinds.count(Kind.NET) != 1:
         raise UploadError(f"there are {kinds.count(Kind.NET)} nets in the upload; wanted one")

@@ -52,7 +52,7 @@ class Document:
         return "".join(self._parts)
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        """An element begins."""
+        """Checks an element as it begins, and writes it."""
         self.elements += 1
         if self._before + self.elements > MAX_ELEMENTS:
             raise UploadError(f"there are more than {MAX_ELEMENTS} elements; wanted at most that")
@@ -102,37 +102,24 @@ class _Root:
 
 
 def root_of(data: bytes) -> str:
-    """The name of a document's root element.
-
-    Raises:
-      UploadError: there is none that can be read.
-    """
+    """Returns the name of a document's root element."""
     root = _Root()
     try:
-        _parse(data, root)
+        parse(data, root)
     except StopIteration:
         return root.tag
     raise UploadError("there is no element; wanted a network")
 
 
 def read(data: bytes, kind: str, observer: Observer, before: int = 0) -> Document:
-    """Read a document.
-
-    Args:
-      data: its bytes, UTF-8.
-      kind: name of its root element.
-      observer: told about each element.
-      before: elements of the documents read before it, which count for the limit.
-
-    Raises:
-      UploadError: it breaks a rule; the message has the line.
-    """
+    """Reads a document of a kind of root; `before` elements were read in earlier ones, and count for the limit."""
     document = Document(kind, observer, before)
-    _parse(data, document)
+    parse(data, document)
     return document
 
 
-def _parse(data: bytes, target: Document | _Root) -> None:
+def parse(data: bytes, target: object) -> None:
+    """Feeds a document to a target of `XMLParser`; an UploadError has the line."""
     _check_encoding(data)
     parser = DefusedXMLParser(target=target, forbid_dtd=True)
     parser.parser.XmlDeclHandler = _check_declaration

@@ -7,16 +7,13 @@ sees no document type, no included file and no option but ours, and what it make
 import re
 import subprocess
 from pathlib import Path
-from xml.etree.ElementTree import ParseError
 from xml.sax.saxutils import quoteattr
-
-from defusedxml.common import DefusedXmlException
-from defusedxml.ElementTree import DefusedXMLParser
 
 from risk_sac.errors import MapError
 from risk_sac.scenario.maps.convert import Format, conversion, netconvert, remarks
 from risk_sac.scenario.maps.sides import side_remarks
 from service.errors import UploadError
+from service.networks.checker.document import parse
 from service.networks.limits import MAX_FOREIGN_DEPTH, MAX_FOREIGN_ELEMENTS, MAX_VALUE, WALL_S
 
 FORMATS = {"osm": Format.OSM, "OpenDRIVE": Format.OPENDRIVE}
@@ -59,17 +56,10 @@ class _Map:
 
 
 def converted(data: bytes, root: str) -> tuple[bytes, list[str]]:
-    """The net that netconvert makes of a map, and what it remarks.
-
-    Args:
-      data: the map.
-      root: name of its root element, one of `FORMATS`.
-
-    Raises:
-      UploadError: the map is no well-formed XML, or too large, or has left-hand traffic, or netconvert refuses it or is
-        not installed.
-    """
-    Path(MAP).write_text(_anew(data), encoding="utf-8")
+    """Returns the net that netconvert makes of a map with this root, one of `FORMATS`, and its remarks."""
+    target = _Map()
+    parse(data, target)
+    Path(MAP).write_text("".join(target.parts), encoding="utf-8")
     try:
         sides = side_remarks(Path(MAP))
         program, environment = netconvert()
@@ -85,22 +75,6 @@ def converted(data: bytes, root: str) -> tuple[bytes, list[str]]:
     for name in (MAP, CONVERTED):
         Path(name).unlink()
     return net, [*sides, *remarks(said, "Warning")]
-
-
-def _anew(data: bytes) -> str:
-    target = _Map()
-    parser = DefusedXMLParser(target=target, forbid_dtd=True)
-    try:
-        parser.feed(data)
-        parser.close()
-    except UploadError as error:
-        raise UploadError(f"line {parser.parser.CurrentLineNumber}: {error}") from error
-    except DefusedXmlException as error:
-        line = parser.parser.CurrentLineNumber
-        raise UploadError(f"line {line}: got a DOCTYPE; wanted a document without") from error
-    except ParseError as error:
-        raise UploadError(f"it is no well-formed XML: {error}") from error
-    return "".join(target.parts)
 
 
 def _is_harmless(name: str, value: str) -> bool:

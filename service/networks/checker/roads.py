@@ -55,11 +55,7 @@ class Net:
                 self._refer("junction", attributes["nodes"], "<roundabout>")
 
     def finish(self) -> Summary:
-        """Check what could not be checked before all was read; what there is.
-
-        Raises:
-          UploadError: a part refers to one that is not there, or there are no roads.
-        """
+        """Checks what could not be checked before all was read; returns what there is."""
         known = {"edge": self.edges, "lane": self.lanes, "junction": self.junctions}
         for what, name, where in self._references:
             if name not in known[what]:

@@ -30,18 +30,9 @@ _OPTIONS = (
 
 
 def load(net: str, additionals: Sequence[str], routes: Sequence[str]) -> list[str]:
-    """Load a network and run a few steps, with no output on and no option of the user's.
+    """Loads a network and runs a few steps, with no output on and no option of the user's.
 
-    Args:
-      net: file of the net; all files lie in the current folder, under names of ours.
-      additionals: additional files.
-      routes: route files.
-
-    Returns:
-      What SUMO warned of.
-
-    Raises:
-      UploadError: SUMO refuses; the message is SUMO's.
+    Returns what SUMO warned of; an UploadError has SUMO's own message. All files lie in the current folder.
     """
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # libsumo imports numpy, which reserves memory for each thread
     import libsumo  # here, so that most uploads are refused without it

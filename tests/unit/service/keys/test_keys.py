@@ -11,11 +11,10 @@ import pytest
 from risk_sac.errors import ConfigError
 from service.errors import KeysError
 from service.keys.__main__ import main
-from service.keys.exposure import check_exposure, is_loopback
 from service.keys.file import KeyFile
 from service.keys.key import Scope
 from service.keys.made import AuthEnabledFlag
-from service.keys.ring import KeyRing
+from service.keys.ring import KeyRing, check_exposure, is_loopback
 from service.settings import ServiceSettings
 
 

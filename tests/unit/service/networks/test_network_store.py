@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError, UploadError
+from service.networks.network_store import INCOMING, RECORD, NetworkStore
 from service.networks.report import Packaging
 from service.networks.schemas import Network
-from service.networks.shelf import INCOMING, RECORD, Shelf
 from tests.hostile_networks import NET
 
 Add = Callable[..., Network]
@@ -20,27 +20,27 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def shelf(folder: Path) -> Shelf:
-    return Shelf(folder, most=5)
+def shelf(folder: Path) -> NetworkStore:
+    return NetworkStore(folder, most=5)
 
 
-def add(shelf: Shelf, project: str = "default", label: str = "", content: str = NET) -> Network:
+def add(shelf: NetworkStore, project: str = "default", label: str = "", content: str = NET) -> Network:
     with shelf.receive() as incoming:
         incoming.write(content[:50].encode())
         incoming.write(content[50:].encode())
         return shelf.add(incoming, Packaging.XML, project, label)
 
 
-def test_a_network_is_kept_as_it_was_described(shelf: Shelf, folder: Path) -> None:
+def test_a_network_is_kept_as_it_was_described(shelf: NetworkStore, folder: Path) -> None:
     network = add(shelf, label="ring road")
     assert (network.label, network.edges, network.bytes) == ("ring road", 1, len(NET))
     assert re.fullmatch("n[0-9a-f]{16}", network.id)
     assert shelf.get(network.id, "default") == network
     assert sorted(path.name for path in (folder / "default" / network.id).iterdir()) == ["net.xml", RECORD]
-    assert Shelf(folder).get(network.id, None) == network  # another server, later
+    assert NetworkStore(folder).get(network.id, None) == network  # another server, later
 
 
-def test_lists_are_newest_first_and_stable_while_others_come(shelf: Shelf) -> None:
+def test_lists_are_newest_first_and_stable_while_others_come(shelf: NetworkStore) -> None:
     ids = [add(shelf, label=str(i)).id for i in range(3)]
     first = shelf.list(2, None, "default")
     assert [network.id for network in first.items] == [ids[2], ids[1]]
@@ -49,7 +49,7 @@ def test_lists_are_newest_first_and_stable_while_others_come(shelf: Shelf) -> No
     assert ([network.id for network in second.items], second.last) == ([ids[0]], None)
 
 
-def test_no_project_sees_another_ones(shelf: Shelf) -> None:
+def test_no_project_sees_another_ones(shelf: NetworkStore) -> None:
     mine, theirs = add(shelf, "mine"), add(shelf, "theirs")
     assert [network.id for network in shelf.list(9, None, "mine").items] == [mine.id]
     assert {network.id for network in shelf.list(9, None, None).items} == {mine.id, theirs.id}
@@ -62,7 +62,7 @@ def test_no_project_sees_another_ones(shelf: Shelf) -> None:
 @pytest.mark.parametrize(
     "name", ["", "..", "../default", "n0", "nffffffffffffffff", ".incoming", "n" + "0" * 16 + "/.."]
 )
-def test_only_ids_that_were_given_out_are_found(shelf: Shelf, name: str) -> None:
+def test_only_ids_that_were_given_out_are_found(shelf: NetworkStore, name: str) -> None:
     add(shelf)
     with pytest.raises(NotFoundError):
         shelf.get(name, None)
@@ -70,7 +70,7 @@ def test_only_ids_that_were_given_out_are_found(shelf: Shelf, name: str) -> None
         shelf.delete(name, None)
 
 
-def test_a_deleted_network_is_gone_with_its_files(shelf: Shelf, folder: Path) -> None:
+def test_a_deleted_network_is_gone_with_its_files(shelf: NetworkStore, folder: Path) -> None:
     network = add(shelf)
     shelf.delete(network.id, "default")
     assert shelf.list(9, None, None).items == ()
@@ -80,7 +80,7 @@ def test_a_deleted_network_is_gone_with_its_files(shelf: Shelf, folder: Path) ->
 
 
 def test_a_project_has_as_many_networks_as_it_may(folder: Path) -> None:
-    shelf = Shelf(folder, most=1)
+    uploaded = NetworkStore(folder, most=1)
     network = add(shelf)
     with pytest.raises(ConflictError, match=r"has 1 networks; wanted fewer than 1: delete one first"):
         add(shelf)
@@ -90,7 +90,7 @@ def test_a_project_has_as_many_networks_as_it_may(folder: Path) -> None:
 
 
 def test_more_uploads_than_may_be_at_once_are_told_to_come_again(folder: Path) -> None:
-    shelf = Shelf(folder, at_once=1)
+    uploaded = NetworkStore(folder, at_once=1)
     with shelf.receive(), pytest.raises(BusyError, match="wanted fewer: try again"), shelf.receive():
         pass
     add(shelf)  # the place is free again
@@ -100,7 +100,7 @@ def test_more_uploads_than_may_be_at_once_are_told_to_come_again(folder: Path) -
 
 
 def test_one_key_has_a_part_of_the_places_only(folder: Path) -> None:
-    shelf = Shelf(folder)
+    uploaded = NetworkStore(folder)
     with shelf.receive("mine"), shelf.receive("mine"):
         with pytest.raises(QuotaError, match="2 uploads of this key are at work; wanted fewer"), shelf.receive("mine"):
             pass
@@ -110,15 +110,15 @@ def test_one_key_has_a_part_of_the_places_only(folder: Path) -> None:
         pass
 
 
-def test_what_an_earlier_server_left_unfinished_is_removed(shelf: Shelf, folder: Path) -> None:
+def test_what_an_earlier_server_left_unfinished_is_removed(shelf: NetworkStore, folder: Path) -> None:
     network = add(shelf)
     shutil.copytree(folder / "default" / network.id, folder / INCOMING / "left")
-    assert Shelf(folder).get(network.id, None) == network
+    assert NetworkStore(folder).get(network.id, None) == network
     assert not (folder / INCOMING).exists()
 
 
 @pytest.mark.parametrize("at", [0.01, 0.5, 0.9, 0.999])
-def test_a_damaged_record_is_noticed(shelf: Shelf, folder: Path, at: float) -> None:
+def test_a_damaged_record_is_noticed(shelf: NetworkStore, folder: Path, at: float) -> None:
     good, damaged = add(shelf), add(shelf)
     record = folder / "default" / damaged.id / RECORD
     content = bytearray(record.read_bytes())
@@ -130,7 +130,7 @@ def test_a_damaged_record_is_noticed(shelf: Shelf, folder: Path, at: float) -> N
     shelf.delete(damaged.id, None)
 
 
-def test_a_disk_that_refuses_is_a_storage_error(shelf: Shelf, folder: Path) -> None:
+def test_a_disk_that_refuses_is_a_storage_error(shelf: NetworkStore, folder: Path) -> None:
     network = add(shelf)
     shutil.rmtree(folder)
     folder.write_text("no folder")

@@ -38,7 +38,7 @@ _ID = re.compile("n[0-9a-f]{16}")
 _RANDOM_BITS = 19  # with the time in ms, an id has 63 bits: enough for a cursor, until the year 2527
 
 
-class Shelf:
+class NetworkStore:
     """Adds, lists, finds and deletes networks; used by many threads."""
 
     def __init__(
@@ -48,13 +48,7 @@ class Shelf:
         most: int = MOST,
         at_once: int = UPLOADS_AT_ONCE,
     ) -> None:
-        """Remove what an earlier server left unfinished.
-
-        Args:
-          folder: of all projects' networks; made when the first one comes.
-          most: networks that one project may have.
-          at_once: uploads that may be received or checked at the same time.
-        """
+        """Removes what an earlier server left unfinished; `most` networks of a project, `at_once` uploads."""
         self._folder = folder
         self._most = most
         self._at_once = at_once
@@ -65,16 +59,7 @@ class Shelf:
 
     @contextmanager
     def receive(self, key_id: str | None = None) -> Iterator[Incoming]:
-        """A place for one upload, which is removed again unless `add` made a network of it.
-
-        Args:
-          key_id: of the key that it was sent with; None: no key is needed.
-
-        Raises:
-          QuotaError: there are too many at once of this key.
-          BusyError: there are too many at once.
-          StorageError: the disk refuses.
-        """
+        """Makes a place for one upload of a key, which is removed again unless `add` made a network of it."""
         with self._counting:
             self._check_share(key_id)
             self._at_work[key_id] += 1
@@ -98,13 +83,7 @@ class Shelf:
             raise BusyError(f"{self._at_once} uploads are at work; {again}", RETRY_AFTER_S)
 
     def add(self, incoming: Incoming, packaging: Packaging, project: str, label: str) -> Network:
-        """Check an upload that has arrived, and keep it.
-
-        Raises:
-          UploadError: it is refused.
-          ConflictError: the project has as many networks as it may.
-          StorageError: the disk refuses.
-        """
+        """Checks an upload that has arrived, and keeps it."""
         self._check_room(project)
         with _refusals("a network cannot be stored"):
             sha256 = incoming.complete(packaging)
@@ -124,16 +103,7 @@ class Shelf:
         return network
 
     def list(self, limit: int, before: int | None, project: str | None) -> StoredPage[Network]:
-        """Networks, newest first; a damaged one is left out and logged.
-
-        Args:
-          limit: most items.
-          before: the `last` of an earlier page.
-          project: whose; None: everybody's.
-
-        Raises:
-          StorageError: the disk refuses.
-        """
+        """Lists networks, newest first, `before` the `last` of an earlier page; logs and leaves out damaged ones."""
         with _refusals("the networks cannot be read"):
             found = sorted((_number(path), path) for path in self._paths(project))
             older = [(number, path) for number, path in reversed(found) if before is None or number < before]
@@ -142,12 +112,7 @@ class Shelf:
         return StoredPage(items=tuple(items), last=page[-1][0] if len(older) > limit else None)
 
     def get(self, network_id: str, project: str | None) -> Network:
-        """One network.
-
-        Raises:
-          NotFoundError: there is none with this id, or it is another project's.
-          StorageError: its record is damaged or cannot be read.
-        """
+        """Returns one network; raises a NotFoundError if there is none, or it is another project's."""
         path = self._path(network_id, project)
         with _refusals("a network cannot be read"):
             return _read(path)
@@ -158,12 +123,7 @@ class Shelf:
         return self._path(network_id, project)
 
     def delete(self, network_id: str, project: str | None) -> None:
-        """Remove a network; at once for those who look, then from the disk.
-
-        Raises:
-          NotFoundError: there is none with this id, or it is another project's.
-          StorageError: the disk refuses.
-        """
+        """Removes a network; at once for those who look, then from the disk."""
         path = self._path(network_id, project)
         grave = self._folder / INCOMING / f"deleted-{network_id}-{secrets.token_hex(4)}"
         with _refusals("a network cannot be deleted"):
