@@ -80,7 +80,7 @@ def test_a_deleted_network_is_gone_with_its_files(shelf: NetworkStore, folder: P
 
 
 def test_a_project_has_as_many_networks_as_it_may(folder: Path) -> None:
-    uploaded = NetworkStore(folder, most=1)
+    shelf = NetworkStore(folder, most=1)
     network = add(shelf)
     with pytest.raises(ConflictError, match=r"has 1 networks; wanted fewer than 1: delete one first"):
         add(shelf)
@@ -90,7 +90,7 @@ def test_a_project_has_as_many_networks_as_it_may(folder: Path) -> None:
 
 
 def test_more_uploads_than_may_be_at_once_are_told_to_come_again(folder: Path) -> None:
-    uploaded = NetworkStore(folder, at_once=1)
+    shelf = NetworkStore(folder, at_once=1)
     with shelf.receive(), pytest.raises(BusyError, match="wanted fewer: try again"), shelf.receive():
         pass
     add(shelf)  # the place is free again
@@ -100,7 +100,7 @@ def test_more_uploads_than_may_be_at_once_are_told_to_come_again(folder: Path) -
 
 
 def test_one_key_has_a_part_of_the_places_only(folder: Path) -> None:
-    uploaded = NetworkStore(folder)
+    shelf = NetworkStore(folder)
     with shelf.receive("mine"), shelf.receive("mine"):
         with pytest.raises(QuotaError, match="2 uploads of this key are at work; wanted fewer"), shelf.receive("mine"):
             pass
