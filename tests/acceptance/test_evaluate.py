@@ -103,7 +103,7 @@ def test_folder_of_another_comparison_is_refused_and_kept(
     before = (whole / "out" / "spec.yaml").read_bytes()
     assert cli.main(["evaluate", *FLAGS, "--seeds", "3", "--episodes", "7"]) == 2
     complaint = capsys.readouterr().err
-    assert complaint.startswith("out: out holds a comparison with another seeds, budget; wanted an empty folder")
+    assert complaint.startswith("out: got out, which holds a comparison with another seeds, budget; wanted an empty")
     assert (whole / "out" / "spec.yaml").read_bytes() == before
 
 
