@@ -33,7 +33,7 @@ class AgentConfig(Settings):
     updates_per_step: Annotated[float, Field(ge=0, le=20)] = 1.0
     """Updates in an environment step. One costs as much as two or three steps."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
-    """`auto` is the CPU, which is faster for networks this small. Results are reproducible on equal devices only."""
+    """`auto` is the CPU; `cuda` has to be asked for. Results are reproducible on equal devices only."""
 
 
 class SacConfig(Settings):
