@@ -27,6 +27,11 @@ if TYPE_CHECKING:
 ROWS = {name: row.index for name, row in vars(Frame).items() if isinstance(row, Row)}
 CAR_M, WALKER_M = (4.6, 1.85), (0.5, 0.5)
 AVOIDS = ReferenceOutcome(avoids=True, impact_speed_mps=0.0)
+LOW_SCENE = {  # the middle of the family
+    **dict.fromkeys(("lead_speed_mps", "left_speed_mps", "right_speed_mps"), 11.3),
+    **dict.fromkeys(("left_offset_m", "right_offset_m"), 5.0),
+    **{"ego_speed_mps": 12.3, "lead_gap_m": 29.0, "follower_gap_m": 25.0, "friction": 0.8},
+}
 TOUCHES = ReferenceOutcome(avoids=False, impact_speed_mps=6.5)
 
 

@@ -27,7 +27,7 @@ from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign, StoredRun
 from service.store.writing import Ledger
-from tests.builders import collision, episode_record, judgement
+from tests.builders import LOW_SCENE, collision, episode_record, judgement
 
 BEGAN = 1_750_000_000.0
 ENDED_ID, LIVE_ID, CANCELLED_ID, POSTED_ID = (f"c{number:016x}" for number in range(1, 5))
@@ -57,7 +57,7 @@ def record(index: int, letter: str, phase: str) -> EpisodeRecord:
         outcome,
         phase=phase,
         seed=index + 7,
-        scene={"lead_gap_m": 12.5 + index},
+        scene=LOW_SCENE | {"lead_gap_m": 12.5 + index},
         reason=reason,
         steps=0 if letter == "r" else 50,
         environment_steps=50 * (index + 1),
@@ -181,7 +181,11 @@ class Recorded:
         for count, episode in enumerate(done, 1):
             self._clock.now += 1
             file = folder / FAILURES / series_name(episode.index)
-            kept = None if episode.collision is None else write_series(file, series_arrays())
+            kept = (
+                None
+                if episode.collision is None
+                else write_series(file, series_arrays() | {"released_s": np.array(0.0)})
+            )
             metrics = finished(spec, done[:count]).metrics
             word = EpisodeDone(
                 record=episode,

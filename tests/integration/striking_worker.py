@@ -7,7 +7,7 @@ import scripted_worker
 
 from risk_sac.metrics import wilson_interval
 from risk_sac.records import EpisodeRecord, Grade, Outcome, RunMetrics
-from tests.builders import collision, episode_record, judgement, run_metrics
+from tests.builders import LOW_SCENE, collision, episode_record, judgement, run_metrics
 
 _record = scripted_worker.record
 
@@ -18,7 +18,7 @@ def record(index: int) -> EpisodeRecord:
     preventable = index % 6 == 1
     judged = judgement(Grade.CAREFUL if preventable else Grade.IDEAL, broke=("red_light",) if preventable else ())
     hit = collision(time_s=3.9, min_ttc_s=0.4, verdicts={"inside_grip": True}, judgement=judged)
-    return episode_record(index, Outcome.FAILURE, scene={}, min_ttc_s=float("inf"), collision=hit)
+    return episode_record(index, Outcome.FAILURE, scene=LOW_SCENE, min_ttc_s=float("inf"), collision=hit)
 
 
 def metrics(episodes: int) -> RunMetrics:
