@@ -91,7 +91,8 @@ class Reports:
                 family_named(run.family)  # raises where its place on a map is gone
                 found.append(read_run(self._settings.run_folder(campaign.id, run.id)))
             except (ConfigError, OSError) as error:
-                reasons[run.spec_digest] = f"it succeeded, but its results are lost: {error}"
+                problem = error.got if isinstance(error, ConfigError) else error
+                reasons[run.spec_digest] = f"it succeeded, but its results are lost: {problem}"
                 lasting = False
         comparison = compare(campaign.spec, found, command="", reasons=reasons)
         folders = {run.spec_digest: self._settings.run_folder(campaign.id, run.id) for run in campaign.runs}

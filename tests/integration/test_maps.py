@@ -92,8 +92,8 @@ def _refuses(service: Service, ground: dict[str, str]) -> None:
     for change, field, says in [
         ({"place": "nowhere"}, "place", "the map has no edge 'nowhere'"),
         ({"place": "-1#0", "pattern": "jump"}, "pattern", "car_following"),
-        ({"place": "1", "places": "all"}, "", "either place"),
-        ({}, "", "either place"),
+        ({"place": "1", "places": "all"}, "place", "either place"),
+        ({}, "place", "either place"),
         ({"place": "1", "network": "n0"}, "network", "GET /v1/networks"),
         ({"place": "1", "families": ["low"]}, "families", "not both"),
     ]:

@@ -139,6 +139,9 @@ def _of_validation(item: Mapping[str, Any], model: type[BaseModel] | None) -> Fi
     part, *location = item["loc"]
     inside = location if part in ("body", "query", "path", "header") else item["loc"]
     message = str(item["msg"]).removeprefix("Value error, ")
+    cause = item.get("ctx", {}).get("error")
+    if isinstance(cause, ConfigError):  # its text begins with its field, which the answer has beside it
+        message = message.removeprefix(f"{cause.field}: ")
     return _field_problem(field_error({**item, "loc": tuple(inside)}, model), message)
 
 
