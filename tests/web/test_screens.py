@@ -98,4 +98,4 @@ def test_a_screen_is_accessible_and_fits_a_phone(
     check_axe(page)
     if scheme == "light":
         page.set_viewport_size(PHONE)
-        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+        page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=PHONE["width"])
