@@ -5,7 +5,6 @@
 BIN := .venv/bin
 PYTHON := $(BIN)/python
 STAMP := .venv/.installed
-COMMONROAD := risk_sac/failures/export/commonroad.txt
 # One thread per process: runs are parallel, not the small matrices within one.
 export OMP_NUM_THREADS := 1
 # Tried by running it: a pyenv shim may exist without its version.
@@ -17,14 +16,11 @@ help: ## list the targets
 
 install: $(STAMP) ## make .venv with the pinned versions
 
-$(STAMP): pyproject.toml constraints.txt $(COMMONROAD)
+$(STAMP): pyproject.toml constraints.txt
 	@python=$$($(FIND_PYTHON)); \
 	if [ -z "$$python" ]; then echo "make: found neither python3.11 nor python3.12; install one of them" >&2; exit 1; fi; \
 	test -x $(PYTHON) || "$$python" -m venv .venv
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev,export]"
-	@# By itself: commonroad-io insists on protobuf 3.20.2.
-	$(PYTHON) -m venv .venv/commonroad
-	.venv/commonroad/bin/python -m pip install --quiet --disable-pip-version-check -r $(COMMONROAD)
 	@echo "compiling, once: else it would be a part of the first searches' processor time"; set -e; \
 	folder=$$(mktemp -d); trap 'rm -r "$$folder"' EXIT; \
 	for run in "low --method archive --episodes 60" "mixed --method risk-sac --episodes 15"; do \

@@ -49,12 +49,7 @@ def exported(failure: Callable[[str], Recorded], tmp_path_factory: pytest.TempPa
 
 def ask_checkers(program: str, *arguments: str | Path) -> str:
     """What a program of this folder prints in the checkers' environment."""
-    return ask(CHECKERS / "python", program, *arguments)
-
-
-def ask(python: Path, program: str, *arguments: str | Path) -> str:
-    """What a program of this folder prints in another environment."""
-    command = [python, Path(__file__).with_name(program), *arguments]
+    command = [CHECKERS / "python", Path(__file__).with_name(program), *arguments]
     clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     done = subprocess.run(command, capture_output=True, text=True, env=clean)
     assert done.returncode == 0, done.stderr[-3000:]

@@ -1,11 +1,16 @@
-"""In CommonRoad's environment: what commonroad-io reads in a scenario, as JSON."""
+"""In the checkers' environment: checks a scenario by its schema; prints what commonroad-io reads in it, as JSON."""
 
 import json
 import sys
+from pathlib import Path
 
+import commonroad
 from commonroad.common.file_reader import CommonRoadFileReader
+from lxml import etree
 
 file, frames = sys.argv[1], int(sys.argv[2])
+schema = Path(commonroad.__file__).parent / "common" / "xml_definition_files" / "XML_commonRoad_XSD.xsd"
+etree.XMLSchema(etree.parse(schema)).assertValid(etree.parse(file))
 scenario, problems = CommonRoadFileReader(file).open()
 (problem,) = problems.planning_problem_dict.values()
 obstacles = {

@@ -16,7 +16,7 @@ import sumo_nets
 from risk_sac.cli import main
 from risk_sac.failures.bundle import MANIFEST
 from risk_sac.failures.export import formats
-from risk_sac.failures.export.formats import COMMONROAD_PYTHON, FORMATS, FormatName
+from risk_sac.failures.export.formats import FORMATS, FormatName
 from tests.exports.make_examples import FOLDER, example
 
 BUNDLE = FOLDER / "low.npz"
@@ -41,13 +41,15 @@ def test_a_missing_package_names_the_extra_before_anything_is_read(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(formats, "find_spec", lambda name: None)
-    monkeypatch.setenv(COMMONROAD_PYTHON, str(tmp_path / "python"))
     asked = (tmp_path / "none.npz", "--out", tmp_path / "x", "--format")
     assert "needs foxglove, and that is not installed; pip install 'risk-sac[export]'" in refused(
         capsys, *asked, "mcap"
     )
-    assert f"needs commonroad, and that is not installed; {COMMONROAD_PYTHON}" in refused(capsys, *asked, "commonroad")
-    assert [name for name, row in FORMATS.items() if not row.missing] == [FormatName.SUMO, FormatName.GIF]
+    assert [name for name, row in FORMATS.items() if not row.missing] == [
+        FormatName.SUMO,
+        FormatName.COMMONROAD,
+        FormatName.GIF,
+    ]
 
 
 @pytest.mark.parametrize("name", ["gif", "openscenario", "sumo"])
@@ -90,7 +92,7 @@ def small_disk() -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 
 
-@pytest.mark.parametrize(("name", "out"), [("commonroad", "folder"), ("sumo", "x.zip"), ("gif", "x.gif")])
+@pytest.mark.parametrize(("name", "out"), [("openscenario", "folder"), ("sumo", "x.zip"), ("gif", "x.gif")])
 def test_a_disk_that_fills_leaves_nothing(name: str, out: str, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "risk_sac", "export", BUNDLE, "--format", name, "--out", tmp_path / "new" / out]
     done = subprocess.run(command, capture_output=True, text=True, preexec_fn=small_disk)

@@ -10,26 +10,24 @@ import numpy as np
 import pytest
 
 from risk_sac.failures.export.commonroad import ACTORS, LANELETS, STATES
-from risk_sac.failures.export.formats import FORMATS, FormatName, commonroad_python
+from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.export.recorded import Recorded, colour
-from tests.exports.conftest import CHECKERS, CM, ask, ask_checkers, checked
+from tests.exports.conftest import CHECKERS, CM, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
 
 NAMES = {"failure.xml": 1, "failure-as-recorded.xml": 0}
-installed = pytest.mark.skipif(bool(FORMATS[FormatName.COMMONROAD].missing), reason="no commonroad-io: `make install`")
 
 
 def read(file: Path, frames: int) -> Any:
-    return json.loads(ask(commonroad_python(), "read_commonroad.py", file, str(frames)))
+    return json.loads(ask_checkers("read_commonroad.py", file, str(frames)))
 
 
 @pytest.mark.skipif("CI" not in os.environ, reason="readers of exports may be missing")
 def test_the_readers_of_exports_are_installed() -> None:
     assert CHECKERS.exists()
-    assert not FORMATS[FormatName.COMMONROAD].missing
 
 
-@installed
+@checked
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("name", NAMES)
 def test_it_comes_back_within_a_centimetre(
@@ -54,7 +52,7 @@ def test_it_comes_back_within_a_centimetre(
     assert problem["goal"] is not None
 
 
-@installed
+@checked
 def test_lights_show_what_they_showed_in_every_frame(
     exported: Callable[..., Path], failure: Callable[[str], Recorded]
 ) -> None:
@@ -68,7 +66,6 @@ def test_lights_show_what_they_showed_in_every_frame(
     assert len({state for light in shown for state in light}) >= 2
 
 
-@installed
 @checked
 @pytest.mark.parametrize("family", FAMILIES)
 def test_its_checker_finds_what_ego_and_striker_drove_feasible(

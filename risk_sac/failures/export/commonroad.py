@@ -1,25 +1,22 @@
 """CommonRoad XML, version 2020a: lanelets and traffic lights, everybody's trajectory, and the ego's planning problem.
 
 In one file the ego is the planning problem alone; in the other one its recorded trajectory is an obstacle as well.
-commonroad-io writes the files, in a process and an environment of its own: see `commonroad_writer.py`.
+Source: https://gitlab.lrz.de/tum-cps/commonroad-scenarios, documentation/XML_commonRoad_2020a.pdf
 """
 
-import json
-import subprocess
-import tempfile
 import xml.etree.ElementTree as ET
-from itertools import groupby
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from itertools import count, groupby
 from operator import itemgetter
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from risk_sac.failures.export.formats import Files, commonroad_python
+from risk_sac.failures.export.formats import Files
 from risk_sac.failures.export.recorded import Actor, Recorded, colour, cycle, goal
 from risk_sac.failures.export.written import BESIDE, beside, document
 from risk_sac.failures.net import Head, Lane, boundaries
-from risk_sac.types import STEP_S
+from risk_sac.types import STEP_S, Floats
 
 FREE, AS_RECORDED = "failure.xml", "failure-as-recorded.xml"
 LACKS = (
@@ -30,127 +27,162 @@ LACKS = (
     "the ego's driver",
     "when the adversaries were released",
 )
-WRITER = Path(__file__).with_name("commonroad_writer.py")
-WRITES_S = 120.0  # until the writer has long ended
 MADE = "2000-01-01"  # a date is required; with a true one the same failure would be another file
-# Values of commonroad-io's enumerations.
 LANELET_TYPES = {"road": "urban", "inside": "intersection", "sidewalk": "sidewalk", "crossing": "crosswalk"}
 DIRECTIONS = {"s": "straight", "l": "left", "r": "right"}
 STATES = {"red": "red", "red_yellow": "redYellow", "yellow": "yellow", "green": "green", "off": "inactive"}
 LAST_STEPS = 200  # that a free ego may take after the recording
 LANELETS, LIGHTS, ACTORS, PROBLEM = 1, 100_001, 200_001, 300_001  # where numbers begin
+Numbers = dict[str | Head, int]
+"""A lane's id, or a head of a signal → its number in the file."""
 
 
 def files(failure: Recorded) -> Files:
-    """Returns two scenarios, and what neither can say.
-
-    Raises:
-      OSError: the writer failed, or the folder for temporary files refuses its files.
-    """
-    with tempfile.TemporaryDirectory() as folder:
-        done = subprocess.run(
-            [commonroad_python(), "-I", WRITER, folder],
-            input=json.dumps(_described(failure)),
-            capture_output=True,
-            text=True,
-            timeout=WRITES_S,
-            check=False,
-        )
-        if done.returncode != 0:
-            reason = done.stderr.strip().rpartition("\n")[2]
-            raise OSError(f"CommonRoad's scenarios cannot be written: {reason}")
-        scenarios = {name: _dated(Path(folder) / name) for name in (FREE, AS_RECORDED)}
-    return scenarios | {BESIDE: beside(failure, LACKS)}
+    """Returns two scenarios, and what neither can say."""
+    return {
+        FREE: _scenario(failure, free=True),
+        AS_RECORDED: _scenario(failure, free=False),
+        BESIDE: beside(failure, LACKS),
+    }
 
 
-def _dated(file: Path) -> bytes:
-    """Returns a scenario without what differs from one export to the next."""
-    root = ET.parse(file).getroot()
-    root.set("date", MADE)
-    tags = root.find("scenarioTags")
-    assert tags is not None  # the writer gives some
-    tags[:] = sorted(tags, key=lambda tag: tag.tag)  # they come from a set, in any order
+def _scenario(failure: Recorded, *, free: bool) -> bytes:
+    root = ET.Element(
+        "commonRoad",
+        commonRoadVersion="2020a",
+        benchmarkID="ZAM_RiskSac-1_1_T-1",
+        date=MADE,
+        author="RISK-SAC",
+        affiliation=f"failure {failure.name}; {BESIDE} has what is not in this file",
+        source="simulated in SUMO",
+        timeStepSize=str(STEP_S),
+    )
+    location = ET.SubElement(root, "location")
+    for name, unknown in (("geoNameId", -999), ("gpsLatitude", 999), ("gpsLongitude", 999)):
+        _add(location, name, unknown)
+    tags = ET.SubElement(root, "scenarioTags")
+    _add(tags, "critical")
+    _add(tags, "simulated")
+    _add_roads(root, failure)
+    numbered = list(enumerate(failure.actors, start=ACTORS))
+    for number, actor in numbered[1:] if free else numbered:
+        _add_obstacle(root, actor, number)
+    _add_problem(root, failure)
     return document(root)
 
 
-def _described(failure: Recorded) -> dict[str, Any]:
-    """Returns what the writer reads."""
-    numbers = {id_: LANELETS + place for place, id_ in enumerate(failure.net.lanes)}
-    lights = _lights(failure)
-    actors = [_actor(actor, ACTORS + place) for place, actor in enumerate(failure.actors)]
-    target, _ = goal(failure)
-    return {
-        "step_s": STEP_S,
-        "affiliation": f"failure {failure.name}; {BESIDE} has what is not in this file",
-        "lights": list(lights.values()),
-        "lanelets": _lanelets(failure, numbers, lights),
-        "actors": actors,
-        "problem": {
-            "number": PROBLEM,
-            "initial": actors[0]["states"][0],
-            "goal": numbers[target.id],
-            "steps": [failure.frames, failure.frames + LAST_STEPS],
-        },
-        "files": {FREE: [each["number"] for each in actors[1:]], AS_RECORDED: [each["number"] for each in actors]},
-    }
+def _add(parent: ET.Element, name: str, value: object = "", **attributes: object) -> ET.Element:
+    """Adds an element; numbers are written with six decimals at most."""
+    child = ET.SubElement(parent, name, {key: str(each) for key, each in attributes.items()})
+    child.text = f"{value:.6f}" if isinstance(value, float) else str(value)
+    return child
 
 
-def _lights(failure: Recorded) -> dict[Head, dict[str, Any]]:
-    heads = {head: lane for lane in failure.net.lanes.values() for head in lane.heads}
-    return {head: _light(failure, lane, head, LIGHTS + place) for place, (head, lane) in enumerate(heads.items())}
-
-
-def _light(failure: Recorded, lane: Lane, head: Head, number: int) -> dict[str, Any]:
-    shown = [(steps, STATES[colour(letters[head.index])]) for steps, letters in cycle(failure, head.signal)]
-    phases = [(sum(steps for steps, _ in run), state) for state, run in groupby(shown, itemgetter(1))]
-    position = boundaries(lane.centre, lane.width_m)[1][-1]
-    direction = DIRECTIONS.get(head.turn, "all")
-    return {"number": number, "position": position.tolist(), "cycle": phases, "direction": direction}
-
-
-def _lanelets(failure: Recorded, numbers: dict[str, int], lights: dict[Head, dict[str, Any]]) -> list[dict[str, Any]]:
-    net = failure.net
-    before: dict[str, list[int]] = {id_: [] for id_ in net.lanes}
-    for lane in net.lanes.values():
+def _add_roads(root: ET.Element, failure: Recorded) -> None:
+    lanes = failure.net.lanes
+    heads = {head: lane for lane in lanes.values() for head in lane.heads}
+    numbers: Numbers = dict(zip(lanes, count(LANELETS), strict=False)) | dict(zip(heads, count(LIGHTS), strict=False))
+    before = defaultdict(list)
+    for lane in lanes.values():
         for name in lane.next:
-            before[name].append(numbers[lane.id])
-    described = []
-    for lane in net.lanes.values():
-        left, right = boundaries(lane.centre, lane.width_m)
-        beside_right, beside_left = net.neighbours(lane)
-        described.append(
-            {
-                "number": numbers[lane.id],
-                "type": LANELET_TYPES[lane.use],
-                "left": left.tolist(),
-                "centre": lane.centre.tolist(),
-                "right": right.tolist(),
-                "predecessor": before[lane.id],
-                "successor": [numbers[name] for name in lane.next],
-                "adjacent_left": beside_left and numbers[beside_left.id],
-                "adjacent_right": beside_right and numbers[beside_right.id],
-                "lights": [lights[head]["number"] for head in lane.heads],
-            }
-        )
-    return described
+            before[name].append(lane.id)
+    for lane in lanes.values():
+        right, left = failure.net.neighbours(lane)
+        links = {"predecessor": before[lane.id], "successor": lane.next}
+        sides = {"adjacentLeft": left, "adjacentRight": right}
+        _add_lanelet(root, lane, numbers, links, sides)
+    for head, lane in heads.items():
+        _add_light(root, failure, lane, head, numbers[head])
 
 
-def _actor(actor: Actor, number: int) -> dict[str, Any]:
-    heading_rad = np.arctan2(np.sin(actor.heading_rad), np.cos(actor.heading_rad))  # within ±π
-    states = [
-        {
-            "time_step": frame,
-            "position": [float(actor.x_m[frame]), float(actor.y_m[frame])],
-            "orientation": float(heading_rad[frame]),
-            "velocity": float(actor.speed_mps[frame]),
-            "acceleration": float(actor.accel_mps2[frame]),
-        }
-        for frame in range(len(actor.time_s))
-    ]
-    return {
-        "number": number,
-        "type": actor.type,
-        "length_m": actor.length_m,
-        "width_m": actor.width_m,
-        "states": states,
+def _add_lanelet(
+    root: ET.Element,
+    lane: Lane,
+    numbers: Numbers,
+    links: Mapping[str, Sequence[str]],
+    sides: Mapping[str, Lane | None],
+) -> None:
+    lanelet = _add(root, "lanelet", id=numbers[lane.id])
+    edges = boundaries(lane.centre, lane.width_m)
+    for side, edge in zip(("leftBound", "rightBound"), edges, strict=True):
+        bound = _add(lanelet, side)
+        for point in edge:
+            _add_point(bound, point)
+        _add(bound, "lineMarking", "no_marking")
+    for name, ids in links.items():
+        for id_ in ids:
+            _add(lanelet, name, ref=numbers[id_])
+    for name, beside_it in sides.items():
+        if beside_it is not None:
+            _add(lanelet, name, ref=numbers[beside_it.id], drivingDir="same")
+    walks = lane.use in ("sidewalk", "crossing")
+    if lane.heads and not walks:
+        stop = _add(lanelet, "stopLine")
+        for edge in edges:
+            _add_point(stop, edge[-1])
+        _add(stop, "lineMarking", "solid")
+        _refer_to_lights(stop, lane, numbers)
+    _add(lanelet, "laneletType", LANELET_TYPES[lane.use])
+    _add(lanelet, *(("userBidirectional", "pedestrian") if walks else ("userOneWay", "vehicle")))
+    _refer_to_lights(lanelet, lane, numbers)
+
+
+def _refer_to_lights(parent: ET.Element, lane: Lane, numbers: Numbers) -> None:
+    for head in lane.heads:
+        _add(parent, "trafficLightRef", ref=numbers[head])
+
+
+def _add_point(parent: ET.Element, place: Floats) -> None:
+    point = _add(parent, "point")
+    for axis, value in zip("xyz", place.tolist(), strict=False):
+        _add(point, axis, value)
+
+
+def _add_light(root: ET.Element, failure: Recorded, lane: Lane, head: Head, number: int) -> None:
+    light = _add(root, "trafficLight", id=number)
+    phases = _add(light, "cycle")
+    shown = [(steps, STATES[colour(letters[head.index])]) for steps, letters in cycle(failure, head.signal)]
+    for state, run in groupby(shown, itemgetter(1)):
+        phase = _add(phases, "cycleElement")
+        _add(phase, "duration", sum(steps for steps, _ in run))
+        _add(phase, "color", state)
+    _add_point(_add(light, "position"), boundaries(lane.centre, lane.width_m)[1][-1])
+    _add(light, "direction", DIRECTIONS.get(head.turn, "all"))
+    _add(light, "active", "true")
+
+
+def _add_obstacle(root: ET.Element, actor: Actor, number: int) -> None:
+    obstacle = _add(root, "dynamicObstacle", id=number)
+    _add(obstacle, "type", actor.type)
+    box = _add(_add(obstacle, "shape"), "rectangle")
+    _add(box, "length", actor.length_m)
+    _add(box, "width", actor.width_m)
+    _add_state(_add(obstacle, "initialState"), actor, 0)
+    trajectory = _add(obstacle, "trajectory")
+    for frame in range(1, len(actor.time_s)):
+        _add_state(_add(trajectory, "state"), actor, frame)
+
+
+def _add_state(state: ET.Element, actor: Actor, frame: int) -> None:
+    values = {
+        "orientation": np.remainder(actor.heading_rad[frame] + np.pi, 2 * np.pi) - np.pi,  # within ±π
+        "velocity": actor.speed_mps[frame],
+        "acceleration": actor.accel_mps2[frame],
     }
+    if frame == 0:  # the schema wants them of an initial state
+        values |= {"yawRate": 0.0, "slipAngle": 0.0}
+    _add(_add(state, "time"), "exact", frame)
+    _add_point(_add(state, "position"), np.array((actor.x_m[frame], actor.y_m[frame])))
+    for name, value in values.items():
+        _add(_add(state, name), "exact", float(value))
+
+
+def _add_problem(root: ET.Element, failure: Recorded) -> None:
+    problem = _add(root, "planningProblem", id=PROBLEM)
+    _add_state(_add(problem, "initialState"), failure.ego, 0)
+    reached = _add(problem, "goalState")
+    time = _add(reached, "time")
+    _add(time, "intervalStart", failure.frames)
+    _add(time, "intervalEnd", failure.frames + LAST_STEPS)
+    number = LANELETS + list(failure.net.lanes).index(goal(failure)[0].id)
+    _add(_add(reached, "position"), "lanelet", ref=number)

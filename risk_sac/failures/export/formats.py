@@ -3,9 +3,7 @@
 The module of a format has its name and a function `files`; it and its packages are imported when an export is made.
 """
 
-import os
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib import import_module
@@ -18,8 +16,7 @@ from risk_sac.errors import ConfigError
 if TYPE_CHECKING:
     from risk_sac.failures.export.recorded import Recorded
 
-EXTRA = "export"  # of pyproject.toml: what has the packages
-COMMONROAD_PYTHON = "RISK_SAC_COMMONROAD_PYTHON"  # environment variable
+REMEDY = "pip install 'risk-sac[export]' brings it"
 ZIP = "application/zip"
 Files = Mapping[str, bytes]
 """What an export is made of: name → content."""
@@ -36,79 +33,50 @@ class FormatName(StrEnum):
     PARQUET = "parquet"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Format:
     """One row of the table."""
 
     title: str  # in a menu
     what: str  # in one sentence
-    of: Literal["failure", "episodes"]  # one failure, or all episodes of runs
     packages: tuple[str, ...] = ()  # that it imports, beyond those that are always there
-    python: Callable[[], Path] | None = None  # that has the packages, where it is not ours
     suffix: str = ".zip"  # of what is downloaded: several files, or the one that it is
     media_type: str = ZIP
+    of: Literal["failure", "episodes"] = "failure"  # one failure, or all episodes of runs
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Its packages that are not installed."""
-        if self.python is not None:
-            return () if self.python().exists() else self.packages
         return tuple(name for name in self.packages if find_spec(name) is None)
-
-    @property
-    def remedy(self) -> str:
-        """What brings its missing packages, as the end of a sentence."""
-        if self.python is None:
-            return f"pip install 'risk-sac[{EXTRA}]' brings it"
-        return f"{COMMONROAD_PYTHON} has to name a Python that has commonroad-io"
-
-
-def commonroad_python() -> Path:
-    """Returns the Python that has commonroad-io, whose pins suit no other package."""
-    return Path(os.environ.get(COMMONROAD_PYTHON) or Path(sys.prefix) / "commonroad" / "bin" / "python")
 
 
 FORMATS: Mapping[FormatName, Format] = {
     FormatName.SUMO: Format(
-        title="SUMO",
-        what="net, vehicle types and a TraCI script that replays it in sumo or sumo-gui, and its FCD",
-        of="failure",
+        "SUMO", "net, vehicle types and a TraCI script that replays it in sumo or sumo-gui, and its FCD"
     ),
     FormatName.OPENSCENARIO: Format(
-        title="OpenSCENARIO",
-        what="OpenSCENARIO XML 1.2 on an OpenDRIVE 1.7 road, signals included; the ego is free, or drives as recorded",
-        of="failure",
+        "OpenSCENARIO",
+        "OpenSCENARIO XML 1.2 on an OpenDRIVE 1.7 road, signals included; the ego is free, or drives as recorded",
         packages=("scenariogeneration", "sumo"),
     ),
     FormatName.COMMONROAD: Format(
-        title="CommonRoad",
-        what="CommonRoad XML 2020a with a planning problem for the ego, or with the ego as recorded",
-        of="failure",
-        packages=("commonroad",),
-        python=commonroad_python,
+        "CommonRoad", "CommonRoad XML 2020a with a planning problem for the ego, or with the ego as recorded"
     ),
     FormatName.MCAP: Format(
-        title="MCAP",
-        what="a recording with foxglove schemas: roads, bodies, signals, distances, requirements",
-        of="failure",
-        packages=("foxglove",),
-        suffix=".mcap",
-        media_type="application/octet-stream",
+        "MCAP",
+        "a recording with foxglove schemas: roads, bodies, signals, distances, requirements",
+        ("foxglove",),
+        ".mcap",
+        "application/octet-stream",
     ),
-    FormatName.GIF: Format(
-        title="GIF",
-        what="an animation of the last seconds, seen from above",
-        of="failure",
-        suffix=".gif",
-        media_type="image/gif",
-    ),
+    FormatName.GIF: Format("GIF", "an animation of the last seconds, seen from above", (), ".gif", "image/gif"),
     FormatName.PARQUET: Format(
-        title="Parquet",
-        what="a table with a row for every episode of the runs, whatever its outcome",
+        "Parquet",
+        "a table with a row for every episode of the runs, whatever its outcome",
+        ("pyarrow",),
+        ".parquet",
+        "application/vnd.apache.parquet",
         of="episodes",
-        packages=("pyarrow",),
-        suffix=".parquet",
-        media_type="application/vnd.apache.parquet",
     ),
 }
 
@@ -127,7 +95,7 @@ def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
         raise ConfigError("format", f"{name.value!r}, which holds {lacks}", f"one of: {wanted}")
     if format_.missing:
         got = f"{name}, which needs {', '.join(format_.missing)}, and that is not installed"
-        raise ConfigError("format", got, remedy=format_.remedy)
+        raise ConfigError("format", got, remedy=REMEDY)
 
 
 def export(name: FormatName, source: "Recorded | Sequence[Path]") -> Files:

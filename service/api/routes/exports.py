@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Response
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, names
+from risk_sac.failures.export.formats import FORMATS, REMEDY, FormatName, check_carries, names
 from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, WAIT, Responses, problem
@@ -27,7 +27,7 @@ def check_installed(format: FormatName, of: Literal["failure", "episodes"]) -> N
     """Answers 501 where the service lacks a package of the format: that is no mistake of the client."""
     row = FORMATS[format]
     if row.of == of and row.missing:
-        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: {row.remedy}"
+        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: {REMEDY}"
         raise ProblemError(HTTPStatus.NOT_IMPLEMENTED, Reason.NOT_INSTALLED, lacks)
 
 
