@@ -34,7 +34,7 @@ from risk_sac.cli.console import (
 )
 from risk_sac.config import METHODS, SHIPPED, RunSpec
 from risk_sac.config.spec_file import read_campaign, read_spec
-from risk_sac.metrics import METRICS, Metric, pooled_counts
+from risk_sac.metrics import METRICS, Metric
 from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import Results
 from risk_sac.run_folder.verified import TIMES
@@ -135,7 +135,7 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
 def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
     """What a metric is called, and what it is."""
     name, value = f"{metric.words} {metric.symbol}".strip(), metric.value(metrics)
-    interval = None if value is None else metric.interval(value, pooled_counts([metrics]))
+    interval = None if value is None else metric.interval(value, metrics)
     text = or_dash(value, ".3f")
     return (name, text) if interval is None else (f"{name} (95 %)", "{} ({:.3f} to {:.3f})".format(text, *interval))
 

@@ -10,41 +10,13 @@ from risk_sac.metrics.features import FEATURES, outcome_features
 from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, clopper_pearson, wilson_interval
 from risk_sac.metrics.metric import (
     Estimate,
-    Kept,
     Metric,
     Ratio,
     estimate,
     mean_over_runs,
     pooled_bins,
+    pooled_counts,
     pooled_signatures,
 )
 from risk_sac.metrics.rows import METRICS, RATIOS, MetricName
-from risk_sac.metrics.tally import COUNTS, WINDOW, Counts, Tally, pooled_counts, preventable
-
-__all__ = [
-    "COUNTS",
-    "FEATURES",
-    "METRICS",
-    "RATIOS",
-    "RESAMPLING_SEED",
-    "WINDOW",
-    "Counts",
-    "Estimate",
-    "Kept",
-    "Metric",
-    "MetricName",
-    "MetricsAccumulator",
-    "Ratio",
-    "Tally",
-    "bootstrap_interval",
-    "clopper_pearson",
-    "estimate",
-    "mean_over_runs",
-    "outcome_features",
-    "pooled_bins",
-    "pooled_counts",
-    "pooled_signatures",
-    "preventable",
-    "results_digest",
-    "wilson_interval",
-]
+from risk_sac.metrics.tally import WINDOW, Tally, preventable

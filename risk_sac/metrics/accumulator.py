@@ -5,10 +5,11 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from risk_sac.metrics.metric import Kept
 from risk_sac.metrics.rows import METRICS, steps_per_distinct_failure
-from risk_sac.metrics.tally import COUNTS, Tally
-from risk_sac.records import EpisodeRecord, Record, RunMetrics
+from risk_sac.metrics.tally import Tally
+from risk_sac.records import Counts, EpisodeRecord, Record, RunMetrics
+
+HISTOGRAMS = ("signatures", "conflicts_by_second", "contacts_by_second")
 
 # Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
 FIELDS_ADDED_LATER = frozenset({"judgement", "noticed_s", "script"})
@@ -39,28 +40,23 @@ class MetricsAccumulator:
         """The figures over all episodes added so far."""
         tally = self._tally
         return RunMetrics(
-            **{name: getattr(tally, name) for name in COUNTS},
-            **_kept(tally),
+            **{name: getattr(tally, name) for name in (*Counts.model_fields, *HISTOGRAMS)},
+            **_figures(tally),
             steps_per_distinct_failure=steps_per_distinct_failure(tally),
             dual_variable=self._dual_variable,
             temperature=self._temperature,
-            signatures=dict(tally.signatures),
-            conflicts_by_second=tuple(tally.conflicts_by_second),
-            contacts_by_second=tuple(tally.contacts_by_second),
         )
 
 
-def _kept(tally: Tally) -> dict[str, Any]:
+def _figures(tally: Tally) -> dict[str, Any]:
     """Field of `RunMetrics` -> its value, for all metrics that have one."""
     found: dict[str, float | None] = {}
     for metric in METRICS:
-        kept = metric.figure
-        if not isinstance(kept, Kept):
+        if not metric.field:
             continue
-        value = found[kept.field] = kept.formula(tally)
-        if kept.interval and value is not None:
-            interval = metric.interval(value, tally)
-            found[f"{kept.field}_low"], found[f"{kept.field}_high"] = interval or (None, None)
+        value = found[metric.field] = metric.formula(tally)
+        if value is not None and f"{metric.field}_low" in RunMetrics.model_fields:
+            found[f"{metric.field}_low"], found[f"{metric.field}_high"] = metric.interval(value, tally) or (None, None)
     return found
 
 

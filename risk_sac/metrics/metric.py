@@ -4,35 +4,10 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
+from typing import Any
 
 from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, wilson_interval
-from risk_sac.metrics.tally import Counts, Tally, pooled_counts
-from risk_sac.records import RunMetrics
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Kept:
-    """A figure that `RunMetrics` keeps, since it follows from sums that only the tally has."""
-
-    field: str  # of `RunMetrics`
-    formula: Callable[[Tally], float | None]
-    interval: bool = False  # whether `<field>_low` and `<field>_high` lie beside it
-
-    def of(self, metrics: RunMetrics) -> float | None:
-        """As it was kept."""
-        value: float | None = getattr(metrics, self.field)
-        return value
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Derived:
-    """A figure that follows from a run's counts whenever it is asked for."""
-
-    formula: Callable[[Counts], float | None]
-
-    def of(self, metrics: RunMetrics) -> float | None:
-        """Computed anew."""
-        return self.formula(pooled_counts([metrics]))
+from risk_sac.records import Counts, RunMetrics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +17,8 @@ class Metric:
     name: str  # in `table.json`, `table.csv`, the API and names of figures
     symbol: str  # in tables
     meaning: str  # the formula in words
-    figure: Kept | Derived
+    formula: Callable[[Any], float | None]  # of a run's `Tally`, where the figure has a field; else of its `Counts`
+    field: str = ""  # of `RunMetrics`, which keeps the figure
     words: str = ""  # before the symbol, where there is room
     trials: Callable[[Counts], int] | None = None  # of a rate: one run has a Wilson interval over so many
     search_only: bool = False  # or of the evaluation as well
@@ -51,7 +27,8 @@ class Metric:
 
     def value(self, metrics: RunMetrics) -> float | None:
         """Its value for a run."""
-        return self.figure.of(metrics)
+        value: float | None = getattr(metrics, self.field) if self.field else self.formula(metrics)
+        return value
 
     def interval(self, value: float, counts: Counts) -> tuple[float, float] | None:
         """Wilson's 95 % interval of one run's rate; None for what is no rate."""
@@ -93,7 +70,7 @@ def estimate(metric: Metric, metrics: Sequence[RunMetrics]) -> Estimate:
     if len(values) > 1:
         interval = bootstrap_interval(values, RESAMPLING_SEED)
     elif values:
-        interval = metric.interval(values[0], pooled_counts(metrics[:1]))
+        interval = metric.interval(values[0], metrics[0])
     low, high = interval or (None, None)
     return Estimate(mean=mean_over_runs(metric, metrics), low=low, high=high, runs=len(values))
 
@@ -106,6 +83,11 @@ def mean_over_runs(metric: Metric, metrics: Sequence[RunMetrics]) -> float | Non
 
 def _values(metric: Metric, metrics: Sequence[RunMetrics]) -> list[float]:
     return [value for value in map(metric.value, metrics) if value is not None]
+
+
+def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
+    """Each count summed over the runs; what two runs found alike counts twice."""
+    return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in Counts.model_fields})
 
 
 def pooled_signatures(metrics: Sequence[RunMetrics]) -> dict[str, int]:

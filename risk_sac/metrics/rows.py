@@ -9,9 +9,9 @@ from typing import Annotated
 from pydantic import Field
 
 from risk_sac.metrics.features import FEATURES
-from risk_sac.metrics.metric import Derived, Kept, Metric, Ratio
-from risk_sac.metrics.tally import WINDOW, Counts, Tally
-from risk_sac.records import ARTEFACT_RULES
+from risk_sac.metrics.metric import Metric, Ratio
+from risk_sac.metrics.tally import WINDOW, Tally
+from risk_sac.records import ARTEFACT_RULES, Counts
 
 PER_STEPS = 1000  # environment steps over which the rate of distinct failures is taken
 
@@ -85,14 +85,16 @@ METRICS = (
         name="ecr",
         symbol="ECR",
         meaning="valid failures / episodes",
-        figure=Kept(field="ecr", formula=effective_collision_rate, interval=True),
+        formula=effective_collision_rate,
+        field="ecr",
         trials=lambda counts: counts.driven,
     ),
     Metric(
         name="pcr",
         symbol="PCR",
         meaning="preventable failures / episodes: valid ones that the careful driver would have prevented",
-        figure=Kept(field="pcr", formula=preventable_collision_rate, interval=True),
+        formula=preventable_collision_rate,
+        field="pcr",
         trials=lambda counts: counts.driven,
     ),
     Metric(
@@ -100,7 +102,7 @@ METRICS = (
         symbol="ACR",
         meaning="avoidable failures / episodes: valid ones that the careful driver, or full braking at once, would "
         "have prevented",
-        figure=Derived(formula=lambda counts: _share(counts.avoidable, counts.driven)),
+        formula=lambda counts: _share(counts.avoidable, counts.driven),
         trials=lambda counts: counts.driven,
         tested=False,
     ),
@@ -108,7 +110,8 @@ METRICS = (
         name="ecr_last",
         symbol=f"ECR last {WINDOW}",
         meaning=f"ECR of the last {WINDOW} search episodes, or of all where there are fewer",
-        figure=Kept(field="window_ecr", formula=lambda tally: _share(tally.newest_failures, tally.newest_episodes)),
+        formula=lambda tally: _share(tally.newest_failures, tally.newest_episodes),
+        field="window_ecr",
         trials=_newest,
         search_only=True,
         tested=False,
@@ -117,7 +120,8 @@ METRICS = (
         name="pcr_last",
         symbol=f"PCR last {WINDOW}",
         meaning=f"PCR of the last {WINDOW} search episodes, or of all where there are fewer",
-        figure=Kept(field="window_pcr", formula=lambda tally: _share(tally.newest_preventable, tally.newest_episodes)),
+        formula=lambda tally: _share(tally.newest_preventable, tally.newest_episodes),
+        field="window_pcr",
         trials=_newest,
         search_only=True,
         tested=False,
@@ -127,27 +131,30 @@ METRICS = (
         symbol="ES",
         words="efficiency",
         meaning="1 − (mean steps to the valid failure) / T; an episode without one counts the horizon T",
-        figure=Kept(field="efficiency", formula=efficiency_score),
+        formula=efficiency_score,
+        field="efficiency",
     ),
     Metric(
         name="rho_c",
         symbol="ρ̄_c",
         words="realism cost per step",
         meaning="mean realism cost C_soft per executed step, in [0, 1]; lower is more realistic",
-        figure=Kept(field="cost_rate", formula=cost_rate),
+        formula=cost_rate,
+        field="cost_rate",
     ),
     Metric(
         name="ofd",
         symbol="OFD",
         words="dispersion",
         meaning="mean distance between two valid failures of a run in outcome features, in [0, 1]",
-        figure=Kept(field="dispersion", formula=outcome_dispersion),
+        formula=outcome_dispersion,
+        field="dispersion",
     ),
     Metric(
         name="distinct_per_1000_steps",
         symbol=f"distinct / {PER_STEPS} steps",
         meaning=f"distinct valid failures per {PER_STEPS} environment steps",
-        figure=Derived(formula=lambda counts: _per_steps(counts.distinct_failures, counts)),
+        formula=lambda counts: _per_steps(counts.distinct_failures, counts),
         search_only=True,
         tabled=False,  # its reciprocal is
     ),
@@ -155,7 +162,7 @@ METRICS = (
         name="preventable_per_1000_steps",
         symbol=f"preventable / {PER_STEPS} steps",
         meaning=f"distinct preventable failures per {PER_STEPS} environment steps",
-        figure=Derived(formula=lambda counts: _per_steps(counts.distinct_preventable, counts)),
+        formula=lambda counts: _per_steps(counts.distinct_preventable, counts),
         search_only=True,
         tested=False,
     ),
@@ -163,7 +170,8 @@ METRICS = (
         name="covered",
         symbol="kinds",
         meaning="cells of the fixed taxonomy of failures that a valid one lies in",
-        figure=Kept(field="covered", formula=lambda tally: len(tally.kinds)),
+        formula=lambda tally: len(tally.kinds),
+        field="covered",
         search_only=True,
         tested=False,
     ),

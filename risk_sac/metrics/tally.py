@@ -2,12 +2,13 @@
 
 import math
 from collections import Counter, deque
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from typing import Annotated
+
+from pydantic import ConfigDict, Field, PrivateAttr
 
 from risk_sac.errors import NotFinite
 from risk_sac.metrics.features import Spread, outcome_features
-from risk_sac.records import EpisodeRecord, Outcome, RunMetrics
+from risk_sac.records import Counts, EpisodeRecord, Outcome
 from risk_sac.types import STEP_S
 from risk_sac.verdicts.distinct import DistinctFailures, FailureKind, kind_of
 
@@ -23,60 +24,40 @@ def preventable(record: EpisodeRecord) -> bool:
     return record.outcome is Outcome.FAILURE and record.collision is not None and record.collision.preventable
 
 
-@dataclass(kw_only=True)
-class Counts:
-    """The counts of a run, as `RunMetrics` has them; several runs have their sums."""
-
-    episodes: int = 0
-    rejected: int = 0
-    raw_collisions: int = 0
-    failures: int = 0
-    distinct_failures: int = 0
-    preventable: int = 0
-    avoidable: int = 0
-    distinct_preventable: int = 0
-    artefacts: int = 0
-    unresponsive: int = 0
-    invalid: int = 0
-    environment_steps: int = 0
-
-    @property
-    def driven(self) -> int:
-        """Episodes that rates are taken over: all, but for those in which the ego failed to drive."""
-        return self.episodes - self.invalid
-
-
-COUNTS = tuple(each.name for each in fields(Counts))
-
-
-def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
-    """Each count summed over the runs; what two runs found alike counts twice."""
-    return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in COUNTS})
-
-
-@dataclass(kw_only=True)
 class Tally(Counts):
     """The counts and sums of a run, at a cost per episode that grows only with the number of failures."""
 
-    horizon_steps: int  # T
-    steps_to_failure: int = 0  # summed over episodes; T for one without a valid collision
-    cost: float = 0.0  # realism cost C_soft, summed over executed steps
-    distance: float = 0.0  # between two failures' outcome features, summed over all pairs
-    newest_episodes: int = 0  # `WINDOW`, or all where there are fewer
-    newest_failures: int = 0  # among them
-    newest_preventable: int = 0
-    signatures: Counter[str] = field(default_factory=Counter)  # signature -> valid failures
-    kinds: set[FailureKind] = field(default_factory=set)  # of the valid failures
-    conflicts_by_second: list[int] = field(init=False)  # valid failures by the second in which they began
-    contacts_by_second: list[int] = field(init=False)  # the same by the second of the contact
-    _newest: deque[tuple[bool, bool]] = field(init=False, default_factory=lambda: deque(maxlen=WINDOW))
-    _spread: Spread = field(init=False, default_factory=Spread)
-    _distinct: DistinctFailures = field(init=False, default_factory=DistinctFailures)
-    _distinct_preventable: DistinctFailures = field(init=False, default_factory=DistinctFailures)
+    model_config = ConfigDict(frozen=False)
 
-    def __post_init__(self) -> None:
-        if self.horizon_steps < 1:
-            raise ValueError(f"horizon_steps is {self.horizon_steps}; wanted at least 1")
+    horizon_steps: Annotated[int, Field(ge=1)]
+    """T."""
+    steps_to_failure: int = 0
+    """Summed over episodes; T for one without a valid collision."""
+    cost: float = 0.0
+    """Realism cost C_soft, summed over executed steps."""
+    distance: float = 0.0
+    """Between two failures' outcome features, summed over all pairs."""
+    newest_episodes: int = 0
+    """`WINDOW`, or all where there are fewer."""
+    newest_failures: int = 0
+    """Among them."""
+    newest_preventable: int = 0
+    signatures: Counter[str] = Field(default_factory=Counter)
+    """Signature → valid failures."""
+    kinds: set[FailureKind] = Field(default_factory=set)
+    """Of the valid failures."""
+    conflicts_by_second: list[int] = Field(default_factory=list)
+    """Valid failures by the second in which they began."""
+    contacts_by_second: list[int] = Field(default_factory=list)
+    """The same by the second of the contact."""
+    _newest: deque[tuple[bool, bool]] = PrivateAttr(default_factory=lambda: deque(maxlen=WINDOW))
+    _spread: Spread = PrivateAttr(default_factory=Spread)
+    _distinct: DistinctFailures = PrivateAttr(default_factory=DistinctFailures)
+    _distinct_preventable: DistinctFailures = PrivateAttr(default_factory=DistinctFailures)
+
+    def model_post_init(self, context: object, /) -> None:
+        """Make a bin for every second that is begun."""
+        super().model_post_init(context)
         seconds = math.ceil(self.horizon_steps / STEPS_PER_S)
         self.conflicts_by_second, self.contacts_by_second = [0] * seconds, [0] * seconds
 

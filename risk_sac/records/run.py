@@ -11,23 +11,45 @@ from risk_sac.config import FamilyName, MethodName, RunMethod
 from risk_sac.records.base import Real, Record
 
 
-class RunMetrics(Record):
+class Counts(Record):
+    """Counts of the episodes of one run; several runs have their sums."""
+
+    episodes: int = 0
+    """Finished, rejected scenes included."""
+    rejected: int = 0
+    """Scenes that were physically infeasible and not simulated."""
+    raw_collisions: int = 0
+    """Episodes in which the ego touched something."""
+    failures: int = 0
+    """Valid collisions."""
+    distinct_failures: int = 0
+    """Valid collisions that resemble no earlier one of their run: another signature, or other outcome features."""
+    preventable: int = 0
+    """Valid collisions that the careful driver would have prevented, repetitions included."""
+    avoidable: int = 0
+    """These, and those that only full braking at once would have prevented."""
+    distinct_preventable: int = 0
+    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
+    artefacts: int = 0
+    """Contacts that the simulator or the control made."""
+    unresponsive: int = 0
+    """Valid collisions with a visible collision course of 1.5 s or more during which the ego never braked."""
+    invalid: int = 0
+    """Episodes in which the ego failed to drive; the rates leave them out."""
+    environment_steps: int = 0
+
+    @property
+    def driven(self) -> int:
+        """Episodes that rates are taken over: all, but for those in which the ego failed to drive."""
+        return self.episodes - self.invalid
+
+
+class RunMetrics(Counts):
     """What a run has achieved so far; rates come with their 95 % interval.
 
     Fields with a default can be read from what was stored before they were counted.
     """
 
-    episodes: int
-    """Finished, rejected scenes included."""
-    rejected: int
-    """Scenes that were physically infeasible and not simulated."""
-    raw_collisions: int
-    """Episodes in which the ego touched something."""
-    failures: int
-    """Valid collisions."""
-    invalid: int = 0
-    """Episodes in which the ego failed to drive; the rates leave them out."""
-    environment_steps: int
     ecr: Real
     """Effective collision rate: valid collisions / episodes."""
     ecr_low: Real
@@ -50,22 +72,10 @@ class RunMetrics(Record):
     """λ."""
     temperature: Real
     """α."""
-    distinct_failures: int = 0
-    """Valid collisions that resemble no earlier one: another signature, or other outcome features."""
     steps_per_distinct_failure: float | None = None
     """Environment steps per distinct failure; null without one."""
-    preventable: int = 0
-    """Valid collisions that the careful driver would have prevented, repetitions included."""
-    avoidable: int = 0
-    """These, and those that only full braking at once would have prevented."""
-    distinct_preventable: int = 0
-    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
     covered: int = 0
     """Kinds of failures found: cells of the fixed taxonomy that a valid collision lies in."""
-    artefacts: int = 0
-    """Contacts that the simulator or the control made."""
-    unresponsive: int = 0
-    """Valid collisions with a visible collision course of 1.5 s or more during which the ego never braked."""
     signatures: Mapping[str, int] = {}
     """Signature → valid collisions, in the order in which they were first met."""
     conflicts_by_second: tuple[int, ...] = ()

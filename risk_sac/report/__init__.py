@@ -14,19 +14,3 @@ from risk_sac.report.files import table_csv, table_json, write_report
 from risk_sac.report.markdown import run_command, table_markdown
 from risk_sac.report.paired import PairedTest
 from risk_sac.report.runs import FinishedRun, read_run
-
-__all__ = [
-    "Comparison",
-    "FinishedRun",
-    "MissingRun",
-    "PairedTest",
-    "compare",
-    "figure_bytes",
-    "figure_names",
-    "read_run",
-    "run_command",
-    "table_csv",
-    "table_json",
-    "table_markdown",
-    "write_report",
-]

@@ -1,7 +1,6 @@
 """One cell of the comparison: a method in a family and phase, over all its seeds. Pure."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from typing import Any
 
 from risk_sac.config import FamilyName, RunMethod
@@ -16,7 +15,7 @@ from risk_sac.metrics import (
     pooled_counts,
     pooled_signatures,
 )
-from risk_sac.records import Phase
+from risk_sac.records import Counts, Phase
 from risk_sac.report.runs import FinishedRun
 
 
@@ -25,8 +24,7 @@ def metrics_of(phase: Phase) -> tuple[Metric, ...]:
     return tuple(metric for metric in METRICS if phase == "search" or not metric.search_only)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Cell:
+class Cell(Counts):
     """What a method achieved in a family and phase, over all its finished runs."""
 
     family: FamilyName
@@ -34,26 +32,6 @@ class Cell:
     phase: Phase
     seeds: tuple[int, ...]
     """Of the runs that are counted."""
-    episodes: int
-    rejected: int
-    """Infeasible scenes."""
-    raw_collisions: int
-    """Episodes in which the ego touched something."""
-    failures: int
-    """Valid collisions."""
-    distinct_failures: int
-    """Sum over the runs; what two runs found alike counts twice."""
-    preventable: int
-    """Valid collisions that the careful driver would have prevented, repetitions included."""
-    avoidable: int
-    """These, and those that only full braking at once would have prevented."""
-    distinct_preventable: int
-    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
-    artefacts: int
-    unresponsive: int
-    invalid: int
-    """Episodes in which the ego failed to drive; the rates leave them out."""
-    environment_steps: int
     estimates: Mapping[MetricName, Estimate]
     """By the name of the metric."""
     steps_per_distinct_failure: float | None
@@ -76,8 +54,6 @@ class Cell:
     contacts_by_second: tuple[int, ...]
     """The same by the second of the contact."""
 
-    __pydantic_config__ = {"use_attribute_docstrings": True}  # noqa: RUF012 - a body of the service shows it
-
 
 def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
     """Sums up the runs of one cell, at least one of them, all with episodes in the phase."""
@@ -91,7 +67,7 @@ def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
         method=method,
         phase=phase,
         seeds=tuple(run.spec.seed for run in runs),
-        **asdict(counts),
+        **dict(counts),
         **ratios,
         estimates={metric.name: estimate(metric, metrics) for metric in metrics_of(phase)},
         cpu_s_per_distinct_failure=cpu_s / distinct if distinct and phase == "search" else None,

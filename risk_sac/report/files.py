@@ -4,7 +4,6 @@ import csv
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,7 +24,9 @@ from risk_sac.run_folder.durable import replace_file
 
 FIGURES = "figures"
 FORMAT_VERSION = 1
-_PLAIN = tuple(each.name for each in fields(Cell) if each.type in (int, float, float | None))  # a column each
+_PLAIN = tuple(
+    name for name, each in Cell.model_fields.items() if each.annotation in (int, float, float | None)
+)  # a column each
 
 
 class MissingRun(Record):

@@ -5,14 +5,3 @@ from risk_sac.scene_optimizer.bandit import DiscountedBandit
 from risk_sac.scene_optimizer.base import NOBODY, Encounter, SceneOptimizer
 from risk_sac.scene_optimizer.bayesian import BotorchOptimizer
 from risk_sac.scene_optimizer.samplers import IidSampler, SobolOptimizer
-
-__all__ = [
-    "NOBODY",
-    "ArchiveOptimizer",
-    "BotorchOptimizer",
-    "DiscountedBandit",
-    "Encounter",
-    "IidSampler",
-    "SceneOptimizer",
-    "SobolOptimizer",
-]

@@ -5,12 +5,10 @@ intervals are those of the report.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict
 
 from risk_sac.metrics import (
     METRICS,
     RATIOS,
-    Kept,
     estimate,
     mean_over_runs,
     pooled_bins,
@@ -44,7 +42,7 @@ def totals(runs: Sequence[StoredRun]) -> list[Total]:
 def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
     counts = pooled_counts(group)
     return Total.model_validate(
-        asdict(counts)
+        dict(counts)
         | {ratio.name: ratio.formula(counts) for ratio in RATIOS}
         | _means(group)
         | {
@@ -62,11 +60,10 @@ def _means(group: Sequence[RunMetrics]) -> dict[str, float | None]:
     """The metrics that a total has, under the names of `RunMetrics`; intervals are drawn for no others."""
     means: dict[str, float | None] = {}
     for metric in METRICS:
-        kept = metric.figure
-        if not isinstance(kept, Kept) or kept.field not in Total.model_fields:
+        if metric.field not in Total.model_fields:
             continue
-        means[kept.field] = mean_over_runs(metric, group)
-        if kept.interval:
+        means[metric.field] = mean_over_runs(metric, group)
+        if f"{metric.field}_low" in Total.model_fields:
             pooled = estimate(metric, group)
-            means |= {f"{kept.field}_low": pooled.low, f"{kept.field}_high": pooled.high}
+            means |= {f"{metric.field}_low": pooled.low, f"{metric.field}_high": pooled.high}
     return means

@@ -9,5 +9,3 @@ from risk_sac.report.evidence.document import POLICY, html, markdown
 from risk_sac.report.evidence.gathered import Evidence, gathered
 from risk_sac.report.evidence.origin import Origin, show_command
 from risk_sac.report.evidence.report import report
-
-__all__ = ["POLICY", "Evidence", "Origin", "gathered", "html", "markdown", "report", "show_command"]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from risk_sac.metrics import COUNTS, METRICS, RATIOS, Counts, Kept, Tally, outcome_features, wilson_interval
+from risk_sac.metrics import METRICS, RATIOS, Tally, outcome_features, wilson_interval
 from risk_sac.metrics.features import Spread
 from risk_sac.metrics.rows import (
     cost_rate,
@@ -15,10 +15,10 @@ from risk_sac.metrics.rows import (
     preventable_collision_rate,
     steps_per_distinct_failure,
 )
-from risk_sac.records import RunMetrics
+from risk_sac.records import Counts, RunMetrics
 from tests.unit.metrics.episodes import JUDGED, any_collision, feed
 
-FORMULAS = {metric.name: metric.figure.formula for metric in METRICS}
+FORMULAS = {metric.name: metric.formula for metric in METRICS}
 
 
 def dispersion_of(features):
@@ -96,11 +96,10 @@ def test_rows_have_names_of_their_own():
     assert all(row.meaning and not row.meaning.endswith(".") for row in rows)
 
 
-def test_run_metrics_have_every_count_and_every_figure_that_is_kept():
-    kept = [metric.figure for metric in METRICS if isinstance(metric.figure, Kept)]
-    ends = [f"{each.field}_{end}" for each in kept if each.interval for end in ("low", "high")]
-    assert {*COUNTS, *(each.field for each in kept), *ends} <= RunMetrics.__annotations__.keys()
-    assert all(metric.trials for metric in METRICS if isinstance(metric.figure, Kept) and metric.figure.interval)
+def test_what_a_metric_keeps_is_a_field_of_the_metrics_of_a_run_and_rates_have_trials():
+    kept = {metric.field: metric for metric in METRICS if metric.field}
+    assert kept.keys() <= RunMetrics.model_fields.keys()
+    assert all(metric.trials for field, metric in kept.items() if f"{field}_low" in RunMetrics.model_fields)
 
 
 def test_a_metric_is_read_from_the_metrics_of_a_run():
