@@ -24,7 +24,7 @@ from risk_sac.problem import Problem
 from risk_sac.records import Collision
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import worst_rss_margin
-from risk_sac.risk.realism import adversaries_cost, broken_hard_rule
+from risk_sac.risk.realism import broken_hard_rule, soft_cost
 from risk_sac.risk.reward import risk_reward
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.families import FAMILIES
@@ -35,11 +35,11 @@ from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
-from risk_sac.verdicts.artefact import Handling
-from risk_sac.verdicts.collision import Acquaintance, collision_of
+from risk_sac.verdicts.collision import collision_of
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.online import CarefulReflex, conflicts_now
 from risk_sac.verdicts.path import Path, polyline
+from risk_sac.verdicts.validity import EpisodeFacts
 
 FEASIBLE_TRIES = 100
 Observation = NDArray[np.float32]
@@ -256,7 +256,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """C_soft of Eq. 5 over the adversaries."""
         if before.ids != frame.ids:  # somebody left the net, far from the ego: compare those who stayed
             return 0.0
-        return adversaries_cost(
+        return soft_cost(
             self._adversaries.rows(frame),
             self._adversaries.accel_limits(frame),
             frame.kind,
@@ -264,7 +264,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             now.assessment.gap_m,
             before.state,
             previous.assessment.gap_m,
-            STEP_S,
         )
 
     def _worth(self, failure: Collision) -> float:
@@ -276,21 +275,17 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame
         other, pedestrian = frame.ids[contact.other], frame.kind[contact.other] == Kind.PEDESTRIAN
-        visible_for_s, ever_visible = (
-            self._perception.in_view_for(other, frame.time_s),
-            self._perception.ever_seen(other),
-        )
-        agrees = None if pedestrian else self._sim.lists_collision(other)
-        handling = Handling(
+        facts = EpisodeFacts(
             teleported=self._teleported,
             spawn_overlap=self._spawn_overlap,
             inside_limits=self._inside_limits,
             touched_before=other in self._touched,
-            ego_model_saw=agrees is not False,  # of a pedestrian, it was told the oracle's own box
+            # Of a pedestrian, the ego's model was told the oracle's own box.
+            simulator_agrees=None if pedestrian else self._sim.lists_collision(other),
+            visible_for_s=self._perception.in_view_for(other, frame.time_s),
+            ever_visible=self._perception.ever_seen(other),
         )
-        striker = Acquaintance(visible_for_s=visible_for_s, ever_visible=ever_visible, simulator_agrees=agrees)
-        measures = self._trace.since_release
-        return collision_of(contact, frame, self._released_s, self.evidence(), measures, handling, striker)
+        return collision_of(contact, frame, self._released_s, self.evidence(), self._trace.since_release, facts)
 
     def evidence(self) -> Evidence:
         """What a judge may look at, of the episode so far."""

@@ -14,6 +14,14 @@ from risk_sac.jit import compiled
 from risk_sac.types import HEADING, LENGTH, VX, VY, WIDTH, Bools, Floats, Frame, X, Y
 
 NO_MOTION = 1e-9  # m/s or m; keeps the sweeps' divisions finite, far below anything that matters
+Pose = tuple[float, float, float]  # x, y, heading of a body's centre
+
+
+class Size(NamedTuple):
+    """Half the length and half the width of a body."""
+
+    half_length: float
+    half_width: float
 
 
 class RelativeView(NamedTuple):
@@ -47,12 +55,18 @@ def relative_view(frame: Frame) -> RelativeView:
 
 @compiled
 def frame_view(state: Floats) -> RelativeView:
-    """`relative_view` of a frame's state."""
+    """`relative_view` of a frame's state.
+
+    The separating axes are the ego's x and y, then the other's long and cross axis.
+    """
     n = state.shape[1] - 1
     others = np.empty((8, n))
     x, y, vx, vy = others[0], others[1], others[2], others[3]
     cos, sin, half_length, half_width = others[4], others[5], others[6], others[7]
     cos_ego, sin_ego = math.cos(state[HEADING, 0]), math.sin(state[HEADING, 0])
+    ego_half_length, ego_half_width = state[LENGTH, 0] / 2, state[WIDTH, 0] / 2
+    separation, reach = np.empty((4, n)), np.empty((4, n))
+    gap, overlap = np.empty(n), np.empty(n, dtype=np.bool_)
     for i in range(n):
         dx, dy = state[X, i + 1] - state[X, 0], state[Y, i + 1] - state[Y, 0]
         dvx, dvy = state[VX, i + 1] - state[VX, 0], state[VY, i + 1] - state[VY, 0]
@@ -60,8 +74,27 @@ def frame_view(state: Floats) -> RelativeView:
         x[i], y[i] = dx * cos_ego + dy * sin_ego, dy * cos_ego - dx * sin_ego
         vx[i], vy[i] = dvx * cos_ego + dvy * sin_ego, dvy * cos_ego - dvx * sin_ego
         cos[i], sin[i] = math.cos(turn), math.sin(turn)
-        half_length[i], half_width[i] = state[LENGTH, i + 1] / 2, state[WIDTH, i + 1] / 2
-    return box_view(
+        a, b = state[LENGTH, i + 1] / 2, state[WIDTH, i + 1] / 2
+        half_length[i], half_width[i] = a, b
+        c, s = abs(cos[i]), abs(sin[i])
+        separation[0, i] = x[i]
+        separation[1, i] = y[i]
+        separation[2, i] = x[i] * cos[i] + y[i] * sin[i]
+        separation[3, i] = y[i] * cos[i] - x[i] * sin[i]
+        reach[0, i] = ego_half_length + a * c + b * s
+        reach[1, i] = ego_half_width + a * s + b * c
+        reach[2, i] = a + ego_half_length * c + ego_half_width * s
+        reach[3, i] = b + ego_half_length * s + ego_half_width * c
+        squared_from_ego = squared_from_other = 0.0
+        for axis in range(4):
+            clear = max(abs(separation[axis, i]) - reach[axis, i], 0.0)
+            if axis < 2:
+                squared_from_ego += clear * clear
+            else:
+                squared_from_other += clear * clear
+        gap[i] = math.sqrt(max(squared_from_ego, squared_from_other))
+        overlap[i] = gap[i] == 0.0
+    return RelativeView(
         x,
         y,
         vx,
@@ -72,63 +105,6 @@ def frame_view(state: Floats) -> RelativeView:
         half_width,
         state[VX, 0] * cos_ego + state[VY, 0] * sin_ego,
         state[VY, 0] * cos_ego - state[VX, 0] * sin_ego,
-        state[LENGTH, 0] / 2,
-        state[WIDTH, 0] / 2,
-    )
-
-
-@compiled
-def box_view(
-    x: Floats,
-    y: Floats,
-    vx: Floats,
-    vy: Floats,
-    cos: Floats,
-    sin: Floats,
-    half_length: Floats,
-    half_width: Floats,
-    ego_vx: float,
-    ego_vy: float,
-    ego_half_length: float,
-    ego_half_width: float,
-) -> RelativeView:
-    """Adds the separating axes (the ego's x and y, then the other's long and cross axis), gap and overlap."""
-    n = len(x)
-    separation, reach = np.empty((4, n)), np.empty((4, n))
-    gap, overlap = np.empty(n), np.empty(n, dtype=np.bool_)
-    for i in range(n):
-        c, s, a, b = abs(cos[i]), abs(sin[i]), half_length[i], half_width[i]
-        separation[0, i] = x[i]
-        separation[1, i] = y[i]
-        separation[2, i] = x[i] * cos[i] + y[i] * sin[i]
-        separation[3, i] = y[i] * cos[i] - x[i] * sin[i]
-        reach[0, i] = ego_half_length + a * c + b * s
-        reach[1, i] = ego_half_width + a * s + b * c
-        reach[2, i] = a + ego_half_length * c + ego_half_width * s
-        reach[3, i] = b + ego_half_length * s + ego_half_width * c
-        squared_from_ego = squared_from_other = 0.0
-        touching = True
-        for axis in range(4):
-            clear = abs(separation[axis, i]) - reach[axis, i]
-            if clear > 0.0:
-                touching = False
-                if axis < 2:
-                    squared_from_ego += clear * clear
-                else:
-                    squared_from_other += clear * clear
-        gap[i] = math.sqrt(max(squared_from_ego, squared_from_other))
-        overlap[i] = touching
-    return RelativeView(
-        x,
-        y,
-        vx,
-        vy,
-        cos,
-        sin,
-        half_length,
-        half_width,
-        ego_vx,
-        ego_vy,
         ego_half_length,
         ego_half_width,
         separation,
@@ -240,28 +216,43 @@ def _crosses(view: RelativeView, wall: int, px: float, py: float) -> bool:
 
 
 @compiled
+def touches(pose0: Pose, size0: Size, pose1: Pose, size1: Size) -> bool:
+    """Whether two oriented boxes overlap (separating axes; circles around both first: most pairs are far apart)."""
+    (x0, y0, heading0), (half_length0, half_width0) = pose0, size0
+    (x1, y1, heading1), (half_length1, half_width1) = pose1, size1
+    dx, dy = x1 - x0, y1 - y0
+    reach = half_length0 + half_width0 + half_length1 + half_width1
+    if dx * dx + dy * dy > reach * reach:
+        return False
+    cos0, sin0, cos1, sin1 = math.cos(heading0), math.sin(heading0), math.cos(heading1), math.sin(heading1)
+    c, s = abs(cos0 * cos1 + sin0 * sin1), abs(sin1 * cos0 - cos1 * sin0)
+    return bool(
+        abs(dx * cos0 + dy * sin0) <= half_length0 + half_length1 * c + half_width1 * s
+        and abs(dy * cos0 - dx * sin0) <= half_width0 + half_length1 * s + half_width1 * c
+        and abs(dx * cos1 + dy * sin1) <= half_length1 + half_length0 * c + half_width0 * s
+        and abs(dy * cos1 - dx * sin1) <= half_width1 + half_length0 * s + half_width0 * c
+    )
+
+
+@compiled
 def overlapping_pairs(state: Floats) -> list[tuple[int, int]]:
     """Pairs i < j of the actors in a frame's state whose bodies touch or overlap."""
-    x, y, heading, length, width = state[X], state[Y], state[HEADING], state[LENGTH], state[WIDTH]
     pairs = [(0, 0) for _ in range(0)]  # an empty list whose type the compiler can tell
-    for i in range(len(x)):
-        cos, sin = math.cos(heading[i]), math.sin(heading[i])
-        for j in range(i + 1, len(x)):
-            dx, dy = x[j] - x[i], y[j] - y[i]
-            reach = (length[i] + width[i] + length[j] + width[j]) / 2
-            if dx * dx + dy * dy > reach * reach:  # circles around both boxes: most pairs are far apart
-                continue
-            c, s = abs(math.cos(heading[j] - heading[i])), abs(math.sin(heading[j] - heading[i]))
-            cos_j, sin_j = math.cos(heading[j]), math.sin(heading[j])
-            a, b, p, q = length[i] / 2, width[i] / 2, length[j] / 2, width[j] / 2
-            if (
-                abs(dx * cos + dy * sin) <= a + p * c + q * s
-                and abs(dy * cos - dx * sin) <= b + p * s + q * c
-                and abs(dx * cos_j + dy * sin_j) <= p + a * c + b * s
-                and abs(dy * cos_j - dx * sin_j) <= q + a * s + b * c
-            ):
+    for i in range(state.shape[1]):
+        for j in range(i + 1, state.shape[1]):
+            if touches(_pose(state, i), _size(state, i), _pose(state, j), _size(state, j)):
                 pairs.append((i, j))
     return pairs
+
+
+@compiled
+def _pose(state: Floats, actor: int) -> Pose:
+    return state[X, actor], state[Y, actor], state[HEADING, actor]
+
+
+@compiled
+def _size(state: Floats, actor: int) -> Size:
+    return Size(state[LENGTH, actor] / 2, state[WIDTH, actor] / 2)
 
 
 ZONE_MARGIN_M = 0.05  # a contact this close to an edge lies on it

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.jit import compiled
-from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, Floats, Kind
+from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, STEP_S, Floats, Kind
 
 BUILD_UP_S = 0.4  # in which an emergency braking builds up from nothing to an actor's limit
 ORDINARY_JERK = 0.75  # share of the jerk that this takes, up to which a driver counts as ordinary
@@ -36,7 +36,7 @@ HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc", "initial_rss
 
 
 @compiled
-def jerk_term(accel_mps2: float, previous_accel_mps2: float, limit_mps2: float, step_s: float) -> float:
+def jerk_term(accel_mps2: float, previous_accel_mps2: float, limit_mps2: float) -> float:
     """Abrupt control of one adversary, max(|Δa| / dt - ordinary, 0) / (greatest - ordinary), at most 1.
 
     Choice: the greatest jerk is the actor's own, limit / BUILD_UP_S, and three quarters of it are free, as ordinary
@@ -44,7 +44,7 @@ def jerk_term(accel_mps2: float, previous_accel_mps2: float, limit_mps2: float, 
     """
     greatest = limit_mps2 / BUILD_UP_S
     ordinary = ORDINARY_JERK * greatest
-    jerk = abs(accel_mps2 - previous_accel_mps2) / step_s
+    jerk = abs(accel_mps2 - previous_accel_mps2) / STEP_S
     return min(max(jerk - ordinary, 0.0) / (greatest - ordinary), 1.0)
 
 
@@ -61,14 +61,14 @@ def acceleration_term(accel_mps2: float, lateral_accel_mps2: float, limit_mps2: 
 
 
 @compiled
-def closeness_term(gap_m: float, previous_gap_m: float, step_s: float) -> float:
+def closeness_term(gap_m: float, previous_gap_m: float) -> float:
     """Sudden extreme proximity of one adversary to the ego, nearness · closing speed / scale.
 
     nearness = max(1 - gap / close, 0) is 1 at contact; the closing speed is (previous gap - gap) / dt. Only what is
     both near and sudden costs: a queue at a light is slow, and a distant oncoming car is far.
     """
     nearness = 1.0 - gap_m / CLOSE_GAP_M
-    closing_mps = (previous_gap_m - gap_m) / step_s
+    closing_mps = (previous_gap_m - gap_m) / STEP_S
     if nearness <= 0.0 or closing_mps <= 0.0:
         return 0.0
     return min(nearness, 1.0) * min(closing_mps / CLOSING_SCALE_MPS, 1.0)
@@ -76,53 +76,16 @@ def closeness_term(gap_m: float, previous_gap_m: float, step_s: float) -> float:
 
 @compiled
 def lateral_accel(
-    lateral_mps: float, previous_lateral_mps: float, turn_rad: float, speed_mps: float, walks: bool, step_s: float
+    lateral_mps: float, previous_lateral_mps: float, turn_rad: float, speed_mps: float, walks: bool
 ) -> float:
     """Acceleration across the lane of a vehicle, or across the walking direction of a pedestrian, m/s²."""
     if walks:
-        return speed_mps * math.atan2(math.sin(turn_rad), math.cos(turn_rad)) / step_s
-    return (lateral_mps - previous_lateral_mps) / step_s
+        return speed_mps * math.atan2(math.sin(turn_rad), math.cos(turn_rad)) / STEP_S
+    return (lateral_mps - previous_lateral_mps) / STEP_S
 
 
 @compiled
 def soft_cost(
-    accel_mps2: Floats,
-    previous_accel_mps2: Floats,
-    lateral_accel_mps2: Floats,
-    limit_mps2: Floats,
-    gap_m: Floats,
-    previous_gap_m: Floats,
-    step_s: float,
-) -> float:
-    """Soft realism cost of one step, C_soft(s, a) of (5).
-
-    C_soft = 1/2 · max_k jerk_k + 1/4 · max_k excess_k + 1/4 · max_k closeness_k
-
-    Choice: jerk counts double, because it tells commands from driving. Over the adversaries the worst counts, not the
-    mean, or one could behave as it liked beside others that do nothing.
-
-    Args:
-      accel_mps2: `n`, acceleration of each adversary in this step.
-      previous_accel_mps2: `n`, in the step before.
-      lateral_accel_mps2: `n`, across the lane of a vehicle or the walking direction of a pedestrian.
-      limit_mps2: `n`, greatest absolute acceleration of each.
-      gap_m: `n`, distance between each adversary's body and the ego's.
-      previous_gap_m: `n`, one step before.
-      step_s: dt.
-
-    Returns:
-      In [0, 1]; 0 without adversaries.
-    """
-    jerk = excess = closeness = 0.0
-    for k in range(len(accel_mps2)):
-        jerk = max(jerk, jerk_term(accel_mps2[k], previous_accel_mps2[k], limit_mps2[k], step_s))
-        excess = max(excess, acceleration_term(accel_mps2[k], lateral_accel_mps2[k], limit_mps2[k]))
-        closeness = max(closeness, closeness_term(gap_m[k], previous_gap_m[k], step_s))
-    return jerk / 2.0 + (excess + closeness) / 4.0
-
-
-@compiled
-def adversaries_cost(
     rows: NDArray[np.intp],
     limit_mps2: Floats,
     kind: NDArray[np.int8],
@@ -130,34 +93,36 @@ def adversaries_cost(
     gap_m: Floats,
     previous: Floats,
     previous_gap_m: Floats,
-    step_s: float,
 ) -> float:
-    """C_soft of the adversaries, in columns `rows`, between two frames of the same `n` actors.
+    """Soft realism cost of the step between two frames of the same `n` actors, C_soft(s, a) of (5).
+
+    C_soft = 1/2 · max_k jerk_k + 1/4 · max_k excess_k + 1/4 · max_k closeness_k
+
+    Choice: jerk counts double, because it tells commands from driving. Over the adversaries the worst counts, not the
+    mean, or one could behave as it liked beside others that do nothing.
 
     Args:
       rows: columns of the adversaries.
       limit_mps2: greatest absolute acceleration of each adversary.
       kind: `n`.
-      state: now.
+      state: `rows x n`, now.
       gap_m: `n - 1`, from the ego's body to the others'.
       previous: state one step before.
       previous_gap_m: the gaps one step before.
-      step_s: dt.
+
+    Returns:
+      In [0, 1]; 0 without adversaries.
     """
-    columns = np.empty((5, len(rows)))
-    accel, accel_before, across, gap, gap_before = columns[0], columns[1], columns[2], columns[3], columns[4]
+    jerk = excess = closeness = 0.0
     for k, row in enumerate(rows):
-        accel[k], accel_before[k] = state[ACCEL, row], previous[ACCEL, row]
-        across[k] = lateral_accel(
-            state[LATERAL, row],
-            previous[LATERAL, row],
-            state[HEADING, row] - previous[HEADING, row],
-            state[SPEED, row],
-            kind[row] == PEDESTRIAN,
-            step_s,
-        )
-        gap[k], gap_before[k] = gap_m[row - 1], previous_gap_m[row - 1]
-    return soft_cost(accel, accel_before, across, limit_mps2, gap, gap_before, step_s)
+        accel, limit = state[ACCEL, row], limit_mps2[k]
+        turn = state[HEADING, row] - previous[HEADING, row]
+        walks = kind[row] == PEDESTRIAN
+        across = lateral_accel(state[LATERAL, row], previous[LATERAL, row], turn, state[SPEED, row], walks)
+        jerk = max(jerk, jerk_term(accel, previous[ACCEL, row], limit))
+        excess = max(excess, acceleration_term(accel, across, limit))
+        closeness = max(closeness, closeness_term(gap_m[row - 1], previous_gap_m[row - 1]))
+    return jerk / 2.0 + (excess + closeness) / 4.0
 
 
 def broken_hard_rule(

@@ -20,79 +20,31 @@ if TYPE_CHECKING:
 Value = TypeVar("Value", float, Floats, "Tensor")
 
 
-def collision_bonus(valid: Value, bonus: float) -> Value:
-    """Sparse reward for a valid collision, first term of R_risk in (1).
+def risk_reward(
+    ttc_s: Value, rss_margin: Value, valid_collision: Value, degenerate_collision: Value, config: RewardConfig
+) -> Value:
+    """Risk reward of one step.
+
+    R_risk(s, a) = bonus · valid - penalty · [degenerate] + w_ttc · exp(-TTC / scale) + w_rss · [RSS violated]     (1)
 
     Deviation: the paper pays all valid collisions alike. Which of them a careful driver would have prevented is what a
     user wants to know.
+    Choice: the paper only filters degenerate contacts out. Without a price on them the policy settles for sideswipes,
+    which are far easier to reach than a failure of the ego.
 
     Args:
-      valid: in the step of a valid collision 1, or less where no driver would have prevented it; else 0.
-      bonus: its size, at least 0.
-    """
-    return bonus * valid
-
-
-def degenerate_penalty(degenerate: Value, penalty: float) -> Value:
-    """What contact costs that a validity rule refuses, as a number to be subtracted.
-
-    Choice: the paper only filters such contacts out. Without a price on them the policy settles for
-    sideswipes, which are far easier to reach than a failure of the ego.
-
-    Args:
-      degenerate: 1 in the step of a degenerate contact, else 0.
-      penalty: its size, at least 0.
-    """
-    return penalty * degenerate
-
-
-def near_miss(ttc_s: Value, weight: float, scale_s: float) -> Value:
-    """Dense near-miss signal, weight · exp(-TTC / scale), the second term of R_risk in (1).
-
-    Args:
-      ttc_s: time to collision, s, at least 0; its cap where there is none.
-      weight: reward at TTC = 0.
-      scale_s: s; the reward falls by e over this much TTC.
-    """
-    decay: Value = math.e ** (-ttc_s / scale_s)  # `**` is the one exponential that all three containers share
-    return weight * decay
-
-
-def rss_violation(margin: Value, weight: float) -> Value:
-    """Indicator that a situation is dangerous in the sense of RSS, the third term of R_risk in (1).
-
-    Args:
-      margin: the larger of the longitudinal and the lateral RSS margin, scaled; below 0 both are violated.
-      weight: reward where they are.
-
-    Source: Shalev-Shwartz et al., "On a formal model of safe and scalable self-driving cars", 2017.
-    """
-    return weight * (margin < 0)  # type: ignore[return-value]  # numpy's stubs lose float64
-
-
-def risk_reward(
-    ttc_s: Value,
-    rss_margin: Value,
-    valid_collision: Value,
-    degenerate_collision: Value,
-    config: RewardConfig,
-) -> Value:
-    """Risk reward of one step, R_risk(s, a) of (1).
-
-    R_risk = bonus · valid - penalty · [degenerate] + w_ttc · exp(-TTC / scale) + w_rss · [RSS violated]
-
-    Args:
-      ttc_s: time to collision after the step, s.
-      rss_margin: smallest RSS margin after the step, scaled.
+      ttc_s: time to collision after the step, s, at least 0; its cap where there is none.
+      rss_margin: the smallest after the step of the larger of both RSS margins, scaled; below 0 both are violated.
       valid_collision: what the valid collision is worth in which the step ended, in (0, 1]; else 0.
       degenerate_collision: 1 if it ended in contact that a validity rule refuses.
       config: sizes of the four terms.
+
+    Source of the third term: Shalev-Shwartz et al., "On a formal model of safe and scalable self-driving cars", 2017.
     """
-    sparse = collision_bonus(valid_collision, config.valid_collision) - degenerate_penalty(
-        degenerate_collision, config.degenerate_collision
-    )
-    dense = near_miss(ttc_s, config.ttc_weight, config.ttc_scale_s) + rss_violation(rss_margin, config.rss_weight)
-    return sparse + dense
+    sparse = config.valid_collision * valid_collision - config.degenerate_collision * degenerate_collision
+    near_miss = config.ttc_weight * math.e ** (-ttc_s / config.ttc_scale_s)  # `**` works on all three containers
+    reward: Value = sparse + (near_miss + config.rss_weight * (rss_margin < 0))
+    return reward
 
 
 def penalised_reward(risk_reward: Value, cost: Value, dual_variable: float) -> Value:
@@ -108,33 +60,12 @@ def penalised_reward(risk_reward: Value, cost: Value, dual_variable: float) -> V
     return risk_reward - dual_variable * cost
 
 
-def potential(robustness: Value) -> Value:
-    """Potential of a state, φ(s) = -ρ(Φ, s): the closer to a violation, the higher.
-
-    Args:
-      robustness: soft-min robustness ρ(Φ, s) of (7), in units of the requirements' scales.
-    """
-    return -robustness
-
-
-def shaping(potential: Value, next_potential: Value, discount: float) -> Value:
-    """Potential-based shaping term.
-
-    F(s, a, s') = γ φ(s') - φ(s)                                                     (6)
-
-    Args:
-      potential: φ(s).
-      next_potential: φ(s'); 0 at a terminal s' if the optimal policy is to stay the same.
-      discount: γ in (0, 1).
-    """
-    return discount * next_potential - potential
-
-
 def shaped_reward(
     reward: Value, robustness: Value, next_robustness: Value, discount: float, terminated: Value
 ) -> Value:
-    """Shaped reward, on which the policy is trained.
+    """Shaped reward, on which the policy is trained; the potential is φ(s) = -ρ(Φ, s).
 
+    F(s, a, s') = γ φ(s') - φ(s)                                                     (6)
     R'(s, a) = R(s, a) + F(s, a, s') = R(s, a) - γ ρ(Φ, s') + ρ(Φ, s)                (8)
 
     Deviation: φ(s') = 0 where `terminated` is 1. Ng et al. need it for policy invariance: otherwise
@@ -144,13 +75,13 @@ def shaped_reward(
 
     Args:
       reward: penalised reward R of (3).
-      robustness: ρ(Φ, s).
+      robustness: ρ(Φ, s), the soft minimum (7), in units of the requirements' scales.
       next_robustness: ρ(Φ, s').
       discount: γ in (0, 1).
       terminated: 1 where s' is terminal and its potential is to be 0, else 0.
     """
-    next_potential = potential(next_robustness) * (1.0 - terminated)
-    return reward + shaping(potential(robustness), next_potential, discount)
+    potential, next_potential = -robustness, -next_robustness * (1.0 - terminated)
+    return reward + (discount * next_potential - potential)
 
 
 @dataclass(frozen=True, slots=True)

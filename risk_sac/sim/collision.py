@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from risk_sac.geometry import RelativeView, box_view, contact_point, zone
+from risk_sac.geometry import RelativeView, contact_point, frame_view, zone
 from risk_sac.jit import compiled
-from risk_sac.types import HEADING, LENGTH, VX, VY, WIDTH, Floats, Frame, X, Y
+from risk_sac.types import HEADING, WIDTH, Floats, Frame, X, Y
 
 BISECTIONS = 10  # of 0.1 s: locates the contact to 0.1 ms
 
@@ -50,7 +50,7 @@ def _first_touch(before: Floats, now: Floats, other: int) -> float:
     low, high = 0.0, 1.0
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        if _seen_from_ego(before, now, other, middle).overlap[0]:
+        if frame_view(_between(before, now, other, middle)).overlap[0]:
             high = middle
         else:
             low = middle
@@ -58,42 +58,21 @@ def _first_touch(before: Floats, now: Floats, other: int) -> float:
 
 
 @compiled
-def _pose(before: Floats, now: Floats, actor: int, share: float) -> tuple[float, float, float]:
-    turn = now[HEADING, actor] - before[HEADING, actor]
-    turn -= math.tau * round(turn / math.tau)
-    return (
-        before[X, actor] + share * (now[X, actor] - before[X, actor]),
-        before[Y, actor] + share * (now[Y, actor] - before[Y, actor]),
-        before[HEADING, actor] + share * turn,
-    )
-
-
-@compiled
-def _seen_from_ego(before: Floats, now: Floats, other: int, share: float) -> RelativeView:
-    """`other` alone in the ego's frame, `share` of the way between two states."""
-    x0, y0, h0 = _pose(before, now, 0, share)
-    x1, y1, h1 = _pose(before, now, other, share)
-    cos0, sin0 = math.cos(h0), math.sin(h0)
-    vx, vy = now[VX, 0], now[VY, 0]
-    dvx, dvy = now[VX, other] - vx, now[VY, other] - vy
-    return box_view(
-        np.array([(x1 - x0) * cos0 + (y1 - y0) * sin0]),
-        np.array([(y1 - y0) * cos0 - (x1 - x0) * sin0]),
-        np.array([dvx * cos0 + dvy * sin0]),
-        np.array([dvy * cos0 - dvx * sin0]),
-        np.array([math.cos(h1 - h0)]),
-        np.array([math.sin(h1 - h0)]),
-        np.array([now[LENGTH, other] / 2]),
-        np.array([now[WIDTH, other] / 2]),
-        vx * cos0 + vy * sin0,
-        vy * cos0 - vx * sin0,
-        now[LENGTH, 0] / 2,
-        now[WIDTH, 0] / 2,
-    )
+def _between(before: Floats, now: Floats, other: int, share: float) -> Floats:
+    """State of the ego and `other` alone, `share` of the way between two frames; the velocities are those of now."""
+    pair = np.empty((WIDTH + 1, 2))
+    for column, actor in enumerate((0, other)):
+        turn = now[HEADING, actor] - before[HEADING, actor]
+        turn -= math.tau * round(turn / math.tau)
+        pair[:, column] = now[:, actor]
+        pair[X, column] = before[X, actor] + share * (now[X, actor] - before[X, actor])
+        pair[Y, column] = before[Y, actor] + share * (now[Y, actor] - before[Y, actor])
+        pair[HEADING, column] = before[HEADING, actor] + share * turn
+    return pair
 
 
 def _describe(before: Frame, other: int, frame: Frame, share: float) -> Contact:
-    view = _seen_from_ego(before.state, frame.state, other, share)
+    view = frame_view(_between(before.state, frame.state, other, share))
     x, y = contact_point(view)
     cos, sin = float(view.cos[0]), float(view.sin[0])
     dx, dy = x - float(view.x[0]), y - float(view.y[0])

@@ -10,9 +10,10 @@ from typing import Generic, NamedTuple
 
 import numpy as np
 
+from risk_sac.geometry import Size
 from risk_sac.jit import compiled
 from risk_sac.types import Bools, Floats
-from risk_sac.verdicts.course import HORIZON_S, Body, F, Size, at
+from risk_sac.verdicts.course import HORIZON_S, Body, F, at
 from risk_sac.verdicts.path import Path, project
 
 WANDER_M = 0.375  # what a vehicle strays from its lane's centre without meaning anything
@@ -50,19 +51,21 @@ def along(path: Path, first: int, s: float, speed: float, size: Size, other: Bod
     return Along(gap, behind, ttc, across, turn, speed_along, aside)
 
 
-@compiled
 def along_series(path: Path, speed: Floats, size: Size, other: Body[Floats]) -> Along[Floats]:
     """Places a body along the ego's path frame by frame; the path has a point per frame."""
-    rows = np.empty((7, len(speed)))
-    for t in range(len(speed)):
-        seen = along(path, t, path.s[t], speed[t], size, at(other, t))
-        rows[0, t], rows[1, t], rows[2, t] = seen.gap_m, seen.behind_m, seen.ttc_s
-        rows[3, t], rows[4, t], rows[5, t], rows[6, t] = seen.across_m, seen.turn_rad, seen.speed_mps, seen.aside_s
-    return Along(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6])
+    return Along(*_along_rows(path, speed, size, other))
 
 
 @compiled
-def towards(across: float, offset: float, lane_width: float) -> float:
+def _along_rows(path: Path, speed: Floats, size: Size, other: Body[Floats]) -> Floats:
+    rows = np.empty((7, len(speed)))
+    for t in range(len(speed)):
+        for row, value in enumerate(along(path, t, path.s[t], speed[t], size, at(other, t))):
+            rows[row, t] = value
+    return rows
+
+
+def towards(across: F, offset: F, lane_width: float) -> F:
     """How far a vehicle is off the centre of the lane beside the ego's, towards the ego, m.
 
     SUMO's offset jumps by a lane's width when the vehicle passes to the next lane; where it stands across the ego's
@@ -70,52 +73,30 @@ def towards(across: float, offset: float, lane_width: float) -> float:
 
     `across` is its centre's distance from the ego's path, positive to the left, `offset` that from its lane's centre.
     """
-    seen = lane_width - abs(across)
-    if math.isnan(offset):
-        return seen
-    recorded = -offset if across > 0.0 else offset
-    return recorded + lane_width * round((seen - recorded) / lane_width)
+    seen = lane_width - np.abs(across)
+    recorded = np.where(np.greater(across, 0.0), -offset, offset)
+    lanes = np.round((seen - recorded) / lane_width)
+    found: F = np.where(np.isnan(offset), seen, recorded + lane_width * lanes)
+    return found
 
 
-@compiled
-def lane_conflict(
-    other: Along[float], speed: float, offset: float, accel: float, lane_width: float, wary: bool
-) -> tuple[bool, bool]:
+def lane_conflict(other: Along[F], speed: F, offset: F, accel: F, lane_width: float, wary: bool) -> tuple[Bools, Bools]:
     """Whether a conflict begins with a vehicle that drives the ego's way, and whether one goes on that had begun.
 
     A cut-in begins when the vehicle is more than 0.375 m off its lane's centre towards the ego, and less than 2 s
     ahead, or alongside and coming nearer; a conflict with a leader when it brakes harder than 5 m/s², or is less than
     2 s ahead.
-    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s; who is
-    alongside comes nearer if the sides would touch within 4 s, or it is half in the ego's lane. Who merely hangs over
-    the line does not.
+    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s; one
+    alongside comes nearer if the sides would touch within 4 s, or it is half in the ego's lane. One that merely hangs
+    over the line does not.
 
     `speed` is the ego's, `accel` the vehicle's. For a wary driver a vehicle alongside counts if it comes nearer or not.
     """
-    in_lane = abs(other.across_m) <= lane_width / 2
-    coming = in_lane or towards(other.across_m, offset, lane_width) > WANDER_M
-    alongside = other.gap_m <= 0.0 and other.behind_m <= 0.0 and (wary or in_lane or other.aside_s < HORIZON_S)
-    brakes = in_lane and 0.0 < other.gap_m <= HORIZON_S * speed and accel < -LEADER_BRAKES_MPS2
-    begins = brakes or (coming and (alongside or other.ttc_s < DANGER_TTC_S))
-    return begins, begins or (coming and other.ttc_s < HORIZON_S)
-
-
-@compiled
-def lane_conflicts(
-    others: Along[Floats], speed: Floats, offset: Floats, accel: Floats, lane_width: float, wary: bool
-) -> tuple[Bools, Bools]:
-    """`lane_conflict` of every frame, two arrays `T`."""
-    count = len(speed)
-    begins, lasts = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
-    for t in range(count):
-        other = Along(
-            others.gap_m[t],
-            others.behind_m[t],
-            others.ttc_s[t],
-            others.across_m[t],
-            others.turn_rad[t],
-            others.speed_mps[t],
-            others.aside_s[t],
-        )
-        begins[t], lasts[t] = lane_conflict(other, speed[t], offset[t], accel[t], lane_width, wary)
-    return begins, lasts
+    in_lane = np.less_equal(np.abs(other.across_m), lane_width / 2)
+    coming = in_lane | np.greater(towards(other.across_m, offset, lane_width), WANDER_M)
+    alongside = np.less_equal(other.gap_m, 0.0) & np.less_equal(other.behind_m, 0.0)
+    alongside &= wary | in_lane | np.less(other.aside_s, HORIZON_S)
+    near = np.greater(other.gap_m, 0.0) & np.less_equal(other.gap_m, HORIZON_S * speed)
+    brakes = in_lane & near & np.less(accel, -LEADER_BRAKES_MPS2)
+    begins = brakes | (coming & (alongside | np.less(other.ttc_s, DANGER_TTC_S)))
+    return begins, begins | (coming & np.less(other.ttc_s, HORIZON_S))

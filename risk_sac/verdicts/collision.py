@@ -1,7 +1,6 @@
-"""A contact with all that is said of it: its place, what led to it, the verdict of each rule, and the judgement."""
+"""The record of a contact: its place, what led to it, the verdict of each rule, and the judgement."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from risk_sac.records import Collision
 from risk_sac.risk.measures import Measures
@@ -10,22 +9,12 @@ from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.sim.collision import Contact
 from risk_sac.types import STEP_S, Frame, Kind, Role
-from risk_sac.verdicts.artefact import Handling, artefact_verdicts
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import judge
-from risk_sac.verdicts.validity import validity_verdicts
+from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, validity_verdicts
 
 WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Acquaintance:
-    """What the ego and SUMO knew of the striker."""
-
-    visible_for_s: float  # in the ego's sight without a break, 0 if it is not
-    ever_visible: bool
-    simulator_agrees: bool | None  # see `Collision`
 
 
 def collision_of(
@@ -34,18 +23,15 @@ def collision_of(
     released_s: float,
     evidence: Evidence,
     measures: Sequence[Measures],
-    handling: Handling,
-    striker: Acquaintance,
+    facts: EpisodeFacts,
 ) -> Collision:
     """The record of a contact in `frame`, the last one; `measures` begin with the release at `released_s`."""
     other, warning = frame.ids[contact.other], measures[:-WARNING_STEPS]
     column = evidence.column(other)
     conflict = find_conflict(evidence, column)
     verdicts = {
-        **artefact_verdicts(evidence, column, conflict, handling),
-        **validity_verdicts(
-            evidence, column, contact, visible_for_s=striker.visible_for_s, ever_visible=striker.ever_visible
-        ),
+        **artefact_verdicts(evidence, column, conflict, facts),
+        **validity_verdicts(evidence, column, contact, facts),
     }
     return Collision(
         time_s=contact.time_s - released_s,
@@ -62,10 +48,10 @@ def collision_of(
         lateral_offset_m=contact.lateral_offset_m,
         min_ttc_s=min((m.signals["ttc_s"] for m in warning), default=TTC_CAP_S),
         min_rss_margin_m=min(worst_rss_margin(m.assessment) for m in measures),
-        visible_for_s=striker.visible_for_s,
+        visible_for_s=facts.visible_for_s,
         ego_peak_braking_mps2=max(m.signals["ego_braking_mps2"] for m in measures),
         min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
-        simulator_agrees=striker.simulator_agrees,
+        simulator_agrees=facts.simulator_agrees,
         verdicts=verdicts,
         judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict),
     )

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from risk_sac.geometry import Size
 from risk_sac.jit import compiled
 from risk_sac.records import ConflictType
 from risk_sac.types import Bools, Floats, Kind
-from risk_sac.verdicts.along import Along, along_series, lane_conflicts
-from risk_sac.verdicts.course import HORIZON_S, Body, Size, at, entry_distance, time_to_touch
+from risk_sac.verdicts.along import Along, along_series, lane_conflict
+from risk_sac.verdicts.course import HORIZON_S, Body, at, entry_distance, time_to_touch, with_margin
 from risk_sac.verdicts.evidence import Evidence, soon_inside
 from risk_sac.verdicts.path import Path, recorded_path
 
@@ -54,7 +55,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     known = evidence.known[:, striker]
     seen = seen_along(path, evidence, striker)
     size, motion = recorded_size(evidence, 0), recorded_motion(evidence, striker)
-    course = collision_courses(path, column(evidence.speed_mps, 0), size.corridor(), motion)
+    course = collision_courses(path, column(evidence.speed_mps, 0), with_margin(size), motion)
     same_way = _drives_the_same_way(evidence, striker, seen.turn_rad)
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         begins = lasts = begins_if_wary = lasts_if_wary = course & _at_the_carriageway(evidence, striker)
@@ -87,7 +88,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
 def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wary: bool) -> tuple[Bools, Bools]:
     e = evidence
     offset, accel = column(e.lane_offset_m, striker), column(e.accel_mps2, striker)
-    return lane_conflicts(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
+    return lane_conflict(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
 
 
 def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
@@ -181,7 +182,7 @@ def _way_to_corridor(path: Path, evidence: Evidence, striker: int) -> Floats:
     """
     first, motion = evidence.since(HORIZON_S), recorded_motion(evidence, striker)
     x, y, heading = motion.x[first:], motion.y[first:], motion.heading[first:]
-    corridor = recorded_size(evidence, 0).corridor()
+    corridor = with_margin(recorded_size(evidence, 0))
     distance, _ = entry_distance(path, first, path.s[-1], corridor, x, y, heading, motion.size)
     gone = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
     return np.concatenate((np.full(first, np.inf), distance - gone))

@@ -3,9 +3,10 @@
 import math
 from typing import Generic, NamedTuple, TypeVar
 
+from risk_sac.geometry import Size, touches
 from risk_sac.jit import compiled
 from risk_sac.types import Floats
-from risk_sac.verdicts.path import Path, Pose, pose_at
+from risk_sac.verdicts.path import Path, pose_at
 
 HORIZON_S = 4.0  # nobody foresees further
 LOOK_S = 0.05  # between two looks at what is foreseen; at 30 m/s of closing 1.5 m, less than a car is long
@@ -13,17 +14,6 @@ CORRIDOR_M = 0.375  # the ego's corridor is this much wider than itself to eithe
 
 
 F = TypeVar("F", float, Floats)  # one number, or one for each frame
-
-
-class Size(NamedTuple):
-    """Half the length and half the width of a body."""
-
-    half_length: float
-    half_width: float
-
-    def corridor(self) -> "Size":
-        """What the ego takes up on its way, with a margin to either side."""
-        return Size(self.half_length, self.half_width + CORRIDOR_M)
 
 
 class Body(NamedTuple, Generic[F]):
@@ -37,29 +27,15 @@ class Body(NamedTuple, Generic[F]):
     size: Size
 
 
+def with_margin(size: Size) -> Size:
+    """What an ego of this size takes up on its way, with a margin to either side."""
+    return Size(size.half_length, size.half_width + CORRIDOR_M)
+
+
 @compiled
 def at(motion: Body[Floats], t: int) -> Body[float]:
     """The body in one frame."""
     return Body(motion.x[t], motion.y[t], motion.heading[t], motion.vx[t], motion.vy[t], motion.size)
-
-
-@compiled
-def touches(pose0: Pose, size0: Size, pose1: Pose, size1: Size) -> bool:
-    """Whether two oriented boxes overlap (separating axes; circles around both first: most pairs are far apart)."""
-    (x0, y0, heading0), (half_length0, half_width0) = pose0, size0
-    (x1, y1, heading1), (half_length1, half_width1) = pose1, size1
-    dx, dy = x1 - x0, y1 - y0
-    reach = half_length0 + half_width0 + half_length1 + half_width1
-    if dx * dx + dy * dy > reach * reach:
-        return False
-    cos0, sin0, cos1, sin1 = math.cos(heading0), math.sin(heading0), math.cos(heading1), math.sin(heading1)
-    c, s = abs(cos0 * cos1 + sin0 * sin1), abs(sin1 * cos0 - cos1 * sin0)
-    return bool(
-        abs(dx * cos0 + dy * sin0) <= half_length0 + half_length1 * c + half_width1 * s
-        and abs(dy * cos0 - dx * sin0) <= half_width0 + half_length1 * s + half_width1 * c
-        and abs(dx * cos1 + dy * sin1) <= half_length1 + half_length0 * c + half_width0 * s
-        and abs(dy * cos1 - dx * sin1) <= half_width1 + half_length0 * s + half_width0 * c
-    )
 
 
 @compiled

@@ -8,11 +8,12 @@ import math
 
 import numpy as np
 
+from risk_sac.geometry import Size
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import Bools, Frame, Kind
 from risk_sac.verdicts.along import along, lane_conflict
 from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_COS, YIELDING_MPS2
-from risk_sac.verdicts.course import HORIZON_S, Body, Size, entry_distance, time_to_touch
+from risk_sac.verdicts.course import HORIZON_S, Body, entry_distance, time_to_touch, with_margin
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S, careful
 from risk_sac.verdicts.evidence import Ground, soon_inside
 from risk_sac.verdicts.path import Path
@@ -49,7 +50,7 @@ def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground, wary: bool) -
     f = frame
     size, other_size = (Size(float(f.length_m[each]) / 2, float(f.width_m[each]) / 2) for each in (0, i))
     other = Body(f.x_m[i], f.y_m[i], f.heading_rad[i], f.vx_mps[i], f.vy_mps[i], other_size)
-    speed, corridor = f.ego_speed_mps, size.corridor()
+    speed, corridor = f.ego_speed_mps, with_margin(size)
     if f.kind[i] == Kind.PEDESTRIAN:
         here = slice(i, i + 1)
         areas = ground.roadway + ground.crossings
@@ -60,7 +61,7 @@ def _in_conflict(frame: Frame, path: Path, i: int, ground: Ground, wary: bool) -
     if math.cos(seen.turn_rad) > SAME_WAY_COS:
         offset, accel = f.lane_offset_m[i], f.accel_mps2[i]
         begins, _ = lane_conflict(seen, speed, offset, accel, ground.lane_width_m, wary)
-        return begins
+        return bool(begins)
     yields = not wary and f.accel_mps2[i] <= -BRAKES_MPS2
     braking_mps2 = FIRM_MPS2 if yields else YIELDING_MPS2
     entry_m, meets_m = _entry(path, speed, corridor, other, float(f.speed_mps[i]), braking_mps2)

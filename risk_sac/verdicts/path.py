@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from risk_sac.geometry import Pose
 from risk_sac.jit import compiled
 from risk_sac.types import Floats
 
 STANDING_M = 1e-6  # two points nearer than this are one
-Pose = tuple[float, float, float]  # x, y, heading of a body's centre
 
 
 class Path(NamedTuple):

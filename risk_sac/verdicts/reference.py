@@ -7,13 +7,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from risk_sac.geometry import box_view, contact_point, zone
+from risk_sac.geometry import Size, contact_point, frame_view, zone
 from risk_sac.records import ConflictType, Grade, ReferenceOutcome
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.types import Floats
+from risk_sac.types import HEADING, LENGTH, WIDTH, Floats, X, Y
 from risk_sac.verdicts.along import Along
 from risk_sac.verdicts.conflict import Conflict, ego_path, recorded_motion, recorded_size, seen_along
-from risk_sac.verdicts.course import Body, Size
+from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path
@@ -85,24 +85,10 @@ def _outcome(
 
 def _from_behind(ending: Ending, size: Size, other_size: Size) -> bool:
     """Whether the contact lies on the ego's rear."""
-    (x, y, heading), (other_x, other_y, other_heading) = ending.pose, ending.other
-    dx, dy, turn = other_x - x, other_y - y, other_heading - heading
-    cos, sin = np.cos(heading), np.sin(heading)
-    still = np.zeros(1)
-    view = box_view(
-        np.array([dx * cos + dy * sin]),
-        np.array([dy * cos - dx * sin]),
-        still,
-        still,
-        np.array([np.cos(turn)]),
-        np.array([np.sin(turn)]),
-        np.array([other_size.half_length]),
-        np.array([other_size.half_width]),
-        0.0,
-        0.0,
-        *size,
-    )
-    return zone(*contact_point(view), *size) == "rear"
+    state = np.zeros((WIDTH + 1, 2))
+    state[[X, Y, HEADING]] = np.transpose((ending.pose, ending.other))
+    state[[LENGTH, WIDTH]] = 2 * np.transpose((size, other_size))
+    return zone(*contact_point(frame_view(state)), *size) == "rear"
 
 
 def _by_ttc(evidence: Evidence, path: Path, striker: int) -> ReferenceOutcome:

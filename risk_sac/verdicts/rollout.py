@@ -9,10 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from risk_sac.geometry import Pose, Size, touches
 from risk_sac.jit import compiled
 from risk_sac.types import Floats
 from risk_sac.verdicts.along import along
-from risk_sac.verdicts.course import Body, Size, touches
+from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.drivers import (
     FUZZY_DELAY_S,
     RSS_DELAY_S,
@@ -23,7 +24,7 @@ from risk_sac.verdicts.drivers import (
     rss,
     towards_command,
 )
-from risk_sac.verdicts.path import Path, Pose, pose_at
+from risk_sac.verdicts.path import Path, pose_at
 
 CAREFUL, IDEAL, FUZZY, RSS = range(4)
 FINE_S = 0.01  # between two box tests; at 30 m/s of closing 0.3 m

@@ -1,13 +1,25 @@
-"""The rules by which a contact that is no artefact is degenerate: the ego had no part in it, or no chance.
+"""The rules by which a contact is an artefact of the simulator or the control, or degenerate.
 
-Source: the grades in risk_sac/verdicts/README.md.
+Degenerate: the ego had no part in it, or no chance. Source: the grades in risk_sac/verdicts/README.md.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
 
+import numpy as np
+
+from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.collision import Contact
-from risk_sac.types import Kind
+from risk_sac.types import Floats, Kind
+from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.evidence import Evidence
+
+AFTER_RELEASE_S = 1.0
+GRIP_LOOKS_BACK_S = 2.0
+GRIP_WINDOW_S = 1.0
+GRIP_TOLERANCE = 1.05
+LEAST_POINTS = 5
 
 FLANK_FROM_FRONT_M = 1.5  # a flank contact nearer to the front bumper than this is a front corner
 STANDING_MPS = 0.5
@@ -15,25 +27,88 @@ CROSSING_HEADING_SIN = 0.5  # headings at least 30 degrees apart: a crossing con
 CROSSING_VISIBLE_S = 1.0
 
 
-def validity_verdicts(
-    evidence: Evidence, striker: int, contact: Contact, *, visible_for_s: float, ever_visible: bool
-) -> Mapping[str, bool]:
-    """The rules, each with whether the contact in the last frame passes it.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EpisodeFacts:
+    """What only the running episode knows of a contact."""
 
-    `visible_for_s` is how long the ego has known of the striker without a break, `ever_visible` whether it ever did.
-    """
+    teleported: bool
+    spawn_overlap: bool
+    inside_limits: bool  # every adversary, up to the contact
+    touched_before: bool  # the striker's body overlapped another one earlier
+    simulator_agrees: bool | None  # see `Collision`
+    visible_for_s: float  # how long the ego has seen the striker without a break, 0 if it does not
+    ever_visible: bool
+
+
+def artefact_verdicts(evidence: Evidence, striker: int, conflict: Conflict, facts: EpisodeFacts) -> Mapping[str, bool]:
+    """The rules of `ARTEFACT_RULES`, each with whether the contact passes it."""
+    return {
+        "no_teleport": not facts.teleported,
+        "no_spawn_overlap": not facts.spawn_overlap,
+        # What was there at the adversaries' release they inherited.
+        "conflict_after_release": conflict.noticed_s >= AFTER_RELEASE_S - 1e-6,
+        "inside_limits": facts.inside_limits,
+        "inside_grip": inside_grip(evidence, striker),
+        "solid_bodies": not facts.touched_before,
+        "ego_model_saw": facts.simulator_agrees is not False,
+    }
+
+
+def validity_verdicts(evidence: Evidence, striker: int, contact: Contact, facts: EpisodeFacts) -> Mapping[str, bool]:
+    """The other rules, each with whether the contact in the last frame passes it."""
     adversary_hit_flank = (
         contact.ego_zone in ("left", "right")
         and evidence.length_m[0] / 2 - contact.x_m > FLANK_FROM_FRONT_M
         and contact.closing_lateral_other_mps > contact.closing_lateral_ego_mps
     )
-    vehicle = evidence.kind[striker] == Kind.VEHICLE
-    crossing_conflict = bool(
-        vehicle and abs(contact.heading_sin) >= CROSSING_HEADING_SIN and visible_for_s >= CROSSING_VISIBLE_S
+    crossing_conflict = (
+        evidence.kind[striker] == Kind.VEHICLE
+        and abs(contact.heading_sin) >= CROSSING_HEADING_SIN
+        and facts.visible_for_s >= CROSSING_VISIBLE_S
     )
     return {
         "not_from_behind": contact.ego_zone != "rear",
         "ego_moving": bool(evidence.speed_mps[-1, 0] >= STANDING_MPS),
         "no_sideswipe": bool(not adversary_hit_flank or crossing_conflict),
-        "seen_before": ever_visible,
+        "seen_before": facts.ever_visible,
     }
+
+
+def inside_grip(evidence: Evidence, striker: int) -> bool:
+    """Whether the striker's driving of the last 2 s fits into the road's friction circle: |a| ≤ 1.05 μ g.
+
+    |a| covers braking, lane changes and cornering alike. Pedestrians pass.
+    """
+    if evidence.kind[striker] == Kind.PEDESTRIAN:
+        return True
+    used = used_grip(evidence, striker)
+    return bool(used.max(initial=0.0) <= GRIP_TOLERANCE * evidence.ground.friction * GRAVITY_MPS2)
+
+
+def used_grip(evidence: Evidence, striker: int) -> Floats:
+    """|a| of the striker at the middle of each second within the last 2 s, m/s²; empty with less than 0.5 s on record.
+
+    It is what the striker drove, not what it was told: x(t) ≈ x0 + v t + a t²/2 by least squares over a second of its
+    front bumper's positions, and y alike; |a| = √(a_x² + a_y²). The front follows its lane, whose polyline has kinks,
+    and a lateral move starts and stops within a step; a second is what a real vehicle needs to yaw.
+    """
+    e = evidence
+    heading = e.heading_rad[:, striker]
+    reach = e.length_m[striker] / 2
+    front = np.stack((e.x_m[:, striker] + reach * np.cos(heading), e.y_m[:, striker] + reach * np.sin(heading)))
+    first = e.since(GRIP_LOOKS_BACK_S + GRIP_WINDOW_S / 2)
+    points = min(round(GRIP_WINDOW_S / e.step_s) + 1, front.shape[1] - first)
+    if points < LEAST_POINTS:
+        return np.empty(0)
+    windows = np.lib.stride_tricks.sliding_window_view(front[:, first:], points, axis=1)
+    accel = 2 * windows @ _curvature(points, e.step_s)  # 2 x windows
+    size: Floats = np.hypot(accel[0], accel[1])
+    return size
+
+
+@cache
+def _curvature(points: int, step_s: float) -> Floats:
+    """Weights that take `points` samples to the coefficient of t² of their least-squares quadratic."""
+    t = (np.arange(points) - (points - 1) / 2) * step_s
+    weights: Floats = np.linalg.pinv(np.stack((np.ones(points), t, t * t), axis=1))[2]
+    return weights

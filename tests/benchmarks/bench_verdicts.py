@@ -8,14 +8,13 @@ import timeit
 
 import pytest
 
-from risk_sac.verdicts.artefact import Handling, artefact_verdicts
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import judge
-from tests.unit.verdicts.staged import crossing_car, cut_in, leader_brakes, pedestrian_crosses
+from risk_sac.verdicts.validity import artefact_verdicts
+from tests.unit.verdicts.staged import CLEAN, crossing_car, cut_in, leader_brakes, pedestrian_crosses
 
 BUDGET_MS = 2.0
-CLEAN = Handling(teleported=False, spawn_overlap=False, inside_limits=True, touched_before=False, ego_model_saw=True)
 STAGED = {
     "cut-in": lambda: cut_in(gap=8.0, ego=12.0, other=10.0, at_s=7.0),  # 12 s
     "leader": leader_brakes,

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from risk_sac.geometry import Size, touches
 from risk_sac.scenario.ground import Area
 from risk_sac.types import STEP_S, Floats, Kind, Role
-from risk_sac.verdicts.course import Size, touches
 from risk_sac.verdicts.evidence import Evidence, Ground
+from risk_sac.verdicts.validity import EpisodeFacts
 
 CAR_M = (4.6, 1.85)
 PERSON_M = (0.5, 0.5)
@@ -20,6 +21,15 @@ STREET = Ground(
     lane_width_m=LANE_M,
     crossings=(Area.box(98.0, 102.0, -6.6, 6.6),),
     roadway=(Area.box(-1000.0, 1000.0, -6.6, 6.6),),
+)
+CLEAN = EpisodeFacts(
+    teleported=False,
+    spawn_overlap=False,
+    inside_limits=True,
+    touched_before=False,
+    simulator_agrees=True,
+    visible_for_s=3.0,
+    ever_visible=True,
 )
 Motion = Callable[[float], tuple[float, float, float]]  # time from the release -> x, y, heading
 

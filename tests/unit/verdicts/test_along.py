@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from risk_sac.geometry import Size
 from risk_sac.verdicts.along import Along, along, lane_conflict, towards
-from risk_sac.verdicts.course import Body, Size
+from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.path import polyline
 
 LANE_M = 3.3

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ARTEFACT_RULES, REPEATS
-from risk_sac.verdicts.artefact import Handling, artefact_verdicts, inside_grip, used_grip
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, inside_grip, used_grip
 from tests.unit.verdicts.staged import (
+    CLEAN,
     cut_in,
     hangs_over,
     leader_brakes,
@@ -18,11 +19,9 @@ from tests.unit.verdicts.staged import (
     straight,
 )
 
-CLEAN = Handling(teleported=False, spawn_overlap=False, inside_limits=True, touched_before=False, ego_model_saw=True)
 
-
-def broken(evidence: Evidence, handling: Handling = CLEAN) -> set[str]:
-    found = artefact_verdicts(evidence, 1, find_conflict(evidence, 1), handling)
+def broken(evidence: Evidence, facts: EpisodeFacts = CLEAN) -> set[str]:
+    found = artefact_verdicts(evidence, 1, find_conflict(evidence, 1), facts)
     assert set(found) == ARTEFACT_RULES - {REPEATS}
     return {rule for rule, passed in found.items() if not passed}
 
@@ -38,7 +37,7 @@ def test_a_clean_contact_passes() -> None:
         ({"spawn_overlap": True}, "no_spawn_overlap"),
         ({"inside_limits": False}, "inside_limits"),
         ({"touched_before": True}, "solid_bodies"),
-        ({"ego_model_saw": False}, "ego_model_saw"),
+        ({"simulator_agrees": False}, "ego_model_saw"),
     ],
 )
 def test_each_fact_breaks_its_own_rule(change: dict[str, bool], rule: str) -> None:

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from shapely import Polygon
 from shapely.affinity import rotate, translate
 
-from risk_sac.verdicts.course import Body, Size, entry_distance, time_to_touch, touches
+from risk_sac.geometry import Size
+from risk_sac.verdicts.course import Body, entry_distance, time_to_touch
 from risk_sac.verdicts.path import polyline
 
 CAR = Size(2.3, 0.9)

@@ -1,6 +1,7 @@
 """The rules on hand-made frames, through the oracle that finds the contact."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from tests.unit.sim.contacts import (
     ego,
     frames,
 )
+from tests.unit.verdicts.staged import CLEAN
 
 
 def broken(pair: tuple[Frame, Frame], visible_for_s: float = 3.0, ever_visible: bool = True) -> set[str]:
@@ -36,7 +38,8 @@ def broken(pair: tuple[Frame, Frame], visible_for_s: float = 3.0, ever_visible: 
     assert contact is not None
     known = [np.ones(len(frame.ids), dtype=bool) for frame in pair]
     evidence = Evidence.of(pair, known, 0.0, Ground())
-    found = validity_verdicts(evidence, contact.other, contact, visible_for_s=visible_for_s, ever_visible=ever_visible)
+    facts = replace(CLEAN, visible_for_s=visible_for_s, ever_visible=ever_visible)
+    found = validity_verdicts(evidence, contact.other, contact, facts)
     assert not set(found) & ARTEFACT_RULES
     return {rule for rule, passed in found.items() if not passed}
 
