@@ -35,8 +35,8 @@ from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
-from risk_sac.verdicts.collision import collision_of
 from risk_sac.verdicts.evidence import Evidence, Ground
+from risk_sac.verdicts.judge import collision_of
 from risk_sac.verdicts.online import CarefulReflex, conflicts_now
 from risk_sac.verdicts.path import Path, polyline
 from risk_sac.verdicts.validity import EpisodeFacts
@@ -289,8 +289,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def evidence(self) -> Evidence:
         """What a judge may look at, of the episode so far."""
-        seen = [np.concatenate(([True], measures.assessment.seen)) for measures in self._trace.measures]
-        return Evidence.of(self._trace.frames, seen, self._released_s, self._ground)
+        return Evidence.from_series(self._trace.series(), self._ground, self._released_s)
 
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.problem.family.horizon_steps

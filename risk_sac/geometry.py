@@ -118,6 +118,8 @@ def frame_view(state: Floats) -> RelativeView:
 def time_to_contact(view: RelativeView) -> Floats:
     """Time until the bodies touch if both keep their velocity and heading, `n`, s; inf if they never do.
 
+    Swept as oriented boxes, crossing and oncoming bodies count as much as a leader in the same lane, of which it is
+    gap / closing speed (Hayward 1972).
     On each separating axis the overlap lasts from t_in to t_out; bodies touch from the largest t_in on,
     provided it is no later than the smallest t_out.
     """

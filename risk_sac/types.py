@@ -79,7 +79,6 @@ class FrameFields(NamedTuple):
     signal: Signal
     stop_line_m: float  # ego's front bumper to its next signal's stop line; negative once past; inf without one
     link: NDArray[np.uint8]  # SUMO's letter of the signal ahead, such as ord("g"): green, but has to yield; 0: none
-    simulator_collisions: tuple[tuple[str, str], ...] = ()  # SUMO's own list, a cross-check only
     teleported: tuple[str, ...] = ()
 
 

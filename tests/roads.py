@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from risk_sac.sim.paths import Path
+from risk_sac.sim.paths import Path, path_through
 
 STRAIGHT_M = 60.0  # before the arc
 AFTER_M = 120.0
@@ -30,7 +30,7 @@ def road(
     station, x, y = (
         np.concatenate(([0.0], np.cumsum(v))) for v in (length, length * np.cos(heading), length * np.sin(heading))
     )
-    return Path.of(x, y, station, np.append(heading, heading[-1]), np.full(len(x), LIMIT_MPS))
+    return path_through(x, y, station, np.append(heading, heading[-1]), np.full(len(x), LIMIT_MPS))
 
 
 def arc_m(radius_m: float, turn_rad: float = math.pi / 2) -> tuple[float, float]:

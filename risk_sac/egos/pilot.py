@@ -35,7 +35,7 @@ class View:
             self._of, self._kind = of, frame.kind[known]
             self._ids = tuple(id_ for id_, is_known in zip(frame.ids, known.tolist(), strict=True) if is_known)
         path, station_m, offset_m = along
-        place, ahead = (path.points, station_m, offset_m), (frame.signal, frame.stop_line_m)
+        place, ahead = (path, station_m, offset_m), (frame.signal, frame.stop_line_m)
         return Perceived(frame.time_s, self._ids, self._kind, shown(belief.state, known), *place, *ahead)
 
 

@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.geometry import RelativeView, frame_view
+from risk_sac.geometry import RelativeView, frame_view, time_to_contact
 from risk_sac.jit import compiled
 from risk_sac.risk.rss import LONGITUDINAL_CAP_M, SCALED_HIGH, margins
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.risk.ttc import ENCOUNTER_CAP_S, TTC_CAP_S, time_to_collision, time_to_encounter
+from risk_sac.risk.ttc import ENCOUNTER_CAP_S, TTC_CAP_S, time_to_encounter
 from risk_sac.types import Bools, Floats, Frame, Kind, Signal
 
 GAP_CAP_M = 50.0
@@ -66,7 +66,7 @@ def _assess(
     state: Floats, kind: NDArray[np.int8], rss: tuple[float, ...], seen: Bools
 ) -> tuple[Floats, tuple[float, float, float, float, float], bool]:
     view = frame_view(state)
-    ttc_s = time_to_collision(view)
+    ttc_s = np.minimum(time_to_contact(view), TTC_CAP_S)
     walks = kind[1:] == PEDESTRIAN
     rss_margins = margins(view, walks, RssParameters(*rss))  # passing one by its name costs as much as the margins
     encounter_s = time_to_encounter(view, walks)

@@ -1,7 +1,8 @@
-"""Time to collision, and time to encounter, which also counts near misses.
+"""Time to encounter: a time to collision that also counts near misses.
 
-TTC is infinite until the courses meet, so it does not show a collision course that is about to begin. In the time to
-encounter a gap that would be left counts as the time in which unforeseen motion closes it.
+TTC (`risk_sac.geometry.time_to_contact`) is infinite until the courses meet, so it does not show a collision course
+that is about to begin. In the time to encounter a gap that would be left counts as the time in which unforeseen motion
+closes it.
 
 Source: Eggert 2014, "Predictive risk estimation for intelligent ADAS functions" (time to and distance at the closest
 encounter); Wachenfeld et al. 2016, "The worst-time-to-collision metric for situation identification" (what others may
@@ -12,7 +13,7 @@ import math
 
 import numpy as np
 
-from risk_sac.geometry import RelativeView, time_to_contact
+from risk_sac.geometry import RelativeView
 from risk_sac.jit import compiled
 from risk_sac.types import Bools, Floats
 
@@ -25,16 +26,6 @@ DRIFT_MPS = 0.3  # in any direction: two vehicles that drift in their lanes
 WALK_MPS = 0.6  # in any direction, if one of the two is a pedestrian: half a walking pace
 BEHIND_S_PER_M = 2.0  # for each metre that the other's centre is behind the ego's rear bumper
 LINES = 9  # both sides of each of the 4 separating axes, and zero
-
-
-@compiled
-def time_to_collision(view: RelativeView) -> Floats:
-    """TTC of the ego with each other actor, `n`, s, capped at `TTC_CAP_S`.
-
-    Bodies are swept as oriented boxes, so crossing and oncoming conflicts count as much as following;
-    for a leader in the same lane it equals gap / closing speed (Hayward 1972).
-    """
-    return np.minimum(time_to_contact(view), TTC_CAP_S)
 
 
 @compiled

@@ -85,7 +85,7 @@ class Driver:
     ) -> float | None:
         """The acceleration that its model wants for the nearest of its `targets`; None where none binds."""
         path, station_m, offset_m = along
-        found = targets(path.points, station_m, offset_m, own, self._accel, state, vehicle, candidate)
+        found = targets(path, station_m, offset_m, own, self._accel, state, vehicle, candidate)
         if not len(found):
             return None
         wanted = math.inf
@@ -149,7 +149,7 @@ class Drivers:
     def _is_askew(self, reading: Reading) -> bool:
         """Whether the ego's body reaches elsewhere than the box along its lane that SUMO's models go by."""
         frame = reading.frame
-        _, _, way_rad = project(self._roads.along(self._ego_id).path.points, float(frame.x_m[0]), float(frame.y_m[0]))
+        _, _, way_rad = project(self._roads.along(self._ego_id).path, float(frame.x_m[0]), float(frame.y_m[0]))
         return abs(math.sin(float(frame.heading_rad[0]) - way_rad)) * float(frame.length_m[0]) / 2 > ASKEW_M
 
     def _tell_ego(self, ego: Driver, reading: Reading, belief: Belief, braking_mps2: float) -> None:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -17,24 +16,13 @@ SHIFT_M = 1.0  # by which a lane may begin beside or before the end of the one t
 TAPER_M = 5.0  # of the way to that lane on which the path makes up for it
 
 
-# Rows of a path's points.
+# A polyline from the start of a lane on; one column for each point, and these rows.
+Path = Floats
 X, Y = 0, 1
 STATION = 2  # length of the line up to each point, m; 0 at the first
 HEADING = 3  # of the segment that begins at the point, rad; the last point repeats the one before
 LIMIT = 4  # the fastest that SUMO's drivers take it, m/s; bends are slow
 COS, SIN = 5, 6  # of the heading
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Path:
-    """A polyline from the start of a lane on."""
-
-    points: Floats  # the rows above x `p`
-
-    @classmethod
-    def of(cls, x_m: Floats, y_m: Floats, station_m: Floats, heading_rad: Floats, limit_mps: Floats) -> "Path":
-        """Of `p` points each."""
-        return cls(np.array((x_m, y_m, station_m, heading_rad, limit_mps, np.cos(heading_rad), np.sin(heading_rad))))
 
 
 class Along(NamedTuple):
@@ -105,7 +93,12 @@ def path_along(lines: Sequence[Floats], limits_mps: Sequence[float]) -> Path:
     steps = np.diff(points, axis=0)
     station = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
     heading = np.arctan2(steps[:, 1], steps[:, 0])
-    return Path.of(points[:, 0], points[:, 1], station, np.append(heading, heading[-1]), limit)
+    return path_through(points[:, 0], points[:, 1], station, np.append(heading, heading[-1]), limit)
+
+
+def path_through(x_m: Floats, y_m: Floats, station_m: Floats, heading_rad: Floats, limit_mps: Floats) -> Path:
+    """The path through points, given its rows but the last two."""
+    return np.array((x_m, y_m, station_m, heading_rad, limit_mps, np.cos(heading_rad), np.sin(heading_rad)))
 
 
 def joined(lines: Sequence[Floats]) -> list[Floats]:

@@ -57,7 +57,7 @@ class MovedEgo:
 
     def move(self, motion: Motion, along: Along) -> None:
         """Has SUMO put it there in its next step; `along` is the ego on its path before."""
-        self.motion, self.told = motion, self._told(motion, along.path.points)
+        self.motion, self.told = motion, self._told(motion, along.path)
         x, y, angle, *_ = self.told
         libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, angle, KEEP_ROUTE)
 

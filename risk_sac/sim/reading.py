@@ -121,7 +121,6 @@ class Reader:
             signal=COLOURS.get(ahead[0][3].lower(), Signal.NONE) if ahead else Signal.NONE,
             stop_line_m=ahead[0][2] if ahead else math.inf,
             link=self._links(ahead[0][3] if ahead else "", walkers),
-            simulator_collisions=tuple((c.collider, c.victim) for c in libsumo.simulation.getCollisions()),
             teleported=libsumo.simulation.getStartingTeleportIDList(),
         )
         near = near_pedestrians(frame.state, self._drives).tolist() if walkers else [False] * len(self._ids)

@@ -45,7 +45,7 @@ class Roads:
     def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
         """Points x and y of the way ahead of a vehicle, its centre first."""
         path, station_m, offset_m = self.along(vehicle)
-        ahead = path.points[:, path.points[STATION] > station_m]
+        ahead = path[:, path[STATION] > station_m]
         sin, cos = np.sin(ahead[HEADING]), np.cos(ahead[HEADING])
         x = np.concatenate(([x_m], ahead[X] - offset_m * sin))
         y = np.concatenate(([y_m], ahead[Y] + offset_m * cos))

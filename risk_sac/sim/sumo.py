@@ -104,7 +104,7 @@ class SumoSimulation:
         frame = self._reading.frame
         motion = self._pilot.begin(self._layout, self._seed, frame)
         self._drivers.release_ego()
-        points = self._roads.along(self._layout.ego.id).path.points
+        points = self._roads.along(self._layout.ego.id).path
         self._moved = MovedEgo(self._layout.ego.id, motion, float(frame.length_m[0]), points)
 
     def release(self) -> None:
@@ -167,7 +167,7 @@ class SumoSimulation:
     def _refuse_off_road(self, frame: Frame, along: Along) -> None:
         """Raises if the ego is off its road; SUMO itself would keep it at the edge."""
         width_m = float(frame.width_m[0])
-        _, offset_m, _ = project(along.path.points, float(frame.x_m[0]), float(frame.y_m[0]))
+        _, offset_m, _ = project(along.path, float(frame.x_m[0]), float(frame.y_m[0]))
         room, _ = self._roads.place(self._layout.ego.id, offset_m, width_m)
         if min(room.left_m, room.right_m) < -width_m:
             raise EgoFailed(f"the ego is {offset_m:.1f} m beside its lane, off its road", reason=OFF_ROAD)
@@ -228,11 +228,14 @@ class SumoSimulation:
         """
         if self._moved is not None:
             return None
-        pair = {self._layout.ego.id, other}
         for _ in range(round(LISTED_WITHIN_S / STEP_S)):
-            if any({c.collider, c.victim} == pair for c in libsumo.simulation.getCollisions()):
+            if self._listed(other):
                 return True
             libsumo.simulationStep()
+        return self._listed(other)
+
+    def _listed(self, other: str) -> bool:
+        pair = {self._layout.ego.id, other}
         return any({c.collider, c.victim} == pair for c in libsumo.simulation.getCollisions())
 
     def close(self) -> None:

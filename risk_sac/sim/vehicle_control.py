@@ -67,14 +67,14 @@ class VehicleControl:
     speed_mps: float
     accel_mps2: float = 0.0
     lateral_mps: float = 0.0
-    _bounds: Floats = field(init=False)
+    _bounds: tuple[float, ...] = field(init=False)
     _path: Path | None = field(init=False, default=None)
     _bends: Floats = field(init=False)  # of that path
     _at_m: float = field(init=False, default=0.0)  # where on it
     _behind_per_m: float = field(init=False, default=0.0)  # bend before that path, which the body has yet to leave
 
     def __post_init__(self) -> None:
-        self._bounds = np.array(Bounds.of(self.limits))
+        self._bounds = tuple(Bounds.of(self.limits))  # passing one by its name costs as much as a step
 
     def step(self, drive: float, steer: float, room: Room, along: Along, intended_mps2: float = 0.0) -> VehicleCommand:
         """One step of 0.1 s.
@@ -110,7 +110,7 @@ class VehicleControl:
 
 @compiled
 def _drive(
-    bounds: Floats,
+    bounds: tuple[float, ...],
     bends: Floats,
     station_m: float,
     behind_per_m: float,
@@ -124,8 +124,7 @@ def _drive(
     intended: float,
 ) -> tuple[float, float, float]:
     """Speed, acceleration and lateral speed of the next step."""
-    b = bounds
-    limits = Bounds(b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7], b[8], b[9], b[10])
+    limits = Bounds(*bounds)
     at, soon = index(bends, station_m), index(bends, station_m + speed * limits.preview_s)
     behind = behind_per_m if station_m < BODY_M else 0.0
     curvature, ahead = max(bends[HERE, at], behind), max(bends[SOON, at], behind)
@@ -195,8 +194,7 @@ def bends(path: Path, limits: Limits) -> Floats:
 
     v(s)² = min over s' ≥ s of  a / κ(s') + 2 b (s' - s),   a the planned cornering, b the braking left beside it
     """
-    points = path.points
-    return _profile(points[STATION], points[HEADING], limits.cornering_mps2, limits.approach_mps2)
+    return _profile(path[STATION], path[HEADING], limits.cornering_mps2, limits.approach_mps2)
 
 
 @compiled

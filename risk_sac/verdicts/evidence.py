@@ -1,6 +1,6 @@
 """What is recorded of an episode up to its contact, as arrays: all that a judge may look at."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.scenario.ground import Area
-from risk_sac.types import STEP_S, Bools, Floats, Frame
+from risk_sac.types import STEP_S, Bools, Floats
 
-Letters = NDArray[np.uint8]
+Letters = NDArray[Any]  # as numbers
 KERB_STEPS = 10  # looks within the time ahead
 
 PER_ACTOR = (
@@ -57,50 +57,14 @@ class Evidence:
     lateral_mps: Floats
     accel_mps2: Floats
     lane_offset_m: Floats  # from the lane SUMO has the vehicle on; NaN where it was not recorded
-    link: Letters  # SUMO's letter of the signal ahead, of the crossing for a pedestrian; 0: none
+    link: Letters  # SUMO's letter of the signal ahead, of the crossing for a pedestrian; 0: none, NaN where it has left
     known: Bools  # in the ego's sight
     ground: Ground = Ground()
     step_s: float = STEP_S
 
     @classmethod
-    def of(cls, frames: Sequence[Frame], known: Sequence[Bools], released_s: float, ground: Ground) -> "Evidence":
-        """From the frames of an episode, from the lead-in to the contact's; actors may leave, but none may come.
-
-        `known` says per frame who of `frame.ids` the ego knows of, itself included. The adversaries were released at
-        `released_s`.
-
-        Raises:
-          ValueError: there is no frame, or `known` does not go with them.
-        """
-        if not frames or len(known) != len(frames):
-            raise ValueError(
-                f"{len(frames)} frames and {len(known)} of `known`; wanted one of each per step, at least 1"
-            )
-        first = frames[0]
-        column = {id_: i for i, id_ in enumerate(first.ids)}
-        shape = len(frames), len(first.ids)
-        values: dict[str, Any] = {name: np.full(shape, np.nan) for name in PER_ACTOR}
-        values["link"] = np.zeros(shape, dtype=np.uint8)
-        values["known"] = np.zeros(shape, dtype=np.bool_)
-        for start, end in _runs(frames):
-            columns = [column[id_] for id_ in frames[start].ids]
-            for name in (*PER_ACTOR, "link"):
-                values[name][start:end, columns] = [getattr(frame, name) for frame in frames[start:end]]
-            values["known"][start:end, columns] = [*known[start:end]]
-        return cls(
-            time_s=np.array([frame.time_s for frame in frames]) - released_s,
-            ids=first.ids,
-            kind=first.kind,
-            role=first.role,
-            length_m=first.length_m,
-            width_m=first.width_m,
-            ground=ground,
-            **values,
-        )
-
-    @classmethod
     def from_series(cls, series: Mapping[str, NDArray[Any]], ground: Ground, released_s: float) -> "Evidence":
-        """From a stored time series, so that a failure can be judged anew by other definitions."""
+        """From the time series of an episode, see `Trace.series`; the adversaries were released at `released_s`."""
         known = np.asarray(series["visible"] == 1.0)
         known[:, 0] = True
         names = (*PER_ACTOR, "link", "kind", "role", "length_m", "width_m")
@@ -160,12 +124,3 @@ def soon_inside(
     t = np.linspace(0.0, ahead_s, KERB_STEPS + 1)[:, None]
     soon: Bools = np.any(inside(areas, x_m + t * vx_mps, y_m + t * vy_mps), axis=0)
     return soon
-
-
-def _runs(frames: Sequence[Frame]) -> Iterator[tuple[int, int]]:
-    """Stretches of frames with the same actors."""
-    start = 0
-    for i in range(1, len(frames) + 1):
-        if i == len(frames) or frames[i].ids != frames[start].ids:
-            yield start, i
-            start = i

@@ -1,12 +1,62 @@
-"""The judgement of one contact, from its evidence alone."""
+"""The record of a contact and its judgement, from its evidence alone."""
 
-from risk_sac.records import Judgement
+from collections.abc import Sequence
+
+from risk_sac.records import Collision, Judgement
+from risk_sac.risk.measures import Measures
+from risk_sac.risk.publish import worst_rss_margin
+from risk_sac.risk.stl import ROBUSTNESS_CLIP
+from risk_sac.risk.ttc import TTC_CAP_S
+from risk_sac.sim.collision import Contact
+from risk_sac.types import STEP_S, Frame, Kind, Role
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.labels import broken, ground, manoeuvre, response, signature
 from risk_sac.verdicts.reference import grade, reference_outcomes
+from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, validity_verdicts
 
 DEFINITIONS = 4  # raise it with whatever changes a verdict; what was judged before says by which it was
+WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
+
+
+def collision_of(
+    contact: Contact,
+    frame: Frame,
+    released_s: float,
+    evidence: Evidence,
+    measures: Sequence[Measures],
+    facts: EpisodeFacts,
+) -> Collision:
+    """The record of a contact in `frame`, the last one; `measures` begin with the release at `released_s`."""
+    other, warning = frame.ids[contact.other], measures[:-WARNING_STEPS]
+    column = evidence.column(other)
+    conflict = find_conflict(evidence, column)
+    verdicts = {
+        **artefact_verdicts(evidence, column, conflict, facts),
+        **validity_verdicts(evidence, column, contact, facts),
+    }
+    return Collision(
+        time_s=contact.time_s - released_s,
+        other_id=other,
+        other_kind=Kind(int(frame.kind[contact.other])).name.lower(),
+        other_role=Role(int(frame.role[contact.other])).name.lower(),
+        contact_x_m=contact.x_m,
+        contact_y_m=contact.y_m,
+        ego_zone=contact.ego_zone,
+        other_zone=contact.other_zone,
+        ego_speed_mps=frame.ego_speed_mps,
+        other_speed_mps=float(frame.speed_mps[contact.other]),
+        relative_speed_mps=contact.relative_speed_mps,
+        lateral_offset_m=contact.lateral_offset_m,
+        min_ttc_s=min((m.signals["ttc_s"] for m in warning), default=TTC_CAP_S),
+        min_rss_margin_m=min(worst_rss_margin(m.assessment) for m in measures),
+        visible_for_s=facts.visible_for_s,
+        ego_peak_braking_mps2=max(m.signals["ego_braking_mps2"] for m in measures),
+        min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
+        simulator_agrees=facts.simulator_agrees,
+        verdicts=verdicts,
+        judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict),
+    )
 
 
 def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflict | None = None) -> Judgement:

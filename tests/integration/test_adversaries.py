@@ -2,22 +2,19 @@
 
 from collections.abc import Iterator
 from contextlib import closing
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from risk_sac.config import AgentConfig, Budget, EgoConfig, FamilyName, LearnerConfig, RunSpec, WarmStartConfig
-from risk_sac.env import Observation, RiskSacEnv, make_default
+from risk_sac.config import EgoConfig, FamilyName
+from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import GRAVITY_MPS2, Limits, limits_from_odd
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.train import train
 from risk_sac.types import STEP_S, Floats, Frame
 from tests.builders import moved
-from tests.listener import Listener
 
 ROUNDING = 0.02  # of SUMO's positions and speeds, divided by the step where a derivative is taken
 WINDOW = 9  # steps, 0.8 s, over which an acceleration is fitted to positions: SUMO's lanes have corners
@@ -57,7 +54,7 @@ def driven(env: RiskSacEnv) -> Driven:
     return Driven(limits_from_odd(problem.odd, friction), friction, frames)
 
 
-def at_random(name: FamilyName, _: Path, __: pytest.MonkeyPatch) -> list[Driven]:
+def at_random(name: FamilyName) -> list[Driven]:
     episodes = []
     with closing(make_default(name)) as env:
         for seed in range(EPISODES):
@@ -71,42 +68,12 @@ def at_random(name: FamilyName, _: Path, __: pytest.MonkeyPatch) -> list[Driven]
     return episodes
 
 
-def by_a_learner(name: FamilyName, folder: Path, monkeypatch: pytest.MonkeyPatch) -> list[Driven]:
-    episodes: list[Driven] = []
-
-    class Watched(RiskSacEnv):
-        def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-            outcome = super().step(action)
-            assert self._inside_limits
-            if outcome[2] or outcome[3]:
-                episodes.append(driven(self))
-            return outcome
-
-    monkeypatch.setattr("risk_sac.run.RiskSacEnv", Watched)
-    agent = AgentConfig(hidden_sizes=(16, 16), batch_size=16, warmup_steps=150, updates_per_step=1)
-    spec = RunSpec(
-        family=name,
-        method="risk-sac",
-        seed=0,
-        learner=LearnerConfig(agent=agent, warm_start=WarmStartConfig(episodes=0)),
-        budget=Budget(episodes=8, evaluation_episodes=2),
-    )
-    train(spec, folder, Listener())
-    return episodes
-
-
 Episodes = tuple[FamilyName, list[Driven]]
 
 
-@pytest.fixture(
-    scope="module",
-    params=[(name, by) for by in (at_random, by_a_learner) for name in NAMES],
-    ids=lambda p: f"{p[0]}-{p[1].__name__}",
-)
-def episodes(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Episodes:
-    name, by = request.param
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        return name, by(name, tmp_path_factory.mktemp("run"), monkeypatch)
+@pytest.fixture(scope="module", params=NAMES)
+def episodes(request: pytest.FixtureRequest) -> Episodes:
+    return request.param, at_random(request.param)
 
 
 def track(frames: list[Frame], id_: str, name: str) -> Floats:

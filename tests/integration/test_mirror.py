@@ -95,8 +95,8 @@ def drive(sim: SumoSimulation, steps: int, before_step: Callable[[float], None])
 def pose(sim: SumoSimulation, station_m: float, aside_m: float) -> tuple[float, float, float]:
     """Place and heading of a point beside the ego's path, positive to its left."""
     path = sim.along("ego").path
-    i = min(max(int(np.searchsorted(path.points[STATION], station_m)) - 1, 0), path.points.shape[1] - 2)
-    x_m, y_m, start_m, heading = path.points[:4, i]
+    i = min(max(int(np.searchsorted(path[STATION], station_m)) - 1, 0), path.shape[1] - 2)
+    x_m, y_m, start_m, heading = path[:4, i]
     along = station_m - start_m
     cos, sin = math.cos(heading), math.sin(heading)
     return x_m + along * cos - aside_m * sin, y_m + along * sin + aside_m * cos, heading

@@ -1,12 +1,13 @@
 """Our box oracle beside SUMO's own list of collisions, in the family of vehicles only.
 
-SUMO measures along and across the lane and takes no account of a body's angle, so bodies that are turned by a lane
-change meet a little earlier or later there. Aligned bodies must meet in the same step.
+SUMO measures along and across the lane and takes no account of a body's angle. Aligned bodies must meet in the same
+step.
 """
 
 from collections.abc import Iterator
 from contextlib import closing
 
+import libsumo
 import numpy as np
 import pytest
 
@@ -22,15 +23,9 @@ from tests.builders import Told, belief_of
 LOW = FAMILIES["low"]
 
 
-def listed(frame: Frame, other: str) -> bool:
-    """Whether SUMO lists a collision of the ego with another."""
-    return any({"ego", other} == set(pair) for pair in frame.simulator_collisions)
-
-
-@pytest.fixture
-def sim() -> Iterator[SumoSimulation]:
-    with closing(SumoSimulation(EgoConfig())) as simulation:
-        yield simulation
+def listed(other: str) -> bool:
+    """Whether SUMO lists a collision of the ego with another now."""
+    return any({c.collider, c.victim} == {"ego", other} for c in libsumo.simulation.getCollisions())
 
 
 @pytest.fixture
@@ -40,8 +35,8 @@ def blind() -> Iterator[SumoSimulation]:
         yield simulation
 
 
-def episode(sim: SumoSimulation, seed: int, *, steering: bool, obstacle: bool) -> Iterator[Frame]:
-    """Frames of a random episode; as an obstacle, the leader stands in the ego's way."""
+def episode(sim: SumoSimulation, seed: int) -> Iterator[Frame]:
+    """Frames of a random episode without steering, in which the leader stands in the ego's way."""
     generator = np.random.default_rng(seed)
     layout = LOW.layout(LOW.space.from_unit(generator.random(LOW.space.dimension)).values)
     frame = sim.reset(layout, seed)
@@ -50,11 +45,8 @@ def episode(sim: SumoSimulation, seed: int, *, steering: bool, obstacle: bool) -
     yield frame
     action = np.zeros(2 * len(LOW.adversaries))
     for _ in range(LOW.horizon_steps):
-        action = np.clip(0.95 * action + 0.3 * generator.standard_normal(len(action)), -1, 1)
-        if not steering:
-            action[1::2] = 0.0
-        if obstacle:
-            action[0] = -1.0
+        action[::2] = np.clip(0.95 * action[::2] + 0.3 * generator.standard_normal(len(LOW.adversaries)), -1, 1)
+        action[0] = -1.0
         adversaries.command(action.tolist(), sim)
         frame = sim.step()
         yield frame
@@ -63,11 +55,11 @@ def episode(sim: SumoSimulation, seed: int, *, steering: bool, obstacle: bool) -
 def test_aligned_vehicles_meet_in_the_step_in_which_sumo_says_so(blind: SumoSimulation) -> None:
     contacts = 0
     for seed in range(60):
-        for frame in episode(blind, seed, steering=False, obstacle=True):
+        for frame in episode(blind, seed):
             if abs(np.sin(frame.heading_rad[0])) > 1e-3:
                 break  # the ego changes lanes
             ours = {frame.ids[i + 1] for i in np.flatnonzero(relative_view(frame).overlap)}
-            theirs = {other for other in frame.ids[1:] if listed(frame, other)}
+            theirs = {other for other in frame.ids[1:] if listed(other)}
             if ours or theirs:
                 contacts += 1
                 assert ours == theirs, (seed, frame.time_s)
@@ -75,20 +67,3 @@ def test_aligned_vehicles_meet_in_the_step_in_which_sumo_says_so(blind: SumoSimu
         if contacts == 15:
             break
     assert contacts == 15
-
-
-def test_steering_vehicles_that_sumo_reports_are_within_their_turned_corners_of_the_ego(sim: SumoSimulation) -> None:
-    reported = 0
-    for seed in range(150):
-        for frame in episode(sim, seed, steering=True, obstacle=False):
-            view = relative_view(frame)
-            theirs = [i for i, other in enumerate(frame.ids[1:]) if listed(frame, other)]
-            if theirs:
-                reported += 1
-                turned = np.abs(view.sin[theirs]) + abs(np.sin(frame.heading_rad[0]))
-                assert np.all(view.gap[theirs] <= 4.6 * turned + 0.01), (seed, frame.time_s)
-            if theirs or view.overlap.any():
-                break
-        if reported == 5:
-            break
-    assert reported == 5

@@ -16,7 +16,7 @@ import pytest
 from risk_sac.agents.controls import RandomAgent
 from risk_sac.config import EgoConfig, FamilyName
 from risk_sac.env import RiskSacEnv, make_default
-from risk_sac.geometry import box_view, contact_point, zone
+from risk_sac.geometry import Size, contact_point, relative_view, touches, zone
 from risk_sac.records import Collision
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import GRAVITY_MPS2
@@ -24,11 +24,11 @@ from risk_sac.sim.placing import STEERED
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Frame
 from risk_sac.verdicts.conflict import Conflict, find_conflict
-from risk_sac.verdicts.course import Size, touches
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S, careful, ideal
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.reference import LEAD_M, reference_outcomes, replayed_contact_s
 from risk_sac.verdicts.rollout import STANDING_MPS
+from tests.builders import frame_of
 
 EPISODES = 60
 FINE = 10  # looks between two steps
@@ -105,12 +105,10 @@ def strikers_pose(struck: Struck, at: float) -> Pose:
 def struck_side(
     ego: Pose, other: Pose, half_length: float, half_width: float, other_half_length: float, other_half_width: float
 ) -> str:
-    cos, sin = math.cos(ego[2]), math.sin(ego[2])
-    dx, dy, turn = other[0] - ego[0], other[1] - ego[1], other[2] - ego[2]
-    place = dx * cos + dy * sin, dy * cos - dx * sin, 0.0, 0.0, math.cos(turn), math.sin(turn)
-    body = other_half_length, other_half_width
-    view = box_view(*(np.array([value]) for value in (*place, *body)), 0.0, 0.0, half_length, half_width)
-    return zone(*contact_point(view), half_length, half_width)
+    x, y, heading = zip(ego, other, strict=True)
+    length, width = (2 * half_length, 2 * other_half_length), (2 * half_width, 2 * other_half_width)
+    both = frame_of(x_m=x, y_m=y, heading_rad=heading, length_m=length, width_m=width)
+    return zone(*contact_point(relative_view(both)), half_length, half_width)
 
 
 def avoids(sim: SumoSimulation, struck: Struck, driver: str) -> bool:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import Limits, limits_from_odd
-from risk_sac.sim.paths import Path
+from risk_sac.sim.paths import Path, path_through
 from risk_sac.sim.vehicle_control import BODY_M, CAP, GRID_M, HERE, SOON, bends
 from tests.roads import arc_m, road
 
@@ -22,7 +22,7 @@ def corner(turn_rad: float) -> Path:
 
 def with_headings(*heading_rad: float) -> Path:
     """Two pieces of 10 m; points and speeds do not matter."""
-    return Path.of(np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), np.array(heading_rad), np.full(3, 13.89))
+    return path_through(np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), np.array(heading_rad), np.full(3, 13.89))
 
 
 def test_a_straight_road_asks_nothing() -> None:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shapely import LineString, Point
 
 from risk_sac.sim.lookout import MARGIN_M, near_pedestrians, project, targets
-from risk_sac.sim.paths import Path, path_along
+from risk_sac.sim.paths import Path, path_along, path_through
 from risk_sac.types import Kind
 from tests.roads import road
 from tests.unit.sim.contacts import CAR, WALKER, WIDTH_M, Actor, frames
@@ -30,7 +30,7 @@ def target(other: Actor, path: Path | None = None, speed_mps: float = SPEED_MPS,
     """What the other is to a driver 20 m down the path."""
     known = np.ones(2, dtype=np.bool_)
     _, frame = frames((*EGO[:3], speed_mps, *EGO[4:]), other, share=1.0)
-    points, vehicle = (path or road()).points, frame.kind == Kind.VEHICLE
+    points, vehicle = (road() if path is None else path), frame.kind == Kind.VEHICLE
     found = targets(points, FRONT_M, offset_m, 0, ACCEL_MPS2, frame.state, vehicle, known).tolist()
     assert [actor for actor, _, _ in found] in ([], [1])
     return Target(*found[0][1:]) if found else NOBODY
@@ -161,7 +161,7 @@ def test_nobody_but_the_candidates_counts() -> None:
     vehicle = frame.kind == Kind.VEHICLE
     for known in (True, False):
         candidate = np.array([True, known])
-        found = targets(road().points, FRONT_M, 0.0, 0, ACCEL_MPS2, frame.state, vehicle, candidate)
+        found = targets(road(), FRONT_M, 0.0, 0, ACCEL_MPS2, frame.state, vehicle, candidate)
         assert len(found) == known
 
 
@@ -184,7 +184,7 @@ def test_the_mirrored_scene_has_the_mirrored_targets(
     assert left == pytest.approx(right)
 
 
-CORNER = Path.of(
+CORNER = path_through(
     np.array([0.0, 10.0, 10.0]),
     np.array([0.0, 0.0, 10.0]),
     np.array([0.0, 10.0, 20.0]),
@@ -205,16 +205,16 @@ CORNER = Path.of(
     ],
 )
 def test_places_beside_a_corner_by_hand(x: float, y: float, expected: tuple[float, float, float]) -> None:
-    assert project(CORNER.points, x, y) == pytest.approx(expected)
+    assert project(CORNER, x, y) == pytest.approx(expected)
 
 
 @settings(max_examples=100)
 @given(st.floats(5, 150), st.floats(-60, 60), st.sampled_from((8.0, 20.0, 40.0)), st.booleans())
 def test_the_nearest_place_is_the_one_that_shapely_finds(x: float, y: float, radius: float, left: bool) -> None:
     path = road(radius, left=left)
-    line = LineString(path.points[:2].T)
+    line = LineString(path[:2].T)
     assume(0.0 < line.project(Point(x, y)) < line.length)  # its ends do not go on
-    station, offset, _ = project(path.points, x, y)
+    station, offset, _ = project(path, x, y)
     if 0.0 <= station <= line.length:
         nearest_m = line.distance(Point(x, y))
         assert Point(x, y).distance(line.interpolate(station)) == pytest.approx(nearest_m, abs=1e-6)
@@ -233,7 +233,7 @@ def test_who_has_a_pedestrian_within_forty_metres() -> None:
 def test_whom_it_passes_at_its_speed_it_may_meet_at_that_of_a_bend() -> None:
     x = np.arange(0.0, 200.0, 10.0)
     straight, slow = (
-        Path.of(x, np.zeros_like(x), x, np.zeros_like(x), limit)
+        path_through(x, np.zeros_like(x), x, np.zeros_like(x), limit)
         for limit in (np.full_like(x, 13.89), np.where(x < 30.0, 13.89, 4.0))
     )
     late = walker(40.0, -6.0, 1.4)  # in the corridor after 3.2 s: at 13 m/s the ego is past, at 4 m/s it is there

@@ -58,9 +58,9 @@ def test_a_vehicle_drives_along_its_path(
 ) -> None:
     frame = sim.reset(alone(family, route, lane, position_m), 0)
     path, station_m, offset_m = sim.along("ego")
-    np.testing.assert_allclose(np.hypot(*np.diff(path.points[:2])), np.diff(path.points[STATION]))
-    assert path.points[STATION, 0] == 0.0
-    assert path.points[STATION, -1] >= min(AHEAD_M, 1.0)
+    np.testing.assert_allclose(np.hypot(*np.diff(path[:2])), np.diff(path[STATION]))
+    assert path[STATION, 0] == 0.0
+    assert path[STATION, -1] >= min(AHEAD_M, 1.0)
     assert abs(offset_m) < 0.5
     libsumo.vehicle.setLaneChangeMode("ego", 0)
     before_m = 0.0
@@ -69,7 +69,7 @@ def test_a_vehicle_drives_along_its_path(
             float(c[0]) + 2.3 * f(float(frame.heading_rad[0]))
             for c, f in ((frame.x_m, math.cos), (frame.y_m, math.sin))
         ]
-        at_m, aside_m, _ = project(path.points, *front)
+        at_m, aside_m, _ = project(path, *front)
         assert abs(aside_m) < 0.73, at_m  # within its lane of 3.3 m; it is 1.85 m wide
         assert at_m >= before_m - 0.1
         before_m = at_m
@@ -84,7 +84,7 @@ def test_the_intersection_looks_the_same_from_every_leg(sim: SumoSimulation, tur
         route = f"from_{leg}", f"to_{LEGS[(LEGS.index(leg) + turn) % 4]}"
         sim.reset(alone("dense", route, 1 if turn == 1 else 2, 190.0), 0)
         path = sim.along("ego").path
-        turned.append(math.remainder(float(path.points[HEADING, -1] - path.points[HEADING, 0]), math.tau))
+        turned.append(math.remainder(float(path[HEADING, -1] - path[HEADING, 0]), math.tau))
     assert turned == pytest.approx([{1: -math.pi / 2, 2: 0.0, 3: math.pi / 2}[turn]] * 4, abs=0.02)
 
 
@@ -127,7 +127,7 @@ def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(
     subprocess.run(command, capture_output=True, check=True)
     layout = replace(alone("low", ("a", "b", "c"), 0, 50.0), net=str(net), signal=None)
     sim.reset(layout, 0)
-    points = sim.along("ego").path.points
+    points = sim.along("ego").path
     assert points[X, -1] > 300.0
     for _ in range(140):
         frame = sim.step()
@@ -152,13 +152,11 @@ def test_a_lane_that_begins_beside_the_end_of_another_is_led_to_without_a_step(
 ) -> None:
     x, y = behind
     lines = [np.array([(0.0, 0.0), (100.0, 0.0)]), np.array([(x, side * y), (200.0, 0.0)])]
-    points = path_along(lines, [13.9, 13.9]).points
+    points = path_along(lines, [13.9, 13.9])
     np.testing.assert_allclose(points[[X, Y]].T, [(x, side * y) for x, y in expected])
     np.testing.assert_allclose(np.hypot(*np.diff(points[[X, Y]])), np.diff(points[STATION]))
 
 
 def test_of_a_lane_shorter_than_the_way_to_a_step_its_beginning_stays() -> None:
     lines = [np.array(line) for line in ([(0.0, 0.0), (3.0, 0.0)], [(3.0, 0.3), (9.0, 0.3)], [(9.0, 0.3), (50.0, 0.3)])]
-    np.testing.assert_allclose(
-        path_along(lines, [9.0, 8.0, 7.0]).points[[X, Y]].T, [(0, 0), (3, 0.3), (9, 0.3), (50, 0.3)]
-    )
+    np.testing.assert_allclose(path_along(lines, [9.0, 8.0, 7.0])[[X, Y]].T, [(0, 0), (3, 0.3), (9, 0.3), (50, 0.3)])

@@ -2,10 +2,6 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
-from shapely import Polygon
-from shapely.affinity import rotate, translate
 
 from risk_sac.geometry import Size
 from risk_sac.verdicts.course import Body, entry_distance, time_to_touch
@@ -13,25 +9,6 @@ from risk_sac.verdicts.path import polyline
 
 CAR = Size(2.3, 0.9)
 STRAIGHT = polyline(np.array([0.0, 100.0]), np.zeros(2))
-
-
-def box(x: float, y: float, heading: float, half_length: float, half_width: float) -> Polygon:
-    corners = [
-        (half_length, half_width),
-        (-half_length, half_width),
-        (-half_length, -half_width),
-        (half_length, -half_width),
-    ]
-    return translate(rotate(Polygon(corners), heading, origin=(0, 0), use_radians=True), x, y)
-
-
-@given(st.floats(-6, 6), st.floats(-6, 6), st.floats(-7, 7), st.floats(-7, 7), st.floats(0.2, 4), st.floats(0.2, 2))
-def test_boxes_touch_where_shapely_says_so(x: float, y: float, a: float, b: float, length: float, width: float) -> None:
-    one, other, size = (0.0, 0.0, a), (x, y, b), Size(length, width)
-    first, second = box(*one, *CAR), box(*other, *size)
-    overlap = first.intersection(second).area
-    assume(overlap > 1e-6 or first.distance(second) > 1e-6)
-    assert touches(one, CAR, other, size) == (overlap > 0.0)
 
 
 def test_time_to_touch_a_standing_body() -> None:

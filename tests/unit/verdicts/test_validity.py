@@ -8,7 +8,7 @@ import pytest
 
 from risk_sac.records import ARTEFACT_RULES
 from risk_sac.types import Frame
-from risk_sac.verdicts.evidence import Evidence, Ground
+from risk_sac.verdicts.evidence import PER_ACTOR, Evidence, Ground
 from risk_sac.verdicts.validity import validity_verdicts
 from tests.unit.sim.contacts import (
     CAR,
@@ -36,8 +36,11 @@ def broken(pair: tuple[Frame, Frame], visible_for_s: float = 3.0, ever_visible: 
     """The rules that the first contact between two frames fails."""
     contact = contact_of(*pair)
     assert contact is not None
-    known = [np.ones(len(frame.ids), dtype=bool) for frame in pair]
-    evidence = Evidence.of(pair, known, 0.0, Ground())
+    names = (*PER_ACTOR, "link")
+    series = {name: np.array([getattr(frame, name) for frame in pair]) for name in names}
+    series |= {name: getattr(pair[0], name) for name in ("ids", "kind", "role", "length_m", "width_m")}
+    series |= {"time_s": np.array([frame.time_s for frame in pair]), "visible": np.ones((2, len(pair[0].ids)))}
+    evidence = Evidence.from_series(series, Ground(), 0.0)
     facts = replace(CLEAN, visible_for_s=visible_for_s, ever_visible=ever_visible)
     found = validity_verdicts(evidence, contact.other, contact, facts)
     assert not set(found) & ARTEFACT_RULES
