@@ -30,7 +30,7 @@ from risk_sac.verdicts.reference import LEAD_M, reference_outcomes, replayed_con
 from risk_sac.verdicts.rollout import STANDING_MPS
 from tests.builders import frame_of
 
-EPISODES = 60
+EPISODES = 30
 FINE = 10  # looks between two steps
 AGREE = 0.99
 

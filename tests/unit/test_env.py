@@ -346,8 +346,8 @@ def test_a_contact_is_recorded_with_its_facts(low: RiskSacEnv) -> None:
 @each_family
 def test_sumo_is_asked_about_vehicles_alone_and_early_conflicts_are_artefacts(family: FamilyName) -> None:
     with closing(make_default(family)) as env:
-        collisions = [c for c in map(collision_of, first_contacts(env, 3)) if c is not None]
-    assert len(collisions) == 3
+        collisions = [c for c in map(collision_of, first_contacts(env, 1)) if c is not None]
+    assert collisions
     for collision in collisions:
         assert (collision.simulator_agrees is None) == (collision.other_kind == "pedestrian")
         assert collision.judgement is not None
