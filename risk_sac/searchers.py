@@ -4,14 +4,13 @@ Source: RISK-SAC, Algorithm 1, l. 1-2. Choice: warm start and turns are ours.
 """
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from risk_sac.agents.controls import RandomAgent, ScriptedAgent
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
-from risk_sac.agents.replay import Transition
 from risk_sac.config import RunSpec, method_of
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, EpisodeRecord, Outcome
@@ -25,7 +24,7 @@ from risk_sac.scene_optimizer import (
     SceneOptimizer,
     SobolOptimizer,
 )
-from risk_sac.types import Floats, Scene, Vector
+from risk_sac.types import Floats, Scene
 from risk_sac.verdicts.distinct import DistinctFailures
 
 CONTROLS: Mapping[str, type[RandomAgent | ScriptedAgent]] = {
@@ -33,13 +32,11 @@ CONTROLS: Mapping[str, type[RandomAgent | ScriptedAgent]] = {
     "random": RandomAgent,
     "none": RandomAgent,
 }
-Sampler = type[BotorchOptimizer | ArchiveOptimizer | SobolOptimizer | IidSampler]
-OPTIMIZERS: Mapping[str, Sampler] = {
-    "botorch": BotorchOptimizer,
-    "archive": ArchiveOptimizer,
-    "sobol": SobolOptimizer,
-    "iid": IidSampler,
+OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
+    each.kind: each for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler)
 }
+Actor = Learner | RandomAgent | ScriptedAgent | ScriptFollower
+"""A joint policy that drives all adversaries."""
 GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
 STEP_COSTS = 1.0, 8.0  # processor time of an environment step: of the guide, and of a policy with its share of updates
 NEW, NEW_PREVENTABLE = 1.0, 4.0  # worth of a distinct failure, and what is added if it is preventable
@@ -47,48 +44,6 @@ NEW, NEW_PREVENTABLE = 1.0, 4.0  # worth of a distinct failure, and what is adde
 DISCOUNT = 0.995
 PRIOR_WORTH, PRIOR_STEPS = 0.05, 1000.0
 LEAST = 0.01  # share of the processor time for either; more would be lost on a policy that yields nothing
-
-
-class Actor(Protocol):
-    """One joint policy that drives all adversaries."""
-
-    @property
-    def genes(self) -> int:
-        """Coordinates of a proposed point, behind those of the scene, that say how it acts."""
-
-    @property
-    def can_stop_early(self) -> bool:
-        """Whether the rest of the episode is not worth playing."""
-
-    @property
-    def device(self) -> str:
-        """Where its networks live."""
-
-    @property
-    def dual_variable(self) -> float:
-        """λ; 0 without one."""
-
-    @property
-    def temperature(self) -> float:
-        """α; 0 without one."""
-
-    def begin(self, genes: Floats) -> None:
-        """Begins an episode."""
-
-    def act(self, observation: Vector, explore: bool) -> Vector:
-        """Returns the joint action in [-1, 1], two entries per adversary."""
-
-    def observe(self, transition: Transition, *, own: bool) -> None:
-        """Stores a step; `own` is False if another actor acted."""
-
-    def update(self) -> object:
-        """Learns from what is stored."""
-
-    def state(self) -> dict[str, Any]:
-        """Returns all that the next episode depends on."""
-
-    def load(self, state: dict[str, Any]) -> None:
-        """Continues from `state()`."""
 
 
 class Searcher(NamedTuple):
@@ -194,7 +149,7 @@ class Searchers:
             self.next(learning=record.searching)
             self.add(record)
 
-    def _searcher(self, actor: Actor, sampler: Sampler) -> Searcher:
+    def _searcher(self, actor: Actor, sampler: type[SceneOptimizer]) -> Searcher:
         dimension = self._space.dimension + actor.genes
         return Searcher(sampler(dimension, self._spec.learner.scenes, self._spec.stream), actor)
 

@@ -1,16 +1,18 @@
-"""Interface of the actor-critic agents, and what their implementations share."""
+"""What the actor-critic agents share: their interface, losses and checkpoints."""
 
 import copy
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.optim import Adam
 
+from risk_sac.agents.networks import Mlp
 from risk_sac.agents.replay import Batch
 from risk_sac.errors import CheckpointError, NotFinite
 from risk_sac.frozen_policy import FrozenPolicy
@@ -28,29 +30,35 @@ class UpdateResult:
     entropy: float = 0.0  # of the policy over the batch, nats; 0 for a deterministic one
 
 
-class Agent(Protocol):
-    """Policy and critics."""
+class Agent(ABC):
+    """A policy, its critics, their optimisers, and the generator of all their noise.
+
+    Attributes:
+      parts: networks and optimisers by their name in a checkpoint.
+    """
+
+    parts: Mapping[str, nn.Module | Adam]
+    _policy: Mlp
+    _action_size: int
+    _generator: torch.Generator
 
     @property
     def temperature(self) -> float:
         """α; 0 for an agent without."""
+        return 0.0
 
+    @abstractmethod
     def act(self, observation: Vector, explore: bool) -> Vector:
-        """Action in [-1, 1], `action_size`.
+        """Returns an action in [-1, 1], `action_size`.
 
         Args:
           observation: `observation_size`.
           explore: act as in training (Alg. 1, l. 7), or as the frozen policy does.
         """
 
-    def frozen(self) -> FrozenPolicy:
-        """A copy of the policy that acts without exploring and no longer learns."""
-
-    def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
-        """|δ| of transitions, `batch`, mean over the critics; arguments as for `update`."""
-
+    @abstractmethod
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
-        """One step of all networks (Alg. 1, l. 14).
+        """Makes one step of all networks (Alg. 1, l. 14).
 
         Args:
           batch: transitions with their importance weights.
@@ -60,15 +68,35 @@ class Agent(Protocol):
           NotFinite: a loss is NaN or infinite.
         """
 
+    @abstractmethod
+    def _td_errors(self, batch: Batch, reward: Tensor) -> Tensor:
+        """Returns δ = y - Q_ψi(s, a), `critics x batch`; only Q has a gradient."""
+
+    @torch.no_grad()
+    def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
+        """Returns |δ| of transitions, `batch`, mean over the critics; arguments as for `update`."""
+        return mean_magnitude(self._td_errors(batch, reward))
+
+    def frozen(self) -> FrozenPolicy:
+        """Returns a copy of the policy that acts without exploring and no longer learns."""
+        return FrozenPolicy(tuple(layer.copy() for layer in self._policy.layers()), self._action_size)
+
     def state(self) -> dict[str, Any]:
-        """Networks, optimisers and generator, copied; tensors and plain values only."""
+        """Copies networks, optimisers and generator; tensors and plain values only."""
+        states = {name: part.state_dict() for name, part in self.parts.items()}
+        return copy.deepcopy(states | {"generator": self._generator.get_state()})
 
     def load(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`.
+        """Continues from `state()`.
 
         Raises:
           CheckpointError: the state is of other networks; the agent must not be used any further.
         """
+        state = copy.deepcopy(state)  # an optimiser would share its tensors
+        with loading():
+            for name, part in self.parts.items():
+                part.load_state_dict(state[name])
+            self._generator.set_state(state["generator"])
 
 
 def td_target(reward: Tensor, terminated: Tensor, next_value: Tensor, discount: float) -> Tensor:
@@ -135,21 +163,6 @@ def minimise(loss: Tensor, optimizer: Adam) -> None:
 def follow(targets: nn.Module, networks: nn.Module, rate: float) -> None:
     """Moves target networks towards the learned ones: ψ̄ ← ψ̄ + τ (ψ - ψ̄)."""
     torch._foreach_lerp_(list(targets.parameters()), list(networks.parameters()), rate)
-
-
-def saved(parts: Mapping[str, nn.Module | Adam], generator: torch.Generator) -> dict[str, Any]:
-    """Copies the state of an agent's networks, optimisers and generator."""
-    states = {name: part.state_dict() for name, part in parts.items()}
-    return copy.deepcopy(states | {"generator": generator.get_state()})
-
-
-def restore(parts: Mapping[str, nn.Module | Adam], generator: torch.Generator, state: dict[str, Any]) -> None:
-    """Continues from `saved`; raises CheckpointError if the networks have other shapes."""
-    state = copy.deepcopy(state)  # an optimiser would share its tensors
-    with loading():
-        for name, part in parts.items():
-            part.load_state_dict(state[name])
-        generator.set_state(state["generator"])
 
 
 @contextmanager

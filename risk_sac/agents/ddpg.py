@@ -4,38 +4,33 @@ Source: Lillicrap et al., "Continuous control with deep reinforcement learning",
 """
 
 import copy
-from typing import Any
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 from torch.optim import Adam
 
 from risk_sac.agents.agent import (
+    Agent,
     UpdateResult,
     all_finite,
     critic_loss,
     follow,
     mean_magnitude,
     minimise,
-    restore,
-    saved,
     td_target,
 )
 from risk_sac.agents.networks import Mlp
 from risk_sac.agents.replay import Batch
 from risk_sac.agents.sac import actor_loss, values
 from risk_sac.config.learner import AgentConfig, DdpgConfig
-from risk_sac.frozen_policy import FrozenPolicy
-from risk_sac.types import Floats, Vector
+from risk_sac.types import Vector
 
 
-class DdpgAgent:
+class DdpgAgent(Agent):
     """Policy and critic with targets; Gaussian noise explores.
 
     Choice: Gaussian noise instead of an Ornstein-Uhlenbeck process, which later work found to gain nothing.
     """
-
-    temperature = 0.0
 
     def __init__(
         self,
@@ -56,7 +51,7 @@ class DdpgAgent:
         self._target_policy, self._target_critic = copy.deepcopy((self._policy, self._critic))
         self._policy_optimizer = Adam(self._policy.parameters(), lr=config.actor_learning_rate, fused=True)
         self._critic_optimizer = Adam(self._critic.parameters(), lr=config.critic_learning_rate, fused=True)
-        self._parts: dict[str, nn.Module | Adam] = {
+        self.parts = {
             "policy": self._policy,
             "critic": self._critic,
             "target_policy": self._target_policy,
@@ -73,18 +68,9 @@ class DdpgAgent:
             action = (action + self._deviation * noise.cpu()).clamp(-1.0, 1.0)
         return action.numpy()
 
-    def frozen(self) -> FrozenPolicy:
-        """See `Agent.frozen`."""
-        return FrozenPolicy(tuple(layer.copy() for layer in self._policy.layers()), self._action_size)
-
-    @torch.no_grad()
-    def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
-        """See `Agent.td_errors`."""
-        return mean_magnitude(self._td_errors(batch, self._target(batch, reward)))
-
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """See `Agent.update`."""
-        td_errors = self._td_errors(batch, self._target(batch, reward))
+        td_errors = self._td_errors(batch, reward)
         loss_q = critic_loss(td_errors, batch.weight)
         minimise(loss_q, self._critic_optimizer)
 
@@ -98,14 +84,6 @@ class DdpgAgent:
         figures = torch.stack((loss_q, loss_mu)).tolist()
         return UpdateResult(mean_magnitude(td_errors.detach()), *all_finite(figures))
 
-    def state(self) -> dict[str, Any]:
-        """See `Agent.state`."""
-        return saved(self._parts, self._generator)
-
-    def load(self, state: dict[str, Any]) -> None:
-        """See `Agent.load`."""
-        restore(self._parts, self._generator, state)
-
     @torch.no_grad()
     def _target(self, batch: Batch, reward: Tensor) -> Tensor:
         next_action = torch.tanh(self._target_policy(batch.next_observation)[0])
@@ -113,5 +91,5 @@ class DdpgAgent:
         # y = r + γ (1 - terminated) Q̄_ψ(s', μ̄_θ(s')), Alg. 1
         return td_target(reward, batch.terminated, next_value, self._config.discount)
 
-    def _td_errors(self, batch: Batch, target: Tensor) -> Tensor:
-        return target - values(self._critic, batch.observation, batch.action)
+    def _td_errors(self, batch: Batch, reward: Tensor) -> Tensor:
+        return self._target(batch, reward) - values(self._critic, batch.observation, batch.action)

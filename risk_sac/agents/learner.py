@@ -8,7 +8,7 @@ Source: RISK-SAC, Alg. 1, l. 7 and 9-16.
 
 import math
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -18,7 +18,7 @@ from risk_sac.agents.agent import Agent, UpdateResult
 from risk_sac.agents.ddpg import DdpgAgent
 from risk_sac.agents.decisions import Decision, Held
 from risk_sac.agents.lagrangian import DualVariable
-from risk_sac.agents.replay import Batch, Replay, RiskPrioritizedReplay, Transition, UniformReplay
+from risk_sac.agents.replay import Batch, RiskPrioritizedReplay, Transition, UniformReplay
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
@@ -27,6 +27,9 @@ from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.problem import check_installed
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.types import Floats, Vector
+
+if TYPE_CHECKING:
+    from risk_sac.agents.sb3 import Sb3Agent
 
 
 class Learner:
@@ -54,10 +57,13 @@ class Learner:
         self._config = config  # with the γ of a decision
         self._reward = TrainingReward(method, config)
         self._action_size = action_size
-        self.device = _device(config.agent.device if method.agent != "sb3" else "cpu")
-        self._agent = self._make_agent(observation_size, action_size, seed)
+        self.device = "cuda" if config.agent.device == "cuda" and method.agent != "sb3" else "cpu"
+        if self.device == "cuda" and not torch.cuda.is_available():
+            raise ConfigError("learner.agent.device", "'cuda', and torch sees no CUDA device here", "'auto' or 'cpu'")
+        sizes = observation_size, action_size
+        self._agent = self._make_agent(*sizes, seed)
         replay = RiskPrioritizedReplay if method.replay == "rper" else UniformReplay
-        self._replay: Replay = replay(observation_size, action_size, config.replay)
+        self._replay = replay(*sizes, config.replay)
         self._dual = DualVariable(config.lagrangian, enabled=method.lagrangian)
         self._generator = np.random.default_rng(seed)
         self._acted = False
@@ -149,7 +155,7 @@ class Learner:
             return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
         return self._agent.act(observation, explore)  # Alg. 1, l. 7
 
-    def _make_agent(self, observation_size: int, action_size: int, seed: int) -> Agent:
+    def _make_agent(self, observation_size: int, action_size: int, seed: int) -> "Agent | Sb3Agent":
         sizes, config = (observation_size, action_size), self._config
         if self._method.agent == "ddpg":
             return DdpgAgent(*sizes, config.agent, config.ddpg, seed, self.device)
@@ -175,24 +181,5 @@ class Learner:
 
         Deviation: formed when sampled, so λ is today's and not the one in force when the step was taken.
         """
-        return self._reward(
-            batch.risk_reward,
-            batch.cost,
-            batch.robustness,
-            batch.next_robustness,
-            batch.terminated,
-            self._dual.value,
-        )
-
-
-def _device(wanted: str) -> str:
-    """Returns where the networks live: the CPU unless the user asks for CUDA.
-
-    Raises:
-      ConfigError: `cuda` is wanted and there is none.
-    """
-    if wanted != "cuda":
-        return "cpu"
-    if not torch.cuda.is_available():
-        raise ConfigError("learner.agent.device", "'cuda', and torch sees no CUDA device here", "'auto' or 'cpu'")
-    return wanted
+        b = batch
+        return self._reward(b.risk_reward, b.cost, b.robustness, b.next_robustness, b.terminated, self._dual.value)

@@ -7,7 +7,7 @@ Source: RISK-SAC, Sec. III-D and Alg. 1, l. 11-13.
 """
 
 from dataclasses import dataclass, fields
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -51,145 +51,91 @@ class Batch:
     indices: Indices  # n, the slots they came from
 
     def on(self, device: str) -> "Batch":
-        """The same transitions on a device."""
+        """Returns the same transitions on a device."""
         if device == "cpu":  # where they are sampled
             return self
         tensors = {f.name: getattr(self, f.name).to(device) for f in fields(self) if f.name != "indices"}
         return Batch(**tensors, indices=self.indices)
 
 
-class Replay(Protocol):
-    """What the learner needs of a replay memory."""
-
-    def __len__(self) -> int: ...
-
-    def add(self, transition: Transition) -> None:
-        """Store a transition over the oldest one once full."""
-
-    def take_unmeasured(self, most: int) -> Batch | None:
-        """New transitions, the oldest first, whose |δ| `update` is to be told before the next draw.
-
-        None once all were taken, or if |δ| makes no difference to what is drawn.
-        """
-
-    def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
-        """Draw with replacement; at least one transition must be stored, and all of them measured."""
-
-    def update(self, indices: Indices, td_errors: Floats) -> None:
-        """Take note of the |δ| just measured; of a repeated index the last one holds."""
-
-    def state(self) -> dict[str, Any]:
-        """Everything sampling depends on, the filled part only; tensors and plain values."""
-
-    def load(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`; raises CheckpointError if it is of another shape."""
+# Numbers of a transition, behind its vectors in a row.
+SCALARS = ("risk_reward", "cost", "robustness", "next_robustness", "terminated")
 
 
-SCALARS = 5  # of a transition, behind its vectors
+class UniformReplay:
+    """Ring buffer of transitions, each of which is drawn as likely; one packed row each, so that a batch is one gather.
 
+    Every replay memory has these methods.
+    """
 
-class Storage:
-    """Ring buffer of transitions, one packed row each, so that a batch is one gather."""
-
-    def __init__(self, observation_size: int, action_size: int, capacity: int) -> None:
-        self._widths = [observation_size, action_size, observation_size, SCALARS]
-        self._rows = np.zeros((capacity, sum(self._widths)), np.float32)
+    def __init__(self, observation_size: int, action_size: int, config: ReplayConfig) -> None:
+        self._widths = [observation_size, action_size, observation_size, len(SCALARS)]
+        self._rows = np.zeros((config.capacity, sum(self._widths)), np.float32)
         self._next = 0
-        self.size = 0
+        self._size = 0
 
-    @property
-    def capacity(self) -> int:
-        """Transitions that fit."""
-        return len(self._rows)
+    def __len__(self) -> int:
+        return self._size
 
     def add(self, transition: Transition) -> int:
-        """Store a transition and return its slot."""
-        scalars = (
-            transition.risk_reward,
-            transition.cost,
-            transition.robustness,
-            transition.next_robustness,
-            transition.terminated,
-        )
+        """Stores a transition over the oldest one once full, and returns its slot."""
+        scalars = [getattr(transition, name) for name in SCALARS]
         parts = (transition.observation, transition.action, transition.next_observation, scalars)
         row = np.concatenate(parts, dtype=np.float32)
         if not np.isfinite(row).all():
             raise NotFinite(f"wanted a transition of finite numbers, got {transition}. Check the environment.")
         slot = self._next
         self._rows[slot] = row
-        self._next = (slot + 1) % self.capacity
-        self.size = max(self.size, slot + 1)
+        self._next = (slot + 1) % len(self._rows)
+        self._size = max(self._size, slot + 1)
         return slot
 
-    def newest(self, count: int) -> Indices:
-        """Slots of the newest transitions, oldest of them first."""
-        return np.arange(self._next - count, self._next) % self.capacity
+    def take_unmeasured(self, most: int) -> Batch | None:
+        """Returns new transitions, the oldest first, whose |δ| `update` is to be told before the next draw.
 
-    def gather(self, indices: Indices, weight: Floats) -> Batch:
-        """The transitions at `indices`, with their importance weights."""
-        rows = torch.from_numpy(self._rows.take(indices, axis=0))
-        observation, action, next_observation, scalars = torch.split(rows, self._widths, dim=1)
-        risk_reward, cost, robustness, next_robustness, terminated = scalars.unbind(dim=1)
-        return Batch(
-            observation=observation,
-            action=action,
-            risk_reward=risk_reward,
-            cost=cost,
-            robustness=robustness,
-            next_robustness=next_robustness,
-            next_observation=next_observation,
-            terminated=terminated,
-            weight=torch.from_numpy(weight.astype(np.float32)),
-            indices=indices,
-        )
+        None once all were taken, or if |δ| makes no difference to what is drawn, as here.
+        """
+        return None
+
+    def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
+        """Draws with replacement; at least one transition must be stored, and all of them measured."""
+        return self.gather(generator.integers(len(self), size=batch_size), np.ones(batch_size))
+
+    def update(self, indices: Indices, td_errors: Floats) -> None:
+        """Takes note of the |δ| just measured, which do not matter here; of a repeated index the last one holds."""
 
     def state(self) -> dict[str, Any]:
-        """The filled rows and where the next one goes."""
-        return {"rows": torch.from_numpy(self._rows[: self.size].copy()), "next": self._next}
+        """Returns everything that sampling depends on, the filled part only; tensors and plain values."""
+        return {"rows": torch.from_numpy(self._rows[: self._size].copy()), "next": self._next}
 
     def load(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`."""
+        """Continues from `state()`; raises CheckpointError if it is of another shape."""
         rows = state["rows"].numpy()
-        if rows.shape[1] != self._rows.shape[1] or len(rows) > self.capacity or not 0 <= state["next"] < self.capacity:
+        capacity, width = self._rows.shape
+        if rows.shape[1] != width or len(rows) > capacity or not 0 <= state["next"] < capacity:
             raise CheckpointError(
                 f"replay rows in the checkpoint are {rows.shape} with the next at {state['next']}; wanted at most"
                 f" {self._rows.shape}. Resume with the sizes and replay.capacity of the run that wrote it."
             )
-        self.size = len(rows)
-        self._rows[: self.size] = rows
-        self._next = int(state["next"])
+        self._size, self._next = len(rows), int(state["next"])
+        self._rows[: self._size] = rows
 
+    def newest(self, count: int) -> Indices:
+        """Returns the slots of the newest transitions, oldest of them first."""
+        return np.arange(self._next - count, self._next) % len(self._rows)
 
-class UniformReplay:
-    """Every stored transition is equally likely."""
-
-    def __init__(self, observation_size: int, action_size: int, config: ReplayConfig) -> None:
-        self._storage = Storage(observation_size, action_size, config.capacity)
-
-    def __len__(self) -> int:
-        return self._storage.size
-
-    def add(self, transition: Transition) -> None:
-        """Store a transition."""
-        self._storage.add(transition)
-
-    def take_unmeasured(self, most: int) -> None:
-        """None: |δ| has no influence."""
-
-    def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
-        """Draw uniformly with replacement; all weights are 1."""
-        return self._storage.gather(generator.integers(len(self), size=batch_size), np.ones(batch_size))
-
-    def update(self, indices: Indices, td_errors: Floats) -> None:
-        """Nothing to note."""
-
-    def state(self) -> dict[str, Any]:
-        """The stored transitions."""
-        return self._storage.state()
-
-    def load(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`."""
-        self._storage.load(state)
+    def gather(self, indices: Indices, weight: Floats) -> Batch:
+        """Returns the transitions at `indices`, with their importance weights."""
+        rows = torch.from_numpy(self._rows.take(indices, axis=0))
+        observation, action, next_observation, scalars = torch.split(rows, self._widths, dim=1)
+        return Batch(
+            observation=observation,
+            action=action,
+            next_observation=next_observation,
+            weight=torch.from_numpy(weight.astype(np.float32)),
+            indices=indices,
+            **dict(zip(SCALARS, scalars.unbind(dim=1), strict=True)),
+        )
 
 
 class RiskPrioritizedReplay:
@@ -208,7 +154,7 @@ class RiskPrioritizedReplay:
 
     def __init__(self, observation_size: int, action_size: int, config: ReplayConfig) -> None:
         self._config = config
-        self._storage = Storage(observation_size, action_size, config.capacity)
+        self._storage = UniformReplay(observation_size, action_size, config)
         self._terms = np.zeros((3, config.capacity))  # |δ|, R̂, -ρ
         self._tree = SumTree(config.capacity)
         self._scales = TermScales(np.zeros(3), np.zeros(3))
@@ -217,19 +163,19 @@ class RiskPrioritizedReplay:
         self._rescale_at = 1
 
     def __len__(self) -> int:
-        return self._storage.size
+        return len(self._storage)
 
     def add(self, transition: Transition) -> None:
-        """Store a transition; it is drawn once its |δ| is told."""
+        """Stores a transition; it is drawn once its |δ| is told."""
         terms = (0.0, transition.accumulated_reward, -transition.robustness)
         if not np.isfinite(terms).all():
             raise NotFinite(f"R̂ and -ρ are {terms[1:]}; wanted finite numbers. Check the reward and the monitor.")
         self._terms[:, self._storage.add(transition)] = terms
         self._additions += 1
-        self._unmeasured = min(self._unmeasured + 1, self._storage.capacity)
+        self._unmeasured = min(self._unmeasured + 1, self._config.capacity)
 
     def take_unmeasured(self, most: int) -> Batch | None:
-        """See `Replay.take_unmeasured`; all importance weights are 1."""
+        """See `UniformReplay.take_unmeasured`; all importance weights are 1."""
         if not self._unmeasured:
             return None
         indices = self._storage.newest(self._unmeasured)[:most]
@@ -237,7 +183,7 @@ class RiskPrioritizedReplay:
         return self._storage.gather(indices, np.ones(len(indices)))
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
-        """Draw in proportion to priority, one transition from each of `batch_size` equal slices of the total.
+        """Draws in proportion to priority, one transition from each of `batch_size` equal slices of the total.
 
         Choice: stratified, as Schaul et al. do; the expected count of a transition stays batch_size · P(i).
         """
@@ -247,7 +193,7 @@ class RiskPrioritizedReplay:
         return self._storage.gather(indices, importance_weights(probabilities, len(self), self._config.correction))
 
     def update(self, indices: Indices, td_errors: Floats) -> None:
-        """See `Replay.update`."""
+        """See `UniformReplay.update`."""
         if not np.isfinite(td_errors).all():
             raise NotFinite(f"|δ| are {td_errors}; wanted finite numbers. Lower the learning rates.")
         self._terms[0, indices] = td_errors
@@ -259,7 +205,7 @@ class RiskPrioritizedReplay:
         self._rebuild()
 
     def state(self) -> dict[str, Any]:
-        """The stored transitions, their terms and the scales."""
+        """See `UniformReplay.state`."""
         return {
             "storage": self._storage.state(),
             "terms": torch.from_numpy(self._terms[:, : len(self)].copy()),
@@ -271,7 +217,7 @@ class RiskPrioritizedReplay:
         }
 
     def load(self, state: dict[str, Any]) -> None:
-        """Continue from `state()`."""
+        """See `UniformReplay.load`."""
         self._storage.load(state["storage"])
         self._terms[:, : len(self)] = state["terms"].numpy()
         self._scales = TermScales(state["lowest"].numpy(), state["inverse_spread"].numpy())

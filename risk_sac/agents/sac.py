@@ -5,28 +5,25 @@ Source: RISK-SAC, Eq. 4; Haarnoja et al., "Soft actor-critic algorithms and appl
 
 import copy
 import math
-from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.optim import Adam
 
 from risk_sac.agents.agent import (
+    Agent,
     UpdateResult,
     all_finite,
     critic_loss,
     follow,
     mean_magnitude,
     minimise,
-    restore,
-    saved,
     td_target,
 )
 from risk_sac.agents.networks import Mlp, bounded_log_std, tanh_gaussian
 from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import MOST_TEMPERATURE, AgentConfig, SacConfig
-from risk_sac.frozen_policy import FrozenPolicy
-from risk_sac.types import Floats, Vector
+from risk_sac.types import Vector
 
 
 def soft_value(values: Tensor, log_prob: Tensor, temperature: Tensor) -> Tensor:
@@ -96,7 +93,7 @@ class Temperature(nn.Module):
         self.log.clamp_(max=math.log(MOST_TEMPERATURE))
 
 
-class SacAgent:
+class SacAgent(Agent):
     """Policy, twin critics with targets and learned temperature; one generator draws all noise.
 
     Choice: the critics' hidden layers are normalised. A memory of a few thousand transitions, replayed at the pace of
@@ -130,7 +127,7 @@ class SacAgent:
             ],
             fused=True,
         )
-        self._parts: dict[str, nn.Module | Adam] = {
+        self.parts = {
             "policy": self._policy,
             "critics": self._critics,
             "targets": self._targets,
@@ -152,18 +149,9 @@ class SacAgent:
             mean = mean + bounded_log_std(raw_log_std).exp() * self._noise(self._action_size).cpu()
         return torch.tanh(mean).numpy()
 
-    def frozen(self) -> FrozenPolicy:
-        """See `Agent.frozen`."""
-        return FrozenPolicy(tuple(layer.copy() for layer in self._policy.layers()), self._action_size)
-
-    @torch.no_grad()
-    def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
-        """See `Agent.td_errors`."""
-        return mean_magnitude(self._td_errors(batch, self._target(batch, reward)))
-
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """See `Agent.update`."""
-        td_errors = self._td_errors(batch, self._target(batch, reward))
+        td_errors = self._td_errors(batch, reward)
         loss_q = critic_loss(td_errors, batch.weight)
         minimise(loss_q, self._critic_optimizer)
 
@@ -179,14 +167,6 @@ class SacAgent:
         figures = torch.stack((loss_q, loss_pi, self._temperature(), entropy)).tolist()
         return UpdateResult(mean_magnitude(td_errors.detach()), *all_finite(figures))
 
-    def state(self) -> dict[str, Any]:
-        """See `Agent.state`."""
-        return saved(self._parts, self._generator)
-
-    def load(self, state: dict[str, Any]) -> None:
-        """See `Agent.load`."""
-        restore(self._parts, self._generator, state)
-
     @torch.no_grad()
     def _target(self, batch: Batch, reward: Tensor) -> Tensor:
         action, log_prob = self._sample(batch.next_observation)
@@ -194,8 +174,8 @@ class SacAgent:
         next_value = soft_value(next_values, log_prob, self._temperature())
         return td_target(reward, batch.terminated, next_value, self._config.discount)
 
-    def _td_errors(self, batch: Batch, target: Tensor) -> Tensor:
-        return target - values(self._critics, batch.observation, batch.action)
+    def _td_errors(self, batch: Batch, reward: Tensor) -> Tensor:
+        return self._target(batch, reward) - values(self._critics, batch.observation, batch.action)
 
     def _sample(self, observation: Tensor) -> tuple[Tensor, Tensor]:
         mean, raw_log_std = self._policy(observation)[0].chunk(2, dim=1)

@@ -115,13 +115,7 @@ class Sb3Agent:
         critic_loss, actor_loss, temperature = all_finite(
             [told["train/critic_loss"], told["train/actor_loss"], self.temperature]
         )
-        return UpdateResult(
-            td_errors=np.zeros(len(reward)),
-            critic_loss=critic_loss,
-            actor_loss=actor_loss,
-            temperature=temperature,
-            entropy=0.0,
-        )
+        return UpdateResult(np.zeros(len(reward)), critic_loss, actor_loss, temperature)
 
     def state(self) -> dict[str, Any]:
         """See `Agent.state`."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision
-from risk_sac.scene_optimizer.base import NOBODY, Encounter, RunningMaximum, State, check_identity, check_told
+from risk_sac.scene_optimizer.base import Encounter, SceneOptimizer, State
 from risk_sac.types import Floats
 from risk_sac.verdicts.distinct import cell_of, signature_of
 
@@ -132,17 +132,17 @@ def _worth(collision: Collision) -> float:
     return ALMOST_WORTH * math.exp(-judged.drivers["careful"].impact_speed_mps / IMPACT_MPS) + LEAST_WORTH
 
 
-class ArchiveOptimizer:
+class ArchiveOptimizer(SceneOptimizer):
     """Breeds points from elites; scores them so that every method's records carry f_e."""
 
+    kind = "archive"
+
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:
-        self._identity: State = {"kind": "archive", "dimension": dimension, "seed": seed}
-        self._dimension = dimension
+        super().__init__(dimension, config, seed)
         self._random = np.random.default_rng(seed)
         self._elites = Elites()
         self._asked = 0
         self._parent: Elite | None = None  # of the point that was asked for last
-        self._maximum = RunningMaximum(config.running_maximum_rate)
 
     def ask(self) -> Floats:
         """See `SceneOptimizer.ask`."""
@@ -155,34 +155,29 @@ class ArchiveOptimizer:
         self._parent = self._elites.draw(pool, self._random)
         return mutated(self._parent.point, pool[self._random.integers(len(pool))].point, self._random)
 
-    def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
-        """See `SceneOptimizer.tell`."""
-        point = check_told(u, mean_return, self._dimension)
+    def _learn(self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter) -> None:
         parent, self._parent = self._parent, None
         if mean_return is None:
-            return None
+            return
         self._elites.add_misses(point, encounter.encounters_s)
         if encounter.collision is not None and encounter.collision.valid:
             self._elites.add_failure(point, encounter.collision, parent)
-        return self._maximum.score(mean_return)
 
     def state(self) -> State:
-        """See `SceneOptimizer.state`; taken between two episodes, when no point is out."""
+        """See `SceneOptimizer.state`; no point is out then."""
         return {
-            **self._identity,
+            **super().state(),
             "random": self._random.bit_generator.state,
             "elites": self._elites.state(),
             "asked": self._asked,
-            "maximum": self._maximum.state(),
         }
 
     def load(self, state: State) -> None:
         """See `SceneOptimizer.load`."""
-        check_identity(state, self._identity)
+        super().load(state)
         self._random.bit_generator.state = state["random"]
         self._elites.load(state["elites"])
         self._asked = state["asked"]
-        self._maximum.load(state["maximum"])
 
 
 def mutated(parent: Floats, other: Floats, random: np.random.Generator) -> Floats:

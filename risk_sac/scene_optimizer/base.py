@@ -4,12 +4,14 @@ Source: RISK-SAC, Sec. III-E.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, overload
+from typing import Any, ClassVar
 
 import numpy as np
 
+from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
 from risk_sac.records import Collision
 from risk_sac.types import Floats
@@ -37,47 +39,7 @@ class Encounter:
 NOBODY = Encounter()
 
 
-class SceneOptimizer(Protocol):
-    """Proposes points of the unit cube, and learns from their scores.
-
-    A point is a scene and, where the adversaries follow scripts, their genes behind it.
-    """
-
-    def ask(self) -> Floats:
-        """Returns the next point to try, `d`, in [0, 1]."""
-
-    def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
-        """Scores a finished episode.
-
-        Args:
-            u: `d`, in [0, 1]; need not come from `ask`.
-            mean_return: R̄_e, mean shaped reward per step; None if C_hard rejected the scene.
-            encounter: what the ego met.
-
-        Returns:
-            f_e (Eq. 11), or None for a rejected scene, which has no return to score.
-
-        Raises:
-            NotFinite: u or mean_return is NaN or infinite.
-            SceneError: u is not a point of the unit cube.
-        """
-
-    def state(self) -> State:
-        """Returns all that is needed to continue exactly here."""
-
-    def load(self, state: State) -> None:
-        """Continues exactly where `state` was taken.
-
-        Raises:
-            CheckpointError: the state is of an optimiser of another kind, dimension or seed.
-        """
-
-
-@overload
-def objective(mean_return: float, running_maximum: float) -> float: ...
-@overload
-def objective(mean_return: Floats, running_maximum: float) -> Floats: ...
-def objective(mean_return: float | Floats, running_maximum: float) -> float | Floats:
+def objective(mean_return: float | Floats, running_maximum: float) -> Floats:
     """How far an episode stays below the best returns, f_e; smaller is riskier.
 
     f_e(ξ) = max(0, M̄_e - R̄_e(ξ)) / (|M̄_e| + ε)                                  (11)
@@ -89,8 +51,7 @@ def objective(mean_return: float | Floats, running_maximum: float) -> float | Fl
     Returns:
         f_e >= 0, shaped like `mean_return`; NaN where that is NaN.
     """
-    score = np.maximum(0.0, running_maximum - mean_return) / (abs(running_maximum) + EPSILON)
-    return score if isinstance(mean_return, np.ndarray) else float(score)
+    return np.asarray(np.maximum(0.0, running_maximum - mean_return) / (abs(running_maximum) + EPSILON))
 
 
 class RunningMaximum:
@@ -116,7 +77,7 @@ class RunningMaximum:
         else:
             self.largest = max(self.largest, mean_return)
             self.smoothed = min(self.largest, self.smoothed + self._rate * (self.largest - self.smoothed))
-        return objective(mean_return, self.smoothed)
+        return float(objective(mean_return, self.smoothed))
 
     def state(self) -> tuple[float | None, float]:
         """Returns plain values to continue from."""
@@ -127,22 +88,71 @@ class RunningMaximum:
         self.largest, self.smoothed = state
 
 
-def check_told(u: Floats, mean_return: float | None, dimension: int) -> Floats:
-    """Returns a copy of u; raises as `SceneOptimizer.tell`."""
-    point = np.array(u, dtype=np.float64)
-    if point.shape != (dimension,):
-        raise SceneError(f"u has shape {point.shape}; wanted ({dimension},), one coordinate per scene parameter")
-    if not np.isfinite(point).all():
-        raise NotFinite(f"u is {point.tolist()}; wanted finite coordinates")
-    if point.min() < 0 or point.max() > 1:
-        raise SceneError(f"u spans [{point.min():g}, {point.max():g}]; wanted coordinates in [0, 1]")
-    if mean_return is not None and not math.isfinite(mean_return):
-        raise NotFinite(f"mean_return is {mean_return}; wanted a finite number, or None for a rejected scene")
-    return point
+class SceneOptimizer(ABC):
+    """Proposes points of the unit cube, and learns from their scores.
 
+    A point is a scene and, where the adversaries follow scripts, their genes behind it.
+    """
 
-def check_identity(state: State, wanted: State) -> None:
-    """Refuses the state of another optimiser; `wanted` holds kind, dimension and seed."""
-    for name, value in wanted.items():
-        if state.get(name) != value:
-            raise CheckpointError(f"the scene optimiser's {name} is {state.get(name)!r} in the state; wanted {value!r}")
+    kind: ClassVar[str]
+
+    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:
+        self._dimension, self._config, self._seed = dimension, config, seed
+        self._maximum = RunningMaximum(config.running_maximum_rate)
+
+    @abstractmethod
+    def ask(self) -> Floats:
+        """Returns the next point to try, `d`, in [0, 1]."""
+
+    def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
+        """Scores a finished episode.
+
+        Args:
+            u: `d`, in [0, 1]; need not come from `ask`.
+            mean_return: R̄_e, mean shaped reward per step; None if C_hard rejected the scene.
+            encounter: what the ego met.
+
+        Returns:
+            f_e (Eq. 11), or None for a rejected scene, which has no return to score.
+
+        Raises:
+            NotFinite: u or mean_return is NaN or infinite.
+            SceneError: u is not a point of the unit cube.
+        """
+        point = np.array(u, dtype=np.float64)
+        if point.shape != (self._dimension,):
+            expected = f"({self._dimension},), one coordinate per scene parameter"
+            raise SceneError(f"u has shape {point.shape}; wanted {expected}")
+        if not np.isfinite(point).all():
+            raise NotFinite(f"u is {point.tolist()}; wanted finite coordinates")
+        if point.min() < 0 or point.max() > 1:
+            raise SceneError(f"u spans [{point.min():g}, {point.max():g}]; wanted coordinates in [0, 1]")
+        if mean_return is not None and not math.isfinite(mean_return):
+            raise NotFinite(f"mean_return is {mean_return}; wanted a finite number, or None for a rejected scene")
+        score = None if mean_return is None else self._maximum.score(mean_return)
+        self._learn(point, mean_return, score, encounter)
+        return score
+
+    def _learn(  # noqa: B027  # controls learn nothing
+        self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter
+    ) -> None:
+        """Learns from an episode; arguments as for `tell`, and its result."""
+
+    def state(self) -> State:
+        """Returns all that is needed to continue exactly here; taken between two episodes."""
+        return {**self._identity(), "maximum": self._maximum.state()}
+
+    def load(self, state: State) -> None:
+        """Continues exactly where `state` was taken.
+
+        Raises:
+            CheckpointError: the state is of an optimiser of another kind, dimension or seed.
+        """
+        for name, expected in self._identity().items():
+            if state.get(name) != expected:
+                got = state.get(name)
+                raise CheckpointError(f"the scene optimiser's {name} is {got!r} in the state; wanted {expected!r}")
+        self._maximum.load(state["maximum"])
+
+    def _identity(self) -> State:
+        return {"kind": self.kind, "dimension": self._dimension, "seed": self._seed}

@@ -7,15 +7,7 @@ import torch
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.scene_optimizer.bandit import DiscountedBandit
-from risk_sac.scene_optimizer.base import (
-    NOBODY,
-    Encounter,
-    RunningMaximum,
-    State,
-    check_identity,
-    check_told,
-    objective,
-)
+from risk_sac.scene_optimizer.base import Encounter, SceneOptimizer, State, objective
 from risk_sac.scene_optimizer.samplers import sobol_points
 from risk_sac.types import Floats
 
@@ -29,7 +21,7 @@ NEAR_CANDIDATES, NEAR_DEVIATIONS = 64, (0.02, 0.05, 0.1)
 CHANGED = 10  # coordinates that differ from the best scene's, on average
 
 
-class BotorchOptimizer:
+class BotorchOptimizer(SceneOptimizer):
     """Sobol scenes first, then those of largest log expected improvement under a Gaussian process.
 
     Choice: the policy changes under the optimiser, so only the newest `config.window` observations are kept, and a
@@ -43,12 +35,12 @@ class BotorchOptimizer:
     Every random number of an ask derives from the seed and the number of asks, so the generator has no state to save.
     """
 
+    kind = "botorch"
+
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:  # Alg. 1, l. 1
-        self._identity: State = {"kind": "botorch", "dimension": dimension, "seed": seed}
-        self._dimension, self._config, self._seed = dimension, config, seed
+        super().__init__(dimension, config, seed)
         self._points: Floats = np.empty((0, dimension))  # n x d, oldest first, n <= window
         self._returns: Floats = np.empty(0)  # n, R̄_e; NaN = rejected
-        self._maximum = RunningMaximum(config.running_maximum_rate)
         self._asked, self._told, self._filled = 0, 0, 0  # filled: Sobol scenes so far
         self._fitted_at = 0  # value of _told at the last refit
         self._hyperparameters: Hyperparameters | None = None
@@ -68,20 +60,16 @@ class BotorchOptimizer:
             return self._fill()
         return self._propose(values, random)
 
-    def tell(  # Alg. 1, l. 21-22
-        self, u: Floats, mean_return: float | None, encounter: Encounter = NOBODY
-    ) -> float | None:
-        """See `SceneOptimizer.tell`."""
-        point = check_told(u, mean_return, self._dimension)
+    def _learn(  # Alg. 1, l. 21-22
+        self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter
+    ) -> None:
         value = np.nan if mean_return is None else mean_return
         self._points = np.concatenate((self._points, point[None]))[-self._config.window :]
         self._returns = np.append(self._returns, value)[-self._config.window :]
         self._told += 1
-        score = None if mean_return is None else self._maximum.score(mean_return)
         if self._arm is not None:
             self._bandit.tell(self._arm, 0.0 if score is None else max(0.0, 1.0 - score))
             self._arm = None
-        return score
 
     def scores(self) -> Floats:
         """Returns f_e of every kept observation, oldest first, `n`.
@@ -128,10 +116,9 @@ class BotorchOptimizer:
     def state(self) -> State:
         """See `SceneOptimizer.state`."""
         return {
-            **self._identity,
+            **super().state(),
             "points": torch.from_numpy(self._points.copy()),
             "returns": torch.from_numpy(self._returns.copy()),
-            "maximum": self._maximum.state(),
             "asked": self._asked,
             "told": self._told,
             "filled": self._filled,
@@ -142,9 +129,8 @@ class BotorchOptimizer:
 
     def load(self, state: State) -> None:
         """See `SceneOptimizer.load`."""
-        check_identity(state, self._identity)
+        super().load(state)
         self._points, self._returns = state["points"].numpy().copy(), state["returns"].numpy().copy()
-        self._maximum.load(state["maximum"])
         self._asked, self._told, self._filled = state["asked"], state["told"], state["filled"]
         self._fitted_at = state["fitted_at"]
         self._hyperparameters = state["hyperparameters"]

@@ -70,8 +70,7 @@ def test_rper_sampling_and_update_beat_a_cumulative_sum() -> None:
     generator = np.random.default_rng(1)
     errors = generator.exponential(size=BATCH)
 
-    uniform = UniformReplay(OBSERVATIONS, ACTIONS, tree._config)
-    uniform._storage = tree._storage
+    uniform = tree._storage
 
     def turn(replay: RiskPrioritizedReplay | UniformReplay) -> None:
         replay.update(replay.sample(BATCH, generator).indices, errors)

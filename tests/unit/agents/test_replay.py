@@ -5,11 +5,12 @@ import pytest
 import torch
 
 from risk_sac.agents.priority import TermScales, priority
-from risk_sac.agents.replay import Replay, RiskPrioritizedReplay, Transition, UniformReplay
+from risk_sac.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
 from risk_sac.config import ReplayConfig
 from risk_sac.errors import CheckpointError, NotFinite
 
 Make = Callable[..., Transition]
+Replay = UniformReplay | RiskPrioritizedReplay
 CONFIG = ReplayConfig(capacity=1000)
 KINDS = pytest.mark.parametrize("kind", [UniformReplay, RiskPrioritizedReplay])
 
