@@ -19,32 +19,23 @@ def advance(motion: Motion, accel_mps2: float, steering_rad: float, vehicle: Veh
     The steering turns no faster than it can, and no further than the grip bears at this speed. What the curve takes of
     the grip is not there to brake or speed up with. A braking builds up at the brakes' jerk; it ends at once.
     """
-    v, (x_m, y_m, heading_rad, speed_mps, before_mps2, steered_rad, _) = vehicle, motion
-    limits = (v.wheelbase_m, v.accel_mps2, v.brake_mps2, v.brake_jerk_mps3, v.steering_rad, v.steering_rate_rad_s)
-    now = x_m, y_m, heading_rad, speed_mps, before_mps2, steered_rad
-    return Motion(*_advanced(*now, float(accel_mps2), float(steering_rad), *limits, v.grip_mps2, step_s))
+    v = vehicle
+    limits = (v.accel_mps2, v.brake_mps2, v.brake_jerk_mps3, v.steering_rad, v.steering_rate_rad_s, v.grip_mps2)
+    return Motion(*_advanced(tuple(motion), (float(accel_mps2), float(steering_rad)), v.wheelbase_m, limits, step_s))
 
 
 @compiled
 def _advanced(
-    x_m: float,
-    y_m: float,
-    heading_rad: float,
-    speed: float,
-    before_mps2: float,
-    steered_rad: float,
-    wanted_mps2: float,
-    wanted_rad: float,
+    motion: tuple[float, ...],
+    command: tuple[float, float],
     wheelbase_m: float,
-    most_accel_mps2: float,
-    most_brake_mps2: float,
-    brake_jerk_mps3: float,
-    most_steering_rad: float,
-    steering_rate_rad_s: float,
-    grip_mps2: float,
+    limits: tuple[float, float, float, float, float, float],
     step_s: float,
 ) -> tuple[float, float, float, float, float, float, float]:
-    """The fields of the next motion."""
+    """Returns the fields of the next motion."""
+    x_m, y_m, heading_rad, speed, before_mps2, steered_rad, _ = motion
+    wanted_mps2, wanted_rad = command
+    most_accel_mps2, most_brake_mps2, brake_jerk_mps3, most_steering_rad, steering_rate_rad_s, grip_mps2 = limits
     turn = steering_rate_rad_s * step_s
     steering = min(max(wanted_rad, steered_rad - turn), steered_rad + turn)
     largest = min(most_steering_rad, math.atan(wheelbase_m * grip_mps2 / max(speed * speed, 1e-3)))

@@ -4,9 +4,8 @@ from collections import deque
 
 import numpy as np
 
-from risk_sac.egos.driving import Lookout, idm, stop_at_signal
-from risk_sac.egos.road import lane_keeping
-from risk_sac.egos.seam import Control, Episode, Perceived, Vehicle
+from risk_sac.egos.driving import Driver, idm, stop_at_signal
+from risk_sac.egos.seam import Control, Episode, Perceived
 from risk_sac.types import X, Y
 
 LATE_STEPS = 10  # it acts on what it perceived a second ago
@@ -14,19 +13,15 @@ SIGHT_M = 20.0
 HEADWAY_S = 1.0
 
 
-class Broken:
+class Broken(Driver):
     """Acts on what it perceived a second ago, and perceives nothing beyond 20 m: wrong on purpose."""
 
     version = "1.0"
     response_time_s = 1.0
 
-    _vehicle: Vehicle
-    _lookout: Lookout
-
     def reset(self, episode: Episode) -> None:
         """Begins an episode."""
-        self._vehicle = episode.vehicle
-        self._lookout = Lookout(episode.vehicle, episode.step_s)
+        super().reset(episode)
         self._decided: deque[float] = deque([0.0] * LATE_STEPS)
 
     def act(self, perceived: Perceived) -> Control:
@@ -39,8 +34,5 @@ class Broken:
             state=np.compress(near, p.state, axis=1),
         )
         signal = stop_at_signal(p) if p.stop_line_m < SIGHT_M else []
-        self._decided.append(idm(seen, self._vehicle, [*self._lookout.ahead(seen), *signal], HEADWAY_S))
-        return Control(self._decided.popleft(), lane_keeping(p, self._vehicle))
-
-    def close(self) -> None:
-        """Holds nothing."""
+        self._decided.append(idm(seen, self._vehicle, [*self._ahead(seen), *signal], HEADWAY_S))
+        return self._keeping_lane(p, self._decided.popleft())

@@ -1,8 +1,7 @@
 """The careful and competent human driver of UN Regulation 157, Annex 3: late by 1.15 s, and then braking in full."""
 
-from risk_sac.egos.driving import Lookout, idm, needed_braking, stop_at_signal, time_to_collision
-from risk_sac.egos.road import lane_keeping
-from risk_sac.egos.seam import Control, Episode, Perceived, Vehicle
+from risk_sac.egos.driving import Driver, needed_braking, time_to_collision
+from risk_sac.egos.seam import Control, Episode, Perceived
 from risk_sac.types import SPEED
 from risk_sac.verdicts.along import LEADER_BRAKES_MPS2
 from risk_sac.verdicts.course import HORIZON_S
@@ -14,26 +13,22 @@ RISK_BRAKING_MPS2 = 3.4  # Choice: or where a gentle braking no longer does
 OVER_S = 1.0  # a risk that has been gone for so long is over
 
 
-class Careful:
+class Careful(Driver):
     """Follows by IDM and brakes as UN R157's careful driver: 0.4 s to perceive, 0.75 s to respond, then 0.774 g."""
 
     version = "1.0"
     response_time_s = 1.15
 
-    _vehicle: Vehicle
-    _lookout: Lookout
-
     def reset(self, episode: Episode) -> None:
         """Begins an episode, without a risk."""
-        self._vehicle = episode.vehicle
-        self._lookout = Lookout(episode.vehicle, episode.step_s)
+        super().reset(episode)
         self._since_s: float | None = None
         self._last_s = 0.0
 
     def act(self, perceived: Perceived) -> Control:
         """Follows, and brakes for what it has perceived as a risk long enough ago."""
         speed, now = float(perceived.state[SPEED, 0]), perceived.time_s
-        ahead = self._lookout.ahead(perceived)
+        ahead = self._ahead(perceived)
         if (
             time_to_collision(speed, ahead) <= RISK_TTC_S
             or needed_braking(speed, ahead) > RISK_BRAKING_MPS2
@@ -42,13 +37,10 @@ class Careful:
             self._since_s, self._last_s = (now if self._since_s is None else self._since_s), now
         elif self._since_s is not None and now - self._last_s > OVER_S:
             self._since_s = None
-        accel = idm(perceived, self._vehicle, [*ahead, *stop_at_signal(perceived)], HEADWAY_S)
+        accel = self._follow(perceived, ahead, HEADWAY_S)
         if self._since_s is not None:
             # Until it has perceived the risk, it drives on; what it then does is the regulation's.
             braked_s = now - self._since_s - CAREFUL_PERCEIVES_S
             reflex = careful(braked_s, self._vehicle.brake_mps2) if braked_s >= 0.0 else 0.0
             accel = min(max(accel, -RISK_BRAKING_MPS2), -reflex) if braked_s < CAREFUL_DELAY_S else min(accel, -reflex)
-        return Control(accel, lane_keeping(perceived, self._vehicle))
-
-    def close(self) -> None:
-        """Holds nothing."""
+        return self._keeping_lane(perceived, accel)

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.egos.road import cruise_speed, leaders
-from risk_sac.egos.seam import Perceived, Vehicle
+from risk_sac.egos.road import cruise_speed, lane_keeping, leaders
+from risk_sac.egos.seam import Control, Episode, Perceived, Vehicle
 from risk_sac.sim.lookout import targets
 from risk_sac.types import SPEED, Kind, Signal
 
@@ -27,14 +27,20 @@ class Ahead(NamedTuple):
     braking_mps2: float = 0.0  # with which it has slowed down since the frame before
 
 
-class Lookout:
-    """Looks out for others, and for how hard they brake; one for each episode."""
+class Driver:
+    """Base of the shipped egos: looks out for others, and for how hard they brake."""
 
-    def __init__(self, vehicle: Vehicle, step_s: float) -> None:
-        self._vehicle, self._step_s = vehicle, step_s
+    _vehicle: Vehicle
+
+    def reset(self, episode: Episode) -> None:
+        """Begins an episode."""
+        self._vehicle, self._step_s = episode.vehicle, episode.step_s
         self._speeds: dict[str, float] = {}
 
-    def ahead(self, perceived: Perceived) -> list[Ahead]:
+    def close(self) -> None:
+        """Releases nothing."""
+
+    def _ahead(self, perceived: Perceived) -> list[Ahead]:
         """Returns what is on a collision course at constant velocity, see `risk_sac.sim.lookout`, and what leads."""
         p, everybody = perceived, np.ones(len(perceived.ids), dtype=np.bool_)
         found = targets(
@@ -47,6 +53,13 @@ class Lookout:
     def _braking(self, before: dict[str, float], id_: str) -> float:
         now = self._speeds[id_]
         return max(before.get(id_, now) - now, 0.0) / self._step_s
+
+    def _follow(self, perceived: Perceived, ahead: list[Ahead], headway_s: float) -> float:
+        """Returns the acceleration of `idm` behind those ahead and before a signal, m/s²."""
+        return idm(perceived, self._vehicle, [*ahead, *stop_at_signal(perceived)], headway_s)
+
+    def _keeping_lane(self, perceived: Perceived, accel_mps2: float) -> Control:
+        return Control(accel_mps2, lane_keeping(perceived, self._vehicle))
 
 
 def stop_at_signal(perceived: Perceived) -> list[Ahead]:

@@ -1,8 +1,7 @@
 """An adaptive cruise control with the emergency braking of UN Regulation 152."""
 
-from risk_sac.egos.driving import Lookout, idm, needed_braking, stop_at_signal, time_to_collision
-from risk_sac.egos.road import lane_keeping
-from risk_sac.egos.seam import Control, Episode, Perceived, Vehicle
+from risk_sac.egos.driving import Driver, needed_braking, time_to_collision
+from risk_sac.egos.seam import Control, Episode, Perceived
 from risk_sac.types import SPEED
 
 CRUISE_MPS2 = 3.5  # what ISO 15622 lets a cruise control brake with
@@ -13,7 +12,7 @@ AT_ONCE_MPS2 = 5.0  # which is left out where the danger could not be seen comin
 AEB_MPS2 = 7.0  # Choice: the regulation asks for 5 or more; cars on sale do about 7
 
 
-class IdmAeb:
+class IdmAeb(Driver):
     """Follows by IDM with a cruise control's braking; in an emergency it warns for 0.8 s, then brakes by 7 m/s².
 
     What it could not warn of it brakes for at once.
@@ -22,29 +21,22 @@ class IdmAeb:
     version = "1.0"
     response_time_s = 0.8
 
-    _vehicle: Vehicle
-    _lookout: Lookout
-
     def reset(self, episode: Episode) -> None:
         """Begins an episode, without a warning."""
-        self._vehicle = episode.vehicle
-        self._lookout = Lookout(episode.vehicle, episode.step_s)
+        super().reset(episode)
         self._warned_s: float | None = None
 
     def act(self, perceived: Perceived) -> Control:
         """Follows, warns, brakes."""
         speed, now = float(perceived.state[SPEED, 0]), perceived.time_s
-        ahead = self._lookout.ahead(perceived)
+        ahead = self._ahead(perceived)
         needed_mps2 = needed_braking(speed, ahead)
         if time_to_collision(speed, ahead) < WARN_TTC_S or needed_mps2 > WARN_MPS2:
             self._warned_s = now if self._warned_s is None else self._warned_s
         else:
             self._warned_s = None
-        accel = max(idm(perceived, self._vehicle, [*ahead, *stop_at_signal(perceived)], HEADWAY_S), -CRUISE_MPS2)
+        accel = max(self._follow(perceived, ahead, HEADWAY_S), -CRUISE_MPS2)
         warned = self._warned_s is not None and now - self._warned_s >= WARNING_S
         if needed_mps2 > AT_ONCE_MPS2 or (warned and needed_mps2 > WARN_MPS2):
             accel = min(accel, -AEB_MPS2)
-        return Control(accel, lane_keeping(perceived, self._vehicle))
-
-    def close(self) -> None:
-        """Holds nothing."""
+        return self._keeping_lane(perceived, accel)

@@ -2,9 +2,8 @@
 
 import math
 
-from risk_sac.egos.driving import Lookout, idm, stop_at_signal
-from risk_sac.egos.road import lane_keeping
-from risk_sac.egos.seam import Control, Episode, Perceived, Vehicle
+from risk_sac.egos.driving import Driver
+from risk_sac.egos.seam import Control, Episode, Perceived
 from risk_sac.risk.rss import lateral, opposite_direction, same_direction
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.sim.lookout import BEHIND_M, BEYOND_M, project, stretch
@@ -15,35 +14,28 @@ REACH_M = 80.0
 HEADWAY_S = 1.0
 
 
-class RssResponder:
+class RssResponder(Driver):
     """Follows by IDM, and brakes by 6 m/s² from 0.3 s after a distance became unsafe by RSS until it is safe again."""
 
     version = "1.0"
     response_time_s = 0.3
 
-    _vehicle: Vehicle
-    _lookout: Lookout
-
     def reset(self, episode: Episode) -> None:
         """Begins an episode, in safety."""
-        self._vehicle = episode.vehicle
-        self._lookout = Lookout(episode.vehicle, episode.step_s)
+        super().reset(episode)
         self._since_s: float | None = None
 
     def act(self, perceived: Perceived) -> Control:
         """Follows, or responds."""
-        p, vehicle = perceived, self._vehicle
+        p = perceived
         if any(dangerous(p, column) for column in range(1, len(p.ids))):
             self._since_s = p.time_s if self._since_s is None else self._since_s
         else:
             self._since_s = None
-        accel = idm(p, vehicle, [*self._lookout.ahead(p), *stop_at_signal(p)], HEADWAY_S)
+        accel = self._follow(p, self._ahead(p), HEADWAY_S)
         if self._since_s is not None and p.time_s - self._since_s >= RSS.response_s - 1e-6:
             accel = min(accel, -RSS.brake_min_mps2)
-        return Control(accel, lane_keeping(p, vehicle))
-
-    def close(self) -> None:
-        """Holds nothing."""
+        return self._keeping_lane(p, accel)
 
 
 def dangerous(perceived: Perceived, column: int) -> bool:
