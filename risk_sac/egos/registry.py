@@ -101,11 +101,8 @@ def card_of(name: str) -> EgoCard:
         return python_card(points[name])
     if name in remotes:
         return remotes[name]
-    raise ConfigError(
-        "ego.driver",
-        f"{name!r}",
-        f"one of {', '.join(sorted((*points, *remotes)))}, which are registered",
-    )
+    registered = ", ".join(sorted((*points, *remotes)))
+    raise ConfigError("ego.driver", f"{name!r}", f"one of {registered}, which are registered")
 
 
 def pinned(ego: EgoConfig) -> EgoConfig:
@@ -141,31 +138,29 @@ def load(ego: EgoConfig) -> Guarded | None:
         from risk_sac.egos.remote.client import RemoteEgo  # here, because not everybody has grpc
 
         return Guarded(RemoteEgo(card.name, card.address, card.version, card.deadline_s), card.deadline_s)
-    return Guarded(make(card.name)[0](), card.deadline_s, interrupted=True)
+    return Guarded(make(card.name, card.name)[0](), card.deadline_s, interrupted=True)
 
 
-def make(name: str) -> tuple[Callable[[], Ego], EgoCard]:
-    """Returns the class of a registered Python ego and its card; a ConfigError if it cannot be loaded."""
-    card, points = card_of(name), _points()
-    if name not in points:
-        raise ConfigError("ego.driver", f"the ego {name!r} is no Python ego, but {card.kind}")
-    return _loaded(points[name]), card
+def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
+    """Returns the class of a Python ego and its card; a ConfigError if it cannot be loaded.
 
-
-def make_unregistered(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
-    """Returns the class `module:Class` that no entry point names, and its card under a name."""
-    point = EntryPoint(name=name, value=source, group=GROUP)
-    return _loaded(point), python_card(point)
-
-
-def _loaded(point: EntryPoint) -> Callable[[], Ego]:
+    Args:
+      source: name of a registered ego, or `module:Class`.
+      name: that the latter gets in its card.
+    """
+    if ":" in source:
+        point = EntryPoint(name=name, value=source, group=GROUP)
+    elif isinstance(card_of(source), RemoteCard):
+        raise ConfigError("ego.driver", f"the ego {source!r} is no Python ego, but remote")
+    else:
+        point = _points()[source]
     try:
         made: Callable[[], Ego] = point.load()
     except Exception as error:
         raise ConfigError(
             "ego.driver", f"the ego {point.name!r} ({point.value}) cannot be loaded: {type(error).__name__}: {error}"
         ) from error
-    return made
+    return made, python_card(point)
 
 
 def _points() -> Mapping[str, EntryPoint]:

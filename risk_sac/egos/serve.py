@@ -5,18 +5,16 @@ It is the reference for egos in other languages.
 
 import argparse
 import json
-import logging
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import grpc
 import numpy as np
 
-from risk_sac.egos.registry import EgoCard, make, make_unregistered
+from risk_sac.egos.registry import EgoCard, make
 from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.remote.messages import (
     METHODS,
@@ -29,20 +27,10 @@ from risk_sac.egos.remote.messages import (
 )
 from risk_sac.egos.seam import Ego, Episode, Vehicle
 from risk_sac.errors import ConfigError
-from risk_sac.types import STEP_S, Floats, Kind, Signal
+from risk_sac.types import STEP_S, Kind, Signal
 
-logger = logging.getLogger(__name__)
-
-MOST_SESSIONS = 64  # who never acted closed nothing; the oldest goes
+MOST_SESSIONS = 64  # the oldest goes: a client that never acted closed nothing
 SPARE_THREADS = 16  # beside one for each session: to start and to close them
-
-
-@dataclass(slots=True)
-class Session:
-    """An episode at work."""
-
-    ego: Ego
-    path: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
 
 class Sessions:
@@ -50,28 +38,33 @@ class Sessions:
 
     def __init__(self, make_ego: Callable[[], Ego], version: str) -> None:
         self._make, self._version = make_ego, version
-        self._sessions: dict[str, Session] = {}
+        self._egos: dict[str, Ego] = {}  # by session
         self._lock = threading.Lock()
 
     def start(self, request: Any, context: Any) -> Any:
         """Begins an episode."""
         if request.protocol != PROTOCOL:
             context.abort(grpc.StatusCode.FAILED_PRECONDITION, f"protocol {request.protocol}; wanted {PROTOCOL}")
-        session = Session(self._make())
-        session.ego.reset(episode_of(request))
+        ego = self._make()
+        ego.reset(episode_of(request))
         with self._lock:
-            while len(self._sessions) >= MOST_SESSIONS:
-                self._sessions.pop(next(iter(self._sessions))).ego.close()
-            self._sessions[request.session] = session
+            while len(self._egos) >= MOST_SESSIONS:
+                self._egos.pop(next(iter(self._egos))).close()
+            self._egos[request.session] = ego
         return ego_pb2.StartReply(version=self._version)
 
     def act(self, requests: Iterator[Any], context: Any) -> Iterator[Any]:
-        """An episode's steps; the session is over with them, also if the client is gone."""
-        name = ""
+        """Answers an episode's steps; the session is over with them, also if the client is gone."""
+        name, path = "", np.empty((0, 0))
         try:
             for request in requests:
                 name = request.session
-                yield self._step(request, context)
+                if name not in self._egos:
+                    context.abort(grpc.StatusCode.NOT_FOUND, f"there is no session {name!r}")
+                if request.HasField("path"):
+                    path = path_of(request.path)
+                command = self._egos[name].act(perceived_of(request, path))
+                yield command_message(command, request.time_s)
         finally:
             self._end(name)
 
@@ -80,20 +73,11 @@ class Sessions:
         self._end(request.session)
         return ego_pb2.CloseReply()
 
-    def _step(self, request: Any, context: Any) -> Any:
-        session = self._sessions.get(request.session)
-        if session is None:
-            context.abort(grpc.StatusCode.NOT_FOUND, f"there is no session {request.session!r}")
-        assert session is not None
-        if request.HasField("path"):
-            session.path = path_of(request.path)
-        return command_message(session.ego.act(perceived_of(request, session.path)), request.time_s)
-
     def _end(self, name: str) -> None:
         with self._lock:
-            session = self._sessions.pop(name, None)
-        if session is not None:
-            session.ego.close()
+            ego = self._egos.pop(name, None)
+        if ego is not None:
+            ego.close()
 
 
 def warm_up(ego: Ego) -> None:
@@ -151,9 +135,8 @@ def main() -> None:
     lines = "print the lines with which an operator registers it by this name, for the file of RISK_SAC_EGOS"
     parser.add_argument("--register", metavar="NAME", help=lines)
     options = parser.parse_args()
-    named = ":" not in options.ego
     try:
-        make_ego, card = make(options.ego) if named else make_unregistered(options.ego, options.register or "ego")
+        make_ego, card = make(options.ego, options.register or "ego")
         warm_up(make_ego())
         server, port = serve(Sessions(make_ego, card.version), options.address)
     except (ConfigError, RuntimeError) as error:

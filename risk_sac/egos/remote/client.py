@@ -1,10 +1,8 @@
 """Client of an ego in another process."""
 
-import math
-import threading
-import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from queue import SimpleQueue
 from typing import Any
 
@@ -104,7 +102,7 @@ class RemoteEgo:
             raise EgoFailed(f"the ego {self._name!r} answered {error}", reason=MALFORMED) from error
         except StopIteration as error:
             raise EgoFailed(f"the ego {self._name!r} ended the session unasked", reason=CRASH) from error
-        except _Late as error:
+        except TimeoutError as error:
             raise self._late() from error
         except grpc.RpcError as error:
             code = error.code()
@@ -121,54 +119,29 @@ class RemoteEgo:
         return EgoFailed(f"the ego {self._name!r} did not answer within {self._deadline_s:g} s", reason=DEADLINE)
 
 
-class _Late(Exception):
-    """No answer came in time."""
-
-
 class _Stream:
-    """A stream of questions and answers in turn, with a deadline for each answer.
-
-    gRPC has a deadline for a whole stream only. Here a thread that sleeps most of the time cancels the stream when an
-    answer is due, so that a question sets no timer and wakes no thread.
-    """
+    """A stream of questions and answers in turn, with a deadline for each answer; gRPC has one for a whole stream."""
 
     def __init__(self, method: Callable[[Iterator[bytes]], Any], deadline_s: float) -> None:
-        self._deadline_s, self._due_s, self._was_late = deadline_s, math.inf, False
+        self._deadline_s = deadline_s
         self._questions: SimpleQueue[bytes | None] = SimpleQueue()
         self._answers = method(iter(self._questions.get, None))
-        self._over = threading.Event()
-        threading.Thread(target=self._watch, daemon=True).start()
+        self._reader = ThreadPoolExecutor(1)
 
     def ask(self, question: bytes) -> bytes:
         """Returns the answer to a question.
 
         Raises:
-          _Late: it does not come in time.
+          TimeoutError: it does not come in time.
           StopIteration: the stream ends without one.
           grpc.RpcError: the stream breaks.
         """
-        self._due_s = time.monotonic() + self._deadline_s
         self._questions.put(question)
-        try:
-            answer: bytes = next(self._answers)
-        except grpc.RpcError as error:
-            if self._was_late:
-                raise _Late from error
-            raise
-        self._due_s = math.inf
+        answer: bytes = self._reader.submit(next, self._answers).result(self._deadline_s)
         return answer
 
     def close(self) -> None:
         """Ends the stream."""
-        self._over.set()
         self._questions.put(None)
-
-    def _watch(self) -> None:
-        wait_s = self._deadline_s
-        while not self._over.wait(wait_s):
-            left_s = self._due_s - time.monotonic()
-            if left_s <= 0.0:
-                self._was_late = True
-                self._answers.cancel()
-                return
-            wait_s = min(left_s, self._deadline_s)
+        self._answers.cancel()
+        self._reader.shutdown(wait=False)
