@@ -1,9 +1,9 @@
 """Drives an ego: shows it what it perceives, and moves its car by its commands."""
 
 import math
+from itertools import compress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from risk_sac.egos.bicycle import advance, track
 from risk_sac.egos.guard import Guarded
@@ -14,29 +14,26 @@ from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import Motion
-from risk_sac.types import ACCEL, LATERAL, OFFSET, SPEED, STEP_S, VX, VY, Bools, Floats, Frame
+from risk_sac.types import ACCEL, HEADING, LATERAL, OFFSET, SPEED, STEP_S, VX, VY, Bools, Floats, Frame, X, Y
 
 BRAKE_MPS2 = 9.0  # as SUMO's driver can, on dry asphalt
 
 
-class View:
-    """Makes the ego's perception of a frame; one for each episode."""
-
-    def __init__(self) -> None:
-        self._of: tuple[tuple[str, ...], bytes] = ((), b"")
-        self._ids: tuple[str, ...] = ()
-        self._kind: NDArray[np.int8] = np.empty(0, dtype=np.int8)
-
-    def perceived(self, frame: Frame, belief: Belief, along: Along) -> Perceived:
-        """Returns the actors that it knows of by its sensor and its memory."""
-        known = belief.known
-        of = frame.ids, known.tobytes()
-        if of != self._of:  # seldom
-            self._of, self._kind = of, frame.kind[known]
-            self._ids = tuple(id_ for id_, is_known in zip(frame.ids, known.tolist(), strict=True) if is_known)
-        path, station_m, offset_m = along
-        place, ahead = (path, station_m, offset_m), (frame.signal, frame.stop_line_m)
-        return Perceived(frame.time_s, self._ids, self._kind, shown(belief.state, known), *place, *ahead)
+def perceive(frame: Frame, belief: Belief, along: Along) -> Perceived:
+    """Returns the actors of a frame that the ego knows of by its sensor and its memory."""
+    known = belief.known
+    path, station_m, offset_m = along
+    return Perceived(
+        time_s=frame.time_s,
+        ids=tuple(compress(frame.ids, known.tolist())),
+        kind=frame.kind[known],
+        state=shown(belief.state, known),
+        path=path,
+        station_m=station_m,
+        offset_m=offset_m,
+        signal=frame.signal,
+        stop_line_m=frame.stop_line_m,
+    )
 
 
 class EgoPilot:
@@ -44,7 +41,6 @@ class EgoPilot:
 
     _vehicle: Vehicle
     _motion: Motion
-    _view: View
 
     def __init__(self, ego: Guarded) -> None:
         self._ego = ego
@@ -54,17 +50,16 @@ class EgoPilot:
         grip = layout.friction * GRAVITY_MPS2
         length_m, width_m = float(frame.length_m[0]), float(frame.width_m[0])
         self._vehicle = Vehicle(length_m=length_m, width_m=width_m, brake_mps2=min(BRAKE_MPS2, grip), grip_mps2=grip)
-        x, y, heading, speed, accel = (
-            float(row[0]) for row in (frame.x_m, frame.y_m, frame.heading_rad, frame.speed_mps, frame.accel_mps2)
+        own = frame.state[[X, Y, HEADING, SPEED, ACCEL], 0].tolist()
+        self._motion = Motion(*own)
+        self._ego.reset(
+            Episode(seed=seed, net=layout.net, route=layout.ego.route, vehicle=self._vehicle, step_s=STEP_S)
         )
-        self._motion, self._view = Motion(x, y, heading, speed, accel), View()
-        route, vehicle = layout.ego.route, self._vehicle
-        self._ego.reset(Episode(seed=seed, net=layout.net, route=route, vehicle=vehicle, step_s=STEP_S))
         return self._motion
 
     def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
         """See `risk_sac.sim.pilot.Pilot.drive`."""
-        command = self._ego.act(self._view.perceived(frame, belief, along))
+        command = self._ego.act(perceive(frame, belief, along))
         if isinstance(command, Trajectory):
             command = track(command, self._motion, self._vehicle)
         self._motion = advance(self._motion, command.accel_mps2, command.steering_rad, self._vehicle, STEP_S)

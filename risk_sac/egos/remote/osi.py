@@ -63,11 +63,12 @@ def ground_truth(perceived: Perceived, numbers: dict[str, int]) -> bytes:
     p = perceived
     for id_ in p.ids:
         numbers.setdefault(id_, len(numbers) + 1)
-    path = (p.path[row].tolist() for row in (PATH_X, PATH_Y, STATION))
-    line = [{"world_position": _vector(x, y), "s_position": s} for x, y, s in zip(*path, strict=True)]
+    seconds, nanos = divmod(round(p.time_s * 1e9), 10**9)
+    points = p.path[[PATH_X, PATH_Y, STATION]].T.tolist()
+    line = [{"world_position": _vector(x, y), "s_position": s} for x, y, s in points]
     truth = {
         "version": VERSION,
-        "timestamp": _timestamp(p.time_s),
+        "timestamp": {"seconds": seconds, "nanos": nanos},
         "host_vehicle_id": {"value": numbers[p.ids[0]]},
         "moving_object": [_moving(p, column, numbers[id_]) for column, id_ in enumerate(p.ids)],
         "traffic_light": [_light(p)] if p.signal in COLOURS and math.isfinite(p.stop_line_m) else [],
@@ -139,11 +140,6 @@ def _light(perceived: Perceived) -> Mapping[str, Any]:
 
 def _vector(x: float, y: float, z: float = 0.0) -> Mapping[str, float]:
     return {"x": x, "y": y, "z": z}
-
-
-def _timestamp(time_s: float) -> Mapping[str, int]:
-    seconds, nanos = divmod(round(time_s * 1e9), 10**9)
-    return {"seconds": seconds, "nanos": nanos}
 
 
 def _point(told: Any, rear_axle_m: float) -> tuple[float, float, float]:
