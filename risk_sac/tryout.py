@@ -16,10 +16,10 @@ from risk_sac.agents.controls import RandomAgent
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene, SimulationError
+from risk_sac.failures.play import play
 from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
 from risk_sac.scenario.families import family_named
-from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
 from risk_sac.scenario.maps.found import Fit
 from risk_sac.sim.commands import Walker
@@ -43,12 +43,10 @@ class Tried:
     """What came of the episodes at one place."""
 
     fit: Fit
-    family: str
     played: int = 0
     rejected: Counter[str] = field(default_factory=Counter)  # by the rule of C_hard that refused the scene
     invalid: list[str] = field(default_factory=list)  # why episodes failed
     touched_by_nobody: int = 0  # contacts with nobody attacking
-    touched: int = 0  # contacts with random actions
     sides: tuple[float, float] = (math.nan, math.nan)  # least distance of a pedestrian from the left and the right
 
     @property
@@ -74,7 +72,7 @@ class Tried:
 
 
 def sample(fits: Sequence[Fit], count: int, seed: int) -> list[Fit]:
-    """So many places of each pattern, or all if there are fewer."""
+    """Draws so many places of each pattern, or all if there are fewer."""
     draw = np.random.default_rng(seed)
     chosen: list[Fit] = []
     for pattern in dict.fromkeys(fit.spot.pattern for fit in fits):
@@ -92,7 +90,7 @@ def try_out(fit: Fit, family: str, episodes: int, seed: int) -> Tried:
       episodes: scenes, each with nobody attacking and with random actions.
       seed: of scenes, actions and SUMO.
     """
-    tried = Tried(fit, family)
+    tried = Tried(fit)
     problem = Problem.from_spec(RunSpec(family=family, method="random", seed=0))
     for controlled in (False, True):
         with closing(RiskSacEnv(problem, RunSpec.model_fields["learner"].default.reward, controlled=controlled)) as env:
@@ -106,13 +104,9 @@ def try_out(fit: Fit, family: str, episodes: int, seed: int) -> Tried:
 def _episode(env: RiskSacEnv, tried: Tried, draw: np.random.Generator, *, controlled: bool) -> None:
     scene = env.problem.space.from_unit(draw.random(env.problem.space.dimension))
     simulator_seed, action_seed = (int(value) for value in draw.integers(2**31 - 1, size=2))
-    agent = RandomAgent(env.action_size, action_seed)
+    agent, none = RandomAgent(env.action_size, action_seed), np.empty((0, env.action_size))
     try:
-        observation, _ = env.reset(seed=simulator_seed, options={"scene": scene})
-        ended = False
-        while not ended:
-            observation, _, touched, truncated, _ = env.step(agent.act(observation))
-            ended = touched or truncated
+        touched = play(env, scene, simulator_seed, none, agent.act).collision is not None
     except InfeasibleScene as infeasible:
         tried.rejected[infeasible.reason] += 1
         return
@@ -120,14 +114,12 @@ def _episode(env: RiskSacEnv, tried: Tried, draw: np.random.Generator, *, contro
         tried.invalid.append(str(error))
         return
     tried.played += 1
-    if controlled:
-        tried.touched += touched
-    else:
+    if not controlled:
         tried.touched_by_nobody += touched
 
 
 def meet(sim: SumoSimulation, family: str, side: int) -> float:
-    """Least distance of an ego, alone on the road, to a pedestrian that would meet it; 0 if it touches it.
+    """Returns the least distance of an ego, alone on the road, to a pedestrian that would meet it; 0 if it touches it.
 
     The pedestrian crosses where the ego drives when nobody is there, and is in the middle of its way at that moment:
     in bends, and where the ego changes lanes, as well as on a straight road.
@@ -139,7 +131,8 @@ def meet(sim: SumoSimulation, family: str, side: int) -> float:
     """
     found = family_named(family)
     middle = found.layout(found.space.from_unit(np.full(found.space.dimension, 0.5)).values)
-    alone = _at_green(sim, replace(middle, vehicles=(), pedestrians=()), _cycle_s(found))
+    cycle_s = next((p.high for p in found.space.parameters if p.name == "signal_offset_s"), 0.0)
+    alone = _at_green(sim, replace(middle, vehicles=(), pedestrians=()), cycle_s)
     there = _driven_to(sim, alone)
     if there is None:
         return math.inf
@@ -168,10 +161,6 @@ def _driven_to(sim: SumoSimulation, alone: Layout) -> tuple[int, float, float, f
         if step * STEP_S >= AHEAD_S and frame.ego_speed_mps >= DRIVING_MPS:
             return step, float(frame.x_m[0]), float(frame.y_m[0]), float(frame.heading_rad[0])
     return None
-
-
-def _cycle_s(family: Family) -> float:
-    return next((p.high for p in family.space.parameters if p.name == "signal_offset_s"), 0.0)
 
 
 def _at_green(sim: SumoSimulation, layout: Layout, cycle_s: float) -> Layout:

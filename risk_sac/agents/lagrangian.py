@@ -1,4 +1,4 @@
-"""The dual variable λ, which prices the realism cost.
+"""The step of the dual variable λ, which prices the realism cost.
 
 Source: RISK-SAC, Sec. III-B, Eq. 1-2, and Alg. 1, l. 15-16.
 """
@@ -29,27 +29,12 @@ def dual_step(dual_variable: float, cost: float, config: LagrangianConfig) -> fl
     Returns:
       The next λ, in [0, λ_max].
 
+    Raises:
+      NotFinite: the cost is NaN or infinite.
+
     Source: RISK-SAC, Alg. 1, l. 16.
     """
+    if not math.isfinite(cost):
+        raise NotFinite(f"realism cost is {cost}; wanted a finite number. Check C_soft.")
     ascended = dual_variable + config.learning_rate * (cost - config.cost_limit)
     return min(max(ascended, 0.0), config.maximum)
-
-
-class DualVariable:
-    """λ over a run; stays 0 where the method has no constraint."""
-
-    def __init__(self, config: LagrangianConfig, *, enabled: bool) -> None:
-        self._config = config
-        self._enabled = enabled
-        self.value = min(config.initial, config.maximum) if enabled else 0.0
-
-    def update(self, cost: float) -> None:
-        """Step λ on the realism cost of one environment step.
-
-        Raises:
-          NotFinite: `cost` is NaN or infinite.
-        """
-        if not math.isfinite(cost):
-            raise NotFinite(f"realism cost is {cost}; wanted a finite number. Check C_soft.")
-        if self._enabled:
-            self.value = dual_step(self.value, cost, self._config)

@@ -17,7 +17,7 @@ from torch import Tensor
 from risk_sac.agents.agent import Agent, UpdateResult
 from risk_sac.agents.ddpg import DdpgAgent
 from risk_sac.agents.decisions import Decision, Held
-from risk_sac.agents.lagrangian import DualVariable
+from risk_sac.agents.lagrangian import dual_step
 from risk_sac.agents.replay import Batch, RiskPrioritizedReplay, Transition, UniformReplay
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
@@ -37,6 +37,7 @@ class Learner:
 
     Attributes:
       device: where the networks live.
+      dual_variable: λ; stays 0 where the method has no constraint.
     """
 
     genes = 0
@@ -64,15 +65,10 @@ class Learner:
         self._agent = self._make_agent(*sizes, seed)
         replay = RiskPrioritizedReplay if method.replay == "rper" else UniformReplay
         self._replay = replay(*sizes, config.replay)
-        self._dual = DualVariable(config.lagrangian, enabled=method.lagrangian)
+        self.dual_variable = min(config.lagrangian.initial, config.lagrangian.maximum) if method.lagrangian else 0.0
         self._generator = np.random.default_rng(seed)
         self._acted = False
         self._steps, self._updates = 0, 0  # steps: its own, and those of others before the first of them
-
-    @property
-    def dual_variable(self) -> float:
-        """λ."""
-        return self._dual.value
 
     @property
     def temperature(self) -> float:
@@ -101,8 +97,8 @@ class Learner:
         """
         self._acted |= own
         self._steps += own or not self._acted
-        if own and self._steps > self._config.agent.warmup_steps:
-            self._dual.update(transition.cost)  # Alg. 1, l. 15-16
+        if self._method.lagrangian and own and self._steps > self._config.agent.warmup_steps:
+            self.dual_variable = dual_step(self.dual_variable, transition.cost, self._config.lagrangian)  # l. 15-16
         decided = self._decision.add(transition)
         if decided is not None:
             self._replay.add(decided)  # Alg. 1, l. 12
@@ -131,7 +127,7 @@ class Learner:
         return {
             "agent": self._agent.state(),
             "replay": self._replay.state(),
-            "dual_variable": self._dual.value,
+            "dual_variable": self.dual_variable,
             "generator": self._generator.bit_generator.state,
             "acted": self._acted,
             "steps": self._steps,
@@ -146,7 +142,7 @@ class Learner:
         """
         self._replay.load(state["replay"])
         self._agent.load(state["agent"])
-        self._dual.value = state["dual_variable"]
+        self.dual_variable = state["dual_variable"]
         self._generator.bit_generator.state = state["generator"]
         self._acted, self._steps, self._updates = state["acted"], state["steps"], state["updates"]
 
@@ -182,4 +178,4 @@ class Learner:
         Deviation: formed when sampled, so λ is today's and not the one in force when the step was taken.
         """
         b = batch
-        return self._reward(b.risk_reward, b.cost, b.robustness, b.next_robustness, b.terminated, self._dual.value)
+        return self._reward(b.risk_reward, b.cost, b.robustness, b.next_robustness, b.terminated, self.dual_variable)

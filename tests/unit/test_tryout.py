@@ -26,7 +26,7 @@ from risk_sac.tryout import ALIKE_M, LEFT, MET_M, RIGHT, Tried, meet
 )
 def test_sides_that_are_not_alike_are_told_with_what_differs(left_m: float, right_m: float, says: str | None) -> None:
     fit = place_at(read_net(NETS / "low" / "low.net.xml"), "car_following", "road")
-    assert Tried(fit, "low", sides=(left_m, right_m)).unlike == says
+    assert Tried(fit, sides=(left_m, right_m)).unlike == says
 
 
 @pytest.fixture(scope="module")

@@ -193,7 +193,7 @@ def test_a_batch_is_learnt_from_with_the_dual_variable_of_the_moment(
     monkeypatch.setattr(subject._agent, "update", watched)
     for _ in range(CONFIG.agent.warmup_steps):
         subject.observe(transition(cost=0.3))  # when λ was 0
-    subject._dual.value = 2.0
+    subject.dual_variable = 2.0
     subject.update()
     assert rewards == [pytest.approx([-2.0 * 0.3] * CONFIG.agent.batch_size)]
 
