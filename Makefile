@@ -63,7 +63,7 @@ torture: $(STAMP) ## kill, fill, damage and fuzz the service in earnest, about t
 	RISK_SAC_TORTURE=full RISK_SAC_SCHEMATHESIS_CASES=20000 $(PYTHON) -m pytest -m "not bench" --timeout 7200 \
 		tests/torture tests/contract/test_fuzzing.py
 	for times in "worker --times 30" "raylet --times 10" "head --times 5" "server --times 10"; do \
-		$(PYTHON) -m tests.torture.ray_numbers kills --of $$times || exit 1; done
+		$(PYTHON) -m tests.torture.ray_numbers --of $$times || exit 1; done
 
 load: $(STAMP) ## poll and follow the service while it searches, and fill its database; half an hour on a quiet machine
 	$(PYTHON) -m tests.load.run

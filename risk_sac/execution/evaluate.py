@@ -5,7 +5,6 @@ DIR/runs/<family>-<method>-<seed>/       a run's folder, see `risk_sac.run_folde
 DIR/table.{json,md,csv}, DIR/figures/    see `risk_sac.report`
 """
 
-import fcntl
 import os
 import signal
 from collections.abc import Iterator, Sequence
@@ -22,9 +21,10 @@ from risk_sac.execution.runs import STOPPING, stop_signal
 from risk_sac.execution.verify import verify
 from risk_sac.problem import checked_campaign
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
+from risk_sac.run_folder.durable import held, replace_file
 from risk_sac.run_folder.verified import TIMES
 
-SPEC, RUNS, LOCK = "spec.yaml", "runs", ".lock"
+SPEC, RUNS = "spec.yaml", "runs"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +61,7 @@ def evaluate(
         raise ConfigError("jobs", f"{jobs}", "at least one process")
     if times < 0:
         raise ConfigError("verify", f"{times}", "0 or more")
+    folder = folder.absolute()  # an ego may change the working directory
     spec = checked_campaign(spec)  # before the folder is claimed
     make_executor = executor_named(executor)
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
@@ -82,19 +83,12 @@ def evaluate(
 @contextmanager
 def _claimed(spec: CampaignSpec, folder: Path) -> Iterator[None]:
     """Holds the folder for this campaign; should this process be killed, its workers leave at once."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / LOCK).open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise ConfigError("out", f"{folder} is in use by another evaluation; wait for it to end") from error
+    with held(folder):
         file = folder / SPEC
         if file.exists():
             _check_same(spec, read_campaign(file, {}, {}), folder)
         else:
-            temporary = folder / f".{SPEC}.tmp"
-            temporary.write_text(campaign_yaml(spec), encoding="utf-8")
-            temporary.replace(file)
+            replace_file(file, campaign_yaml(spec).encode())
         yield
 
 

@@ -63,6 +63,9 @@ class LocalExecutor:
     The thread checks five times a second whether the worker overstays or has fallen silent.
     """
 
+    slots = math.inf  # the caller knows this machine
+    cluster = None
+
     def __init__(self, program: Program) -> None:
         self._program = program
         self._mailbox = Mailbox()
@@ -93,23 +96,8 @@ class LocalExecutor:
         """See `Executor.wake`."""
         self._mailbox.wake()
 
-    @property
-    def slots(self) -> float:
-        """Infinite: the caller knows this machine."""
-        return math.inf
-
-    @property
-    def cluster(self) -> None:
-        """There is none."""
-
     def close(self) -> None:
         """Holds nothing."""
-
-    def pid(self, number: int) -> int | None:
-        """Process at work on a run, which leads a group of its own; None if there is none."""
-        with self._lock:
-            worker = self._workers.get(number)
-            return None if worker is None else worker.process.pid
 
     def cancel(self, number: int, grace_s: float) -> None:
         """SIGTERM now; SIGKILL once the grace time is over."""

@@ -11,6 +11,7 @@ from risk_sac.config import RunSpec
 from risk_sac.execution.recorder import Recorder
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.run_folder.durable import held
 from risk_sac.run_folder.results import Results
 from risk_sac.train import train
 
@@ -23,12 +24,13 @@ def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
     """Executes a run, or goes on with the one in `folder`; SIGINT and SIGTERM end it after the episode.
 
     Raises:
-      ConfigError: the spec poses no problem that can be run, or the folder holds a run of another one.
+      ConfigError: the spec poses no problem that can be run, or the folder is in use or holds another run.
       CheckpointError: the folder's checkpoint is of another run.
       OSError: the folder cannot be written.
     """
     spec = spec.model_copy(update={"ego": Problem.from_spec(spec).ego})  # before the folder is claimed
-    with stop_signal() as stopping, Recorder(spec, folder, Watcher(progress, stopping)) as recorder:
+    folder = folder.absolute()  # an ego may change the working directory
+    with held(folder), stop_signal() as stopping, Recorder(spec, folder, Watcher(progress, stopping)) as recorder:
         return recorder.finish(train(spec, folder, recorder))
 
 

@@ -8,7 +8,6 @@ means that the scheduler has died: the worker leaves at once, and the run resume
 """
 
 import errno
-import fcntl
 import io
 import logging
 import os
@@ -26,11 +25,12 @@ from typing import IO, TYPE_CHECKING
 import psutil
 
 from risk_sac.config import RunSpec
-from risk_sac.errors import RiskSacError
+from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.executor import WORDS
 from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.run_folder.durable import LOCK, lock
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 BEAT_S = 1.0
-LOCK = ".lock"  # in the run's folder
 PATIENCE_S = 5.0  # a worker leaves as soon as its scheduler is gone, but one that was stopped cannot
+GIVE_UP_S = 60.0  # after which what holds the folder is no such worker
 POLL_S = 0.05
 # Torch, C++ and the loader of libraries have no class of errors for it.
 _OUT_OF_MEMORY = (
@@ -236,19 +236,20 @@ def take_over(folder: Path) -> IO[bytes]:
     some time, then it is killed.
 
     Raises:
+      ConfigError: `risk-sac run` is at work in the folder.
       OSError: the folder cannot be written.
     """
-    killing_at = time.monotonic() + PATIENCE_S
-    lock = (folder / LOCK).open("ab")
+    began = time.monotonic()
     while True:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if time.monotonic() >= killing_at:
+            return lock(folder / LOCK)
+        except BlockingIOError as error:
+            waited_s = time.monotonic() - began
+            if waited_s >= GIVE_UP_S:
+                raise ConfigError("out", f"{folder}, in which another process is at work") from error
+            if waited_s >= PATIENCE_S:
                 _kill_others()
             time.sleep(POLL_S)
-        else:
-            return lock
 
 
 def _kill_others() -> None:

@@ -4,20 +4,28 @@ A sealed file is a JSON object whose last field is the SHA-256 of all bytes befo
 """
 
 import contextlib
+import errno
+import fcntl
 import hashlib
+import logging
 import os
 import re
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from risk_sac.errors import DamagedError
+from risk_sac.errors import ConfigError, DamagedError
+
+logger = logging.getLogger(__name__)
 
 T = TypeVar("T")
 _SEAL = re.compile(rb',\n  "sha256": "([0-9a-f]{64})"\n}\n\Z')
 _END = b"\n}"
+LOCK = ".lock"  # in a folder that one process at a time may work in
+NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS)  # of a network's file system
 
 
 def replace_file(path: Path, content: bytes | memoryview, *, keep: Path | None = None, mode: int = 0o666) -> None:
@@ -56,6 +64,51 @@ def sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def lock(path: Path, *, wait: bool = False) -> IO[bytes]:
+    """Locks a file, which is made where there is none; close it to unlock it.
+
+    The kernel unlocks it when the process dies.
+
+    Raises:
+      BlockingIOError: another process has locked it, and this one does not wait.
+      OSError: it cannot be opened or locked.
+    """
+    file = path.open("ab")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+@contextlib.contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Makes a folder of results and keeps other processes from working in it.
+
+    Raises:
+      ConfigError: another process works in it, or it cannot be written.
+      OSError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = lock(folder / LOCK)
+    except BlockingIOError as error:
+        expected = "a folder that no other process is using"
+        raise ConfigError("out", f"{folder}, in which another process is at work", expected) from error
+    except OSError as error:
+        if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+            got = f"{folder}, which cannot be written ({error.strerror})"
+            raise ConfigError("out", got, "a folder that can be written") from error
+        if error.errno not in NO_LOCKS:
+            raise
+        logger.warning("%s cannot be locked (%s); let no other process work in it", folder, error.strerror)
+        yield
+        return
+    with file:
+        yield
 
 
 def set_aside(path: Path) -> Path:

@@ -11,7 +11,7 @@ from service.api.answers.pages import Cursors
 from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
 from service.api.stream import Streams
-from service.keys.key import Scope
+from service.keys.file import Scope
 from service.networks.network_store import NetworkStore
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager

@@ -1,11 +1,11 @@
 """The data folder: private to its owner, and in use by one process at a time."""
 
-import fcntl
 import os
 import stat
 from pathlib import Path
 from typing import IO
 
+from risk_sac.run_folder.durable import lock
 from service.errors import StorageError
 
 LOCK = ".lock"
@@ -26,15 +26,9 @@ def hold_data_folder(folder: Path) -> IO[bytes]:
     try:
         folder.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
         _close_to_others(folder)
-        handle = (folder / LOCK).open("ab")
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            handle.close()
-            raise StorageError(
-                f"folder {str(folder)!r} is in use by another process; stop it or use another"
-            ) from error
-        return handle
+        return lock(folder / LOCK)
+    except BlockingIOError as error:
+        raise StorageError(f"folder {str(folder)!r} is in use by another process; stop it or use another") from error
     except OSError as error:
         message = f"data_dir is {str(folder)!r}; wanted a folder that can be written ({error.strerror})"
         raise StorageError(message) from error

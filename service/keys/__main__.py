@@ -14,8 +14,7 @@ from rich.table import Table
 
 from risk_sac.errors import ConfigError, RiskSacError
 from service.host.environment import MISUSED, read_settings
-from service.keys.file import KeyFile, missing
-from service.keys.key import PROJECT, Key, Scope
+from service.keys.file import PROJECT, Key, KeyFile, Scope, missing
 from service.keys.made import ever_made, noting
 from service.settings import ServiceSettings
 

@@ -1,23 +1,62 @@
-"""The keys on disk: one small file, replaced as a whole."""
+"""The API keys on disk: one small file, replaced as a whole.
 
-import contextlib
-import fcntl
+A key reads `rsk_ID_SECRET`. The id is public and finds the record; of the secret only a hash is kept. One SHA-256 is
+enough: slow hashes make guessable passwords expensive to guess, and 256 random bits cannot be guessed.
+"""
+
 import hashlib
+import hmac
+import re
+import secrets
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-from pydantic_core import to_json
+from pydantic import BaseModel, ConfigDict, Field
 
 from risk_sac.errors import DamagedError
-from risk_sac.run_folder.durable import unseal, write_sealed
+from risk_sac.run_folder.durable import lock, read_sealed, write_sealed
 from service.errors import KeysError
 from service.host.data_folder import FILE_MODE, FOLDER_MODE
-from service.keys.key import Key, Scope, mint
 
+PROJECT = "[a-z0-9][a-z0-9-]{0,39}"
 REMEDY = "restore their file from a copy, or begin anew with `risk-sac keys create --anew`"
+_TOKEN = re.compile(r"rsk_([0-9a-f]{8})_([A-Za-z0-9_-]{43})")
+
+
+class Scope(StrEnum):
+    """What a key may do; each scope includes those before it."""
+
+    READ = "read"  # look at its project's campaigns
+    RUN = "run"  # post, cancel and delete them
+    ADMIN = "admin"  # all of that in every project; and see the metrics
+
+    def includes(self, other: "Scope") -> bool:
+        """Whether this scope allows what `other` allows."""
+        order = list(Scope)
+        return order.index(self) >= order.index(other)
+
+
+class Key(BaseModel):
+    """What the service knows of a key. Times are seconds since the epoch."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    id: Annotated[str, Field(pattern="^[0-9a-f]{8}$")]
+    project: Annotated[str, Field(pattern=f"^{PROJECT}$")]
+    name: Annotated[str, Field(max_length=100)]
+    scope: Scope
+    created_at: float
+    revoked_at: float | None = None
+    hash: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+    def opened_by(self, secret: str) -> bool:
+        """Whether this is the key's secret and the key still counts."""
+        # In constant time, or the time of the answer would tell how much of the hash is right.
+        return hmac.compare_digest(self.hash, _hash(secret)) and self.revoked_at is None
 
 
 class Document(BaseModel):
@@ -30,14 +69,8 @@ class Document(BaseModel):
     """Whether processes of this machine need no key, because an administrator said so."""
 
 
-class _UnsealedDocument(Document):
-    """The file as version 0.1 wrote it, with a checksum over the keys."""
-
-    sha256: str
-
-    def whole(self) -> bool:
-        content = to_json(self.keys) + (b"open" if self.open else b"")
-        return hashlib.sha256(content).hexdigest() == self.sha256
+class DamagedKeysError(KeysError):
+    """The file of keys is not as it was written."""
 
 
 class KeyFile:
@@ -47,11 +80,17 @@ class KeyFile:
         self.path = path
 
     def load(self) -> Document | None:
-        """Reads the file; None where there is none. Raises a KeysError if it is damaged."""
+        """Reads the file; None where there is none.
+
+        Raises:
+          KeysError: it is damaged, or cannot be read.
+        """
         try:
-            return _parse(self.path.read_bytes(), self.path)
+            return read_sealed(self.path, Document)
         except FileNotFoundError:
             return None
+        except DamagedError as error:
+            raise DamagedKeysError(_unusable(self.path, "damaged")) from error
         except OSError as error:
             raise KeysError(f"keys file {str(self.path)!r} cannot be read: {error.strerror}") from error
 
@@ -62,18 +101,24 @@ class KeyFile:
 
     def create(self, project: str, name: str, scope: Scope) -> tuple[Key, str]:
         """Adds a key; returns it with the token that its holder needs. From now on every caller needs a key."""
-        with self._changing() as keys:
-            return _add(keys, project, name, scope)
+        with self._turn():
+            keys = self.read()
+            key, token = _mint(project, name, scope, {key.id for key in keys})
+            self._write(Document(keys=(*keys, key)))
+        return key, token
 
     def create_anew(self, project: str, name: str, scope: Scope) -> tuple[Key, str]:
         """Makes the first key of a new file in place of a lost or damaged one; refuses to replace a whole one."""
         with self._turn():
-            if self._whole():
+            try:
+                whole = self.load() is not None
+            except DamagedKeysError:
+                whole = False
+            if whole:
                 raise KeysError(f"keys file {str(self.path)!r} is whole; wanted a lost or damaged one: `revoke` keys")
-            keys: list[Key] = []
-            made = _add(keys, project, name, scope)
-            self._write(Document(keys=tuple(keys)))
-        return made
+            key, token = _mint(project, name, scope, set())
+            self._write(Document(keys=(key,)))
+        return key, token
 
     def open_all(self) -> None:
         """Forgets all keys, also lost and damaged ones, and lets in every process of this machine without one."""
@@ -82,38 +127,22 @@ class KeyFile:
 
     def revoke(self, key_id: str) -> Key:
         """Makes a key worthless; does nothing to one that is already."""
-        with self._changing() as keys:
-            for index, key in enumerate(keys):
-                if key.id == key_id:
-                    if key.revoked_at is None:
-                        keys[index] = key.model_copy(update={"revoked_at": round(time.time(), 3)})
-                    return keys[index]
-            raise KeysError(f"id is {key_id!r}; wanted one that `risk-sac keys list` shows")
-
-    def _whole(self) -> bool:
-        """Whether there is a file and it is not damaged; one that may not be read raises, since nobody can know."""
-        try:
-            _parse(self.path.read_bytes(), self.path)
-        except (FileNotFoundError, KeysError):
-            return False
-        return True
-
-    @contextmanager
-    def _changing(self) -> Iterator[list[Key]]:
-        """The keys as a list whose changes are written, with nobody else changing them meanwhile."""
         with self._turn():
-            keys = list(self.read())
-            yield keys
-            self._write(Document(keys=tuple(keys)))
+            keys = {key.id: key for key in self.read()}
+            if key_id not in keys:
+                raise KeysError(f"id is {key_id!r}; wanted one that `risk-sac keys list` shows")
+            if keys[key_id].revoked_at is None:
+                keys[key_id] = keys[key_id].model_copy(update={"revoked_at": round(time.time(), 3)})
+                self._write(Document(keys=tuple(keys.values())))
+        return keys[key_id]
 
     @contextmanager
     def _turn(self) -> Iterator[None]:
-        """With nobody else changing the file meanwhile."""
+        """Keeps other processes from changing the file meanwhile."""
         try:
             self.path.parent.mkdir(mode=FOLDER_MODE, parents=True, exist_ok=True)
             # A file of its own, because replacing the keys file would leave a lock on the old one.
-            with self.path.with_suffix(".lock").open("ab") as lock:
-                fcntl.flock(lock, fcntl.LOCK_EX)
+            with lock(self.path.with_suffix(".lock"), wait=True):
                 yield
         except OSError as error:
             raise KeysError(f"keys file {str(self.path)!r} cannot be written: {error.strerror}") from error
@@ -122,23 +151,23 @@ class KeyFile:
         write_sealed(self.path, document, mode=FILE_MODE)
 
 
-def _add(keys: list[Key], project: str, name: str, scope: Scope) -> tuple[Key, str]:
-    key, token = mint(project, name, scope)
-    while any(key.id == other.id for other in keys):
-        key, token = mint(project, name, scope)
-    keys.append(key)
-    return key, token
+def _mint(project: str, name: str, scope: Scope, taken: set[str]) -> tuple[Key, str]:
+    """A new key: its record, and the token that is shown once and kept nowhere."""
+    while (key_id := secrets.token_hex(4)) in taken:
+        pass
+    secret = secrets.token_urlsafe(32)
+    key = Key(id=key_id, project=project, name=name, scope=scope, created_at=round(time.time(), 3), hash=_hash(secret))
+    return key, f"rsk_{key_id}_{secret}"
 
 
-def _parse(content: bytes, path: Path) -> Document:
-    try:
-        return unseal(content, Document)
-    except DamagedError as error:
-        with contextlib.suppress(ValidationError):
-            old = _UnsealedDocument.model_validate_json(content)
-            if old.whole():
-                return Document(keys=old.keys, open=old.open)
-        raise KeysError(_unusable(path, "damaged")) from error
+def split(token: str) -> tuple[str, str] | None:
+    """Id and secret of a token; None if it has not the shape of one."""
+    found = _TOKEN.fullmatch(token)
+    return None if found is None else (found[1], found[2])
+
+
+def _hash(secret: str) -> str:
+    return hashlib.sha256(secret.encode("ascii")).hexdigest()
 
 
 def missing(path: Path) -> KeysError:

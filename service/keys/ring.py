@@ -8,8 +8,7 @@ from pathlib import Path
 
 from risk_sac.errors import ConfigError
 from service.errors import KeysError
-from service.keys.file import Document, KeyFile, missing
-from service.keys.key import Key, split
+from service.keys.file import Document, Key, KeyFile, missing, split
 from service.keys.made import AuthEnabledFlag
 from service.settings import ServiceSettings
 

@@ -213,7 +213,7 @@ def test_two_comparisons_do_not_share_a_folder(
     with (tmp_path / ".lock").open() as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         assert cli.main(["evaluate", "--families", "low", "--out", str(tmp_path)]) == 2
-    assert "is in use by another evaluation" in capsys.readouterr().err
+    assert "in which another process is at work" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

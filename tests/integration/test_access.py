@@ -17,8 +17,7 @@ import pytest
 from fastapi.routing import iter_route_contexts
 
 from service.app import create_app
-from service.keys.file import KeyFile
-from service.keys.key import Scope
+from service.keys.file import KeyFile, Scope
 from service.settings import ServiceSettings
 from tests.server import LONG_S
 

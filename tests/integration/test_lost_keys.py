@@ -1,12 +1,10 @@
 """A service whose file of keys is lost: whatever is restarted, nobody gets in until an administrator says otherwise."""
 
-import subprocess
-import sys
-
 import httpx
 import pytest
 
-RISK_SAC = [sys.executable, "-c", "import sys; from risk_sac.cli import main; sys.exit(main())"]
+from service.keys.__main__ import main
+
 NEEDS_KEY = (
     ("GET", "/v1/campaigns"),
     ("GET", "/metrics"),
@@ -16,16 +14,10 @@ NEEDS_KEY = (
 )
 
 
-def keys(service, *arguments):
-    command = [*RISK_SAC, "keys", *arguments]
-    return subprocess.run(command, env=service.environment, capture_output=True, text=True, timeout=600, check=False)
-
-
-def create(service, *arguments):
+def create(service, capsys, *arguments):
     """A client with a new key."""
-    made = keys(service, "create", "--project", "maps", *arguments)
-    assert made.returncode == 0, made.stderr
-    headers = {"authorization": f"Bearer {made.stdout.strip()}"}
+    assert main(["create", "--project", "maps", *arguments]) == 0
+    headers = {"authorization": f"Bearer {capsys.readouterr().out.strip()}"}
     return httpx.Client(base_url=service.client.base_url, headers=headers, timeout=120)
 
 
@@ -37,10 +29,13 @@ def statuses(client, campaign):
 
 
 @pytest.mark.parametrize("serve", ["sqlite", pytest.param("postgresql", marks=pytest.mark.torture)], indirect=True)
-def test_lost_keys_open_nothing(serve):
+def test_lost_keys_open_nothing(serve, monkeypatch, capsys):
     service = serve()
+    for name in ("RISK_SAC_DATA_DIR", "RISK_SAC_DATABASE_URL"):
+        if name in service.environment:
+            monkeypatch.setenv(name, service.environment[name])
     campaign = service.wait(service.post(budget={"episodes": 1}))["id"]
-    with create(service) as holder:
+    with create(service, capsys) as holder:
         assert holder.get("/v1/campaigns").status_code == 200
         (service.data_dir / "keys.json").unlink()
         for restarted in (False, True):
@@ -54,14 +49,15 @@ def test_lost_keys_open_nothing(serve):
             assert service.client.get("/healthz").status_code == 200
             assert service.client.get("/openapi.json").status_code == 200
         assert "is missing, although keys were made; restore their file from a copy" in service.log.read_text()
-        assert keys(service, "create", "--project", "maps").returncode == 1
-        with create(service, "--anew") as new:
+        assert main(["create", "--project", "maps"]) == 1
+        with create(service, capsys, "--anew") as new:
             assert new.get("/v1/campaigns").status_code == 200
             assert holder.get("/v1/campaigns").status_code == 401
             assert service.client.get("/v1/campaigns").status_code == 401
-    assert keys(service, "open").returncode == 2
+    with pytest.raises(SystemExit, match="2"):
+        main(["open"])
     assert service.client.get("/v1/campaigns").status_code == 401
-    assert keys(service, "open", "--yes").returncode == 0
+    assert main(["open", "--yes"]) == 0
     assert [each["id"] for each in service.client.get("/v1/campaigns").json()["items"]] == [campaign]
     (service.data_dir / "keys.json").unlink()
     assert statuses(service.client, campaign) == {503}

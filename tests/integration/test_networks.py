@@ -13,8 +13,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.keys.file import KeyFile
-from service.keys.key import Scope
+from service.keys.file import KeyFile, Scope
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
 from tests.server import Service
 

@@ -71,11 +71,11 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_a_comparison_comes_to_the_same_on_a_cluster_and_leaves_nothing_there(cluster, place, tmp_path):
-    there = evaluated(tmp_path / "ray", ["low", place])
+    there = evaluated(tmp_path / "ray", [place])
     assert there.returncode == 0, there.stderr
-    here = evaluated(tmp_path / "local", ["low", place], RISK_SAC_EXECUTOR="local")
+    here = evaluated(tmp_path / "local", [place], RISK_SAC_EXECUTOR="local")
     assert here.returncode == 0, here.stderr
-    assert len(digests(tmp_path / "local")) == 2
+    assert len(digests(tmp_path / "local")) == 1
     assert digests(tmp_path / "ray") == digests(tmp_path / "local")
     for name in digests(tmp_path / "local"):
         files = {path.name for path in (tmp_path / "local" / "runs" / name).iterdir()}

@@ -1,9 +1,8 @@
-"""`python -m tests.torture.ray_numbers WHAT …`: runs on a Ray cluster of this machine: load and kills.
+"""`python -m tests.torture.ray_numbers`: kills on a Ray cluster of this machine.
 
-scale --runs 1000 --slots 64 stand-ins that sleep, through the service: the server's share of a processor, lost runs
-kills --of worker --times 30 kill -9 at random moments of a worker, a raylet, the head or the server; or a node hangs
+--of worker --times 30 kill -9 at random moments of a worker, a raylet, the head or the server; or a node hangs
 
-Each ends with a line that has its figures and the machine's load while they were taken.
+It ends with a line that has the figures and the machine's load while they were taken.
 """
 
 import argparse
@@ -14,64 +13,14 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 import psutil
 
-from risk_sac.execution.messages import Finished
-from tests.builders import run_metrics
 from tests.ray_cluster import Cluster, running
 from tests.server import Service, servers
 
 LONG_S = 3600.0
 WORKER = "risk_sac.execution.worker"
-FEW = {"seeds": [0], "budget": {"episodes": 2}}
-
-
-def waited(service: Service, campaigns: list[str]) -> list[dict[str, Any]]:
-    """Campaigns that have ended; asked for as seldom as a client should."""
-    ended = []
-    for each in campaigns:
-        while (seen := service.get(each))["state"] not in ("succeeded", "failed", "cancelled"):
-            time.sleep(1.0)
-        ended.append(seen)
-    return ended
-
-
-def scale(options: argparse.Namespace) -> str:
-    """Through the service, its database and the bridge; the cluster's processes are started before."""
-    last = Finished(finished=True, metrics=run_metrics(1), evaluation=None, digest="d", versions={}, wall_s=1.0)
-    stand_in = {"SLEEPING_WORKER_LAST": last.model_dump_json(), "SLEEPING_WORKER_S": str(options.sleep_s)}
-    with (
-        running(options.folder, nodes=2, cpus=options.slots // 2, RISK_SAC_RAY_LEASE_S="120", **stand_in),
-        servers(options.folder) as serve,
-    ):
-        service = serve("sleeping_worker", max_workers=1024, lease_s=120)
-        service.wait(service.post(seeds=list(range(options.slots)), budget={"episodes": 1}), LONG_S)
-        server = psutil.Process(service.process.pid)
-        bridge = next(each for each in server.children() if "risk_sac.execution.ray.bridge" in each.cmdline())
-        spent = cpu_s(server), cpu_s(bridge)
-        began = time.monotonic()
-        campaigns = [
-            service.post(seeds=list(range(first, min(first + 100, options.runs))), budget={"episodes": 1})
-            for first in range(0, options.runs, 100)
-        ]
-        states = [run["state"] for each in waited(service, campaigns) for run in each["runs"]]
-        took_s = time.monotonic() - began
-        shares = [(cpu_s(process) - before) / took_s for process, before in zip((server, bridge), spent, strict=True)]
-    ideal_s = -(-options.runs // options.slots) * options.sleep_s
-    lost = options.runs - states.count("succeeded")
-    return (
-        f"{options.runs} runs of {options.sleep_s:g} s on {options.slots} slots: {lost} lost; "
-        f"drained in {took_s:.0f} s, ideal {ideal_s:.0f} s ({took_s / ideal_s - 1:+.1%}); "
-        f"of a core the server took {shares[0]:.1%}, the bridge {shares[1]:.1%}"
-    )
-
-
-def cpu_s(process: psutil.Process) -> float:
-    """Processor time so far."""
-    times = process.cpu_times()
-    return float(times.user + times.system)
 
 
 def kills(options: argparse.Namespace) -> str:
@@ -187,11 +136,7 @@ KILL = {"worker": _worker, "raylet": _raylet, "head": _head, "server": _server, 
 def main() -> None:
     """Prints one line of figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("scale", "kills"))
-    parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--episodes", type=int, default=30)
-    parser.add_argument("--slots", type=int, default=64)
-    parser.add_argument("--sleep-s", type=float, default=30.0)
     parser.add_argument("--of", choices=KILL, default="worker")
     parser.add_argument("--times", type=int, default=30)
     parser.add_argument("--within-s", type=float, default=9.0)
@@ -201,7 +146,7 @@ def main() -> None:
         options.folder = Path(folder)
         for name in ("local", "ray"):
             (options.folder / name).mkdir()
-        line = globals()[options.what](options)
+        line = kills(options)
     print(f"{line}; load {os.getloadavg()[1]:.1f} on {os.cpu_count()} cores")
 
 

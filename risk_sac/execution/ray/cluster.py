@@ -9,17 +9,14 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
-from typing import Any
 
 import ray
-from ray.exceptions import GetTimeoutError, RayError, RayTaskError
+from ray.exceptions import RayError, RayTaskError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from risk_sac import __version__
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Node
-from risk_sac.execution.ray.caretaker import Caretaker
 from risk_sac.execution.ray.node import check, versions
 from risk_sac.execution.ray.settings import ADDRESS, RaySettings, variable
 
@@ -29,13 +26,11 @@ TOKEN_MODE = "RAY_AUTH_MODE"  # Ray's own
 HEAD_S = 10.0
 PROBE_S = 60.0
 START_S = 60.0  # after which Ray goes on trying to join
-LEAVE_S = 10.0
 STORE_BYTES = 80_000_000  # about the least that Ray takes
 STARTED, JOINED = "Ray runtime started", re.compile(r"Local node IP: ([\w.:]+)")
 
 
-@contextlib.contextmanager
-def connected(settings: RaySettings) -> Iterator[None]:
+def connect(settings: RaySettings) -> None:
     """Makes this process a client of the cluster.
 
     Raises:
@@ -44,22 +39,21 @@ def connected(settings: RaySettings) -> Iterator[None]:
     """
     if settings.ray_address != "auto":
         _check_head(settings.ray_address)
-    with _joined(settings) as node:
-        try:
-            ray.init(
-                address=settings.ray_address,
-                log_to_driver=False,
-                logging_level=logging.ERROR,
-                configure_logging=False,
-                _node_ip_address=node,
-            )
-        except (ConnectionError, RuntimeError, ValueError, RayError) as error:
-            got = f"{settings.ray_address!r}: {' '.join(str(error).split())}"
-            expected = f"the head of a cluster of Ray {ray.__version__}, with its token where {TOKEN_MODE} is set"
-            raise ConfigError(ADDRESS, got, expected) from error
-        check_token(ray.get_runtime_context().gcs_address.rpartition(":")[0])
-        _check_nodes(settings)
-        yield
+    node = _join(settings) if settings.ray_join else None
+    try:
+        ray.init(
+            address=settings.ray_address,
+            log_to_driver=False,
+            logging_level=logging.ERROR,
+            configure_logging=False,
+            _node_ip_address=node,
+        )
+    except (ConnectionError, RuntimeError, ValueError, RayError) as error:
+        got = f"{settings.ray_address!r}: {' '.join(str(error).split())}"
+        expected = f"the head of a cluster of Ray {ray.__version__}, with its token where {TOKEN_MODE} is set"
+        raise ConfigError(ADDRESS, got, expected) from error
+    check_token(ray.get_runtime_context().gcs_address.rpartition(":")[0])
+    _check_nodes(settings)
 
 
 def nodes(settings: RaySettings) -> list[Node]:
@@ -95,50 +89,32 @@ def check_token(host: str) -> None:
 
 def _check_head(address: str) -> None:
     """Asks whether anything answers, before Ray itself tries for minutes."""
-    if not re.fullmatch(r"(\[[0-9A-Fa-f:]+\]|[^:/\s]+):\d{1,5}", address):
-        raise ConfigError(ADDRESS, f"{address!r}", "`auto` or HOST:PORT of the head")
     host, _, port = address.rpartition(":")
     try:
         socket.create_connection((host.strip("[]"), int(port)), timeout=HEAD_S).close()
-    except (OSError, OverflowError) as error:
+    except (OSError, OverflowError, ValueError) as error:
         got = f"{address!r}, where nothing answers ({error})"
-        raise ConfigError(ADDRESS, got, "HOST:PORT of the head of a Ray cluster") from error
+        raise ConfigError(ADDRESS, got, "`auto` or HOST:PORT of the head of a Ray cluster") from error
     check_token(host)
 
 
-@contextlib.contextmanager
-def _joined(settings: RaySettings) -> Iterator[str | None]:
-    """Makes this machine a node without room for runs, if that is wanted: Ray lets no client in whose machine is none.
+def _join(settings: RaySettings) -> str:
+    """Makes this machine a node that executes nothing, since Ray lets no client in whose machine is none.
 
-    Yields:
-      The node's address; None if that is not wanted.
+    The helper process ends the node with this process. Returns the node's address.
     """
-    if not settings.ray_join:
-        yield None
-        return
     if settings.ray_address == "auto":
         raise ConfigError(ADDRESS, "'auto', which is no cluster to join", "HOST:PORT")
     node = subprocess.Popen(
-        [sys.executable, "-m", "ray.scripts.scripts", "start", f"--address={settings.ray_address}", "--num-cpus=0",
-         f"--object-store-memory={STORE_BYTES}", "--disable-usage-stats", "--block"],
-        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
+        [sys.executable, "-m", "risk_sac.execution.helper", "0", "0", "ray.scripts.scripts", "start",
+         f"--address={settings.ray_address}", "--num-cpus=0", f"--object-store-memory={STORE_BYTES}",
+         "--disable-usage-stats", "--block"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
     )  # fmt: skip
-    caretaker = Caretaker()
-    caretaker.watch(node.pid)
-    late = threading.Timer(START_S, caretaker.act)
-    late.start()
-    try:
-        yield _address(node, settings, late)
-    finally:
-        late.cancel()
-        node.terminate()  # it ends what it has started
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            node.wait(LEAVE_S)
-        caretaker.act()
-
-
-def _address(node: "subprocess.Popen[str]", settings: RaySettings, late: threading.Timer) -> str:
+    assert node.stdin is not None
     assert node.stdout is not None
+    late = threading.Timer(START_S, node.stdin.close)
+    late.start()
     said = ""
     for line in node.stdout:
         said += line
@@ -146,6 +122,7 @@ def _address(node: "subprocess.Popen[str]", settings: RaySettings, late: threadi
             late.cancel()
             threading.Thread(target=node.stdout.read, daemon=True).start()
             return address[1]
+    late.cancel()
     got = f"{settings.ray_address!r}, which this machine cannot join ({' '.join(said[-1000:].split())})"
     raise ConfigError(ADDRESS, got, "a cluster of the same Ray")
 
@@ -156,33 +133,20 @@ def _check_nodes(settings: RaySettings) -> None:
     if not able:
         got = f"{settings.ray_cpus_per_run:g} processors and {settings.ray_memory_bytes_per_run} bytes for a run"
         raise ConfigError(variable("ray_cpus_per_run"), f"{got}; no node of the cluster has as much")
+    task = ray.remote(check)
     asked = {}
     for node in able:
         there = NodeAffinitySchedulingStrategy(node.id, soft=False)
-        task = ray.remote(check).options(num_cpus=0, max_retries=0, scheduling_strategy=there)
-        asked[task.remote(settings.ray_scratch_dir, versions())] = node.address
-    answered = [_answers(address, reference) for reference, address in asked.items()]
-    if not any(answered):
-        raise ConfigError(ADDRESS, f"all nodes were lost: {', '.join(node.address for node in able)}")
-
-
-def _answers(address: str, reference: Any) -> bool:
-    """Passes on what a node refuses; False if it was lost, which the head tells after a while."""
-    try:
-        ray.get(reference, timeout=PROBE_S)
-    except GetTimeoutError as error:
-        raise ConfigError(ADDRESS, f"node {address} does not answer within {PROBE_S:g} s") from error
-    except RayTaskError as error:
-        if isinstance(error.cause, ConfigError):
-            raise error.cause from None
-        wanted = f"risk-sac {__version__} and all that belongs to it, as on the server's machine"
-        got = f"node {address}, which cannot run what is here ({_first(error.cause)})"
-        raise ConfigError(ADDRESS, got, wanted) from error
-    except RayError as error:
-        logger.warning("node %s was lost: %s", address, _first(error))
-        return False
-    return True
-
-
-def _first(error: object) -> str:
-    return str(error).strip().partition("\n")[0] or type(error).__name__
+        options = task.options(num_cpus=0, max_retries=0, scheduling_strategy=there)
+        asked[options.remote(settings.ray_scratch_dir, versions())] = node.address
+    for reference, address in asked.items():
+        try:
+            ray.get(reference, timeout=PROBE_S)
+        except RayTaskError as error:
+            if isinstance(error.cause, ConfigError):
+                raise error.cause from None
+            wanted = f"risk-sac {__version__} and all that belongs to it, as on the server's machine"
+            got = f"node {address}, which cannot run what is here ({str(error.cause).partition(chr(10))[0]})"
+            raise ConfigError(ADDRESS, got, wanted) from error
+        except RayError as error:  # it is gone, or does not answer in time
+            logger.warning("node %s was lost: %s", address, type(error).__name__)

@@ -27,15 +27,15 @@ from risk_sac.scenario import library
 
 logger = logging.getLogger(__name__)
 
-FIRST_WAIT_S, LONGEST_WAIT_S = 1.0, 15.0  # between two attempts to reach a cluster that was lost
+WAIT_S = 5.0  # between two attempts to reach a cluster that was lost
 CLOSE_S = 10.0
 
 
 class RayExecutor:
     """Orders attempts and passes on what is said of them.
 
-    A thread listens to the bridge. When the cluster is lost, what was at work on it is told to be lost, and what is
-    submitted waits until there is a cluster again.
+    A thread listens to the bridge. When the cluster is lost, so is what was at work on it and what is submitted before
+    there is one again.
 
     Attributes:
       cluster: as it was a few seconds ago; without nodes while it is lost.
@@ -59,8 +59,8 @@ class RayExecutor:
         self._orders: dict[str, Order] = {}  # whose attempts have not ended
         self._lock = threading.RLock()
         self._closed = threading.Event()
-        self._bridge: _Bridge | None = _Bridge()
-        threading.Thread(target=self._work, args=(self._bridge,), name="ray", daemon=True).start()
+        self._bridge = _Bridge()
+        threading.Thread(target=self._work, name="ray", daemon=True).start()
 
     @property
     def slots(self) -> float:
@@ -79,14 +79,14 @@ class RayExecutor:
         with self._lock:
             for overtaken in self._orders_of(number):
                 del self._orders[overtaken.id]
-                self._say("cancel", overtaken.id, 0)
+                self._bridge.say("drop", overtaken.id)
             self._orders[order.id] = order
-            self._say("submit", order)
+            if not self._bridge.say("submit", order):
+                self._lose(order)
 
     def _order(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> Order:
         """An attempt, with the egos that the server's operator has registered and the run's place."""
-        id_ = secrets.token_hex(8)
-        scratch = self._scratch / f"{folder.name}-{id_}"
+        scratch = self._scratch / f"{folder.name}-{secrets.token_hex(8)}"
         beside: dict[str, Path] = {}
         environment = {registry.FILE: ""}  # whatever a node registers by itself does not count
         if registered := os.environ.get(registry.FILE):
@@ -98,14 +98,7 @@ class RayExecutor:
             environment[library.VARIABLE] = str(scratch / "places")
         program = replace(self._program, environment=environment)
         return Order(
-            id=id_,
-            number=number,
-            attempt=attempt,
-            spec=spec,
-            program=program,
-            folder=folder,
-            scratch=scratch,
-            beside=beside,
+            number=number, attempt=attempt, spec=spec, program=program, folder=folder, scratch=scratch, beside=beside
         )
 
     def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
@@ -121,41 +114,35 @@ class RayExecutor:
         with self._lock:
             for order in self._orders_of(number):
                 order.told_to_stop = True
-                self._say("cancel", order.id, grace_s)
-                if self._bridge is None:
-                    self._pass_on(order, Exited("stopped before it began"))
+                self._bridge.say("cancel", order.id, grace_s)
 
     def close(self) -> None:
         """Leaves the cluster; actors that are still there end."""
         self._closed.set()
-        with self._lock:
-            bridge, self._bridge = self._bridge, None
-        if bridge is not None:
-            bridge.close()
+        self._bridge.close()
 
     def _orders_of(self, number: int) -> list[Order]:
         return [order for order in self._orders.values() if order.number == number]
 
-    def _say(self, kind: str, *content: Any) -> None:
-        """Tells the bridge something; the next one is told what is ordered then."""
-        if self._bridge is not None:
-            self._bridge.say(kind, *content)
-
-    def _work(self, bridge: "_Bridge | None") -> None:
+    def _work(self) -> None:
         """Listens to one bridge after the other."""
-        while bridge is not None:
-            for kind, *content in bridge.messages():
+        while True:
+            for kind, *content in self._bridge.messages():
                 self._hear(kind, *content)
-            bridge.close()
-            if self._closed.is_set():
-                return
-            logger.error("the cluster is lost; runs go on from their checkpoints once there is one again")
             with self._lock:
-                self._bridge, self.cluster = None, Cluster()
-                for order in list(self._orders.values()):
-                    cause = Cause.ENDED if order.told_to_stop else Cause.LOST
-                    self._pass_on(order, Exited("the cluster was lost", cause))
-            bridge = self._reached_again()
+                self.cluster = Cluster()
+                self._lose(*self._orders.values())
+            while True:
+                logger.error("the cluster is lost; runs go on from their checkpoints once there is one again")
+                if self._closed.wait(WAIT_S):
+                    return
+                with contextlib.suppress(ConfigError):
+                    self._bridge = _Bridge()
+                    break
+
+    def _lose(self, *orders: Order) -> None:
+        for order in orders:
+            self._pass_on(order, Exited("the cluster was lost", Cause.LOST))
 
     def _hear(self, kind: str, *content: Any) -> None:
         with self._lock:
@@ -166,32 +153,12 @@ class RayExecutor:
             elif content[0] in self._orders:  # else another attempt has overtaken it
                 self._pass_on(self._orders[content[0]], *content[1])
 
-    def _reached_again(self) -> "_Bridge | None":
-        """Another bridge, once there is a cluster; None if this was closed."""
-        wait_s = FIRST_WAIT_S
-        while not self._closed.wait(wait_s):
-            try:
-                bridge = _Bridge()
-            except ConfigError as error:
-                logger.warning("the cluster cannot be reached: %s", error)
-                wait_s = min(2 * wait_s, LONGEST_WAIT_S)
-                continue
-            with self._lock:
-                if self._closed.is_set():
-                    bridge.close()
-                    return None
-                self._bridge = bridge
-                for order in self._orders.values():  # which were submitted meanwhile
-                    bridge.say("submit", order)
-            logger.info("there is a cluster again")
-            return bridge
-        return None
-
     def _pass_on(self, order: Order, *messages: Event | Exited) -> None:
         for message in messages:
-            self._mailbox.put(order.number, order.attempt, message)
             if isinstance(message, Exited):
                 del self._orders[order.id]
+                message = replace(message, cause=Cause.ENDED) if order.told_to_stop else message
+            self._mailbox.put(order.number, order.attempt, message)
 
 
 class _Bridge:
@@ -209,7 +176,7 @@ class _Bridge:
                 [sys.executable, "-m", "risk_sac.execution.ray.bridge", str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 pass_fds=(theirs.fileno(),),
-                start_new_session=True,  # Ctrl-C is for whoever started us
+                start_new_session=True,  # Ctrl-C is for our starter
             )
         self._connection = Connection(ours.detach())
         kind, *content = next(self.messages(), ("refused",))
@@ -217,10 +184,12 @@ class _Bridge:
             self.close()
             raise content[0] if content else ConfigError(ADDRESS, "Ray ended while it was reaching the cluster")
 
-    def say(self, kind: str, *content: Any) -> None:
-        """Tells it something; what it does not read any more is lost with it."""
+    def say(self, kind: str, *content: Any) -> bool:
+        """Tells it something; returns False if it has ended."""
         with contextlib.suppress(OSError):
             self._connection.send((kind, *content))
+            return True
+        return False
 
     def messages(self) -> Iterator[tuple[Any, ...]]:
         """What it says until it ends."""

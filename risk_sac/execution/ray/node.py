@@ -5,7 +5,9 @@ It works in a folder of its node, which begins with the files of the run's folde
 """
 
 import contextlib
+import fcntl
 import os
+import shutil
 import sys
 import tempfile
 import time
@@ -21,7 +23,6 @@ from risk_sac.execution.executor import Exited, Program
 from risk_sac.execution.local import LocalExecutor
 from risk_sac.execution.messages import Event
 from risk_sac.execution.postmortem import without_folders
-from risk_sac.execution.ray.caretaker import Caretaker
 from risk_sac.execution.ray.settings import ADDRESS, variable
 from risk_sac.run_folder.durable import replace_file
 
@@ -40,15 +41,19 @@ Versions = Mapping[str, str]
 class Order:
     """An attempt at a run."""
 
-    id: str  # of this attempt and no other, of this server or an earlier one
     number: int
     attempt: int
     spec: RunSpec
     program: Program
     folder: Path  # of the run, on the server's machine
-    scratch: Path  # of the attempt, on its node
+    scratch: Path  # of this attempt and no other, on its node
     beside: Mapping[str, Path]  # what the worker reads beside the run's folder, by its path in `scratch`
     told_to_stop: bool = False
+
+    @property
+    def id(self) -> str:
+        """Of this attempt and no other, of this server or an earlier one."""
+        return self.scratch.name
 
 
 class Attendant:
@@ -64,8 +69,8 @@ class Attendant:
         import ray
 
         check(order.scratch.parent, expected)
-        order.scratch.mkdir(mode=0o700)
-        self._caretaker = Caretaker(order.scratch)
+        self._scratch = order.scratch
+        self._lock = claim(order.scratch)
         self._folder = order.scratch / order.folder.name
         self._folder.mkdir()
         write(self._folder, seed)
@@ -74,8 +79,6 @@ class Attendant:
         self._grown_due = 0.0
         self._local = LocalExecutor(order.program)
         self._local.submit(1, 1, order.spec, self._folder)
-        if (pid := self._local.pid(1)) is not None:
-            self._caretaker.watch(pid)
         return str(ray.get_runtime_context().get_node_id())
 
     def poll(self, wait_s: float) -> tuple[list[Event | Exited], Files]:
@@ -88,7 +91,7 @@ class Attendant:
         ended = bool(messages) and isinstance(messages[-1], Exited)
         files = self._changed(ended)
         if ended:
-            self._caretaker.act()
+            shutil.rmtree(self._scratch, ignore_errors=True)
         return messages, files
 
     def cancel(self, grace_s: float) -> None:
@@ -120,6 +123,34 @@ class Attendant:
             if grown:
                 self._grown_due = time.monotonic() + max(GROWN_S, size / GROWN_BYTES_PER_S)
                 grown = False
+
+
+def claim(scratch: Path) -> int:
+    """Makes the folder of an attempt, and removes those of attempts whose actors have gone.
+
+    Returns the descriptor by which this process locks it; the kernel unlocks it when the process dies.
+    """
+    others = os.open(scratch.parent, os.O_RDONLY)
+    fcntl.flock(others, fcntl.LOCK_EX)  # else another actor takes the new folder for an old one
+    try:
+        for folder in scratch.parent.iterdir():
+            with contextlib.suppress(OSError):
+                os.close(_locked(folder))
+                shutil.rmtree(folder, ignore_errors=True)
+        scratch.mkdir(mode=0o700)
+        return _locked(scratch)
+    finally:
+        os.close(others)
+
+
+def _locked(folder: Path) -> int:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(descriptor)
+        raise
+    return descriptor
 
 
 def check(scratch: Path, expected: Versions) -> None:

@@ -16,7 +16,7 @@ from service.api.answers.problems import ProblemError, problem_response
 from service.api.context import CALLER, LOCAL, Caller, check_scope
 from service.errors import KeysError
 from service.keys.file import REMEDY
-from service.keys.key import Scope as KeyScope
+from service.keys.file import Scope as KeyScope
 from service.keys.made import AuthEnabledFlag
 from service.keys.ring import KeyRing, is_loopback
 from service.settings import ServiceSettings

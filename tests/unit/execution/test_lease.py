@@ -28,16 +28,6 @@ def test_a_worker_that_stays_busy_without_an_episode_is_lost_when_it_stalls():
     assert seconds_until_lost(Lease(4.0, 60.0), busy) == 60.0
 
 
-def test_an_episode_ends_a_stall():
-    signs = [Signs(words=count, episodes=count // 200) for count in range(1000)]
-    assert seconds_until_lost(Lease(4.0, 60.0), signs) is None
-
-
-def test_the_reason_names_the_limit():
-    assert Lease(4.0, FOREVER).passed(4.0, Signs()) == "worker gave no sign of life for 4 s"
-    assert Lease(FOREVER, 600.0).passed(600.0, Signs()) == "worker finished no episode for 600 s"
-
-
 def test_time_that_nobody_watched_is_not_held_against_a_worker():
     lease = Lease(4.0, FOREVER)
     lease.passed(3.9, Signs())

@@ -94,11 +94,6 @@ def test_unusual_arrays_survive(tmp_path, array):
     assert_same(checkpoint.load(tmp_path / "a", RUN)["array"], array)
 
 
-def test_loaded_arrays_can_be_written_to(path):
-    loaded = checkpoint.load(path, RUN)["observations"]
-    loaded[0, 0] = 5
-
-
 def test_view_does_not_drag_its_whole_storage_along(tmp_path):
     big, big_array = torch.zeros(1_000_000), np.zeros(1_000_000)
     checkpoint.save(tmp_path / "v", {"few": big[:10], "array": big_array[:10]}, RUN)
@@ -114,15 +109,6 @@ def test_truncation_to_a_few_bytes_and_by_one_byte_is_noticed(path):
     path.write_bytes(content + b"\x00")
     with pytest.raises(CheckpointError, match="damaged"):
         checkpoint.load(path, RUN)
-
-
-def test_every_flipped_bit_is_noticed(path):
-    content = path.read_bytes()
-    positions = np.random.default_rng(0).integers(len(content) * 8, size=50)
-    for position in (0, 70, *positions):
-        path.write_bytes(flipped(content, position))
-        with pytest.raises(DamagedCheckpoint, match="damaged"):
-            checkpoint.load(path, RUN)
 
 
 def flipped(content, position):
@@ -167,12 +153,6 @@ def test_a_missing_newest_checkpoint_is_replaced_by_the_one_before_it(two):
     assert checkpoint.exists(two)
 
 
-def test_a_damaged_older_checkpoint_is_never_looked_at_while_the_newest_is_good(two, caplog):
-    checkpoint.previous(two).write_bytes(b"")
-    assert checkpoint.load_newest(two, RUN)["episode"] == 40
-    assert not caplog.records
-
-
 def test_two_damaged_checkpoints_mean_the_first_episode_and_both_are_named(two, caplog):
     for path in (two, checkpoint.previous(two)):
         path.write_bytes(flipped(path.read_bytes(), 999))
@@ -193,16 +173,6 @@ def test_a_damaged_checkpoint_never_takes_the_place_of_the_good_one_before_it(tw
 def test_a_checkpoint_of_another_run_is_no_reason_to_begin_anew(two):
     with pytest.raises(CheckpointError, match="belongs to the run"):
         checkpoint.load_newest(two, "b" * 64)
-
-
-def test_missing_file_is_named(tmp_path):
-    with pytest.raises(CheckpointError, match=r"no checkpoint at .*gone\.ckpt"):
-        checkpoint.load(tmp_path / "gone.ckpt", RUN)
-
-
-def test_checkpoint_of_another_run_is_refused(path):
-    with pytest.raises(CheckpointError, match=r"belongs to the run aaaa.*wanted bbbb"):
-        checkpoint.load(path, "b" * 64)
 
 
 def test_file_of_another_program_or_version_is_refused(tmp_path):
@@ -246,13 +216,6 @@ def test_what_could_not_be_read_back_is_refused_when_saving(path, value, message
     with pytest.raises(TypeError, match=message):
         checkpoint.save(path, value, RUN)
     assert path.read_bytes() == before
-
-
-def test_temporary_name_that_cannot_be_opened_leaves_the_old_checkpoint(path):
-    (path.parent / ".run.ckpt.tmp").mkdir()
-    with pytest.raises(IsADirectoryError):
-        checkpoint.save(path, {"episode": 40}, RUN)
-    assert_same(checkpoint.load(path, RUN), example_state())
 
 
 @pytest.mark.parametrize("function", ["fsync", "replace"])

@@ -12,7 +12,7 @@ from service.api.answer_cache import MOST_BYTES, AnswerCache, keep
 from service.api.answers.representations import Representation, caching, entity_tag
 from service.api.context import CALLER, Caller
 from service.errors import StorageError
-from service.keys.key import Scope
+from service.keys.file import Scope
 
 ADMIN = "admin"  # a caller who sees all projects
 

@@ -4,7 +4,7 @@ from service.api.answers.problems import ProblemError
 from service.api.context import Caller, check_scope
 from service.api.guards.gate import RateLimit, allowed_hosts, check_host, check_origin
 from service.app import create_app
-from service.keys.key import Scope
+from service.keys.file import Scope
 from service.settings import ServiceSettings
 
 

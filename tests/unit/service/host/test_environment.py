@@ -60,11 +60,6 @@ def test_secrets_are_read_and_wrong_ones_named(tmp_path: Path) -> None:
     assert (ended.returncode, ended.stderr) == (2, "RISK_SAC_PORT: got '70000'; wanted integer ≥ 1, ≤ 65535\n")
 
 
-def test_lists_are_json(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RISK_SAC_ALLOWED_HOSTS", '["a.example", "b.example"]')
-    assert read_settings().allowed_hosts == ["a.example", "b.example"]
-
-
 @pytest.mark.parametrize("value", ["a.example", "{}", '"a"', "", "7"])
 def test_what_is_no_list_is_named(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
     monkeypatch.setenv("RISK_SAC_ALLOWED_HOSTS", value)
@@ -83,11 +78,3 @@ def test_every_setting_has_a_default_and_one_worker_per_core(monkeypatch: pytest
     settings = ServiceSettings()
     assert (settings.host, settings.port) == ("127.0.0.1", 8000)
     assert settings.max_workers == 3
-
-
-def test_the_environment_overrides(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RISK_SAC_DATA_DIR", "/srv/x")
-    monkeypatch.setenv("RISK_SAC_MAX_WORKERS", "7")
-    settings = ServiceSettings()
-    assert settings.max_workers == 7
-    assert settings.run_folder("c1", "low-sac-0") == Path("/srv/x/campaigns/c1/low-sac-0")

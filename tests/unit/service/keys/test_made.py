@@ -11,8 +11,7 @@ import pytest
 from service.errors import KeysError, StorageError
 from service.host.data_folder import hold_data_folder
 from service.keys.__main__ import main
-from service.keys.file import KeyFile
-from service.keys.key import Scope
+from service.keys.file import KeyFile, Scope
 from service.keys.made import AuthEnabledFlag, ever_made, noting
 from service.keys.ring import KeyRing
 from service.settings import ServiceSettings
@@ -51,12 +50,6 @@ def test_the_command_notes_in_the_database_that_there_are_keys(settings: Service
     store = Store(settings.url)  # which is the server's, and is as the server would have made it
     assert keys_were_made(store.engine)
     store.close()
-
-
-def test_the_command_works_beside_a_server(settings: ServiceSettings, file: KeyFile, store: Store) -> None:
-    assert main(CREATE) == 0
-    assert keys_were_made(store.engine)
-    assert len(file.read()) == 1
 
 
 def test_a_key_that_cannot_be_noted_is_not_made(
@@ -127,17 +120,6 @@ def test_a_server_notes_keys_that_are_made_while_nobody_asks(file: KeyFile, stor
             pause.wait(0.05)
         with pytest.raises(KeysError, match="missing"):
             _ = KeyRing(file.path, made).open
-
-
-def test_keys_that_a_request_saw_are_known_of_at_once(file: KeyFile) -> None:
-    made = AuthEnabledFlag()
-    ring = KeyRing(file.path, made)
-    assert ring.open
-    file.create("maps", "", Scope.RUN)
-    assert not ring.open
-    file.path.unlink()
-    with pytest.raises(KeysError, match="missing"):
-        ring.keys()
 
 
 def test_open_is_what_an_administrator_has_said(file: KeyFile) -> None:

@@ -7,7 +7,6 @@ import pytest
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import Finished
 from risk_sac.records import Episode, Outcome, State, StateChange
-from service.errors import NotFoundError
 
 
 @pytest.fixture
@@ -130,8 +129,3 @@ def test_an_episode_that_comes_out_otherwise_keeps_its_place(store, ledger, epis
     ledger.add_episodes([(number, episode(2))])
     after = store.events(campaign.id, limit=100).items
     assert [short(each) for each in after] == [*map(short, before), "low-random-0-train-2"]
-
-
-def test_a_campaign_that_is_gone_has_no_feed(store):
-    with pytest.raises(NotFoundError):
-        store.events("none", limit=100)

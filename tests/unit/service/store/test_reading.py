@@ -4,7 +4,7 @@ import pytest
 from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, EgoConfig
-from risk_sac.records import Funnel, Grade, Outcome, State, stored
+from risk_sac.records import Grade, Outcome, State, stored
 from service.errors import NotFoundError
 from service.store.finding import Judged
 from tests.begun import start
@@ -137,13 +137,6 @@ def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, 
     first = store.episodes(campaign.id, limit=1, judged=Judged(grade=Grade.CAREFUL))
     rest = store.episodes(campaign.id, limit=9, after=first.last, judged=Judged(grade=Grade.CAREFUL))
     assert [item.index for item in (*first.items, *rest.items)] == [0, 3] * 2
-
-
-def test_an_episode_comes_with_the_funnel_at_its_time(store, ledger, episode):
-    campaign = ledger.create(SPEC)
-    ledger.add_episodes([(start(store, ledger), episode(0))])
-    (stored,) = store.episodes(campaign.id, limit=10).items
-    assert stored.funnel == Funnel(contacts=2, valid=1, distinct=1, preventable=1)
 
 
 def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):

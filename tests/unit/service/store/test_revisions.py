@@ -1,6 +1,6 @@
 import pytest
 
-from service.store.revisions import Known, Revisions
+from service.store.revisions import Revisions
 
 
 @pytest.fixture
@@ -8,15 +8,6 @@ def revisions():
     revisions = Revisions()
     revisions.note("c1", "ours", 1)
     return revisions
-
-
-def test_what_was_never_read_or_written_is_not_known(revisions):
-    assert revisions.get("c2") is None
-
-
-def test_what_was_written_is_known(revisions):
-    revisions.note("c1", "ours", 2)
-    assert revisions.get("c1") == Known("ours", 2)
 
 
 def test_the_revision_of_all_campaigns_moves_with_each_of_them(revisions):
@@ -45,8 +36,3 @@ def test_a_write_that_a_reader_saw_first_counts_all_the_same(revisions):
     assert revisions.all == before, "a campaign that is only read is no news"
     revisions.note("c2", "ours", 1)
     assert revisions.all > before
-
-
-def test_a_deleted_campaign_is_forgotten(revisions):
-    revisions.forget("c1")
-    assert revisions.get("c1") is None

@@ -1,7 +1,5 @@
 """The one order of a campaign's events."""
 
-from random import Random
-
 import pytest
 
 from risk_sac.config import CampaignSpec
@@ -19,42 +17,6 @@ def test_a_page_of_events_ends_where_it_says(store, ledger, episode):
     assert len(store.events(campaign.id, limit=4, after=3).items) == 2
     for after in (5, 6, 1 << 62):
         assert store.events(campaign.id, limit=4, after=after).items == ()
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_what_was_told_as_it_was_written_is_told_again_from_every_position(store, ledger, episode, seed):
-    """Three runs that start, report, repeat, wait, pause and end in turns that chance chooses."""
-    chance = Random(seed)
-    spec = CampaignSpec(families=("low",), methods=("random",), seeds=(0, 1, 2))
-    campaign = ledger.create(spec)
-    other = ledger.create(spec)  # whose rows come between
-    told_first = []
-
-    def hear():
-        told_first.extend(store.events(campaign.id, limit=500, after=len(told_first)).items)
-
-    waiting, at_work = [run.number for run in campaign.runs], []
-    ledger.start_run(other.runs[0].number)
-    for index in range(60):
-        ledger.add_episodes([(other.runs[0].number, episode(index))])
-        if waiting and (not at_work or chance.random() < 0.4):
-            at_work.append(waiting.pop(chance.randrange(len(waiting))))
-            ledger.start_run(at_work[-1])
-        elif chance.random() < 0.8:
-            ledger.add_episodes([(chance.choice(at_work), episode(chance.randrange(30)))])
-        else:
-            waiting.append(at_work.pop(chance.randrange(len(at_work))))
-            ledger.requeue_run(waiting[-1], "its worker died")
-        hear()
-    ledger.pause(at_work, "the disk is full")
-    hear()
-    ledger.resume()
-    hear()
-    ledger.cancel(campaign.id)
-    hear()
-    assert told_first[-1].state is State.CANCELLED
-    for position in range(len(told_first) + 1):
-        assert list(store.events(campaign.id, limit=500, after=position).items) == told_first[position:]
 
 
 @pytest.mark.parametrize("damage", ["DELETE FROM changes", "UPDATE changes SET sequence = 9"])

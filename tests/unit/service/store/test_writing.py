@@ -74,16 +74,6 @@ def test_an_episode_that_comes_out_otherwise_replaces_the_first(store, ledger, e
     assert (store.campaign(campaign.id).runs[0].failures, store.campaign(campaign.id).runs[0].episodes_done) == (0, 1)
 
 
-def test_search_and_evaluation_episodes_of_one_index_are_two(store, ledger, episode):
-    campaign = ledger.create(SPEC)
-    number = start(store, ledger)
-    ledger.add_episodes([(number, episode(0))])
-    ledger.add_episodes([(number, episode(0, phase="evaluate"))])
-    (run, *_) = store.campaign(campaign.id).runs
-    assert run.episodes_done == 2
-    assert run.metrics == run.evaluation == episode(0).metrics
-
-
 def test_a_campaign_succeeds_with_its_last_run(store, ledger, metrics):
     campaign = ledger.create(SPEC)
     result = Finished(
@@ -291,15 +281,3 @@ def test_a_triage_outlives_that_its_run_reports_the_episode_again(store, ledger,
     noted = ledger.triage(campaign.id, "low-risk-sac-3-train-0", TriageState.DISMISSED, "artefact")
     ledger.add_episodes([(number, episode(0, Outcome.DEGENERATE))])
     assert store.triage(campaign.id, "low-risk-sac-3-train-0") == noted
-
-
-def test_triages_go_with_their_campaign(store, ledger, episode):
-    campaign, other = ledger.create(SPEC), ledger.create(SPEC)
-    for run in (campaign.runs[0], other.runs[0]):
-        ledger.start_run(run.number)
-        ledger.add_episodes([(run.number, episode(0, Outcome.FAILURE))])
-    for each in (campaign, other):
-        ledger.triage(each.id, "low-risk-sac-3-train-0", TriageState.CONFIRMED, each.id)
-    ledger.delete(campaign.id)
-    assert store.triages(campaign.number) == {}
-    assert store.triage(other.id, "low-risk-sac-3-train-0").comment == other.id
