@@ -1,5 +1,6 @@
 """Draws the view from above: the roads, both paths, and the bodies at the contact and before it."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon
 
 from risk_sac.config import FamilyName
-from risk_sac.failures.net import roads_of
+from risk_sac.failures.net import SurfaceUse, roads_of
 from risk_sac.failures.recording import BOX, Recording, on_body
 from risk_sac.types import Kind, Role
 
@@ -20,7 +21,7 @@ def legend(axis: Axes, title: str | None = None) -> None:
     axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7, frameon=False, title=title, title_fontsize=7)
 
 
-SURFACE_COLOURS = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
+SURFACE_COLOURS: Mapping[SurfaceUse, str] = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
 GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the contact, where the two bodies are drawn as well
 OUTLINE: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.3", "linewidth": 0.8}
 CONFLICT: dict[str, Any] = {"facecolor": "none", "edgecolor": CONFLICT_COLOUR, "linewidth": 1.4, "linestyle": "--"}

@@ -1,13 +1,13 @@
 """Reads of a SUMO net what pictures and formats need: surfaces, lanes with successors, and the signals' programs."""
 
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+import sumolib.net
 
 import sumo_nets
 from risk_sac.config import FamilyName
@@ -15,9 +15,7 @@ from risk_sac.scenario.families import family_named
 from risk_sac.types import Floats
 
 SurfaceUse = Literal["lane", "sidewalk", "crossing", "junction"]
-LaneUse = Literal["road", "inside", "sidewalk", "crossing"]
-SURFACES: Mapping[LaneUse, SurfaceUse] = {"road": "lane", "sidewalk": "sidewalk", "crossing": "crossing"}
-DEFAULT_WIDTH_M = 3.2  # of a lane without one, as in SUMO
+LaneUse = Literal["lane", "inside", "sidewalk", "crossing"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +45,6 @@ class Lane:
     use: LaneUse
     centre: Floats  # `k x 2`, m
     width_m: float
-    speed_mps: float
     next: list[str] = field(default_factory=list)  # lanes that follow
     heads: list[Head] = field(default_factory=list)  # at its end
 
@@ -90,70 +87,46 @@ class Net:
 
 def read_net(file: Path) -> Net:
     """Reads a net of ours, or one that was checked when it was uploaded."""
-    root = ET.parse(file).getroot()
-    lanes = {lane.id: lane for edge in root.iter("edge") for lane in _lanes(edge)}
-    for connection in root.iter("connection"):
-        _connect(lanes, connection)
-    signals = {
-        logic.get("id", ""): Program(
-            [(float(phase.get("duration", "0")), phase.get("state", "")) for phase in logic.iter("phase")],
-            float(logic.get("offset", "0")),
-        )
-        for logic in root.iter("tlLogic")
-    }
-    junctions = [
-        _points(junction.get("shape", ""))
-        for junction in root.iter("junction")
-        if junction.get("type") not in ("internal", "dead_end")
-    ]
-    return Net(lanes, signals, junctions)
+    found = sumolib.net.readNet(str(file), withPedestrianConnections=True, withLatestPrograms=True)
+    every = [lane for edge in found.getEdges() for lane in edge.getLanes()]
+    lanes = {lane.getID(): _lane(lane) for lane in every if lane.getEdge().getFunction() != "walkingarea"}
+    for lane in every:
+        for connection in lane.getOutgoing():
+            _connect(lanes, connection)
+    signals = {}
+    for light in found.getTrafficLights():
+        for program in light.getPrograms().values():  # the latest alone
+            phases = [(phase.duration, phase.state) for phase in program.getPhases()]
+            signals[light.getID()] = Program(phases, program.getOffset())
+    nodes = [node for node in found.getNodes() if node.getType() != "dead_end"]
+    return Net(lanes, signals, [np.array(node.getShape()) for node in nodes])
 
 
-def _points(shape: str) -> Floats:
-    """Returns `k x 2` of "x,y x,y ..."; a height, where given, is dropped."""
-    return np.array([[float(value) for value in point.split(",")[:2]] for point in shape.split()]).reshape(-1, 2)
+def _lane(lane: Any) -> Lane:
+    edge = lane.getEdge()
+    uses: Mapping[str, LaneUse] = {"crossing": "crossing", "internal": "inside"}
+    walks = set(lane.getPermissions()) == {"pedestrian"} and edge.getFunction() != "crossing"
+    return Lane(
+        id=lane.getID(),
+        edge=edge.getID(),
+        index=lane.getIndex(),
+        use="sidewalk" if walks else uses.get(edge.getFunction(), "lane"),
+        centre=np.array(lane.getShape()),
+        width_m=lane.getWidth(),
+    )
 
 
-def _lanes(edge: ET.Element) -> list[Lane]:
-    function = edge.get("function", "normal")
-    if function == "walkingarea":
-        return []
-    return [
-        Lane(
-            id=lane.get("id", ""),
-            edge=edge.get("id", ""),
-            index=int(lane.get("index", "0")),
-            use=_use(function, lane),
-            centre=_points(lane.get("shape", "")),
-            width_m=float(lane.get("width", DEFAULT_WIDTH_M)),
-            speed_mps=float(lane.get("speed", "13.89")),
-        )
-        for lane in edge.iter("lane")
-    ]
-
-
-def _use(function: str, lane: ET.Element) -> LaneUse:
-    if function == "crossing":
-        return "crossing"
-    if lane.get("allow") == "pedestrian":
-        return "sidewalk"
-    return "inside" if function == "internal" else "road"
-
-
-def _connect(lanes: Mapping[str, Lane], connection: ET.Element) -> None:
+def _connect(lanes: Mapping[str, Lane], connection: Any) -> None:
     """Follows a connection by way of the lane inside the junction, if it has one."""
-    ends = [f"{connection.get(end)}_{connection.get(f'{end}Lane')}" for end in ("from", "to")]
-    signal, via, turn = connection.get("tl"), connection.get("via"), connection.get("dir", "s").lower()
-    head = None if signal is None else Head(signal=signal, index=int(connection.get("linkIndex", "0")), turn=turn)
-    if ends[1] in lanes and lanes[ends[1]].use == "crossing":
-        lanes[ends[1]].heads += [head] if head else []  # it comes from a walking area, which is no lane here
-    if ends[0] not in lanes:
-        return
-    start = lanes[ends[0]]
-    after = via or ends[1]
-    if after in lanes and after not in start.next:
+    start, end = (lanes.get(lane.getID()) for lane in (connection.getFromLane(), connection.getToLane()))
+    signal = connection.getTLSID()
+    head = Head(signal=signal, index=connection.getTLLinkIndex(), turn=connection.getDirection().lower())
+    after = connection.getViaLaneID() or connection.getToLane().getID()
+    if start is not None and after in lanes and after not in start.next:
         start.next.append(after)
-    if head is not None:
+    if signal and end is not None and end.use == "crossing":
+        end.heads.append(head)  # it comes from a walking area, which is no lane here
+    elif signal and start is not None:
         start.heads.append(head)
 
 
@@ -166,6 +139,12 @@ def boundaries(centre: Floats, width_m: float) -> tuple[Floats, Floats]:
     mitre = before + after
     mitre /= (1.0 + (before * after).sum(axis=1, keepdims=True)).clip(min=0.5)
     return centre + mitre * width_m / 2, centre - mitre * width_m / 2
+
+
+def ribbon(centre: Floats, width_m: float) -> Floats:
+    """Returns the outline of a lane, `2k x 2`: its left edge, and its right edge back."""
+    left, right = boundaries(centre, width_m)
+    return np.concatenate((left, right[::-1]))
 
 
 def roads_of(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Surface]:
@@ -186,14 +165,6 @@ def surfaces(net: Net) -> Sequence[Surface]:
     """
     found = [Surface("junction", outline) for outline in net.junctions]
     for lane in net.lanes.values():
-        if lane.use == "crossing" or not lane.edge.startswith(":"):
-            found.append(Surface(SURFACES[lane.use], _ribbon(lane.centre, lane.width_m)))
+        if lane.use != "inside":
+            found.append(Surface(lane.use, ribbon(lane.centre, lane.width_m)))
     return found
-
-
-def _ribbon(centre: Floats, width_m: float) -> Floats:
-    """Returns the outline, `2k x 2`, of a ribbon along a line; each point is moved across the line's direction."""
-    along = np.gradient(centre, axis=0)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    left = np.column_stack((-along[:, 1], along[:, 0])) * width_m / 2
-    return np.concatenate((centre + left, (centre - left)[::-1]))

@@ -40,7 +40,7 @@ def _survey() -> dict[str, object]:
     found = survey(chosen.net)
     fits = [_spot(fit) | {"summary": fit.place.summary} for fit in found.fits]
     misfits = [_spot(misfit) | {"why": misfit.why} for misfit in found.misfits]
-    picture = map_png(NET, found)
+    picture = map_png(chosen.net, found)
     replace_file(Path(PICTURE), picture)
     replace_file(Path(PLACES), json.dumps({"items": fits, "elsewhere": misfits}).encode())
     return {}

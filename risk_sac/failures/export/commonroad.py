@@ -28,7 +28,7 @@ LACKS = (
     "when the adversaries were released",
 )
 MADE = "2000-01-01"  # a date is required; with a true one the same failure would be another file
-LANELET_TYPES = {"road": "urban", "inside": "intersection", "sidewalk": "sidewalk", "crossing": "crosswalk"}
+LANELET_TYPES = {"lane": "urban", "inside": "intersection", "sidewalk": "sidewalk", "crossing": "crosswalk"}
 DIRECTIONS = {"s": "straight", "l": "left", "r": "right"}
 STATES = {"red": "red", "red_yellow": "redYellow", "yellow": "yellow", "green": "green", "off": "inactive"}
 LAST_STEPS = 200  # that a free ego may take after the recording

@@ -23,7 +23,7 @@ MAP, EGO = "map", "ego"  # frames of reference
 BLUE, ORANGE, GREY, WHITE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5, 0.5), (0.9, 0.9, 0.9)
 UNSEEN_ALPHA = 0.35  # of a body that the ego does not know of
 ASPHALT = (0.25, 0.25, 0.27)
-GROUND = {"road": ASPHALT, "inside": ASPHALT, "sidewalk": (0.55, 0.55, 0.55), "crossing": (0.8, 0.8, 0.8)}
+GROUND = {"lane": ASPHALT, "inside": ASPHALT, "sidewalk": (0.55, 0.55, 0.55), "crossing": (0.8, 0.8, 0.8)}
 LIGHTS = {"red": (1, 0, 0), "red_yellow": (1, 0.5, 0), "yellow": (1, 0.9, 0), "green": (0, 0.8, 0), "off": (0.2,) * 3}
 HEIGHTS_M = {True: 1.75, False: 1.5}  # of pedestrians, and of vehicles
 MEASURES = "risk_sac.Measures"
@@ -75,9 +75,9 @@ def _surface(lane: Lane) -> fox.SceneEntity:
     """A lane as a strip of triangles, with lines along a road's edges."""
     left, right = boundaries(lane.centre, lane.width_m)
     strip = np.stack((left, right), axis=1).reshape(-1, 2)
-    height = {"road": 0.0, "inside": 0.01, "sidewalk": 0.0, "crossing": 0.02}[lane.use]
+    height = {"lane": 0.0, "inside": 0.01, "sidewalk": 0.0, "crossing": 0.02}[lane.use]
     corners = [strip[k + step] for k in range(len(strip) - 2) for step in (0, 1, 2)]
-    lines = [] if lane.use != "road" else [_line(left), _line(right)]
+    lines = [] if lane.use != "lane" else [_line(left), _line(right)]
     area = fox.TriangleListPrimitive(points=_points(np.array(corners), height), color=_paint(GROUND[lane.use]))
     return fox.SceneEntity(frame_id=MAP, id=lane.id, triangles=[area], lines=lines)
 

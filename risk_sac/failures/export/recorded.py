@@ -183,7 +183,7 @@ def goal(failure: Recorded) -> tuple[Lane, Floats]:
                 known.add(name)
                 ahead.append(lanes[name])
     if reached is None:  # its route asks for another lane than the one that it starts in
-        reached = next(lane for lane in lanes.values() if lane.edge == last and lane.use == "road")
+        reached = next(lane for lane in lanes.values() if lane.edge == last and lane.use == "lane")
     return reached, _place(reached.centre, np.inf if len(start.route) == 1 else BEYOND_M)
 
 

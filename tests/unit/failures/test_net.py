@@ -5,33 +5,21 @@ import pytest
 
 import sumo_nets
 from risk_sac.config import FamilyName
-from risk_sac.failures.net import read_net, roads_of, surfaces
+from risk_sac.failures.net import read_net, ribbon, roads_of, surfaces
 from risk_sac.scenario.families import FAMILIES
 
 NETS = Path(sumo_nets.__path__[0])
 
 
-def test_lane_is_a_ribbon_of_its_width_around_its_centre_line(tmp_path: Path) -> None:
-    net = tmp_path / "bend.net.xml"
-    net.write_text(
-        '<net><edge id="e"><lane id="e_0" width="2.00" shape="0,0 10,0"/></edge>'
-        '<edge id=":j_0" function="internal"><lane id=":j_0_0" shape="10,0 20,0"/></edge></net>'
-    )
-    (lane,) = surfaces(read_net(net))
-    assert lane.use == "lane"
-    np.testing.assert_allclose(lane.outline, [(0, 1), (10, 1), (10, -1), (0, -1)])
+def test_lane_is_a_ribbon_of_its_width_around_its_centre_line() -> None:
+    straight = ribbon(np.array([(0.0, 0.0), (10.0, 0.0)]), 2.0)
+    np.testing.assert_allclose(straight, [(0, 1), (10, 1), (10, -1), (0, -1)])
 
 
 @pytest.mark.parametrize(("family", "lanes", "crossings"), [("low", 3, 0), ("mixed", 12, 2), ("dense", 16, 4)])
 def test_nets_have_the_lanes_and_crossings_of_their_family(family: str, lanes: int, crossings: int) -> None:
     uses = [surface.use for surface in surfaces(read_net(NETS / family / f"{family}.net.xml"))]
     assert (uses.count("lane"), uses.count("crossing")) == (lanes, crossings)
-
-
-def test_heights_in_a_net_are_dropped(tmp_path: Path) -> None:
-    net = tmp_path / "hill.net.xml"
-    net.write_text('<net><edge id="e"><lane id="e_0" width="2" shape="0,0,5 0,10,6"/></edge></net>')
-    np.testing.assert_allclose(surfaces(read_net(net))[0].outline, [(-1, 0), (-1, 10), (1, 10), (1, 0)])
 
 
 @pytest.mark.parametrize("family", FAMILIES)
