@@ -4,8 +4,9 @@ import argparse
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -16,6 +17,7 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
+from rich.table import Table
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs
@@ -68,6 +70,14 @@ class Board:
             if name not in self._tasks:
                 self._tasks[name] = self._bar.add_task(name, total=its_total, found="")
             self._bar.update(self._tasks[name], completed=its_done)
+
+
+def narrow_table(*columns: str, **style: Any) -> Table:
+    """Returns an empty table without lines, of which only the last column wraps."""
+    table = Table(box=SIMPLE_HEAD, padding=0, **style)
+    for name in columns:
+        table.add_column(name, no_wrap=name != columns[-1])
+    return table
 
 
 def or_dash(value: float | None, format_: str) -> str:

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 from junitparser import Error, Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 from pydantic import ValidationError
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.console import EGO, FAILED, OK, Commands, add_command, console, counted, printable
+from risk_sac.cli.console import EGO, FAILED, OK, Commands, add_command, console, counted, narrow_table, printable
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
@@ -70,10 +69,7 @@ def _regress(options: argparse.Namespace) -> int:
 def cases_table(found: Regression) -> Table:
     """The cases, and below them how many there are of each verdict."""
     caption = f"{counted(len(found.cases), 'failure')}: {found.counts_in_words}"
-    table = Table(box=SIMPLE_HEAD, padding=0, caption=caption)
-    table.caption_justify = "left"
-    for name in ("verdict", "failure, and what happens now"):
-        table.add_column(name, no_wrap=name == "verdict")
+    table = narrow_table("verdict", "failure, and what happens now", caption=caption, caption_justify="left")
     for case in found.cases:
         table.add_row(case.verdict_in_words, Text(printable(f"{case.id}: {case.name}\n  {case.reason}")))
     return table

@@ -3,10 +3,9 @@
 import argparse
 from pathlib import Path
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from risk_sac.cli.console import EGO, OK, Commands, add_command, console, in_words
+from risk_sac.cli.console import EGO, OK, Commands, add_command, console, in_words, narrow_table
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
@@ -56,11 +55,17 @@ def _contacts(results: Results) -> Table:
     Fits 80 columns; only the last one wraps.
     """
     run = results.spec.id
-    table = Table(title=run, caption=f"in full, as the service says it: {run}-ID", box=SIMPLE_HEAD, padding=0)
-    speeds, zones = "ego's\nother's\nm/s", "ego's\nother's\nzone"
-    for name in ("id", "outcome\ngrade", "other", speeds, zones, "conflict\nbegan at s,\nx y m"):
-        table.add_column(name, no_wrap=True)
-    table.add_column("failed rules,\nor what the\nother broke")
+    table = narrow_table(
+        "id",
+        "outcome\ngrade",
+        "other",
+        "ego's\nother's\nm/s",
+        "ego's\nother's\nzone",
+        "conflict\nbegan at s,\nx y m",
+        "failed rules,\nor what the\nother broke",
+        title=run,
+        caption=f"in full, as the service says it: {run}-ID",
+    )
     for contact in results.contacts:
         collision = contact.episode.collision
         if collision is None:

@@ -2,15 +2,12 @@
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.console import OK, Commands, add_command, console, counted, printable
+from risk_sac.cli.console import OK, Commands, add_command, console, counted, narrow_table, printable
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, note
 from risk_sac.records import EpisodeRecord
@@ -26,61 +23,54 @@ def add(commands: Commands) -> None:
     """Add the commands."""
     summary = "find the core of a failure: the least that makes the ego fail"
     minimise = add_command(commands, "minimise", _minimise, summary)
-    _add_failure(minimise)
     minimise.add_argument("--out", type=Path, metavar="FILE", help="write the core there, a bundle too")
-
     region = add_command(commands, "region", _region, "how many of the neighbours of a failure fail too")
-    _add_failure(region)
     region.add_argument("--out", type=Path, metavar="FILE.json", help="write the shares there too")
-
+    what = (
+        "what `risk-sac bundle` or `minimise` wrote, or the folder of a finished run, in which the report finds it then"
+    )
+    for parser in (minimise, region):
+        parser.add_argument("path", type=Path, metavar="PATH", help=what)
+        parser.add_argument("failure", nargs="?", metavar="FAILURE", help="of a run: id of a contact, or its number")
     clusters = add_command(commands, "clusters", _clusters, "which different failures runs have found, and one of each")
     clusters.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a run, or its results.json")
     clusters.add_argument("--out", type=Path, metavar="FILE.json", help="write them there too")
 
 
-def _add_failure(parser: argparse.ArgumentParser) -> None:
-    what = (
-        "what `risk-sac bundle` or `minimise` wrote, or the folder of a finished run, in which the report finds it then"
-    )
-    parser.add_argument("path", type=Path, metavar="PATH", help=what)
-    parser.add_argument("failure", nargs="?", metavar="FAILURE", help="of a run: id of a contact, or its number")
-
-
-@dataclass(frozen=True, slots=True)
-class _Asked:
+class _Asked(NamedTuple):
     """The failure that the command line names."""
 
     bundle: "Bundle"
-    folder: Path | None  # of its run; None of a bundle's
+    folder: Path | None = None  # of its run; None of a bundle's
     digest: str = ""  # of the run's results
 
-    def note(self, studied: Studied) -> None:
-        """Leaves beside the results what was found out."""
-        if self.folder is not None:
-            note(self.folder, self.digest, self.bundle.manifest.episode.index, studied)
 
-
-def _asked(options: argparse.Namespace) -> _Asked:
+def _asked(path: Path, failure: str | None) -> _Asked:
     from risk_sac.failures.bundle import read_bundle  # here, for the simulator takes a second to load
     from risk_sac.failures.collect import bundles
 
-    path: Path = options.path
-    if options.failure is None:
+    if failure is None:
         if path.is_dir():
             raise ConfigError("FAILURE", f"{path}, which is a folder", "a bundle, or a failure of its run too")
-        return _Asked(read_bundle(path), None)
+        return _Asked(read_bundle(path))
     results, folder = read_results(path), path if path.is_dir() else path.parent
     if results.digest is None:
         raise ConfigError("PATH", f"the run in {folder} is not finished")
-    (bundle,) = bundles(folder, results, [results.contact(options.failure).episode])
+    (bundle,) = bundles(folder, results, [results.contact(failure).episode])
     return _Asked(bundle, folder, results.digest)
+
+
+def _note(asked: _Asked, studied: Studied) -> None:
+    """Leaves beside the results of a run what was found out."""
+    if asked.folder is not None:
+        note(asked.folder, asked.digest, asked.bundle.manifest.episode.index, studied)
 
 
 def _minimise(options: argparse.Namespace) -> int:
     from risk_sac.failures.bundle import write_bundle
     from risk_sac.failures.minimise import minimise
 
-    asked = _asked(options)
+    asked = _asked(options.path, options.failure)
     if asked.folder is None and options.out is None:
         raise ConfigError("--out", "nothing", "a file for the core of a bundle")
     minimal = minimise(asked.bundle)
@@ -89,7 +79,7 @@ def _minimise(options: argparse.Namespace) -> int:
     if options.out is not None:
         write_bundle(options.out, minimal)
     before, after = core.before, core.after
-    lines = (
+    lines = [
         core.sentence,
         f"adversaries that act: {after.adversaries} of {before.adversaries}",
         f"segments of 0.5 s: {after.segments} of {before.segments}; drive and steering apart: "
@@ -97,23 +87,23 @@ def _minimise(options: argparse.Namespace) -> int:
         f"parameters of the scene in the middle of their ranges: {core.plain_parameters} of {core.parameters}",
         f"copies, perturbed by 1 %, that fail as well: {core.held} of {core.copies}",
         f"played: {counted(core.episodes, 'episode')}",
-        *([] if options.out is None else [f"Bundle: {options.out}"]),
-    )
+    ]
+    if options.out is not None:
+        lines.append(f"Bundle: {options.out}")
     console.print(printable("\n".join(lines)), markup=False, soft_wrap=True)
-    asked.note(Studied(core=core))
+    _note(asked, Studied(core=core))
     return OK
 
 
 def _region(options: argparse.Namespace) -> int:
     from risk_sac.failures.variants import region
 
-    asked = _asked(options)
+    asked = _asked(options.path, options.failure)
     if options.out is not None:
         options.out.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
     found = region(asked.bundle)
-    table = Table(title=Text(printable(asked.bundle.manifest.id)), box=SIMPLE_HEAD, padding=0)
-    for name in ("changed", "fail", "of", "share", "95 % interval"):
-        table.add_column(name, no_wrap=True)
+    title = Text(printable(asked.bundle.manifest.id))
+    table = narrow_table("changed", "fail", "of", "share", "95 % interval", title=title)
     for share in found.shares:
         rate, interval = f"{share.failed / share.played:.2f}", f"{share.low:.2f} - {share.high:.2f}"
         table.add_row(share.what, str(share.failed), str(share.played), rate, interval)
@@ -121,7 +111,7 @@ def _region(options: argparse.Namespace) -> int:
     console.print("a needle: most scenes right beside it do not fail" if found.needle else "no needle")
     if options.out is not None:
         replace_file(options.out, found.model_dump_json(indent=2).encode())
-    asked.note(Studied(region=found))
+    _note(asked, Studied(region=found))
     return OK
 
 
@@ -138,9 +128,7 @@ def _clusters(options: argparse.Namespace) -> int:
     from risk_sac.failures.clusters import overview
 
     found = overview(episode for run in options.runs for episode in _failures(run))
-    table = Table(box=SIMPLE_HEAD, padding=0)
-    for name in ("failures", "distinct", "preventable", "kind; look first at"):
-        table.add_column(name, no_wrap=name != "kind; look first at")
+    table = narrow_table("failures", "distinct", "preventable", "kind; look first at")
     for cluster in found.clusters:
         first = f"{cluster.name}\n  {cluster.representative} ({cluster.grade})"
         table.add_row(str(cluster.failures), str(cluster.distinct), str(cluster.preventable), printable(first))

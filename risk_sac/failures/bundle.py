@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
-from math import prod
 from pathlib import Path
 from typing import Any, Literal
 
@@ -199,33 +198,18 @@ def _read(file: Path) -> bytes:
 
 
 def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
-    arrays: dict[str, NDArray[Any]] = {}
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         entries = archive.infolist()
-        if len(entries) > MOST_ARRAYS or sum(entry.file_size for entry in entries) > MOST_BYTES:
-            raise ValueError(f"{len(entries)} arrays; wanted at most {MOST_ARRAYS}, of {MOST_BYTES} bytes in all")
-        for entry in entries:
-            name = entry.filename.removesuffix(".npy")
-            if entry.compress_type not in PACKED:  # the others are unpacked whole, whatever size they say
-                raise ValueError(f"{name} is packed in another way than a bundle's arrays are")
-            if name in arrays:
-                raise ValueError(f"two arrays are called {name}")
-            with archive.open(entry) as packed:
-                arrays[name] = _array(packed.read(entry.file_size))
+    if len(entries) > MOST_ARRAYS or sum(entry.file_size for entry in entries) > MOST_BYTES:
+        raise ValueError(f"{len(entries)} arrays; wanted at most {MOST_ARRAYS}, of {MOST_BYTES} bytes in all")
+    for entry in entries:
+        if entry.compress_type not in PACKED:  # the others are unpacked whole, whatever size they say
+            raise ValueError(f"{entry.filename} is packed in another way than a bundle's arrays are")
+    with np.load(io.BytesIO(content), allow_pickle=False) as file:
+        arrays = dict(file)
+    if not all(isinstance(array, np.ndarray) for array in arrays.values()):
+        raise ValueError("a file in it is no array")
     return arrays
-
-
-def _array(content: bytes) -> NDArray[Any]:
-    """Reads one array, whose header must not promise more than follows: numpy allocates it before it reads."""
-    stream = io.BytesIO(content)
-    major, _ = np.lib.format.read_magic(stream)
-    header = np.lib.format.read_array_header_1_0 if major == 1 else np.lib.format.read_array_header_2_0
-    shape, _, kind = header(stream)
-    if kind.hasobject or prod(shape) * kind.itemsize != len(content) - stream.tell():
-        raise ValueError("an array that is not what its header says")
-    stream.seek(0)
-    array: NDArray[Any] = np.load(stream, allow_pickle=False)
-    return array
 
 
 def _check_playable(problem: Problem, manifest: Manifest, series: Series) -> None:

@@ -174,19 +174,18 @@ ONE = array((1,), bytes(8))
         (lambda: b"", "is no bundle"),
         (lambda: b"\x89PNG\r\n", "is no bundle"),
         (lambda: zipped(b"no array"), "is no bundle"),
-        (lambda: zipped(array((10**11,), bytes(8))), "an array that is not what its header says"),
+        (lambda: zipped(array((10**11,), bytes(8))), "is no bundle"),
         (lambda: zipped(array((0, 10**30), b"")), "is no bundle"),
         (lambda: zipped(ONE[:10] + b"{[]: 1}".ljust(len(ONE) - 19) + b"\n" + bytes(8)), "is no bundle"),
-        (lambda: zipped(pickled()), "an array that is not what its header says"),
-        (lambda: zipped(ONE, ONE), "two arrays are called x_m"),
-        (lambda: zipped(ONE, packed=zipfile.ZIP_LZMA), "x_m is packed in another way"),
-        (lambda: zipped(ONE, packed=zipfile.ZIP_BZIP2), "x_m is packed in another way"),
+        (lambda: zipped(pickled()), "is no bundle"),
+        (lambda: zipped(ONE, packed=zipfile.ZIP_LZMA), "x_m.npy is packed in another way"),
+        (lambda: zipped(ONE, packed=zipfile.ZIP_BZIP2), "x_m.npy is packed in another way"),
         (lambda: larger_than_it_is(2**28 + 1), "wanted at most"),
         (lambda: bytes(MOST_FILE_BYTES + 1), "is larger than"),
     ],
     ids=[
         *("empty", "a picture", "no array", "a lying header", "an endless shape", "a header that is none", "pickled"),
-        *("twice the same", "lzma", "bzip2", "a bomb", "large"),
+        *("lzma", "bzip2", "a bomb", "large"),
     ],
 )
 def test_hostile_files_are_refused_in_one_line(
@@ -286,7 +285,7 @@ def test_a_bundle_that_lost_its_place_or_carries_another_is_refused(
     told = replayed_elsewhere(changed(placed, tmp_path / "a.npz", lambda arrays: arrays.pop(carried.NET)), tmp_path)
     assert (told.returncode, "there is no place 'junction_" in told.stderr.replace("\n", " ")) == (2, True), told.stderr
     doctype = np.frombuffer(b"<!DOCTYPE net [<!ENTITY a 'b'>]><net/>", dtype=np.uint8)
-    with pytest.raises(ConfigError, match="DOCTYPE"):
+    with pytest.raises(ConfigError, match="DTD"):
         read_bundle(changed(placed, tmp_path / "b.npz", lambda arrays: arrays.update({carried.NET: doctype})))
     other = np.frombuffer(b"<net/>", dtype=np.uint8)
     with pytest.raises(ConfigError, match="not what its name says"):
