@@ -17,8 +17,8 @@ class Series(BaseModel):
 
     time_s: Reals
     """T, of the simulator."""
-    released_s: Real = None
-    """When the adversaries were handed to the policy, as `time_s` counts; null in older files: at the first step."""
+    released_s: float
+    """When the adversaries were handed to the policy, as `time_s` counts."""
     ids: list[str]
     """n."""
     kind: list[str]

@@ -9,7 +9,6 @@ from risk_sac.cli.console import FAILED, OK, Commands, add_command, complain, co
 from risk_sac.errors import SimulationError
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import TIMES, distinct_failures
-from risk_sac.types import Scene
 
 
 def add(commands: Commands) -> None:
@@ -53,8 +52,8 @@ def _bundle(options: argparse.Namespace) -> int:
 def _replay(options: argparse.Namespace) -> int:
     from risk_sac.env import RiskSacEnv
     from risk_sac.failures.bundle import check_world, code_digest, read_bundle, versions
-    from risk_sac.failures.play import play
-    from risk_sac.failures.recording import actions_of, trajectory_digest
+    from risk_sac.failures.play import replay
+    from risk_sac.failures.recording import trajectory_digest
 
     bundle = read_bundle(options.bundle)
     manifest = bundle.manifest
@@ -62,8 +61,7 @@ def _replay(options: argparse.Namespace) -> int:
     if (manifest.code, manifest.versions) != (code_digest(), versions()):
         complain(f"the code, or {' or '.join(versions())}, has changed since the bundle was written")
     with closing(RiskSacEnv.of(manifest.spec)) as env:
-        scene = Scene(manifest.spec.family, manifest.episode.scene)
-        played = play(env, scene, manifest.episode.seed, actions_of(bundle.series))
+        played = replay(env, manifest.episode, bundle.series)
     same = trajectory_digest(played.series) == manifest.digest
     same &= played.signal_heads.tobytes() == bundle.signal_heads.tobytes()
     found = played.collision

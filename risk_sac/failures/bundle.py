@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from risk_sac.config import SHIPPED, RunSpec
-from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.errors import ConfigError
 from risk_sac.failures.carried import carried, unpack
 from risk_sac.failures.recording import Series, actions_of, trajectory_digest
 from risk_sac.failures.studied import Core
@@ -157,44 +157,39 @@ def read_bundle(file: Path) -> Bundle:
       ConfigError: it is no bundle, of another version, damaged, too large, or holds no episode that can be played.
       OSError: it cannot be read, or the place that it carries cannot be kept.
     """
-    content = _read(file)
-    try:
-        arrays = _arrays(content)
-        text = str(arrays.pop(MANIFEST))
-        heads = arrays.pop(HEADS)
-        layers = tuple(arrays.pop(f"{LAYER}{place}") for place in range(sum(name.startswith(LAYER) for name in arrays)))
-    except Exception as error:  # what zipfile, zlib and numpy raise of bytes that mean nothing is an open set
-        raise _refused(file, f"is no bundle of a failure, or is damaged: {error}") from error
-    try:
-        manifest = Manifest.model_validate_json(text)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise _refused(file, f"has a manifest of another version, or none: {where}: {first['msg']}") from error
-    try:
-        unpack(manifest.spec.family, arrays)
-    except ValueError as error:
-        raise _refused(file, f"is no bundle that can be played: {error}") from error
-    if trajectory_digest(arrays) != manifest.digest:
-        raise _refused(file, "is damaged: its arrays do not have the digest in its manifest")
-    try:
-        problem = Problem.from_spec(manifest.spec)
-        _check_playable(problem, manifest, arrays)
-        policy = None
-        if layers:
-            policy = FrozenPolicy(layers, problem.action_size)
-            policy.check(problem.observation_size)
-    except (RiskSacError, ValueError) as error:
-        raise _refused(file, f"holds no episode that can be played: {error}") from error
-    return Bundle(manifest=manifest, series=arrays, signal_heads=heads, policy=policy)
-
-
-def _read(file: Path) -> bytes:
     with file.open("rb") as stream:
         content = stream.read(MOST_FILE_BYTES + 1)
+    try:
+        return _bundle(content)
+    except OSError:
+        raise
+    except ValidationError as error:
+        first = error.errors()[0]
+        why = f"a manifest of another version, or none: {'.'.join(map(str, first['loc']))}: {first['msg']}"
+        raise ConfigError("BUNDLE", f"{file} is no bundle that can be played: {why}") from error
+    except Exception as error:  # what zipfile, zlib and numpy raise of bytes that mean nothing is an open set
+        raise ConfigError("BUNDLE", f"{file} is no bundle that can be played: {error}") from error
+
+
+def _bundle(content: bytes) -> Bundle:
     if len(content) > MOST_FILE_BYTES:
-        raise _refused(file, f"is larger than {MOST_FILE_BYTES} bytes")
-    return content
+        raise ValueError(f"it is larger than {MOST_FILE_BYTES} bytes")
+    arrays = _arrays(content)
+    if missing := {MANIFEST, HEADS} - arrays.keys():
+        raise ValueError(f"it lacks {', '.join(missing)}")
+    manifest = Manifest.model_validate_json(str(arrays.pop(MANIFEST)))
+    heads = arrays.pop(HEADS)
+    layers = tuple(arrays.pop(f"{LAYER}{place}") for place in range(sum(name.startswith(LAYER) for name in arrays)))
+    unpack(manifest.spec.family, arrays)
+    if trajectory_digest(arrays) != manifest.digest:
+        raise ValueError("it is damaged: its arrays do not have the digest in its manifest")
+    problem = Problem.from_spec(manifest.spec)
+    _check_playable(problem, manifest, arrays)
+    policy = None
+    if layers:
+        policy = FrozenPolicy(layers, problem.action_size)
+        policy.check(problem.observation_size)
+    return Bundle(manifest=manifest, series=arrays, signal_heads=heads, policy=policy)
 
 
 def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
@@ -230,7 +225,3 @@ def _check_playable(problem: Problem, manifest: Manifest, series: Series) -> Non
     most, size = problem.family.horizon_steps, problem.action_size
     if not 0 < len(actions) <= most or actions.shape[1] != size or not np.isfinite(actions).all():
         raise ValueError(f"actions of shape {actions.shape}; wanted up to {most} x {size} finite numbers")
-
-
-def _refused(file: Path, why: str) -> ConfigError:
-    return ConfigError("BUNDLE", f"{file} {why}")

@@ -59,9 +59,14 @@ def play(env: RiskSacEnv, scene: Scene, seed: int, actions: Floats, policy: Poli
     )
 
 
+def replay(env: RiskSacEnv, episode: EpisodeRecord, recorded: Series) -> Played:
+    """Plays an episode again with its recorded actions."""
+    return play(env, Scene(env.problem.family.name, episode.scene), episode.seed, actions_of(recorded))
+
+
 def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> Played:
     """Plays a contact again; a SimulationError if it is not the same to the bit."""
-    played = play(env, Scene(spec.family, episode.scene), episode.seed, actions_of(recorded))
+    played = replay(env, episode, recorded)
     if trajectory_digest(played.series) != trajectory_digest(recorded):
         raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here")
     return played

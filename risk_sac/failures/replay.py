@@ -16,29 +16,13 @@ import numpy as np
 
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene, RiskSacError, SimulationError
-from risk_sac.failures.play import play
-from risk_sac.failures.recording import actions_of, trajectory_digest
+from risk_sac.failures.play import replay
+from risk_sac.failures.recording import trajectory_digest
+from risk_sac.records import EpisodeRecord
 from risk_sac.risk.measures import soft_min
 from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
 from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import distinct_failures
-from risk_sac.types import Scene
-
-
-def _same(folder: Path, results: Results, env: RiskSacEnv) -> list[int]:
-    """The distinct failures of a run that are the same again."""
-    same = []
-    for episode in distinct_failures(results):
-        recorded = read_series(folder / FAILURES / series_name(episode.index))
-        try:
-            scene = Scene(env.problem.family.name, episode.scene)
-            again = play(env, scene, episode.seed, actions_of(recorded)).series
-        except (InfeasibleScene, SimulationError):
-            continue
-        if trajectory_digest(again) == trajectory_digest(recorded):
-            same.append(episode.index)
-    return same
-
 
 Prepared = Mapping[Path, tuple[Results, RiskSacEnv]]
 
@@ -62,12 +46,22 @@ def _say(file: Path, folder: Path, **told: object) -> None:
 
 
 def _tell(file: Path, runs: Prepared) -> None:
+    """Replays the distinct failures of all runs, and says of each run which are the same again."""
     for folder, (results, env) in runs.items():
         try:
             with closing(env):
-                _say(file, folder, same=_same(folder, results, env))
+                same = [each.index for each in distinct_failures(results) if _repeats(folder, each, env)]
+            _say(file, folder, same=same)
         except (RiskSacError, OSError) as error:
             _say(file, folder, error=f"{type(error).__name__}: {error}")
+
+
+def _repeats(folder: Path, episode: EpisodeRecord, env: RiskSacEnv) -> bool:
+    recorded = read_series(folder / FAILURES / series_name(episode.index))
+    try:
+        return trajectory_digest(replay(env, episode, recorded).series) == trajectory_digest(recorded)
+    except (InfeasibleScene, SimulationError):
+        return False
 
 
 def _main(file: Path, times: int, jobs: int, folders: list[Path]) -> int:

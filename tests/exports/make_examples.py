@@ -15,9 +15,7 @@ from risk_sac.failures.bundle import Bundle, make_bundle, read_bundle, write_bun
 from risk_sac.failures.export.formats import FORMATS, FormatName, export, names
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.export.written import write
-from risk_sac.failures.play import play
-from risk_sac.failures.recording import actions_of
-from risk_sac.types import Scene
+from risk_sac.failures.play import replay
 
 FOLDER = Path(__file__).with_name("examples")
 FAMILIES = ("low", "mixed", "dense")
@@ -29,8 +27,7 @@ def played_here(bundle: Bundle) -> Bundle:
     """Plays a bundle; with the same code and kind of processor the result is the same."""
     manifest = bundle.manifest
     with closing(RiskSacEnv.of(manifest.spec)) as env:
-        scene = Scene(manifest.spec.family, manifest.episode.scene)
-        played = play(env, scene, manifest.episode.seed, actions_of(bundle.series))
+        played = replay(env, manifest.episode, bundle.series)
     if played.collision is None:
         raise SimulationError(f"{manifest.id} is no failure here any more; wanted another example")
     episode = manifest.episode.model_copy(update={"collision": played.collision})

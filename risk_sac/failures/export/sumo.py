@@ -3,7 +3,7 @@
 import json
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from importlib.resources import files as resources
 from pathlib import Path
@@ -47,35 +47,34 @@ class Heard:
 @contextmanager
 def _tapped() -> Iterator[Heard]:
     """Records what this process tells libsumo; `risk_sac.sim` calls it as a module, so that no command is missed."""
-    heard, own_start, own_step = Heard(), libsumo.start, libsumo.simulationStep
-    taps: list[tuple[type, str, Any]] = []
+    heard = Heard()
 
-    def start(command: list[str]) -> None:
-        own_start(command)
+    def start(command: list[str], own: Any = libsumo.start) -> None:
+        own(command)
         heard.options += command[1:]
 
-    def step(time: float = 0.0) -> None:
-        own_step(time)
+    def step(time: float = 0.0, own: Any = libsumo.simulationStep) -> None:
+        own(time)
         heard.states.append([_state(id_) for id_ in libsumo.vehicle.getIDList()])
         heard.calls.append([])
 
-    try:
-        libsumo.start, libsumo.simulationStep = start, step
+    with ExitStack() as taps:
+
+        def tap(owner: Any, name: str, told: Any) -> None:
+            taps.callback(setattr, owner, name, vars(owner)[name])
+            setattr(owner, name, told)
+
+        tap(libsumo, "start", start)
+        tap(libsumo, "simulationStep", step)
         for domain in DOMAINS:
             owner = getattr(libsumo, domain)
             for name, function in vars(owner).copy().items():
-                if name.startswith(("_", *QUESTIONS)) or not isinstance(function, staticmethod):
-                    continue
-                taps.append((owner, name, function))
-                setattr(owner, name, staticmethod(_tap(heard, domain, name, function.__func__)))
+                if not name.startswith(("_", *QUESTIONS)) and isinstance(function, staticmethod):
+                    tap(owner, name, staticmethod(_told(heard, domain, name, function.__func__)))
         yield heard
-    finally:
-        libsumo.start, libsumo.simulationStep = own_start, own_step
-        for owner, name, function in taps:
-            setattr(owner, name, function)
 
 
-def _tap(heard: Heard, domain: str, name: str, function: Any) -> Any:
+def _told(heard: Heard, domain: str, name: str, function: Any) -> Any:
     def told(*arguments: Any, **named: Any) -> Any:
         heard.calls[-1].append((domain, name, list(arguments), named))
         return function(*arguments, **named)

@@ -37,7 +37,7 @@ export function recordingOf(series: Series, collision: Collision): Recording {
   const actors = series.ids.length;
   const striker = series.ids.indexOf(collision.other_id);
   const after = collision.time_s ?? 0; // the contact counts from the release
-  const zero = (series.released_s ?? series.time_s[0] ?? 0) + after;
+  const zero = series.released_s + after;
   const time_s = Float64Array.from(series.time_s, (time) => (time ?? Number.NaN) - zero);
   const judged = collision.judgement?.conflict_s;
   const conflict_s = judged === null || judged === undefined ? null : judged - after;

@@ -26,11 +26,10 @@ def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
     assert len(series.actions[0]) == 4
 
 
-def test_a_series_from_before_the_release_was_recorded_lacks_it(tmp_path):
-    new = ("released_s", "lane_offset_m", "link")
-    write_series(tmp_path / "a.npz", {name: values for name, values in series_arrays().items() if name not in new})
-    series = load_series(tmp_path / "a.npz", None)
-    assert (series.released_s, series.lane_offset_m, series.link) == (None, None, None)
+def test_a_series_without_the_release_is_a_storage_error(tmp_path):
+    write_series(tmp_path / "a.npz", {name: each for name, each in series_arrays().items() if name != "released_s"})
+    with pytest.raises(StorageError, match="'a.npz' is damaged: .*released_s"):
+        load_series(tmp_path / "a.npz", None)
 
 
 @pytest.mark.parametrize(
