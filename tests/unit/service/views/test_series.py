@@ -28,7 +28,7 @@ def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
 
 def test_a_series_without_the_release_is_a_storage_error(tmp_path):
     write_series(tmp_path / "a.npz", {name: each for name, each in series_arrays().items() if name != "released_s"})
-    with pytest.raises(StorageError, match="'a.npz' is damaged: .*released_s"):
+    with pytest.raises(StorageError, match=r"'a.npz' is damaged: .*released_s"):
         load_series(tmp_path / "a.npz", None)
 
 
