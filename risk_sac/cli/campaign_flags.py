@@ -80,7 +80,7 @@ def _seeds(options: argparse.Namespace, default: int) -> list[int] | None:
     return list(range(first, first + count))
 
 
-MAP_HELP = "a SUMO net, an OSM extract or OpenDRIVE, also gzipped"
+MAP_HELP = "a SUMO net, an OSM extract or OpenDRIVE, also packed"
 
 
 def add_map_flags(parser: argparse.ArgumentParser, *, several: bool) -> None:

@@ -16,8 +16,8 @@ from risk_sac.cli.campaign_flags import MAP_HELP
 from risk_sac.cli.console import FAILED, OK, Commands, add_command, console, counted
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, Map, survey
-from risk_sac.scenario.maps.found import TITLES, Fit, Misfit, Pattern, Survey
-from risk_sac.scenario.maps.net import read_net
+from risk_sac.scenario.maps.found import TITLES, Pattern, Survey
+from risk_sac.scenario.maps.summary import net_remarks
 
 if TYPE_CHECKING:
     from risk_sac.tryout import Tried
@@ -43,18 +43,20 @@ def _places(options: argparse.Namespace) -> int:
     patterns: tuple[Pattern, ...] = (options.pattern,) if options.pattern else tuple(FINDERS)
     with TemporaryDirectory() as folder:
         converted = present_net(options.network, Path(folder))
-        net = read_net(converted.file)
-        found = survey(net, patterns)
+        chosen = Map(converted.file)
+        found = survey(chosen.net, patterns)
+        warnings = [*converted.warnings, *net_remarks(chosen.net)]
         if options.out is not None:
             from risk_sac.failures.map_picture import map_png  # here, because loading matplotlib takes a second
 
             options.out.write_bytes(map_png(net, found))
         if options.tries is not None:
-            return _try_places(Map(converted.file), found, options)
+            return _try_places(chosen, found, options)
     if options.json:
-        sys.stdout.write(json.dumps(_document(found, converted.warnings)) + "\n")
+        fits, misfits = [fit.told() for fit in found.fits], [misfit.told() for misfit in found.misfits]
+        sys.stdout.write(json.dumps({"places": fits, "elsewhere": misfits, "warnings": warnings}) + "\n")
         return OK
-    for warning in converted.warnings:
+    for warning in warnings:
         console.print(f"warning: {warning}", soft_wrap=True, markup=False)
     for pattern in patterns:
         _tell(pattern, found, most=len(found.fits) if options.all else SHOWN, why=options.why)
@@ -81,19 +83,6 @@ def _table(heading: str, rows: Sequence[tuple[str, str]], most: int) -> Table:
     if len(rows) > most:
         table.add_row("…", f"and {len(rows) - most} more: --all")
     return table
-
-
-def _document(found: Survey, warnings: Sequence[str]) -> dict[str, object]:
-    return {
-        "places": [_spot(fit) | {"summary": fit.place.summary} for fit in found.fits],
-        "elsewhere": [_spot(misfit) | {"why": misfit.why} for misfit in found.misfits],
-        "warnings": list(warnings),
-    }
-
-
-def _spot(found: Fit | Misfit) -> dict[str, object]:
-    spot = found.spot
-    return {"pattern": spot.pattern, "place": spot.id, "x_m": spot.x_m, "y_m": spot.y_m}
 
 
 def _try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:

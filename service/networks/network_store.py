@@ -21,7 +21,7 @@ from pathlib import Path
 from risk_sac.errors import DamagedError
 from risk_sac.run_folder.durable import read_sealed, seal, sync_folder
 from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError
-from service.networks.report import CheckReport, Packaging
+from service.networks.report import CheckReport
 from service.networks.sandbox import Incoming, inspect
 from service.networks.schemas import BoundingBox, Network, StoredNetwork
 from service.store.stored import StoredPage
@@ -82,12 +82,12 @@ class NetworkStore:
         if self._at_work.total() >= self._at_once:
             raise BusyError(f"{self._at_once} uploads are at work; {again}", RETRY_AFTER_S)
 
-    def add(self, incoming: Incoming, packaging: Packaging, project: str, label: str) -> Network:
+    def add(self, incoming: Incoming, project: str, label: str) -> Network:
         """Checks an upload that has arrived, and keeps it."""
         self._check_room(project)
         with _refusals("a network cannot be stored"):
-            sha256 = incoming.complete(packaging)
-            report = inspect(incoming.folder, packaging)
+            sha256 = incoming.complete()
+            report = inspect(incoming.folder)
             network = _network(report, label, sha256, incoming.bytes)
             incoming.strip()
             (incoming.folder / RECORD).write_bytes(seal(StoredNetwork(network=network)))

@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from risk_sac.execution.helper import ANSWER, run_helper
 from service.errors import StorageError, UploadError
 from service.networks.limits import LOG_BYTES, WALL_S
-from service.networks.report import SNIFFED_BYTES, CheckReport, Packaging, sniff
+from service.networks.report import CheckReport
 
 logger = logging.getLogger(__name__)
 
@@ -29,24 +29,21 @@ class Incoming:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.bytes = 0
-        self._start = b""
         self._hash = hashlib.sha256()
         self._file = (folder / UPLOAD).open("wb")
 
     def write(self, chunk: bytes) -> None:
         """Writes one more piece of the upload."""
         self.bytes += len(chunk)
-        self._start += chunk[: SNIFFED_BYTES - len(self._start)]
         self._hash.update(chunk)
         try:
             self._file.write(chunk)
         except OSError as error:
             raise StorageError(f"an upload cannot be received ({error.strerror})") from error
 
-    def complete(self, packaging: Packaging) -> str:
+    def complete(self) -> str:
         """Returns the SHA-256 of the upload, now that it is there."""
         self._file.close()
-        sniff(self._start, packaging)
         return self._hash.hexdigest()
 
     def strip(self) -> None:
@@ -60,12 +57,12 @@ class Incoming:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def inspect(folder: Path, packaging: Packaging, checker: str = CHECKER, wall_s: float = WALL_S) -> CheckReport:
-    """Checks the file `upload` in a folder, in a process of its own that writes it anew, and waits for the report."""
+def inspect(folder: Path, checker: str = CHECKER, wall_s: float = WALL_S) -> CheckReport:
+    """Checks the file `upload` in a folder, in a process of its own that writes it again, and waits for the report."""
     try:
         result = run_helper(
             checker,
-            [packaging, ANSWER],
+            [ANSWER],
             wall_s=wall_s + _GRACE_S,
             isolated=True,
             cwd=folder,

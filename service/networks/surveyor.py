@@ -15,7 +15,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures.map_picture import map_png
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.scenario.maps.finder import FINDERS, Map, survey
-from risk_sac.scenario.maps.found import Fit, Misfit, Pattern
+from risk_sac.scenario.maps.found import Pattern
 from service.networks.limits import MAX_PLACES, SURVEY_MEMORY_BYTES
 from service.networks.report import PICTURE, PLACES
 
@@ -38,11 +38,9 @@ def main() -> None:
 def _survey() -> dict[str, object]:
     chosen = Map(NET)
     found = survey(chosen.net)
-    fits = [_spot(fit) | {"summary": fit.place.summary} for fit in found.fits]
-    misfits = [_spot(misfit) | {"why": misfit.why} for misfit in found.misfits]
-    picture = map_png(chosen.net, found)
-    replace_file(Path(PICTURE), picture)
-    replace_file(Path(PLACES), json.dumps({"items": fits, "elsewhere": misfits}).encode())
+    places = {"items": [fit.told() for fit in found.fits], "elsewhere": [misfit.told() for misfit in found.misfits]}
+    replace_file(Path(PICTURE), map_png(chosen.net, found))
+    replace_file(Path(PLACES), json.dumps(places).encode())
     return {}
 
 
@@ -55,11 +53,6 @@ def _keep(name: str, place: str | None = None) -> dict[str, object]:
     if not fits:
         raise ConfigError("places", f"{pattern} fits nowhere on this network; its places say why")
     return {"families": [chosen.keep(fit) for fit in fits]}
-
-
-def _spot(found: Fit | Misfit) -> dict[str, object]:
-    spot = found.spot
-    return {"pattern": spot.pattern, "place": spot.id, "x_m": spot.x_m, "y_m": spot.y_m}
 
 
 if __name__ == "__main__":

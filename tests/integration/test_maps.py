@@ -108,13 +108,13 @@ def _refuses(service: Service, ground: dict[str, str]) -> None:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ('<!DOCTYPE osm [<!ENTITY a SYSTEM "file:///etc/passwd">]><osm>&a;</osm>', "got a DOCTYPE"),
+        ('<!DOCTYPE osm [<!ENTITY a SYSTEM "file:///etc/passwd">]><osm>&a;</osm>', "got a DOCTYPE in line 1"),
         ("<osm><node", "no well-formed XML"),
         (f"<osm>{osm_roundabout(clockwise=True)}</osm>", "left-hand traffic: the roundabout way 99 runs clockwise"),
         ('<OpenDRIVE><road id="2" rule="LHT"/></OpenDRIVE>', "left-hand traffic: road 2 has rule=LHT"),
-        ("<osm></osm>", "netconvert cannot convert the map"),
+        ("<osm></osm>", "the upload without roads"),
         ("<OpenDRIVE>" + "<road>" * 30 + "</road>" * 30 + "</OpenDRIVE>", "nested more than 20 deep"),
-        ("<OpenDRIVE><include file='/etc/passwd'/></OpenDRIVE>", "netconvert cannot convert the map"),
+        ("<OpenDRIVE><include file='/etc/passwd'/><road/></OpenDRIVE>", "netconvert cannot convert the upload"),
     ],
 )
 def test_a_map_that_cannot_be_converted_says_why(service: Service, content: str, says: str) -> None:

@@ -4,81 +4,78 @@ netconvert comes with the package `eclipse-sumo`, not with `libsumo`; on a machi
 format can be read.
 """
 
-import gzip
 import importlib.util
 import os
 import re
 import shutil
+import signal
 import subprocess
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 
 from risk_sac.errors import MapError
+from risk_sac.scenario.maps.documents import FOREIGN_ROOTS, MAP_ROOTS, Document, rewritten
 from risk_sac.scenario.maps.sides import side_remarks
+from risk_sac.scenario.maps.unpack import SMALLER
 
 PRESENT = (1, 16)  # nets since then say all that is read
-HEAD_BYTES = 4096
 WALL_S = 120
 MOST_REMARKS = 20
 _LONGEST = 300
-
-
-class Format(StrEnum):
-    """What a map is written in."""
-
-    NET = "net"
-    OSM = "osm"
-    OPENDRIVE = "OpenDRIVE"
-
-
 _OSM = (
     "--geometry.remove --ramps.guess --junctions.join --tls.guess-signals --tls.discard-simple --tls.join "
     "--tls.default-type static --sidewalks.guess --crossings.guess --walkingareas --no-turnarounds "
-    "--remove-edges.isolated --output.street-names --osm-files"
+    "--output.street-names --osm-files"
 )
 _OPENDRIVE = "--geometry.remove --tls.default-type static --no-turnarounds --opendrive-files"
-OPTIONS: dict[Format, tuple[str, ...]] = {
-    Format.NET: ("--sumo-net-file",),
-    Format.OSM: tuple(_OSM.split()),
-    Format.OPENDRIVE: tuple(_OPENDRIVE.split()),
+OPTIONS: dict[str, list[str]] = {  # by the root of a map
+    "net": ["--sumo-net-file"],
+    "osm": _OSM.split(),
+    "OpenDRIVE": _OPENDRIVE.split(),
 }
-ROOTS = {"net": Format.NET, "osm": Format.OSM, "OpenDRIVE": Format.OPENDRIVE}
 
 
 @dataclass(frozen=True, slots=True)
 class Converted:
-    """A net that can be read, and what was remarked on the way to it."""
+    """A net that can be read, what was remarked on the way to it, and the documents that came with it."""
 
     file: Path
     warnings: tuple[str, ...]
+    others: tuple[Document, ...] = ()
 
 
-def present_net(file: Path, folder: Path) -> Converted:
-    """The map as a net of the present format: itself, where it is one, or a file in `folder`.
+def present_net(file: Path, folder: Path, name: str = "") -> Converted:
+    """Writes the map as a net of the present format into `folder`.
 
-    It may be a net, an OSM extract or OpenDRIVE, gzipped or not; its content tells, not its name.
+    It may be a net, an OSM extract or OpenDRIVE, plain, in gzip, or in a zip archive; its content tells, not its name.
+
+    Args:
+      file: the map.
+      folder: for the net and for what comes before it.
+      name: what messages call the map; by default the file's name.
 
     Raises:
       MapError: it is none of them, or has left-hand traffic, or netconvert refuses it or is not there.
     """
-    plain = _unpacked(file, folder)
-    format_, version = _told(plain)
-    if format_ is Format.NET and version >= PRESENT:
-        return Converted(plain, ())
-    out = folder / "converted.net.xml"
-    sides = side_remarks(plain) if format_ is not Format.NET else []
-    said = _run(format_, plain, out, file.name)
-    return Converted(out, (*sides, *remarks(said, "Warning")))
-
-
-def conversion(format_: Format, source: str, target: str) -> list[str]:
-    """Netconvert's arguments."""
-    return [*OPTIONS[format_], source, "--output-file", target]
+    name = name or file.name
+    documents = rewritten(file, folder, name)
+    maps = [document for document in documents if document.root in MAP_ROOTS]
+    if len(maps) != 1:
+        raise MapError("network", f"{name} with {len(maps)} maps", "one")
+    (found,) = maps
+    others = tuple(document for document in documents if document is not found)
+    left_out = [remark for document in documents for remark in document.remarks]
+    if found.root == "net" and _version(found.attributes) >= PRESENT:
+        return Converted(found.file, tuple(left_out), others)
+    net = folder / "converted.net.xml"
+    sides = side_remarks(found.file) if found.root in FOREIGN_ROOTS else []
+    said = _convert(found, net, name)
+    return Converted(net, (*left_out, *sides, *remarks(said, "Warning")), others)
 
 
 def remarks(said: str, severity: str) -> list[str]:
-    """Netconvert's messages of a severity, `Error` or `Warning`; the first ones, shortened."""
+    """Messages of SUMO's programs of a severity, `Error` or `Warning`; the first ones, shortened."""
     found = re.findall(rf"^{severity}: (.*)$", said, re.MULTILINE)
     return ["".join(filter(str.isprintable, line))[:_LONGEST] for line in found[:MOST_REMARKS]]
 
@@ -100,46 +97,37 @@ def _environment(home: str) -> dict[str, str]:
     return {"PATH": os.defpath, "SUMO_HOME": home, "PROJ_LIB": f"{home}/data/proj", "PROJ_DATA": f"{home}/data/proj"}
 
 
-def _unpacked(file: Path, folder: Path) -> Path:
-    with file.open("rb") as stream:
-        packed = stream.read(2) == b"\x1f\x8b"
-    if not packed:
-        return file
-    plain = folder / "unpacked.xml"
-    try:
-        with gzip.open(file) as source, plain.open("wb") as target:
-            shutil.copyfileobj(source, target)
-    except (EOFError, gzip.BadGzipFile) as error:
-        raise MapError("network", f"{file.name} is no whole gzip file: {error}") from error
-    return plain
+def _version(attributes: Mapping[str, str]) -> tuple[int, ...]:
+    told = re.match(r"(\d+)\.(\d+)", attributes.get("version", ""))
+    return (int(told[1]), int(told[2])) if told else (0,)
 
 
-def _told(file: Path) -> tuple[Format, tuple[int, ...]]:
-    """Format and version, by the root element."""
-    with file.open("rb") as stream:
-        head = stream.read(HEAD_BYTES).decode("utf-8", "replace")
-        # Netconvert writes a long comment first.
-        while "-->" not in head and "<!--" in head and (more := stream.read(HEAD_BYTES)):
-            head += more.decode("utf-8", "replace")
-        head += stream.read(HEAD_BYTES).decode("utf-8", "replace")
-    root = re.search(r"<([A-Za-z_][\w.-]*)([^>]*)", re.sub(r"<!--.*?-->", "", head, flags=re.DOTALL))
-    if root is None or root[1] not in ROOTS:
-        got = "no XML" if root is None else f"XML with the root <{root[1][:40]}>"
-        raise MapError("network", f"{file.name}, which is {got}", "<net> (SUMO), <osm> or <OpenDRIVE>")
-    version = re.search(r'version="(\d+)\.(\d+)', root[2])
-    return ROOTS[root[1]], (0,) if version is None else (int(version[1]), int(version[2]))
-
-
-def _run(format_: Format, plain: Path, out: Path, name: str) -> str:
-    """What netconvert says."""
+def _convert(found: Document, net: Path, name: str) -> str:
+    """Runs netconvert in the folder of its files, since a comma in a path makes a list; returns its messages."""
     program, environment = netconvert()
-    command = [program, *conversion(format_, str(plain), str(out))]
+    files = [found.file.name, "--output-file", net.name, "--xml-validation", "never"]
+    command = [program, *OPTIONS[found.root], *files]
     try:
-        done = subprocess.run(command, capture_output=True, timeout=WALL_S, env=environment, check=False)
+        done = subprocess.run(
+            command, cwd=net.parent, capture_output=True, timeout=WALL_S, env=environment, check=False
+        )
     except subprocess.TimeoutExpired:
-        raise MapError("network", f"{name}, which takes more than {WALL_S} s to convert", "a smaller map") from None
+        raise MapError("network", f"{name}, which takes more than {WALL_S} s to convert", remedy=SMALLER) from None
     said = done.stderr.decode("utf-8", "replace")
+    if done.returncode < 0 or "bad_alloc" in said:
+        raise _crash(done.returncode, said, name)
     if done.returncode != 0:
         why = "; ".join(remarks(said, "Error")[:5]) or f"status {done.returncode}"
         raise MapError("network", f"netconvert cannot convert {name}: {why}")
     return said
+
+
+def _crash(status: int, said: str, name: str) -> MapError:
+    if "bad_alloc" in said or -status in (signal.SIGXCPU, signal.SIGKILL):
+        return MapError("network", f"{name}, for which netconvert has too little time or memory", remedy=SMALLER)
+    last = next(iter(remarks(said, "Error") or remarks(said, "Warning")[::-1]), "nothing")
+    return MapError(
+        "network",
+        f"SUMO's netconvert crashes on {name} ({signal.Signals(-status).name}); it said last: {last}",
+        remedy="open the map in SUMO's netedit, repair or remove what it cannot read, and send what netedit saves",
+    )

@@ -23,6 +23,10 @@ class Spot:
     x_m: float
     y_m: float
 
+    def told(self) -> dict[str, object]:
+        """The spot as it is written as JSON."""
+        return {"pattern": self.pattern, "place": self.id, "x_m": self.x_m, "y_m": self.y_m}
+
 
 @dataclass(frozen=True, slots=True)
 class Fit:
@@ -31,6 +35,10 @@ class Fit:
     spot: Spot
     place: Place
 
+    def told(self) -> dict[str, object]:
+        """The place as it is written as JSON."""
+        return self.spot.told() | {"summary": self.place.summary}
+
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
@@ -38,6 +46,10 @@ class Misfit:
 
     spot: Spot
     why: str
+
+    def told(self) -> dict[str, object]:
+        """The spot and the reason as they are written as JSON."""
+        return self.spot.told() | {"why": self.why}
 
 
 class NoFit(Exception):

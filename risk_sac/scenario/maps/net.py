@@ -19,6 +19,10 @@ DRIVER = "passenger"  # the class of every vehicle of ours
 TURNAROUND = "t"
 STOP = "rRyYu"  # red, yellow, and red with yellow: of the colours of a signal, those that let nobody go
 DEFAULT_WIDTH_M = 3.2
+LEAST_LIMIT_MPS = 0.01  # of a closed lane, so that driving it takes a finite time
+FARTHEST = 1e8  # m; the Earth's circumference is 4e7
+LONGEST_NAME = 200
+REPAIR = "run netconvert over it, or save it with netedit"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,6 +122,7 @@ class Net:
     inside: dict[str, list[Lane]] = field(default_factory=lambda: defaultdict(list))  # drivable, by junction
     # Inside junctions, by a lane's id: the lanes that vehicles wait for before they drive onto it.
     waits_for: dict[str, tuple[Lane, ...]] = field(default_factory=dict)
+    keeps_left: bool = False
 
     @cached_property
     def arriving(self) -> Mapping[str, list[Edge]]:
@@ -148,53 +153,56 @@ class Net:
     def lane(self, id_: str) -> Lane:
         """A lane outside junctions."""
         edge, _, index = id_.rpartition("_")
-        return self.edges[edge].lanes[int(index)]
+        lanes = self.edges[edge].lanes
+        if not 0 <= int(index) < len(lanes):
+            raise ValueError(f"a connection names lane {index} of edge {edge!r}, which has {len(lanes)}")
+        return lanes[int(index)]
 
 
 def read_tree(path: Path) -> ET.Element:
-    """Reads the XML of a net that we, the sandbox or netconvert have written; raises `MapError` if it is none."""
+    """Reads the XML of a net that we or netconvert have written; raises `MapError` if it is none."""
     try:
         return ET.parse(path).getroot()
     except ET.ParseError as error:
-        raise MapError("network", f"{path.name} is no XML: {error}") from error
+        raise MapError("network", f"the net is no XML: {error}") from error
 
 
 def read_net(path: Path, root: ET.Element | None = None) -> Net:
-    """Reads a net, or takes its XML from `root`; raises `MapError` if nothing could be found on it."""
-    root = read_tree(path) if root is None else root
-    if root.tag != "net":
-        raise MapError("network", f"{path.name} with the root <{root.tag}>", "<net>", "convert it first")
-    if root.get("lefthand", "false").lower() in ("true", "1"):
+    """Reads a net, or takes its XML from `root`; raises `MapError` if no place could be found on it."""
+    net = parse_net(read_tree(path) if root is None else root)
+    if net.keeps_left:
         raise MapError("network", 'left-hand traffic (lefthand="true")', "right-hand traffic")
-    try:
-        net = _net(root)
-    except (KeyError, ValueError, IndexError, TypeError) as error:
-        raise MapError(
-            "network", f"{path.name} is no net of the present format ({error!r})", remedy="run netconvert over it"
-        ) from error
     if not any(edge.drivable for edge in net.edges.values()):
-        raise MapError("network", f"none of the {len(net.edges)} edges has a lane for passenger cars")
-    starts = {edge.start for edge in net.edges.values() if edge.drivable}
-    if not net.onward and any(edge.end in starts for edge in net.edges.values()):
-        raise MapError(
-            "network", "roads meet, but no lane leads on to another: the net lacks its <connection> elements"
-        )
+        raise MapError("network", f"none of the {len(net.edges)} edges of the map has a lane for passenger cars")
     return net
 
 
+def parse_net(root: ET.Element) -> Net:
+    """Reads the XML of any net; raises `MapError` if it is none of the present format."""
+    if root.tag != "net":
+        raise MapError("network", f"a file with the root <{root.tag}>", "<net>", "convert it first")
+    try:
+        return _net(root)
+    except KeyError as error:
+        raise MapError("network", f"the net lacks {error}, or names it and does not have it", remedy=REPAIR) from error
+    except (ValueError, IndexError) as error:
+        raise MapError("network", f"the net is broken: {error}", remedy=REPAIR) from error
+
+
 def _net(root: ET.Element) -> Net:
-    net, inner = Net(), dict[str, Lane]()
+    net = Net(keeps_left=root.get("lefthand", "false").lower() in ("true", "1"))
+    inner = dict[str, Lane]()
     crossings = []
     for edge in root.iter("edge"):
         function = edge.get("function", "normal")
-        lanes = tuple(_lane(edge.attrib["id"], lane.attrib) for lane in edge.iter("lane"))
+        lanes = tuple(_lane(edge.attrib["id"], i, lane.attrib) for i, lane in enumerate(edge.iter("lane")))
         if function == "internal":
             inner |= {lane.id: lane for lane in lanes}
             net.inside[edge.attrib["id"].rpartition("_")[0][1:]] += [lane for lane in lanes if lane.drivable]
         elif function == "crossing" and lanes:
             crossings.append((edge, lanes[0]))
         elif function == "normal":
-            net.edges[edge.attrib["id"]] = Edge(edge.attrib["id"], edge.attrib["from"], edge.attrib["to"], lanes)
+            net.edges[edge.attrib["id"]] = _edge(edge, lanes)
     index_of: dict[str, int] = {}
     for junction in root.iter("junction"):
         if junction.get("type") == "internal":
@@ -207,7 +215,7 @@ def _net(root: ET.Element) -> Net:
     for light in root.iter("tlLogic"):  # of several programmes, SUMO runs the last
         phases = list(light.iter("phase"))
         states[light.attrib["id"]] = [phase.attrib["state"] for phase in phases]
-        net.cycles_s[light.attrib["id"]] = sum(float(phase.attrib["duration"]) for phase in phases)
+        net.cycles_s[light.attrib["id"]] = sum(_number(phase.attrib["duration"]) for phase in phases)
     lights = _link(net, root, inner, index_of, states)
     for edge, lane in crossings:
         id_ = edge.attrib["id"]
@@ -256,15 +264,25 @@ def _is_closed(connection: Mapping[str, str], states: Mapping[str, Sequence[str]
     return bool(phases) and all(state[int(connection["linkIndex"])] in STOP for state in phases)
 
 
-def _lane(edge: str, a: Mapping[str, str]) -> Lane:
+def _edge(edge: ET.Element, lanes: tuple[Lane, ...]) -> Edge:
+    id_ = edge.attrib["id"]
+    if len(id_) > LONGEST_NAME or not lanes:
+        got = f"edge {id_[:60]!r} has {len(lanes)} lanes and an id of {len(id_)} characters"
+        raise ValueError(f"{got}; wanted one lane or more, and at most {LONGEST_NAME} characters")
+    return Edge(id_, edge.attrib["from"], edge.attrib["to"], lanes)
+
+
+def _lane(edge: str, index: int, a: Mapping[str, str]) -> Lane:
     line = _line(a["shape"])
+    if not line:
+        raise ValueError(f"lane {a['id']!r} has no shape")
     return Lane(
         id=a["id"],
         edge=edge,
-        index=int(a["index"]),
-        length_m=float(a["length"]),
-        width_m=float(a.get("width", DEFAULT_WIDTH_M)),
-        limit_mps=float(a["speed"]),
+        index=index,  # as SUMO has it, whatever the file says
+        length_m=_positive(a["length"]),
+        width_m=_positive(a.get("width", DEFAULT_WIDTH_M)),
+        limit_mps=max(_number(a["speed"]), LEAST_LIMIT_MPS),
         line=line if len(line) > 1 else (line[0], (line[0][0] + 1e-3, line[0][1])),
         drivable=_admits(a.get("allow"), a.get("disallow")),
     )
@@ -279,11 +297,27 @@ def _admits(allow: str | None, disallow: str | None) -> bool:
 def _junction(junction: ET.Element) -> Junction:
     a = junction.attrib
     foes = {int(request.attrib["index"]): request.attrib["foes"] for request in junction.iter("request")}
-    return Junction(a["id"], a.get("type", ""), float(a["x"]), float(a["y"]), _line(a.get("shape", "")), foes)
+    return Junction(a["id"], a.get("type", ""), _number(a["x"]), _number(a["y"]), _line(a.get("shape", "")), foes)
 
 
 def _line(shape: str) -> tuple[Point, ...]:
-    return tuple((float(x), float(y)) for x, y, *_ in (point.split(",") for point in shape.split()))
+    points = [[_number(each) for each in point.split(",")] for point in shape.split()]
+    if any(len(point) not in (2, 3) for point in points):
+        raise ValueError(f"{shape[:60]!r} is no shape; wanted points x,y or x,y,z")
+    return tuple((x, y) for x, y, *_ in points)
+
+
+def _number(text: str | float) -> float:
+    number = float(text)
+    if not abs(number) <= FARTHEST:
+        raise ValueError(f"{text!r} is no number within ±{FARTHEST:g}")
+    return number
+
+
+def _positive(text: str | float) -> float:
+    if (number := _number(text)) <= 0.0:
+        raise ValueError(f"{text!r} is no size above 0")
+    return number
 
 
 def _direction(a: Point, b: Point) -> float:

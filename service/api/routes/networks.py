@@ -7,14 +7,16 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from risk_sac.scenario.maps.documents import MAX_ROADS
+from risk_sac.scenario.maps.unpack import MAX_BYTES, MAX_FILES
 from service.api.answers.pages import Cursor, Limit
 from service.api.answers.problem_body import Reason
 from service.api.answers.problems import ProblemError
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, WAIT, Responses, header, problem
 from service.api.context import CurrentCaller, Service
 from service.api.posted import media_type
-from service.networks.limits import MAX_EDGES, MAX_EXPANDED_BYTES, MAX_FILES, WALL_S
-from service.networks.report import MEDIA_TYPES, Packaging
+from service.networks.limits import WALL_S
+from service.networks.report import MEDIA_TYPES
 from service.networks.schemas import Network, NetworkPage, Places
 
 LISTED = "networks"
@@ -33,12 +35,12 @@ FINDING = problem(422, "Nothing can be found on the network, and `detail` says w
 DRAWN: Responses = {200: {"content": {"image/png": {}}}}
 DESCRIPTION = f"""Check a SUMO road network and keep it. Its `places` are where campaigns can be run on it.
 
-The body is a net (`.net.xml`), an OpenStreetMap extract or OpenDRIVE, the same as gzip, or a zip archive of one net \
-and up to {MAX_FILES - 1} route and additional files, told apart by their root elements. A map that is no net is \
-converted by SUMO's netconvert; `warnings` has its remarks, and whether lanes for cars, signals or connections are \
-missing. UTF-8, at most {MAX_EXPANDED_BYTES >> 20} MiB once unpacked and {MAX_EDGES} edges, those inside junctions \
-included. What names a file, includes one or writes output is refused. What was read is written anew and loaded once, \
-in at most {WALL_S} s; only that is kept, without comments, under names of the service's own."""
+The body is a net (`.net.xml`), an OpenStreetMap extract or OpenDRIVE, the same as gzip, or a zip archive of one map \
+and up to {MAX_FILES - 1} route and additional files. Its content tells what it is. A map that is no net, or an old \
+one, is converted by SUMO's netconvert; `warnings` has its remarks, the side of traffic, and whether lanes for cars, \
+signals or connections are missing. At most {MAX_BYTES >> 20} MiB once unpacked and {MAX_ROADS} edges, not counting \
+those inside junctions. What names a file, includes one or writes output is refused. What was read is written again \
+and loaded once, in at most {WALL_S} s; only that is kept, without comments, under names of the service's own."""
 DOCUMENTED_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -49,17 +51,23 @@ DOCUMENTED_BODY: dict[str, Any] = {
 router = APIRouter(prefix="/v1/networks", tags=["networks"], responses=STORAGE | INVALID)
 
 
-def _packaging(request: Request) -> Packaging:
-    return MEDIA_TYPES[media_type(request, MEDIA_TYPES)]
+def _refuse_other_types(request: Request) -> None:
+    media_type(request, MEDIA_TYPES)
 
 
-@router.post("", status_code=201, responses=CREATED | REFUSALS, description=DESCRIPTION, openapi_extra=DOCUMENTED_BODY)
+@router.post(
+    "",
+    status_code=201,
+    responses=CREATED | REFUSALS,
+    description=DESCRIPTION,
+    openapi_extra=DOCUMENTED_BODY,
+    dependencies=[Depends(_refuse_other_types)],
+)
 async def post_network(
     request: Request,
     response: Response,
     service: Service,
     caller: CurrentCaller,
-    packaging: Annotated[Packaging, Depends(_packaging)],
     label: Annotated[str, Query(max_length=200, description="A note of your own.")] = "",
 ) -> Network:
     """Receive an upload, have it checked, and keep it."""
@@ -68,7 +76,7 @@ async def post_network(
             async with asyncio.timeout(RECEIVE_S):
                 async for chunk in request.stream():
                     incoming.write(chunk)
-            network = await run_in_threadpool(service.networks.add, incoming, packaging, caller.project, label)
+            network = await run_in_threadpool(service.networks.add, incoming, caller.project, label)
     except TimeoutError as error:
         detail = f"the body took longer than {RECEIVE_S} s; wanted it faster"
         raise ProblemError(HTTPStatus.REQUEST_TIMEOUT, Reason.UPLOAD_TOO_SLOW, detail) from error

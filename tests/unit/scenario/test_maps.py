@@ -21,6 +21,7 @@ from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.finder import Map, place_at, survey
 from risk_sac.scenario.maps.found import NoFit
 from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net, read_net
+from risk_sac.scenario.maps.summary import net_remarks
 from risk_sac.scenario.maps.ways import way_back, way_on
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch
 from risk_sac.sim.sumo import SumoSimulation
@@ -137,14 +138,9 @@ def road(id_: str, a: str, b: str, metres: float, line: str) -> str:
     [
         ("<net><edge", "is no XML"),
         ("<routes/>", "with the root <routes>"),
-        ("<net/>", "none of the 0 edges has a lane for passenger cars"),
         (f'<net lefthand="true">{road("r", "a", "b", 900, "0,0 900,0")}</net>', "left-hand traffic"),
-        (f"<net>{RAILS}</net>", "none of the 1 edges has a lane for passenger cars"),
-        (
-            f"<net>{road('r', 'a', 'b', 90, '0,0 90,0')}{road('s', 'b', 'c', 90, '90,0 180,0')}</net>",
-            "roads meet, but no lane leads on",
-        ),
-        ('<net><edge id="r" from="a" to="b"><lane id="r_0" index="0"/></edge></net>', "no net of the present format"),
+        (f"<net>{RAILS}</net>", "none of the 1 edges of the map has a lane for passenger cars"),
+        ('<net><edge id="r" from="a" to="b"><lane id="r_0"/></edge></net>', "the net lacks 'shape'"),
     ],
 )
 def test_a_map_that_nothing_fits_on_says_why(tmp_path: Path, content: str, says: str) -> None:
@@ -167,13 +163,48 @@ def test_a_place_that_cannot_be_run_says_why(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "says"),
-    [("<html/>", "root <html>"), ("nothing", "no XML"), ("<osm/>", "netconvert cannot convert")],
+    [
+        ("<html/>", "map, whose root is <html>"),
+        ("nothing", "map is no well-formed XML"),
+        ("<osm/>", "map without roads"),
+        ('<osm><way id="2"><nd ref="1"/><tag k="highway" v="primary"/></way></osm>', "netconvert cannot convert map"),
+        ('<osm><relation id="1"><tag k="type" v="lanelet"/></relation></osm>', "map, a Lanelet2 map; .* as OpenDRIVE"),
+    ],
 )
 def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str) -> None:
     file = tmp_path / "map"
     file.write_text(content)
     with pytest.raises(MapError, match=says):
         present_net(file, tmp_path)
+
+
+TWO_WAYS = road("r", "a", "b", 900, "0,0 900,0") + road("s", "b", "a", 900, "900,3 0,3")
+ONWARD = road("t", "b", "c", 90, "900,0 990,0")
+
+
+@pytest.mark.parametrize(
+    ("roads", "says"),
+    [
+        (TWO_WAYS, []),
+        (TWO_WAYS + ONWARD, ["there are no connections, although roads meet: no lane leads on to another"]),
+        (
+            TWO_WAYS + road("u", "d", "e", 90, "0,90 90,90"),
+            ["roads are disconnected: the largest part has 2 of 3 edges for cars"],
+        ),
+    ],
+)
+def test_a_dead_end_is_no_missing_connection(tmp_path: Path, roads: str, says: list[str]) -> None:
+    file = tmp_path / "map.net.xml"
+    file.write_text(f"<net>{roads}</net>")
+    net = read_net(file)
+    assert net_remarks(net) == ["there are no traffic lights", *says]
+    assert place_at(net, "car_following", "r")
+
+
+@pytest.mark.parametrize("name", ["straight_two_way.xodr", "single_road.osm"])
+def test_a_map_of_one_road_has_places(tmp_path: Path, name: str) -> None:
+    found = survey(Map(present_net(Path(__file__).with_name("maps") / name, tmp_path).file).net)
+    assert found.counts["car_following"] >= 1
 
 
 def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(

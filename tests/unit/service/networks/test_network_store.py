@@ -7,7 +7,6 @@ import pytest
 
 from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError, UploadError
 from service.networks.network_store import INCOMING, RECORD, NetworkStore
-from service.networks.report import Packaging
 from service.networks.schemas import Network
 from tests.hostile_networks import NET
 
@@ -28,7 +27,7 @@ def add(shelf: NetworkStore, project: str = "default", label: str = "", content:
     with shelf.receive() as incoming:
         incoming.write(content[:50].encode())
         incoming.write(content[50:].encode())
-        return shelf.add(incoming, Packaging.XML, project, label)
+        return shelf.add(incoming, project, label)
 
 
 def test_a_network_is_kept_as_it_was_described(shelf: NetworkStore, folder: Path) -> None:

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from risk_sac.scenario.maps.unpack import MAX_BYTES
 from service.errors import StorageError, UploadError
 from service.networks import limits
-from service.networks.report import Packaging
 from service.networks.sandbox import inspect
 from tests.hostile_networks import NET, ROUTES, zipped
 from tests.server import LONG_S
 
-BOUND = "import os, sys; from service.networks.checker.simulator import bind; bind();"
+BOUND = "import os, sys; from service.networks.simulator import bind; bind();"
 
 
 def python(code: str) -> Sequence[str]:
@@ -30,14 +30,14 @@ def checker(folder: Path, code: str) -> str:
 
 def refusal(folder: Path, code: str, wall_s: float = 5) -> str:
     with pytest.raises(UploadError) as caught:
-        inspect(folder, Packaging.XML, checker(folder, code), wall_s)
+        inspect(folder, checker(folder, code), wall_s)
     return str(caught.value)
 
 
 def test_a_good_network_passes_with_its_files(tmp_path: Path) -> None:
     (tmp_path / "upload").write_bytes(zipped(ROUTES, NET))
-    report = inspect(tmp_path, Packaging.ZIP)
-    assert [(file.name, file.kind) for file in report.files] == [("net.xml", "net"), ("routes-0.xml", "routes")]
+    report = inspect(tmp_path)
+    assert [(file.name, file.kind) for file in report.files] == [("net.xml", "net"), ("routes-1.xml", "routes")]
     assert all((tmp_path / file.name).stat().st_size == file.bytes for file in report.files)
 
 
@@ -68,22 +68,22 @@ def test_a_checker_that_hangs_is_killed_with_its_children(tmp_path: Path) -> Non
 def test_a_checker_that_floods_its_output_fills_no_memory(tmp_path: Path) -> None:
     code = f"{BOUND} [os.write(1, bytes(1 << 20)) for _ in range(1000)]"
     with pytest.raises(StorageError, match="cannot be checked"):
-        inspect(tmp_path, Packaging.XML, checker(tmp_path, code))
-    assert (tmp_path / "log").stat().st_size <= 2 * limits.MAX_EXPANDED_BYTES
+        inspect(tmp_path, checker(tmp_path, code))
+    assert (tmp_path / "log").stat().st_size <= 2 * MAX_BYTES
 
 
 def test_what_the_checker_says_is_not_believed_either(tmp_path: Path) -> None:
     for said in ("", "hello", "[]", '{"refused": 3}', '{"summary": {"edges": "many"}}'):
-        code = f"import sys; open(sys.argv[2], 'w').write({said!r})"
+        code = f"import sys; open(sys.argv[1], 'w').write({said!r})"
         with pytest.raises(StorageError, match="cannot be checked"):
-            inspect(tmp_path, Packaging.XML, checker(tmp_path, code))
+            inspect(tmp_path, checker(tmp_path, code))
     with pytest.raises(StorageError, match="cannot be checked"):
-        inspect(tmp_path, Packaging.XML, checker(tmp_path, "raise SystemExit(3)"))
+        inspect(tmp_path, checker(tmp_path, "raise SystemExit(3)"))
 
 
 def test_a_checker_that_cannot_be_started_is_no_fault_of_the_upload(tmp_path: Path) -> None:
     with pytest.raises(StorageError, match="No such file"):
-        inspect(tmp_path / "missing", Packaging.XML)
+        inspect(tmp_path / "missing")
 
 
 def test_the_checker_knows_nothing_of_the_servers_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,17 +102,17 @@ def bounded(code: str) -> subprocess.CompletedProcess[str]:
     [
         ("bytearray(limits.MEMORY_BYTES)", "MemoryError"),
         ("[open(os.devnull) for _ in range(limits.OPEN_FILES)]", "Too many open files"),
-        ("open('big', 'wb').truncate(2 * limits.MAX_EXPANDED_BYTES + 1)", "File too large"),
+        ("open('big', 'wb').truncate(2 * simulator.MAX_BYTES + 1)", "File too large"),
     ],
 )
 def test_the_checker_binds_itself(code: str, says: str, tmp_path: Path) -> None:
-    ended = bounded(f"from service.networks import limits; os.chdir({str(tmp_path)!r}); {code}")
+    ended = bounded(f"from service.networks import limits, simulator; os.chdir({str(tmp_path)!r}); {code}")
     assert ended.returncode == 1
     assert says in ended.stderr
 
 
 def test_the_checker_ends_itself_when_nobody_watches() -> None:
-    code = f"from service.networks import limits; limits.WALL_S = 1; {BOUND} import time; time.sleep(30)"
+    code = f"from service.networks import simulator; simulator.WALL_S = 1; {BOUND} import time; time.sleep(30)"
     ended = subprocess.run(python(code), timeout=LONG_S, check=False)
     assert ended.returncode == -signal.SIGALRM
 
@@ -122,7 +122,7 @@ def test_the_simulator_may_write_little_whatever_it_is_told(tmp_path: Path) -> N
     (tmp_path / "net.xml").write_text(NET)
     (tmp_path / "log").touch()
     code = (
-        "from service.networks.checker.simulator import bind_simulator; import libsumo; os.chdir(sys.argv[1]);"
+        "from service.networks.simulator import bind_simulator; import libsumo; os.chdir(sys.argv[1]);"
         "bind_simulator();"
         "libsumo.start(['sumo', '-n', 'net.xml', '--fcd-output', 'out.xml', '--netstate-dump', 'dump.xml']);"
         "[libsumo.simulationStep() for _ in range(20000)]; os._exit(0)"

@@ -1,52 +1,43 @@
 """Whether libsumo can load a network, and what the process that tries may use."""
 
 import os
-import re
 import resource
 import signal
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from risk_sac.scenario.maps.convert import remarks
+from risk_sac.scenario.maps.unpack import MAX_BYTES
 from service.errors import UploadError
-from service.networks.limits import (
-    CPU_S,
-    LOG_BYTES,
-    MAX_EXPANDED_BYTES,
-    MAX_VEHICLES,
-    MEMORY_BYTES,
-    OPEN_FILES,
-    STEP_S,
-    STEPS,
-    WALL_S,
-)
+from service.networks.limits import CPU_S, LOG_BYTES, MEMORY_BYTES, OPEN_FILES, STEP_S, STEPS, WALL_S
+from service.networks.report import Kind
 
 LOG = Path("log")  # where the file descriptors 1 and 2 lead to
-_MOST_WARNINGS = 20
-_LONGEST = 300
+_FLAGS: Mapping[Kind, str] = {Kind.NET: "-n", Kind.ADDITIONAL: "-a", Kind.ROUTES: "-r"}
 _OPTIONS = (
     "--xml-validation never --xml-validation.net never --xml-validation.routes never --route-steps 0 "
-    f"--step-length {STEP_S} --max-num-vehicles {MAX_VEHICLES} --no-step-log --duration-log.disable"
+    f"--step-length {STEP_S} --scale 0 --no-step-log --duration-log.disable"  # flows insert nothing
 ).split()
 
 
-def load(net: str, additionals: Sequence[str], routes: Sequence[str]) -> list[str]:
-    """Loads a network and runs a few steps, with no output on and no option of the user's.
+def load(names: Mapping[Kind, Sequence[str]]) -> list[str]:
+    """Loads files of the current folder and runs a few steps, with no output on and no option of the user's.
 
-    Returns what SUMO warned of; an UploadError has SUMO's own message. All files lie in the current folder.
+    Returns what SUMO warned of; an UploadError has SUMO's own message.
     """
     os.environ["OPENBLAS_NUM_THREADS"] = "1"  # libsumo imports numpy, which reserves memory for each thread
     import libsumo  # here, so that most uploads are refused without it
 
-    command = ["sumo", "-n", net, *_OPTIONS]
-    command += ["-a", ",".join(additionals)] if additionals else []
-    command += ["-r", ",".join(routes)] if routes else []
+    command = ["sumo", *_OPTIONS]
+    for kind, flag in _FLAGS.items():
+        command += [flag, ",".join(names[kind])] if names[kind] else []
     try:
         libsumo.start(command)
         for _ in range(STEPS):
             libsumo.simulationStep()
     except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
-        raise UploadError(f"the simulator cannot load it: {'; '.join(said('Error')[:5]) or error}") from error
-    return said("Warning")[:_MOST_WARNINGS]
+        raise UploadError(f"the simulator cannot load it: {'; '.join(_said('Error')[:5]) or error}") from error
+    return _said("Warning")
 
 
 def bind() -> None:
@@ -56,7 +47,7 @@ def bind() -> None:
     _limit(resource.RLIMIT_CPU, CPU_S)
     _limit(resource.RLIMIT_AS, MEMORY_BYTES)
     _limit(resource.RLIMIT_NOFILE, OPEN_FILES)
-    _limit(resource.RLIMIT_FSIZE, 2 * MAX_EXPANDED_BYTES)  # what is written anew has more end tags
+    _limit(resource.RLIMIT_FSIZE, 2 * MAX_BYTES)  # what is written again has more end tags
 
 
 def bind_simulator() -> None:
@@ -72,8 +63,6 @@ def _limit(resource_: int, most: int) -> None:
     resource.setrlimit(resource_, (most, most))
 
 
-def said(severity: str, log: Path = LOG) -> list[str]:
+def _said(severity: str) -> list[str]:
     """SUMO's messages of a severity, `Error` or `Warning`, so far."""
-    text = log.read_bytes().decode("utf-8", "replace")
-    lines = re.findall(rf"^{severity}: (.*)$", text, re.MULTILINE)
-    return ["".join(filter(str.isprintable, line))[:_LONGEST] for line in lines]
+    return remarks(LOG.read_text("utf-8", "replace"), severity)

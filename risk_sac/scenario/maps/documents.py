@@ -1,0 +1,179 @@
+"""Reads the XML documents of a map and writes them again without what could do harm.
+
+SUMO never sees the bytes that a user sent. Refused are document types, names of files, and whatever is beyond the
+limits; elements that no map needs are left out.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+from xml.parsers.expat import ExpatError, ParserCreate
+from xml.sax.saxutils import quoteattr
+
+from risk_sac.errors import MapError
+from risk_sac.scenario.maps.unpack import DAMAGED, SMALLER, unpacked
+
+MAX_DEPTH = 20
+MAX_ELEMENTS = 2_000_000  # of one document
+MAX_ATTRIBUTES = 100  # of one element
+MAX_VALUE = 100_000  # characters of one attribute: a shape of 4,000 points
+MAX_ROADS = 50_000  # edges of a net without those inside junctions, ways of OpenStreetMap, roads of OpenDRIVE
+
+FOREIGN_ROOTS = ("osm", "OpenDRIVE")
+MAP_ROOTS = ("net", *FOREIGN_ROOTS)
+_OF_SUMO = (
+    "net location type restriction edge lane neigh stopOffset junction request connection prohibition roundabout param "
+    "tlLogic phase routes additional vType vTypeDistribution route routeDistribution vehicle trip flow stop person "
+    "personFlow walk ride personTrip busStop trainStop containerStop chargingStation access parkingArea space poly poi "
+    "taz tazSource tazSink"
+)
+_COPIED = frozenset(_OF_SUMO.split())
+_LEFT_OUT = ("include", "userData", "dataQuality", "geoReference", "offset", "license")  # other files, projections
+_NAMES_FILE = re.compile("(?<!pro)file|output|^href$|^dest$", re.IGNORECASE)
+_SWITCHES_DEVICE = re.compile(r"^(has|device)\.")  # of a vehicle; some write files
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A document that was written again."""
+
+    file: Path
+    root: str
+    attributes: Mapping[str, str]  # of the root
+    elements: int
+    remarks: tuple[str, ...]
+
+
+def rewritten(upload: Path, folder: Path, name: str) -> list[Document]:
+    """Writes the documents of a file, which may be packed by gzip or zip, again into a folder.
+
+    Args:
+      upload: the file.
+      folder: for the documents, under names of ours.
+      name: what messages call the file.
+
+    Raises:
+      MapError: with the line, if the file holds what no map needs.
+    """
+    upload.stat()  # one that is missing is not damaged
+    try:
+        contents = list(unpacked(upload))
+    except MapError:
+        raise
+    except DAMAGED as error:
+        raise MapError("network", f"{name} is damaged: {error}") from error
+    return [_copied(content, folder / f"{i}.xml", name) for i, content in enumerate(contents)]
+
+
+def _copied(content: bytes, file: Path, name: str) -> Document:
+    with file.open("w", encoding="utf-8") as output:
+        copy = _Copy(output, name)
+        try:
+            copy.parser.Parse(content, True)
+        except MapError:
+            raise
+        except (ExpatError, LookupError, ValueError) as error:  # the latter two: an encoding that Python lacks
+            raise MapError("network", f"{name} is no well-formed XML: {error}") from error
+    if not copy.roads and copy.root in MAP_ROOTS:
+        raise MapError("network", f"{name} without roads", "a map with one at least")
+    left_out = ", ".join(f"<{tag[:40]}> ({count})" for tag, count in copy.left_out.most_common(10))
+    remarks = (f"left out, because they are no part of a map: {left_out}",) if left_out else ()
+    return Document(file, copy.root, copy.attributes, copy.elements, remarks)
+
+
+class _Copy:
+    """Handlers of a parser that write what they are given, unless it is refused or left out."""
+
+    def __init__(self, output: IO[str], name: str) -> None:
+        self.root = ""
+        self.attributes: Mapping[str, str] = {}
+        self.elements = 0
+        self.left_out = Counter[str]()
+        self.roads = 0
+        self._name = name
+        self._path: list[str] = []
+        self._skipped = 0  # elements that are open and left out
+        self._write = output.write
+        self.parser = ParserCreate()
+        self.parser.StartElementHandler, self.parser.EndElementHandler = self._start, self._end
+        self.parser.StartDoctypeDeclHandler = self._doctype
+        output.write('<?xml version="1.0" encoding="UTF-8"?>\n')
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        if not self._path:
+            self._begin(tag, attributes)
+        self.elements += 1
+        self._check_sizes(tag, attributes)
+        self._count_road(tag, attributes)
+        self._path.append(tag)
+        if self._skipped or not self._is_copied(tag, attributes):
+            self._skipped += 1
+            return
+        kept = (f" {key}={quoteattr(_harmless(value))}" for key, value in attributes.items() if _is_plain(key))
+        self._write(f"<{tag}{''.join(kept)}>")
+
+    def _end(self, tag: str) -> None:
+        self._path.pop()
+        if self._skipped:
+            self._skipped -= 1
+        else:
+            self._write(f"</{tag}>\n")
+
+    def _begin(self, tag: str, attributes: Mapping[str, str]) -> None:
+        if tag not in (*MAP_ROOTS, "routes", "additional"):
+            got = f"{self._name}, whose root is <{tag[:80]}>"
+            raise MapError("network", got, "<net> (SUMO), <osm> (OpenStreetMap) or <OpenDRIVE>")
+        self.root, self.attributes = tag, attributes
+
+    def _check_sizes(self, tag: str, attributes: Mapping[str, str]) -> None:
+        if self.elements > MAX_ELEMENTS:
+            raise self._refusal(f"more than {MAX_ELEMENTS} elements", "at most that", SMALLER)
+        if len(self._path) >= MAX_DEPTH:
+            raise self._refusal(f"elements nested more than {MAX_DEPTH} deep", "at most that")
+        if len(attributes) > MAX_ATTRIBUTES:
+            raise self._refusal(f"<{tag[:80]}> with {len(attributes)} attributes", f"at most {MAX_ATTRIBUTES}")
+        for key, value in attributes.items():
+            if len(value) > MAX_VALUE:
+                raise self._refusal(f"{len(value)} characters in {key[:80]!r} of <{tag[:80]}>", f"at most {MAX_VALUE}")
+
+    def _count_road(self, tag: str, attributes: Mapping[str, str]) -> None:
+        """Counts roads, so that a map that is too large is refused before SUMO works on it."""
+        if tag == "tag" and attributes.get("k") == "type" and attributes.get("v") == "lanelet":
+            raise MapError("network", f"{self._name}, a Lanelet2 map", "another format", "export it as OpenDRIVE")
+        is_way = tag == "tag" and self._path[-1] == "way" and attributes.get("k") == "highway"
+        is_edge = tag == "edge" and self.root == "net" and attributes.get("function", "normal") == "normal"
+        self.roads += is_way or is_edge or (tag == "road" and self.root == "OpenDRIVE" and len(self._path) == 1)
+        if self.roads > MAX_ROADS:
+            raise self._refusal(f"more than {MAX_ROADS} roads", "at most that", SMALLER)
+
+    def _is_copied(self, tag: str, attributes: Mapping[str, str]) -> bool:
+        if self.root in FOREIGN_ROOTS:
+            return tag.isidentifier() and tag not in _LEFT_OUT
+        named = [*attributes, attributes["key"]] if tag == "param" and "key" in attributes else [*attributes]
+        if found := next((key for key in named if _NAMES_FILE.search(key) or _SWITCHES_DEVICE.search(key)), None):
+            raise self._refusal(f"<{tag[:80]}> with {found[:80]!r}", "nothing that names a file or writes output")
+        if "/" in attributes.get("projParameter", ""):
+            raise self._refusal("projParameter with '/'", "a projection that names no file")
+        if tag not in _COPIED:
+            self.left_out[tag] += 1
+        return tag in _COPIED
+
+    def _doctype(self, *_: object) -> None:
+        raise self._refusal("a DOCTYPE", "a document without")
+
+    def _refusal(self, got: str, expected: str, remedy: str = "") -> MapError:
+        where = f"line {self.parser.CurrentLineNumber} of {self._name}"
+        return MapError("network", f"{got} in {where}", expected, remedy)
+
+
+def _is_plain(key: str) -> bool:
+    return key.isidentifier() and key != "xmlns"
+
+
+def _harmless(value: str) -> str:
+    """The value without what SUMO takes for an environment variable, and without characters that turn text."""
+    value = value.replace("${", "_{")
+    return value if value.isprintable() else "".join(char if char.isprintable() else "_" for char in value)

@@ -1,0 +1,110 @@
+import contextlib
+import gzip
+import random
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+import sumo
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import sumo_nets
+from risk_sac.errors import MapError
+from risk_sac.scenario.maps import documents, unpack
+from risk_sac.scenario.maps.documents import rewritten
+from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
+
+NETS = sorted(Path(sumo_nets.__path__[0]).glob("*/*.net.xml"))
+PACKED = {
+    "xml": NET.encode(),
+    "gzip": gzip.compress(NET.encode()),
+    "zip": zipped(NET, ROUTES, "", names=("nets/a.net.xml", "b.rou.xml", "nets/")),
+}
+
+
+def written(content: bytes | str, folder: Path) -> list[str]:
+    upload = folder / "upload"
+    upload.write_bytes(content.encode() if isinstance(content, str) else content)
+    return [document.file.read_text("utf-8") for document in rewritten(upload, folder, "the map")]
+
+
+def listed(text: str) -> list[tuple[str, dict[str, str]]]:
+    return [(e.tag, {k: v for k, v in e.attrib.items() if not k.startswith("{")}) for e in ET.fromstring(text).iter()]
+
+
+@pytest.mark.parametrize("net", NETS, ids=lambda path: path.name)
+def test_what_is_written_again_says_the_same(net: Path, tmp_path: Path) -> None:
+    (once,) = written(net.read_bytes(), tmp_path)
+    assert listed(once) == listed(net.read_text())
+    assert written(once, tmp_path) == [once]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(name=st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=50))
+def test_a_name_survives_unless_it_hides_a_variable_or_turns_text(name: str, tmp_path: Path) -> None:
+    root = ET.fromstring(NET)
+    root[0].set("name", name)
+    (text,) = written(ET.tostring(root), tmp_path)
+    kept = ET.fromstring(text)[0].get("name", "")
+    assert "${" not in kept
+    assert kept.isprintable()
+    if name.isprintable():
+        assert kept == name.replace("${", "_{")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "iso-8859-1"])
+def test_a_map_is_read_in_any_encoding(encoding: str, tmp_path: Path) -> None:
+    text = f'<?xml version="1.0" encoding="{encoding.removesuffix("-sig")}"?>\r\n{NET.replace("road", "Straße")}'
+    assert listed(*written(text.encode(encoding), tmp_path)) == listed(NET.replace("road", "Straße"))
+
+
+def test_comments_text_and_schemas_are_left_out_and_unknown_elements_are_told(tmp_path: Path) -> None:
+    schema = '<net xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="http://x/y.xsd"'
+    noisy = NET.replace("<net", schema).replace("</net>", "text<viewsettings><zoom/></viewsettings></net>")
+    (tmp_path / "upload").write_text(f"<!-- a --><?evil b?>{noisy}<!-- c -->")
+    (document,) = rewritten(tmp_path / "upload", tmp_path, "the map")
+    assert listed(document.file.read_text()) == listed(NET)
+    assert document.remarks == ("left out, because they are no part of a map: <viewsettings> (1)",)
+
+
+def test_a_refusal_names_the_line_the_element_and_what_was_wanted(tmp_path: Path) -> None:
+    says = "^network: got <edge> with 'file' in line 3 of the map; wanted nothing that names a file or writes output$"
+    with pytest.raises(MapError, match=says):
+        written(NET.replace("<edge", '\n\n<edge file="/etc/passwd"'), tmp_path)
+
+
+def test_every_element_that_is_copied_is_one_of_sumos() -> None:
+    schemas = (Path(sumo.SUMO_HOME) / "data" / "xsd").rglob("*.xsd")
+    pattern = ".//{http://www.w3.org/2001/XMLSchema}element"
+    assert {node.get("name") for schema in schemas for node in ET.parse(schema).iterfind(pattern)} >= documents._COPIED
+
+
+@pytest.mark.parametrize("packing", PACKED)
+def test_documents_come_out_of_a_package_as_they_went_in(packing: str, tmp_path: Path) -> None:
+    files = [NET, ROUTES][: 2 if packing == "zip" else 1]
+    assert [listed(text) for text in written(PACKED[packing], tmp_path)] == [listed(file) for file in files]
+
+
+@pytest.mark.parametrize("packing", ["gzip", "zip"])
+def test_damage_of_any_kind_is_refused_and_nothing_else_happens(packing: str, tmp_path: Path) -> None:
+    generator = random.Random(4)
+    refused = 0
+    for _ in range(300):
+        content = bytearray(PACKED[packing])
+        for _ in range(generator.randint(1, 4)):
+            content[generator.randrange(len(content))] = generator.randrange(256)
+        if generator.random() < 0.2:
+            del content[generator.randrange(len(content)) :]
+        refused += 1
+        with contextlib.suppress(MapError):
+            written(bytes(content), tmp_path)
+            refused -= 1
+    assert refused > 250
+
+
+def test_all_files_of_an_archive_count_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unpack, "MAX_BYTES", len(NET) + len(ROUTES))
+    assert len(written(zipped(NET, ROUTES), tmp_path)) == 2
+    with pytest.raises(MapError, match="what unpacks to more than"):
+        written(zipped(NET, ROUTES, ADDITIONAL), tmp_path)
