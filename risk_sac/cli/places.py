@@ -49,7 +49,7 @@ def _places(options: argparse.Namespace) -> int:
         if options.out is not None:
             from risk_sac.failures.map_picture import map_png  # here, because loading matplotlib takes a second
 
-            options.out.write_bytes(map_png(net, found))
+            options.out.write_bytes(map_png(chosen.net, found))
         if options.tries is not None:
             return _try_places(chosen, found, options)
     if options.json:
