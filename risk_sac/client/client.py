@@ -1,6 +1,7 @@
 """One RISK-SAC service, as Python methods."""
 
 import json
+import math
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -9,9 +10,10 @@ from typing import Any, Literal, Self, TypeVar
 from urllib.parse import quote
 from uuid import uuid4
 
+import httpx
+
 from risk_sac.client.address import DEFAULT_URL, api_key, checked_key, checked_url
-from risk_sac.client.errors import StreamLost, UnexpectedAnswer
-from risk_sac.client.follow import AWAY_S, SILENCE_S, Follower
+from risk_sac.client.errors import Overdue, StreamLost, UnexpectedAnswer, Unreachable
 from risk_sac.client.transport import Transport, read
 from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.failures.cases import CampaignRegression
@@ -34,7 +36,9 @@ PATIENCE_S = 10.0  # with a service that does not answer
 MAKING_S = 300.0  # with one that has something to play for its answer
 PAGE = 100  # items that are asked for at a time
 PNG, BUNDLE = "image/png", "application/zip"
-RECONNECT_S = 1.0  # between two streams of events
+AWAY_S = 120.0  # how long a service that was there may be away, as when it is restarted
+SILENCE_S = 45.0  # three times what the service leaves between two signs of life
+LOOK_S = 1.0  # between two looks at a campaign, and between two streams of events
 
 Query = dict[str, str | int | None]
 R = TypeVar("R", bound=Record)
@@ -228,11 +232,37 @@ class Client:
             except StreamLost:
                 pass
             patience_s = away_s
-            time.sleep(RECONNECT_S)
+            time.sleep(LOOK_S)
 
     def follow(self, campaign_id: str, *, timeout_s: float | None = None, away_s: float = AWAY_S) -> Iterator[Campaign]:
-        """A campaign now, and whenever it has changed, until it has ended; `Overdue` is raised after `timeout_s`."""
-        return Follower(self._transport, _path(campaign_id), timeout_s=timeout_s, away_s=away_s).changes()
+        """The campaign now, and whenever it has changed, until it has ended.
+
+        Args:
+          campaign_id: of the campaign.
+          timeout_s: after which `Overdue` is raised.
+          away_s: how long the service may be unreachable once the campaign was seen.
+        """
+        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
+        patience_s, headers = self._transport.patience_s, dict[str, str]()
+        known: Campaign | None = None
+        while (left_s := deadline - time.monotonic()) > 0:
+            try:
+                response = self._transport.ask(
+                    "GET", _path(campaign_id), headers=headers, patience_s=min(patience_s, left_s)
+                )
+            except Unreachable:
+                if time.monotonic() < deadline:
+                    raise
+                break
+            if response.status_code != httpx.codes.NOT_MODIFIED:
+                campaign = read(Campaign, response)
+                if campaign != known:
+                    yield campaign
+                if campaign.ended:
+                    return
+                patience_s, headers, known = away_s, {"If-None-Match": response.headers.get("etag", "")}, campaign
+            time.sleep(min(LOOK_S, max(0.0, deadline - time.monotonic())))
+        raise Overdue(f"it did not end within {timeout_s:g} s; it goes on, and can be followed again")
 
     def wait(
         self,
