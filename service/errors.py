@@ -7,7 +7,9 @@ RiskSacError
     ├── QuotaError         a project, or a key, has used up its share
     ├── KeysError          the API keys cannot be read, or have no such key
     ├── StorageError       the database or the data folder refused
-    │   └── OutdatedError  what a stored campaign asks for is refused by now
+    │   ├── OutdatedError  what a stored campaign asks for is refused by now
+    │   └── SeriesLost     the time series of a failure cannot be read
+    ├── NotPlayable        a failure does not repeat here, or cannot be played as was asked
     ├── UploadError        an upload is refused
     ├── BusyError          as much is at work as may be
     └── TransitionError    a change of state that the table of transitions does not allow
@@ -55,6 +57,14 @@ class StorageError(ServiceError):
 
 class OutdatedError(StorageError):
     """What a stored campaign asks for is refused by now; it can be listed and deleted, and its runs fail."""
+
+
+class SeriesLost(StorageError):
+    """The time series of a failure was not recorded, or its file is gone or damaged."""
+
+
+class NotPlayable(ServiceError):
+    """A failure does not repeat here, or cannot be played as was asked; the message says why."""
 
 
 class UploadError(ServiceError):

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fastapi import Request
+from fastapi import Request, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.answers.representations import Representation
+from service.api.answers.representations import has
 from service.api.context import CALLER
 from service.store.reading import Store
 
@@ -26,10 +26,11 @@ Asked = tuple[str | None, str, bytes]  # the only project that the caller sees (
 
 @dataclass(frozen=True, slots=True)
 class KeptAnswer:
-    """An answer with the revision that makes it valid."""
+    """A JSON answer with the revision that makes it valid."""
 
-    representation: Representation
-    revision: str  # read before the representation was made, so that it is never newer
+    body: bytes
+    headers: Mapping[str, str]  # with a tag
+    revision: str  # read before the body was made, so that it is never newer
     campaign_id: str | None  # whose revision it is; None: the one of all campaigns together
     routed: Mapping[str, Any]  # what the router leaves in the scope for the log and the metrics
 
@@ -38,18 +39,24 @@ class KeptAnswer:
         campaign_id = self.campaign_id
         return self.revision == (store.revision_of_all() if campaign_id is None else store.known_revision(campaign_id))
 
+    def response(self, request: Request) -> Response:
+        """The body, or 304 where the client has it."""
+        if has(request, self.headers["ETag"]):
+            return Response(status_code=304, headers=self.headers)
+        return Response(self.body, headers=self.headers, media_type="application/json")
 
-def keep(request: Request, representation: Representation, revision: str, campaign_id: str | None = None) -> None:
-    """Hand an answer to the cache.
 
-    Args:
-      request: which the answer belongs to.
-      representation: the answer; it may depend on the project that the caller sees, the path and the query alone.
-      revision: of what it shows, read before it was made.
-      campaign_id: whose revision that is; None: the one of all campaigns together.
+def kept(
+    request: Request, body: bytes, headers: Mapping[str, str], revision: str, campaign_id: str | None = None
+) -> Response:
+    """An answer that the cache gives again; see `KeptAnswer`.
+
+    It may depend on the project that the caller sees, the path and the query alone.
     """
     routed = {name: request.scope[name] for name in ("route", "path_params")}
-    request.scope[ANSWER] = KeptAnswer(representation, revision, campaign_id, routed)
+    answer = KeptAnswer(body, headers, revision, campaign_id, routed)
+    request.scope[ANSWER] = answer
+    return answer.response(request)
 
 
 class AnswerCache:
@@ -74,7 +81,7 @@ class AnswerCache:
             return
         scope.update(answer.routed)
         scope[FROM_CACHE] = True
-        await answer.representation.response(Request(scope))(scope, receive, send)
+        await answer.response(Request(scope))(scope, receive, send)
 
     async def _find(self, asked: Asked, store: Store) -> KeptAnswer | None:
         """An answer that shows what is stored now or later; None where a route has to make one."""
@@ -125,4 +132,4 @@ class AnswerCache:
 def _size(asked: Asked, answer: KeptAnswer) -> int:
     """Memory that an answer takes, bytes, about."""
     _, path, query = asked
-    return len(answer.representation.body) + len(path) + len(query) + OVERHEAD_BYTES
+    return len(answer.body) + len(path) + len(query) + OVERHEAD_BYTES

@@ -8,8 +8,7 @@ from fastapi import Depends, Request
 from prometheus_client import CollectorRegistry
 
 from service.api.answers.pages import Cursors
-from service.api.answers.problem_body import Reason
-from service.api.answers.problems import ProblemError
+from service.api.answers.problems import ProblemError, Reason
 from service.api.stream import Streams
 from service.keys.file import Scope
 from service.networks.network_store import NetworkStore
@@ -18,6 +17,7 @@ from service.runs.manager import Manager
 from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
 from service.store.reading import Store
+from service.store.stored import StoredCampaign
 from service.views.on_demand import OnDemandCache
 from service.views.pictures import Picture
 from service.views.reports import Reports
@@ -84,6 +84,13 @@ async def _caller(request: Request) -> Caller:
 
 
 CurrentCaller = Annotated[Caller, Depends(_caller)]
+
+
+def _campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> StoredCampaign:
+    return service.store.campaign(campaign_id, caller.sees)
+
+
+AskedCampaign = Annotated[StoredCampaign, Depends(_campaign)]
 
 
 async def require_admin(caller: CurrentCaller) -> None:

@@ -9,8 +9,7 @@ from fastapi import Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ValidationError
 
-from service.api.answers.problem_body import Reason
-from service.api.answers.problems import ProblemError
+from service.api.answers.problems import ProblemError, Reason
 
 MOST_MISTAKES = 50  # that a refusal names one by one
 REFERENCE = "#/components/schemas/{model}"

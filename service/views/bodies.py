@@ -4,7 +4,7 @@ from pathlib import Path
 
 from risk_sac.records import Campaign, CampaignSummary, Failure, Triage
 from risk_sac.run_folder.results import FAILURES
-from service.errors import StorageError
+from service.errors import SeriesLost
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign, StoredContact
 from service.views.progress import progress
@@ -23,18 +23,18 @@ def summary_body(campaign: StoredCampaign, workers: int) -> CampaignSummary:
 
 
 def failure_body(campaign_id: str, contact: StoredContact, triage: Triage | None, settings: ServiceSettings) -> Failure:
-    """A contact with its time series, or with the reason why there is none, and with its triage."""
+    """A contact with its time series, or with why there is none, and with its triage."""
     series, problem = None, None
     try:
         series = load_series(*series_file(campaign_id, contact, settings))
-    except StorageError as error:
+    except SeriesLost as error:
         problem = str(error)
     return Failure(**dict(contact.episode), series=series, series_problem=problem, triage=triage)
 
 
 def series_file(campaign_id: str, contact: StoredContact, settings: ServiceSettings) -> tuple[Path, str | None]:
-    """Path and SHA-256 of a contact's time series; StorageError if none was recorded."""
+    """Path and SHA-256 of a contact's time series; SeriesLost if none was recorded."""
     if contact.series is None:
-        raise StorageError("no time series was recorded")
+        raise SeriesLost("no time series was recorded")
     folder = settings.run_folder(campaign_id, contact.episode.run_id) / FAILURES
     return folder / contact.series, contact.series_sha256

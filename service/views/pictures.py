@@ -47,7 +47,7 @@ class ContactOfARun:
 
 
 def recording_of(contact: ContactOfARun, settings: ServiceSettings) -> Recording:
-    """What is drawn of a contact; StorageError if its time series is lost."""
+    """What is drawn of a contact; SeriesLost if its time series is lost."""
     episode = contact.episode
     path, sha256 = series_file(contact.campaign.id, contact.stored, settings)
     arrays = load_arrays(path, sha256)
@@ -66,7 +66,7 @@ class Picture:
 
 
 def pictures(settings: ServiceSettings) -> OnDemandCache[Picture]:
-    """PNGs of contacts; StorageError where the time series is lost."""
+    """PNGs of contacts; SeriesLost where the time series is lost."""
 
     def draw(picture: Picture) -> bytes:
         from risk_sac.failures.show import recording_bytes  # here, because it loads matplotlib
@@ -115,7 +115,7 @@ def roads_body(contact: ContactOfARun) -> Roads:
 
 
 def thumbnail_of(contact: ContactOfARun, settings: ServiceSettings) -> str:
-    """A contact as a small SVG; StorageError if its time series is lost."""
+    """A contact as a small SVG; SeriesLost if its time series is lost."""
     roads = roads_of(contact.run.family, contact.episode.scene)
     return thumbnail(recording_of(contact, settings), roads)
 

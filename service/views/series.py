@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from risk_sac.series import Series
 from risk_sac.types import Kind, Role, Signal
-from service.errors import StorageError
+from service.errors import SeriesLost
 
 _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 
@@ -37,7 +37,7 @@ def load_arrays(path: Path, sha256: str | None) -> dict[str, NDArray[Any]]:
       sha256: of its content, as its worker told; None: not checked.
 
     Raises:
-      StorageError: the file is missing, is not the one that was written, or lacks an array.
+      SeriesLost: the file is missing, is not the one that was written, or lacks an array.
     """
     try:
         content = path.read_bytes()
@@ -46,15 +46,15 @@ def load_arrays(path: Path, sha256: str | None) -> dict[str, NDArray[Any]]:
             names = (name for name, field in Series.model_fields.items() if field.is_required() or name in arrays)
             return {name: arrays[name] for name in names}
     except FileNotFoundError as error:
-        raise StorageError(f"the time series {path.name!r} is gone") from error
+        raise SeriesLost(f"the time series {path.name!r} is gone") from error
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-        raise StorageError(f"the time series {path.name!r} is damaged: {error}") from error
+        raise SeriesLost(f"the time series {path.name!r} is damaged: {error}") from error
 
 
 def _verify(path: Path, content: bytes, sha256: str | None) -> None:
     actual = hashlib.sha256(content).hexdigest()
     if sha256 is not None and actual != sha256:
-        raise StorageError(f"the time series {path.name!r} is damaged: its SHA-256 is {actual}, wanted {sha256}")
+        raise SeriesLost(f"the time series {path.name!r} is damaged: its SHA-256 is {actual}, wanted {sha256}")
 
 
 def _letter(value: float | str) -> str | None:

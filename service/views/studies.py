@@ -8,7 +8,7 @@ from risk_sac.execution.helper import ANSWER, QUESTION
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
-from service.errors import OutdatedError, ServiceError
+from service.errors import NotPlayable, OutdatedError
 from service.settings import ServiceSettings
 from service.views.bodies import series_file
 from service.views.on_demand import WALL_S, Helper, OnDemandCache
@@ -16,10 +16,6 @@ from service.views.pictures import ContactOfARun
 from service.views.series import load_arrays
 
 logger = logging.getLogger(__name__)
-
-
-class CannotBePlayed(ServiceError):
-    """The failure does not repeat here, or cannot be played as was asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +31,7 @@ class Study:
 
 
 class Studies(OnDemandCache[Study]):
-    """Answers, one at a time; StorageError where the time series is lost, CannotBePlayed where nothing can be said."""
+    """Answers, one at a time; SeriesLost where the time series is lost, NotPlayable where nothing can be said."""
 
     def __init__(self, settings: ServiceSettings, helper: Helper) -> None:
         super().__init__(self._answer, "failures")
@@ -48,7 +44,7 @@ class Studies(OnDemandCache[Study]):
         try:
             spec = contact.campaign.run_spec(contact.run)
         except OutdatedError as error:
-            raise CannotBePlayed(str(error)) from error
+            raise NotPlayable(str(error)) from error
         question = Question(
             subject=study.subject,
             spec=spec,
@@ -60,10 +56,10 @@ class Studies(OnDemandCache[Study]):
         asked = question.model_dump_json().encode()
         result = self._helper.run("risk_sac.failures.study", [QUESTION, ANSWER], asked)
         if result.timed_out:
-            raise CannotBePlayed(f"it takes more than {WALL_S:g} s here")
+            raise NotPlayable(f"it takes more than {WALL_S:g} s here")
         if result.status == REFUSED:
-            raise CannotBePlayed(without_folders(result.answer.decode(errors="replace"), path.parent))
+            raise NotPlayable(without_folders(result.answer.decode(errors="replace"), path.parent))
         if result.status != 0:
             logger.error("a study ended with status %d: %s", result.status, result.log)
-            raise CannotBePlayed("its process was lost; the log has the reason")
+            raise NotPlayable("its process was lost; the log has the reason")
         return result.answer

@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Mapping
+from enum import StrEnum
 from http import HTTPStatus
 from typing import Any
 
@@ -16,10 +17,79 @@ from starlette.routing import compile_path
 
 from risk_sac.config.invalid import LONGEST_VALUE, causes, field_error, shown
 from risk_sac.errors import ConfigError
-from service.api.answers.problem_body import FieldProblem, Problem, Reason
-from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError, UploadError
+from risk_sac.records import Record
+from service.api.answers.representations import NotModified
+from service.errors import (
+    BusyError,
+    ConflictError,
+    NotFoundError,
+    NotPlayable,
+    QuotaError,
+    SeriesLost,
+    StorageError,
+    UploadError,
+)
 
 logger = logging.getLogger(__name__)
+
+
+class Reason(StrEnum):
+    """What went wrong, in one word that stays the same while messages change; see `detail` for the rest."""
+
+    MALFORMED_JSON = "malformed_json"
+    UNKNOWN_HOST = "unknown_host"
+    UNAUTHORIZED = "unauthorized"
+    FORBIDDEN = "forbidden"
+    FOREIGN_ORIGIN = "foreign_origin"
+    UNKNOWN_ROUTE = "unknown_route"
+    UNKNOWN_ID = "unknown_id"
+    METHOD_NOT_ALLOWED = "method_not_allowed"
+    NOT_ACCEPTABLE = "not_acceptable"
+    IDEMPOTENCY_KEY_REUSED = "idempotency_key_reused"
+    NOT_ENDED = "not_ended"
+    TOO_LARGE = "too_large"
+    UPLOAD_TOO_SLOW = "upload_too_slow"
+    UPLOAD_REFUSED = "upload_refused"
+    UPLOADS_BUSY = "uploads_busy"
+    PICTURES_BUSY = "pictures_busy"
+    SERIES_LOST = "series_lost"
+    NOT_PLAYABLE = "not_playable"
+    NOT_INSTALLED = "not_installed"
+    TOO_MANY_NETWORKS = "too_many_networks"
+    UNSUPPORTED_MEDIA_TYPE = "unsupported_media_type"
+    INVALID_FIELD = "invalid_field"
+    QUOTA_EXCEEDED = "quota_exceeded"
+    RATE_LIMITED = "rate_limited"
+    INTERNAL_ERROR = "internal_error"
+    KEYS_UNAVAILABLE = "keys_unavailable"
+    CONNECTIONS_BUSY = "connections_busy"
+    STORAGE_UNAVAILABLE = "storage_unavailable"
+    MANAGER_STOPPED = "manager_stopped"
+
+
+class FieldProblem(Record):
+    """What is wrong with one field."""
+
+    field: str
+    """Dotted path as it was written, such as `budget.episodes`."""
+    message: str
+    got: str
+    """The offending value as JSON, shortened."""
+    wanted: str
+
+
+class Problem(Record):
+    """Problem details (RFC 9457)."""
+
+    type: str
+    title: str
+    status: int
+    reason: Reason
+    detail: str
+    instance: str
+    errors: list[FieldProblem]
+    """Empty when no field is to blame."""
+
 
 CLIENT_LEFT = 499  # in the middle of its request; nobody gets this answer, but the log and the metrics tell of it
 _REASONS = {
@@ -31,7 +101,7 @@ _REASONS = {
 
 
 class ProblemError(Exception):
-    """An answer that a route or a dependency decides on; the response says the same."""
+    """An error answer; `detail` says what was got, what was wanted and the remedy."""
 
     def __init__(
         self,
@@ -41,15 +111,6 @@ class ProblemError(Exception):
         *errors: FieldProblem,
         headers: dict[str, str] | None = None,
     ) -> None:
-        """A problem.
-
-        Args:
-          status: of the response; the problem's type is stable for each.
-          reason: stable for each cause.
-          detail: what was got, what was wanted, and the remedy.
-          errors: the fields to blame.
-          headers: of the response.
-        """
         super().__init__(detail)
         self.status = status
         self.reason = reason
@@ -63,16 +124,17 @@ def invalid_field(field: str, got: object, wanted: str) -> ProblemError:
     return invalid(detail, FieldProblem(field=field, message=detail, got=shown(got), wanted=wanted))
 
 
-# Errors that say what is wrong; any other is a bug of the service.
+# Errors that say what is wrong; any other is a bug of the service, of which the server logs the traceback.
 _OF_REQUESTS = (RequestValidationError, HTTPException, ProblemError, ConfigError)
-_OF_THE_SERVICE = (NotFoundError, ConflictError, QuotaError, BusyError, UploadError, StorageError)
+_OF_THE_SERVICE = (NotFoundError, ConflictError, QuotaError, BusyError, UploadError, StorageError, NotPlayable)
 
 
 def add_problem_handlers(app: FastAPI) -> None:
-    """Make every error response of the app a problem."""
+    """Makes every error response of the app a problem."""
     for kind in (*_OF_REQUESTS, *_OF_THE_SERVICE, Exception):
         app.add_exception_handler(kind, _answer)
     app.add_exception_handler(ClientDisconnect, _left)
+    app.add_exception_handler(NotModified, _not_modified)
 
 
 def problem_response(path: str, problem: ProblemError) -> JSONResponse:
@@ -116,6 +178,12 @@ def _problem(request: Request, error: Exception) -> ProblemError:
         case BusyError():
             headers = {"Retry-After": str(error.retry_after_s)}
             return ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason(error.reason), said, headers=headers)
+        case SeriesLost():
+            said = f"{request.path_params['failure_id']!r} cannot be shown: {said}"
+            return ProblemError(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, said)
+        case NotPlayable():
+            said = f"{request.path_params['failure_id']!r}: {said}"
+            return ProblemError(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, said)
         case UploadError():
             return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.UPLOAD_REFUSED, said)
         case StorageError():
@@ -166,6 +234,11 @@ def _http_error(request: Request, error: HTTPException) -> ProblemError:
 def invalid(detail: str, *errors: FieldProblem) -> ProblemError:
     """The answer to a request that holds something wrong."""
     return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail, *errors)
+
+
+async def _not_modified(request: Request, error: Exception) -> Response:
+    assert isinstance(error, NotModified)
+    return Response(status_code=304, headers=error.headers)
 
 
 async def _left(request: Request, error: Exception) -> Response:

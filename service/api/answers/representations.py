@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from fastapi import HTTPException, Request, Response
 from pydantic import BaseModel
@@ -25,12 +24,6 @@ def accepted(accept: str, offered: Sequence[str]) -> str:
     if not quality(best):
         raise HTTPException(406, f"accept is {accept!r}; wanted one of {', '.join(offered)}")
     return best
-
-
-def accepted_format(request: Request, media_types: Mapping[str, str]) -> str:
-    """Which of the formats, each of a media type, the request likes best, see `accepted`."""
-    names = {media_type: name for name, media_type in media_types.items()}
-    return names[accepted(", ".join(request.headers.getlist("accept")), list(names))]
 
 
 def takes(accept_encoding: str, encoding: str) -> bool:
@@ -56,37 +49,31 @@ def has(request: Request, tag: str) -> bool:
     return "*" in given or tag.removeprefix("W/") in given
 
 
-def not_modified(tag: str, vary: str = "") -> Response:
-    """Nothing, since the client has it."""
-    return Response(status_code=304, headers=caching(tag, vary))
+class NotModified(Exception):
+    """The client has the representation; the answer is a 304 with `headers`."""
+
+    def __init__(self, headers: Mapping[str, str]) -> None:
+        super().__init__(headers)
+        self.headers = headers
 
 
-def caching(tag: str | None, vary: str = "") -> dict[str, str]:
+def cacheable(request: Request, *parts: str, others: Mapping[str, str] = {}) -> dict[str, str]:
     """Headers of what may be kept, but is to be asked for again before it is used.
 
     Args:
-      tag: names the representation; None where the same tag could come to mean another one.
-      vary: the request header that the representation was chosen by.
+      request: which the answer belongs to.
+      parts: of the tag; they change whenever the representation does.
+      others: headers beside those.
+
+    Raises:
+      NotModified: the client has it already.
     """
-    headers = {"Cache-Control": "no-cache", "ETag": tag or "", "Vary": vary}
-    return {name: value for name, value in headers.items() if value}
+    headers = {"Cache-Control": "no-cache", "ETag": entity_tag(*parts), **others}
+    if has(request, headers["ETag"]):
+        raise NotModified(headers)
+    return headers
 
 
 def as_json(record: BaseModel) -> Response:
     """A record as it is answered; FastAPI's own way would write numbers that are not finite as strings."""
     return Response(wire(record), media_type="application/json")
-
-
-@dataclass(frozen=True, slots=True)
-class Representation:
-    """A JSON body as it is sent, with its headers."""
-
-    body: bytes
-    tag: str
-    headers: Mapping[str, str]
-
-    def response(self, request: Request) -> Response:
-        """The body, or 304 where the client has it."""
-        if has(request, self.tag):
-            return Response(status_code=304, headers=self.headers)
-        return Response(self.body, headers=self.headers, media_type="application/json")

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from service.api.answers.problem_body import Problem
+from service.api.answers.problems import Problem
 
 Responses = dict[int | str, dict[str, Any]]
 

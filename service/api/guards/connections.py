@@ -17,8 +17,7 @@ import uvicorn
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
-from service.api.answers.problem_body import Reason
-from service.api.answers.problems import ProblemError, problem_response
+from service.api.answers.problems import ProblemError, Reason, problem_response
 from service.settings import ServiceSettings
 
 OWN_FILES = 64  # that the server may have open without any connection: database, log, keys, reports, uploads

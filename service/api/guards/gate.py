@@ -11,8 +11,7 @@ from http import HTTPStatus
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.answers.problem_body import Reason
-from service.api.answers.problems import ProblemError, problem_response
+from service.api.answers.problems import ProblemError, Reason, problem_response
 from service.api.context import CALLER, LOCAL, Caller, check_scope
 from service.errors import KeysError
 from service.keys.file import REMEDY

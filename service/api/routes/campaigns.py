@@ -10,9 +10,9 @@ from fastapi.responses import PlainTextResponse
 from risk_sac import __version__, problem
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.records import Campaign, CampaignPage, Record, Results, State, wire
-from service.api.answer_cache import keep
+from service.api.answer_cache import kept
 from service.api.answers.pages import TIERS, Cursor, Limit, Tier
-from service.api.answers.representations import Representation, caching, entity_tag, has, not_modified
+from service.api.answers.representations import cacheable, entity_tag
 from service.api.answers.responses import (
     ACCEPTED,
     INVALID,
@@ -100,10 +100,8 @@ def list_campaigns(
     items = [summary_body(campaign, service.manager.workers) for campaign in page.items]
     cursor = service.cursors.encode(page.last, LISTED, caller.sees)
     body = wire(CampaignPage(items=items, next=cursor))
-    tag = entity_tag(blake2b(body, digest_size=8).hexdigest())
-    representation = Representation(body, tag, caching(tag))
-    keep(request, representation, revision)
-    return representation.response(request)
+    headers = {"Cache-Control": "no-cache", "ETag": entity_tag(_digest(body))}
+    return kept(request, body, headers, revision)
 
 
 @router.post("/{campaign_id}/cancel", status_code=202, response_model=Campaign, responses=UNKNOWN | ACCEPTED)
@@ -122,13 +120,13 @@ def delete_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -
 @router.get("/{campaign_id}", response_model=Campaign, responses=UNKNOWN | LIVE)
 def get_campaign(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """State, progress and runs of a campaign."""
-    return _kept(campaign_id, request, service, caller, lambda found: campaign_body(found, service.manager.workers))
+    return _live(campaign_id, request, service, caller, lambda found: campaign_body(found, service.manager.workers))
 
 
 @router.get("/{campaign_id}/results", response_model=Results, responses=UNKNOWN | LIVE)
 def get_results(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """What a campaign has found; partial until it has ended."""
-    return _kept(campaign_id, request, service, caller, results)
+    return _live(campaign_id, request, service, caller, results)
 
 
 @router.get("/{campaign_id}/failure-table", response_model=FailureTable, responses=UNKNOWN | LIVE)
@@ -136,7 +134,7 @@ def get_failure_table(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, tier: Tier = "valid"
 ) -> Response:
     """All failures at once, by columns, to sort, filter and plot them."""
-    return _kept(
+    return _live(
         campaign_id,
         request,
         service,
@@ -154,7 +152,7 @@ def get_curves(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, points: Points = 200
 ) -> Response:
     """How the search of each run has gone: rates, distinct failures, λ and cost over its episodes."""
-    return _kept(
+    return _live(
         campaign_id,
         request,
         service,
@@ -178,24 +176,23 @@ def get_log(
         message = f"campaign {campaign_id} has no run {run_id!r}; GET it lists all runs"
         raise NotFoundError(message, field="run_id", got=run_id)
     text = log_tail(service.settings.run_folder(campaign_id, run_id) / LOG, lines).encode()
-    tag = entity_tag(blake2b(text, digest_size=8).hexdigest())
-    return not_modified(tag) if has(request, tag) else PlainTextResponse(text, headers=caching(tag))
+    return PlainTextResponse(text, headers=cacheable(request, _digest(text)))
 
 
-def _kept(
+def _live(
     campaign_id: str, request: Request, service: Context, caller: Caller, body: Callable[[StoredCampaign], Record]
 ) -> Response:
     """An answer about one campaign, which the cache keeps."""
     revision = service.store.revision(campaign_id, caller.sees)
     campaign = service.store.campaign(campaign_id, caller.sees)
     # The revision that was read, which may be newer. A body depends on it, on the version and on how many are at work.
-    tag = entity_tag(campaign.revision, __version__, str(service.manager.workers))
-    headers = caching(tag) | _retry_after(campaign, service)
-    if has(request, tag):  # before the body is made, which of many episodes takes seconds
-        return Response(status_code=304, headers=headers)
-    representation = Representation(wire(body(campaign)), tag, headers)
-    keep(request, representation, revision, campaign_id)
-    return representation.response(request)
+    parts = (campaign.revision, __version__, str(service.manager.workers))
+    headers = cacheable(request, *parts, others=_retry_after(campaign, service))
+    return kept(request, wire(body(campaign)), headers, revision, campaign_id)
+
+
+def _digest(content: bytes) -> str:
+    return blake2b(content, digest_size=8).hexdigest()
 
 
 def _accepted(campaign: StoredCampaign, service: Context) -> Response:

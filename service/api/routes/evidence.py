@@ -13,26 +13,17 @@ from risk_sac.failures.cases import Regression
 from risk_sac.records import State
 from risk_sac.report import FinishedRun
 from risk_sac.report.evidence import POLICY, Evidence, Origin, gathered, html, markdown, report
-from service.api.answers.representations import accepted_format, caching, entity_tag, has, not_modified
 from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
-from service.api.context import Context, CurrentCaller, Service
-from service.api.routes.reports import CACHED, UNCHANGED, commands
+from service.api.context import AskedCampaign, Context, Service
+from service.api.routes.reports import BY_ACCEPT, FOR_BROWSERS, MEDIA_TYPES, UNCHANGED, chosen, commands, reported, text
 from service.errors import ConflictError, NotFoundError
 from service.runs.regressions import StoredRegression, campaign_of
 from service.store.stored import StoredCampaign
 from service.views.reports import CampaignReport
 
 ReportFormat = Literal["json", "html", "md"]
-MEDIA_TYPES = {"json": "application/json", "html": "text/html", "md": "text/markdown"}
-REPORT: Responses = {
-    200: {
-        "headers": CACHED,
-        "content": {
-            "text/html": {"schema": {"type": "string"}, "example": "<!doctype html>…"},
-            "text/markdown": {"schema": {"type": "string"}, "example": "# Failures of an ego: low\n\n> **Search…"},
-        },
-    }
-}
+OFFERED = ("json", "html", "md")
+REPORT: Responses = {200: text(html="<!doctype html>…", md="# Failures of an ego: low\n\n> **Search…")}
 NOT_PLAYED = problem(409, "The regression has not ended, or has failed")
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
@@ -40,13 +31,10 @@ router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], respo
 
 @router.get("/report", response_model=Evidence, responses=REPORT | UNCHANGED | UNACCEPTABLE | NOT_PLAYED)
 def get_report(
-    campaign_id: str,
     request: Request,
     service: Service,
-    caller: CurrentCaller,
-    format_: Annotated[
-        ReportFormat | None, Query(alias="format", description="Instead of the Accept header, for a browser.")
-    ] = None,
+    campaign: AskedCampaign,
+    format_: Annotated[ReportFormat | None, FOR_BROWSERS] = None,
     regression: Annotated[
         str | None, Query(max_length=200, description="Id of a regression of this campaign, to be told of in it.")
     ] = None,
@@ -55,14 +43,10 @@ def get_report(
 
     Search results are no crash rate: bounds come from the i.i.d. phase alone, and there are none without one.
     """
-    campaign = service.store.campaign(campaign_id, caller.sees)
-    name = format_ or accepted_format(request, MEDIA_TYPES)
+    name = chosen(request, format_, OFFERED)
     played = None if regression is None else _played(service, campaign, regression)
-    tag = entity_tag(service.reports.edition(campaign), "report", name, *([played.id] if played else []))
-    if has(request, tag):
-        return not_modified(tag, "Accept")
-    made = service.reports.report(campaign)
-    headers = caching(tag if made.lasting else None, "Accept")
+    parts = ("report", name, *([played.id] if played else []))
+    made, headers = reported(request, service, campaign, *parts, others=BY_ACCEPT)
     if name == "html":
         headers["Content-Security-Policy"] = f"{POLICY}; frame-ancestors 'none'"
     return Response(_content(request, campaign, made, name, played), headers=headers, media_type=MEDIA_TYPES[name])

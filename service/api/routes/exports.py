@@ -1,53 +1,86 @@
-"""/v1/campaigns/{id}/export: all its episodes in a format of other tools; a failure's own is among `pictures`."""
+"""/v1/campaigns/{id}/export and failures/{id}/export: all episodes, or one failure, in a format of other tools."""
 
+from functools import partial
 from http import HTTPStatus
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Response
+from fastapi import APIRouter, Response
+from pydantic import BeforeValidator, WithJsonSchema
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.failures.export.formats import FORMATS, REMEDY, FormatName, check_carries, names
-from service.api.answers.problem_body import Reason
-from service.api.answers.problems import ProblemError
-from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, WAIT, Responses, problem
-from service.api.context import CurrentCaller, Service
+from risk_sac.errors import ConfigError
+from risk_sac.failures.export.formats import FORMATS, ZIP, FormatName, check_carries, names
+from service.api.answers.problems import ProblemError, Reason
+from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, problem
+from service.api.context import AskedCampaign, Service
+from service.api.routes.pictures import CROWDED, PLAYED, Asked, Headers, made
 from service.errors import ConflictError
-from service.store.stored import StoredCampaign
+from service.views.studies import Study
 from service.views.tables import Table
 
 LACKING = problem(501, "The service lacks a package that makes this format")
-CROWDED = problem(503, "The database cannot be read, or too many wait for theirs", WAIT)
-TABLE: Responses = {200: {"content": {FORMATS[name].media_type: {} for name in names("episodes")}}}
 NOTHING_YET = problem(409, "No run has played an episode yet")
 
-router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
+router = APIRouter(prefix="/v1/campaigns/{campaign_id}", responses=STORAGE | INVALID | UNKNOWN)
 
 
-def check_installed(format: FormatName, of: Literal["failure", "episodes"]) -> None:
-    """Answers 501 where the service lacks a package of the format: that is no mistake of the client."""
-    row = FORMATS[format]
-    if row.of == of and row.missing:
-        lacks = f"{format} needs {', '.join(row.missing)}, which is not installed here: {REMEDY}"
+def _checked(given: str, of: Literal["failure", "episodes"]) -> FormatName:
+    if given not in FORMATS:
+        raise ConfigError("format", repr(given), f"one of: {', '.join(names(of))}")
+    name = FormatName(given)
+    row = FORMATS[name]
+    if row.of == of and row.missing:  # no mistake of the client
+        lacks = f"{name} needs {', '.join(row.missing)}, which is not installed here: {row.remedy}"
         raise ProblemError(HTTPStatus.NOT_IMPLEMENTED, Reason.NOT_INSTALLED, lacks)
+    check_carries(name, of)
+    return name
 
 
-def _campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> StoredCampaign:
-    return service.store.campaign(campaign_id, caller.sees)
+FailureFormat = Annotated[
+    FormatName,
+    BeforeValidator(partial(_checked, of="failure")),
+    WithJsonSchema({"type": "string", "enum": names("failure")}),
+]
+EpisodesFormat = Annotated[
+    FormatName,
+    BeforeValidator(partial(_checked, of="episodes")),
+    WithJsonSchema({"type": "string", "enum": names("episodes")}),
+]
 
 
-Asked = Annotated[StoredCampaign, Depends(_campaign)]  # so that who may not see it hears of nothing else
+@router.get(
+    "/failures/{failure_id}/export",
+    tags=["campaigns"],
+    response_class=Response,
+    responses=made(*(FORMATS[name].media_type for name in names("failure"))) | PLAYED | LACKING,
+)
+async def get_export(contact: Asked, format: FailureFormat, headers: Headers, service: Service) -> Response:
+    """One collision in a format of other tools, see `GET /v1/formats`; some are several files, and come as a zip."""
+    content = await service.studies.get(Study(contact, "export", format=format))
+    row = FORMATS[format]
+    name = f"{contact.episode.id}{f'-{format}' if row.media_type == ZIP else ''}{row.suffix}"
+    return Response(content, headers=headers | _attachment(name), media_type=row.media_type)
 
 
-@router.get("/export", response_class=Response, responses=TABLE | NOTHING_YET | LACKING | CROWDED)
-async def get_episodes_export(campaign: Asked, format: FormatName, service: Service) -> Response:
+@router.get(
+    "/export",
+    tags=["reports"],
+    response_class=Response,
+    responses={200: {"content": {FORMATS[name].media_type: {} for name in names("episodes")}}}
+    | NOTHING_YET
+    | LACKING
+    | CROWDED,
+)
+async def get_episodes_export(campaign: AskedCampaign, format: EpisodesFormat, service: Service) -> Response:
     """All episodes so far, whatever their outcome, as a table for other tools, see `GET /v1/formats`."""
-    check_installed(format, "episodes")
-    check_carries(format, "episodes")
     folders = [service.settings.run_folder(campaign.id, run.id) for run in campaign.runs]
     table = await run_in_threadpool(Table.of, folders, format)
     if not table.folders:
         raise ConflictError(f"no run of campaign {campaign.id} has results yet", reason="not_ended")
     content = await service.tables.get(table)
     row = FORMATS[format]
-    name = f'attachment; filename="{campaign.id}{row.suffix}"'
-    return Response(content, headers={"Content-Disposition": name}, media_type=row.media_type)
+    return Response(content, headers=_attachment(f"{campaign.id}{row.suffix}"), media_type=row.media_type)
+
+
+def _attachment(name: str) -> dict[str, str]:
+    return {"Content-Disposition": f'attachment; filename="{name}"'}

@@ -10,8 +10,7 @@ from fastapi.concurrency import run_in_threadpool
 from risk_sac.scenario.maps.documents import MAX_ROADS
 from risk_sac.scenario.maps.unpack import MAX_BYTES, MAX_FILES
 from service.api.answers.pages import Cursor, Limit
-from service.api.answers.problem_body import Reason
-from service.api.answers.problems import ProblemError
+from service.api.answers.problems import ProblemError, Reason
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, WAIT, Responses, header, problem
 from service.api.context import CurrentCaller, Service
 from service.api.posted import media_type

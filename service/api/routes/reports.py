@@ -18,9 +18,9 @@ from risk_sac.records import Record
 from risk_sac.report import Comparison, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
-from service.api.answers.representations import accepted_format, caching, entity_tag, has, not_modified
+from service.api.answers.representations import accepted, cacheable
 from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNACCEPTABLE, UNKNOWN, Responses
-from service.api.context import Context, CurrentCaller, Service
+from service.api.context import AskedCampaign, Context, Service
 from service.store.stored import StoredCampaign
 from service.views.reports import CampaignReport
 
@@ -63,10 +63,19 @@ class Figures(Record):
 
 TableFormat = Literal["json", "md", "csv"]
 SpecFormat = Literal["json", "yaml"]
-MEDIA_TYPES = {"json": "application/json", "md": "text/markdown", "csv": "text/csv", "yaml": "application/yaml"}
-IMAGE_TYPES: dict[Format, str] = {"png": "image/png", "svg": "image/svg+xml"}
+FOR_BROWSERS = Query(alias="format", description="Instead of the Accept header, for a browser.")
+MEDIA_TYPES = {
+    "json": "application/json",
+    "html": "text/html",
+    "md": "text/markdown",
+    "csv": "text/csv",
+    "yaml": "application/yaml",
+    "png": "image/png",
+    "svg": "image/svg+xml",
+}
 TABLES: dict[str, Callable[[Comparison], str]] = {"json": table_json, "md": table_markdown, "csv": table_csv}
 SPECS: dict[str, Callable[[CampaignSpec], str]] = {"json": CampaignSpec.model_dump_json, "yaml": campaign_yaml}
+BY_ACCEPT = {"Vary": "Accept"}
 
 CACHED = {
     "ETag": {
@@ -78,19 +87,17 @@ CACHED = {
 UNCHANGED: Responses = {304: {"description": "What If-None-Match names still holds", "headers": CACHED}}
 
 
-def _content(**examples: str) -> dict[str, Any]:
-    """Media types of an answer that is text, with an example of each."""
-    return {MEDIA_TYPES[name]: {"schema": {"type": "string"}, "example": text} for name, text in examples.items()}
+def text(**examples: str) -> dict[str, Any]:
+    """An answer in several formats of text, with an example of each."""
+    content = {MEDIA_TYPES[name]: {"schema": {"type": "string"}, "example": text} for name, text in examples.items()}
+    return {"headers": CACHED, "content": content}
 
 
 TABLE: Responses = {
-    200: {
-        "headers": CACHED,
-        "content": _content(
-            md="# Comparison of methods\n\n…\n\n## low, search\n\n| method | seeds | ECR | …",
-            csv="family,method,phase,runs,episodes,failures,…\nlow,random,search,2,80,3,…",
-        ),
-    }
+    200: text(
+        md="# Comparison of methods\n\n…\n\n## low, search\n\n| method | seeds | ECR | …",
+        csv="family,method,phase,runs,episodes,failures,…\nlow,random,search,2,80,3,…",
+    )
 }
 SPEC: Responses = {
     200: {
@@ -103,120 +110,86 @@ SPEC: Responses = {
     }
 }
 FIGURES: Responses = {200: {"headers": CACHED}}
-FIGURE: Responses = {200: {"headers": CACHED, "content": {media_type: {} for media_type in IMAGE_TYPES.values()}}}
+FIGURE: Responses = {200: {"headers": CACHED, "content": {MEDIA_TYPES[each]: {} for each in FORMATS}}}
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
 
 
 @router.get("/table", response_model=Table, responses=TABLE | UNCHANGED | UNACCEPTABLE)
 def get_table(
-    campaign_id: str,
     request: Request,
     service: Service,
-    caller: CurrentCaller,
-    format_: Annotated[
-        TableFormat | None, Query(alias="format", description="Instead of the Accept header, for a browser.")
-    ] = None,
+    campaign: AskedCampaign,
+    format_: Annotated[TableFormat | None, FOR_BROWSERS] = None,
 ) -> Response:
     """The methods compared over seeds by the runs that have finished, with the others named; empty before the first."""
-    campaign = service.store.campaign(campaign_id, caller.sees)
-    name = format_ or accepted_format(request, _types(TABLES))
-    command, spec_command = commands(request, campaign_id)
-
-    def table(report: CampaignReport) -> str:
-        return TABLES[name](replace(report.comparison, command=command, spec_command=spec_command))
-
-    return _shown(request, service, campaign, (name,), table, MEDIA_TYPES[name], vary="Accept")
+    name = chosen(request, format_, TABLES)
+    report, headers = reported(request, service, campaign, name, others=BY_ACCEPT)
+    command, spec_command = commands(request, campaign.id)
+    comparison = replace(report.comparison, command=command, spec_command=spec_command)
+    return Response(TABLES[name](comparison), headers=headers, media_type=MEDIA_TYPES[name])
 
 
 @router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED)
-def get_clusters(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+def get_clusters(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Which different failures the finished runs have found, named in words, and one of each to look at first."""
-    campaign = service.store.campaign(campaign_id, caller.sees)
-
-    def clusters(report: CampaignReport) -> str:
-        comparison = report.comparison
-        return Clusters(complete=not comparison.missing, families=comparison.overviews).model_dump_json()
-
-    return _shown(request, service, campaign, ("clusters",), clusters, MEDIA_TYPES["json"])
+    report, headers = reported(request, service, campaign, "clusters")
+    body = Clusters(complete=not report.comparison.missing, families=report.comparison.overviews)
+    return Response(body.model_dump_json(), headers=headers, media_type=MEDIA_TYPES["json"])
 
 
 @router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)
-def list_figures(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+def list_figures(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """The figures that the finished runs allow: how the methods search, what they reach, λ and α."""
-    campaign = service.store.campaign(campaign_id, caller.sees)
-
-    def figures(report: CampaignReport) -> str:
-        items = [Figure(name=name, files=_files(campaign_id, name)) for name in report.figures]
-        return Figures(complete=not report.comparison.missing, items=items).model_dump_json()
-
-    return _shown(request, service, campaign, ("figures",), figures, MEDIA_TYPES["json"])
+    report, headers = reported(request, service, campaign, "figures")
+    items = [Figure(name=name, files=_files(campaign.id, name)) for name in report.figures]
+    body = Figures(complete=not report.comparison.missing, items=items)
+    return Response(body.model_dump_json(), headers=headers, media_type=MEDIA_TYPES["json"])
 
 
 @router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED)
-def get_figure(
-    campaign_id: str,
-    name: str,
-    format: Format,
-    request: Request,
-    service: Service,
-    caller: CurrentCaller,
-) -> Response:
+def get_figure(name: str, format: Format, request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """One figure; drawn when it is first asked for, and again once more runs have finished."""
-    campaign = service.store.campaign(campaign_id, caller.sees)
-    return _shown(
-        request, service, campaign, (name, format), lambda report: report.figure(name, format), IMAGE_TYPES[format]
-    )
+    report, headers = reported(request, service, campaign, name, format)
+    return Response(report.figure(name, format), headers=headers, media_type=MEDIA_TYPES[format])
 
 
 @router.get("/spec", response_model=CampaignSpec, responses=SPEC | UNACCEPTABLE)
 def get_spec(
-    campaign_id: str,
-    request: Request,
-    service: Service,
-    caller: CurrentCaller,
-    format_: Annotated[
-        SpecFormat | None, Query(alias="format", description="Instead of the Accept header, for a browser.")
-    ] = None,
+    request: Request, campaign: AskedCampaign, format_: Annotated[SpecFormat | None, FOR_BROWSERS] = None
 ) -> Response:
     """The campaign alone: JSON to post again, or YAML for `risk-sac run --spec` and `risk-sac evaluate --spec`."""
-    spec = service.store.campaign(campaign_id, caller.sees).spec
-    name = format_ or accepted_format(request, _types(SPECS))
-    return Response(SPECS[name](spec), headers={"Vary": "Accept"}, media_type=MEDIA_TYPES[name])
+    name = chosen(request, format_, SPECS)
+    return Response(SPECS[name](campaign.spec), headers=BY_ACCEPT, media_type=MEDIA_TYPES[name])
 
 
-def _shown(
-    request: Request,
-    service: Context,
-    campaign: StoredCampaign,
-    parts: tuple[str, ...],
-    show: Callable[[CampaignReport], str | bytes],
-    media_type: str,
-    vary: str = "",
-) -> Response:
-    """What the report says in one representation, which `parts` name, unless the client has it."""
-    tag = entity_tag(service.reports.edition(campaign), *parts)
-    if has(request, tag):
-        return not_modified(tag, vary)
+def chosen(request: Request, given: str | None, offered: Iterable[str]) -> str:
+    """The format that a query names, or else the Accept header; raises what `accepted` does."""
+    names = {MEDIA_TYPES[name]: name for name in offered}
+    return given or names[accepted(", ".join(request.headers.getlist("accept")), list(names))]
+
+
+def reported(
+    request: Request, service: Context, campaign: StoredCampaign, *parts: str, others: Mapping[str, str] = {}
+) -> tuple[CampaignReport, dict[str, str]]:
+    """The report, and the headers of what is shown of it; arguments and errors as `cacheable` has them."""
+    headers = cacheable(request, service.reports.edition(campaign), *parts, others=others)
     report = service.reports.report(campaign)
-    return Response(show(report), headers=caching(tag if report.lasting else None, vary), media_type=media_type)
-
-
-def _types(formats: Iterable[str]) -> dict[str, str]:
-    return {name: MEDIA_TYPES[name] for name in formats}
+    if not report.lasting:
+        del headers["ETag"]
+    return report, headers
 
 
 def _files(campaign_id: str, name: str) -> list[FigureFile]:
     path = f"/v1/campaigns/{campaign_id}/figures/{name}"
-    return [FigureFile(format=each, media_type=IMAGE_TYPES[each], href=f"{path}.{each}") for each in FORMATS]
+    return [FigureFile(format=each, media_type=MEDIA_TYPES[each], href=f"{path}.{each}") for each in FORMATS]
 
 
 def commands(request: Request, campaign_id: str) -> tuple[str, str]:
     """What to type to queue the campaign again, and to have it as a file for the command line."""
     campaigns = f"{request.base_url}v1/campaigns"
     spec, post, as_yaml = map(
-        shlex.quote,
-        (f"{campaigns}/{campaign_id}/spec", campaigns, f"{campaigns}/{campaign_id}/spec?format=yaml"),
+        shlex.quote, (f"{campaigns}/{campaign_id}/spec", campaigns, f"{campaigns}/{campaign_id}/spec?format=yaml")
     )
     again = f"curl -s {spec} | curl {post} -H 'content-type: application/json' -d @-"
     return again, f"curl -s {as_yaml} -o spec.yaml"

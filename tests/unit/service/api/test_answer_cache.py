@@ -8,8 +8,8 @@ import httpx
 import pytest
 from fastapi import FastAPI, Request, Response
 
-from service.api.answer_cache import MOST_BYTES, AnswerCache, keep
-from service.api.answers.representations import Representation, caching, entity_tag
+from service.api.answer_cache import MOST_BYTES, AnswerCache, kept
+from service.api.answers.representations import entity_tag
 from service.api.context import CALLER, Caller
 from service.errors import StorageError
 from service.keys.file import Scope
@@ -73,10 +73,7 @@ class Service:
         if revision is None:
             return Response(status_code=404)
         body = f"{request.scope[CALLER].project} {request.url.path} {revision}".encode().ljust(self.body_bytes)
-        tag = entity_tag(revision)
-        representation = Representation(body, tag, caching(tag))
-        keep(request, representation, revision, campaign_id)
-        return representation.response(request)
+        return kept(request, body, {"ETag": entity_tag(revision)}, revision, campaign_id)
 
     async def get(self, path="/campaigns/c1", who=ADMIN, **headers):
         return await self.client.get(path, headers={"who": who} | headers)
