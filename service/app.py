@@ -47,8 +47,7 @@ from service.store.server import cursor_secret
 from service.views.on_demand import Helper
 from service.views.pictures import pictures as pictures_of_contacts
 from service.views.reports import Reports
-from service.views.studies import Studies
-from service.views.tables import Tables
+from service.views.studies import Studies, Tables
 
 
 def create_app(settings: ServiceSettings, executor: Executor | None = None) -> FastAPI:

@@ -1,6 +1,8 @@
 """HTTP with patience: what may pass is asked again, for a bounded time, and only where that can do no harm."""
 
 import logging
+import random
+import time
 from collections.abc import Generator, Mapping
 from contextlib import closing
 from typing import TypeVar
@@ -8,7 +10,6 @@ from typing import TypeVar
 import httpx
 from httpx_sse import EventSource, ServerSentEvent, SSEError
 from pydantic import ValidationError
-from tenacity import RetryCallState, Retrying, retry_if_exception, stop_before_delay, wait_exponential_jitter
 
 from risk_sac import __version__
 from risk_sac.client.errors import ClientError, Refused, StreamLost, UnexpectedAnswer, Unreachable
@@ -23,8 +24,6 @@ LONGEST_PAUSE_S = 2.0  # between two attempts, unless the service asks for more
 NOT_BEGUN = frozenset({429, 503})  # the service has done nothing, whatever was asked
 PASSING = NOT_BEGUN | {502, 504}
 NEVER_SENT = (httpx.ConnectError, httpx.ConnectTimeout)
-
-_backoff = wait_exponential_jitter(multiplier=0.1, max=LONGEST_PAUSE_S, jitter=0.1)
 
 
 def read(type_: type[R], response: httpx.Response) -> R:
@@ -115,14 +114,20 @@ class Transport:
     def _answer(
         self, request: httpx.Request, patience_s: float, *, repeatable: bool = True, stream: bool = False
     ) -> httpx.Response:
-        attempts = Retrying(
-            retry=retry_if_exception(lambda error: isinstance(error, ClientError) and error.passing),
-            wait=_pause_s,
-            stop=stop_before_delay(patience_s),
-            before_sleep=_say,
-            reraise=True,
-        )
-        return attempts(self._attempt, request, repeatable, stream)
+        give_up = time.monotonic() + patience_s
+        attempt = 0
+        while True:
+            try:
+                return self._attempt(request, repeatable, stream)
+            except ClientError as error:
+                backoff_s = min(0.1 * 2 ** min(attempt, 9), LONGEST_PAUSE_S) + random.uniform(0.0, 0.1)
+                pause_s = max(backoff_s, error.retry_after_s or 0.0)
+                if not error.passing or time.monotonic() + pause_s > give_up:
+                    raise
+                if attempt == 1:  # a first failure that passes is not worth a line
+                    logger.warning("%s; trying again", error)
+            attempt += 1
+            time.sleep(pause_s)
 
     def _attempt(self, request: httpx.Request, repeatable: bool, stream: bool) -> httpx.Response:
         try:
@@ -138,20 +143,3 @@ class Transport:
         if response.is_error:
             raise Refused(response, passing=response.status_code in (PASSING if repeatable else NOT_BEGUN))
         raise UnexpectedAnswer(response, "an answer")
-
-
-def _pause_s(state: RetryCallState) -> float:
-    """As long as the service asks for, if that is longer than what the number of attempts asks for."""
-    return max(_backoff(state), _error(state).retry_after_s or 0.0)
-
-
-def _say(state: RetryCallState) -> None:
-    if state.attempt_number == 2:  # a first failure that passes is not worth a line
-        logger.warning("%s; trying again", _error(state))
-
-
-def _error(state: RetryCallState) -> ClientError:
-    assert state.outcome is not None
-    error = state.outcome.exception()
-    assert isinstance(error, ClientError)
-    return error

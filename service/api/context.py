@@ -21,8 +21,7 @@ from service.store.stored import StoredCampaign
 from service.views.on_demand import OnDemandCache
 from service.views.pictures import Picture
 from service.views.reports import Reports
-from service.views.studies import Studies
-from service.views.tables import Tables
+from service.views.studies import Studies, Tables
 
 
 @dataclass(frozen=True, slots=True)

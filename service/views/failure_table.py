@@ -3,9 +3,8 @@
 Records are taken from their JSON without validation, because a table may have ten thousand of them.
 """
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from operator import itemgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -19,22 +18,22 @@ Plain = Mapping[str, Any]
 """A JSON object as it is stored, see `risk_sac.records.stored`."""
 Repeats = Literal["verified", "flaky"]
 DECIMALS = 4
-OF_RUN = {"run_ids": "id", "families": "family", "methods": "method", "seeds": "seed"}  # column -> field
-OF_COLLISION = {
-    **{"striker": "other_id", "striker_kind": "other_kind", "time_s": "time_s", "visible_for_s": "visible_for_s"},
-    **{name: name for name in ("ego_speed_mps", "other_speed_mps", "relative_speed_mps", "lateral_offset_m")},
-    **{name: name for name in ("min_rss_margin_m", "ego_peak_braking_mps2")},
+OF_COLLISION = {"striker": "other_id", "striker_kind": "other_kind"} | {  # column -> field
+    name: name
+    for name in (
+        "time_s",
+        "visible_for_s",
+        "ego_speed_mps",
+        "other_speed_mps",
+        "relative_speed_mps",
+        "lateral_offset_m",
+        "min_rss_margin_m",
+        "ego_peak_braking_mps2",
+    )
 }
-OF_JUDGEMENT = ("signature", "grade", "conflict_type", "conflict_s", "hidden", "ego_response", "ground", "broke")
-DECIDED = ("ids", "number", "indices", "phases", "valid", "distinct", "refused_by", "repeats")
-EARLY = ("min_ttc_s", "min_robustness")
-COLUMNS = (*OF_RUN, *OF_COLLISION, *OF_JUDGEMENT, *DECIDED, *EARLY, "name", "scene")
-ROUNDED = (*(name for name in OF_COLLISION if not name.startswith("striker")), *EARLY, "conflict_s")
-UNJUDGED: Plain = dict.fromkeys(OF_JUDGEMENT) | {"broke": []}
-
-_of_collision, _of_judgement = itemgetter(*OF_COLLISION.values()), itemgetter(*OF_JUDGEMENT)
-
-Columns = Mapping[str, Sequence[Any]]
+OF_JUDGEMENT = ("grade", "conflict_type", "conflict_s", "hidden", "ego_response", "ground", "broke")
+COUNTED = ("failures", "distinct", "preventable")
+UNJUDGED: Plain = dict.fromkeys((*OF_JUDGEMENT, "signature")) | {"broke": []}
 
 
 class FailureKind(Record):
@@ -162,72 +161,64 @@ def failure_table(
     """The table of these contacts of the campaign, in their order; a contact without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
     found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)
+    contacts = list(contacts)
     rows = [_row(runs[each.run_number], each, found[each.run_number, each.phase]) for each in contacts]
-    columns: dict[str, Sequence[Any]] = dict.fromkeys(COLUMNS, ())
-    columns |= zip(COLUMNS, zip(*rows, strict=True), strict=bool(rows))
-    kinds = _kinds(columns)
+    names = [signature_of(each.record["collision"]) for each in contacts]
+    kinds = _kinds(contacts, names, rows)
     places = {kind.name: place for place, kind in enumerate(kinds)}
-    noted = [triages.get(number, TriageState.NEW) for number in columns["number"]]
-    made = {name: _rounded(columns[name]) for name in ROUNDED} | {
-        "kind": [places[name] for name in columns["name"]],
+    table: dict[str, Any] = {
+        "kind": [places[name] for name in names],
         "kinds": kinds,
-        "triage": noted,
-        "scenes": _scenes(columns),
+        "triage": [triages.get(each.number, TriageState.NEW) for each in contacts],
+        "scenes": _scenes([row["families"] for row in rows], [each.record["scene"] for each in contacts]),
     }
-    return FailureTable.model_validate(columns | made)
+    for column in FailureTable.model_fields.keys() - table.keys():
+        values = [row[column] for row in rows]
+        table[column] = _rounded(values) if FailureTable.model_fields[column].annotation == list[Real] else values
+    return FailureTable.model_validate(table)
 
 
-def _row(run: StoredRun, contact: PlainEpisode, found: Kinds) -> tuple[Any, ...]:
-    """`COLUMNS`."""
-    record = contact.record
-    collision = record["collision"]
+def _row(run: StoredRun, contact: PlainEpisode, found: Kinds) -> dict[str, Any]:
+    """A contact's entries of the columns."""
+    collision = contact.record["collision"]
+    judged = collision.get("judgement") or UNJUDGED
     repetition = run.repetitions.get(contact.index)
     valid = contact.outcome == Outcome.FAILURE
-    return (
-        *(run.id, run.family, run.method, run.seed),
-        *_of_collision(collision),
-        *_of_judgement(collision.get("judgement") or UNJUDGED),
-        f"{run.id}-{contact.phase}-{contact.index}",
-        contact.number,
-        contact.index,
-        contact.phase,
-        valid,
-        valid and found.add(collision),
-        [rule for rule, passed in collision.get("verdicts", {}).items() if not passed],
-        None if repetition is None else "verified" if repetition.verified else "flaky",
-        *(collision.get(f"early_{name}", collision.get(name)) for name in EARLY),
-        signature_of(collision),
-        record["scene"],
-    )
+    row = {column: collision[name] for column, name in OF_COLLISION.items()}
+    row |= {name: judged[name] for name in OF_JUDGEMENT}
+    row |= {name: collision.get(f"early_{name}", collision.get(name)) for name in ("min_ttc_s", "min_robustness")}
+    return row | {
+        "ids": f"{run.id}-{contact.phase}-{contact.index}",
+        "run_ids": run.id,
+        "families": run.family,
+        "methods": run.method,
+        "seeds": run.seed,
+        "indices": contact.index,
+        "phases": contact.phase,
+        "valid": valid,
+        "distinct": valid and found.add(collision),
+        "refused_by": [rule for rule, passed in collision.get("verdicts", {}).items() if not passed],
+        "repeats": None if repetition is None else "verified" if repetition.verified else "flaky",
+    }
 
 
-def _kinds(columns: Columns) -> list[FailureKind]:
+def _kinds(contacts: Sequence[PlainEpisode], names: Sequence[str], rows: Sequence[Plain]) -> list[FailureKind]:
     """Of the signatures, the most preventable failures first."""
-    signatures = dict(zip(columns["name"], columns["signature"], strict=True))
-    failures, distinct, preventable = Counter[str](), Counter[str](), Counter[str]()
-    told = (columns[name] for name in ("name", "valid", "distinct", "grade"))
-    for name, valid, first, grade in zip(*told, strict=True):
-        failures[name] += valid
-        distinct[name] += first
-        preventable[name] += valid and grade == Grade.CAREFUL
-    kinds = [
-        FailureKind(
-            signature=signature,
-            name=name,
-            failures=failures[name],
-            distinct=distinct[name],
-            preventable=preventable[name],
-        )
-        for name, signature in signatures.items()
-    ]
-    return sorted(kinds, key=lambda kind: (-kind.preventable, -kind.failures, kind.name))
+    kinds: dict[str, dict[str, Any]] = {}
+    for contact, name, row in zip(contacts, names, rows, strict=True):
+        judged = contact.record["collision"].get("judgement") or UNJUDGED
+        kind = kinds.setdefault(name, {"signature": judged["signature"], "name": name} | dict.fromkeys(COUNTED, 0))
+        kind["failures"] += row["valid"]
+        kind["distinct"] += row["distinct"]
+        kind["preventable"] += row["valid"] and row["grade"] == Grade.CAREFUL
+    ordered = sorted(kinds.values(), key=lambda kind: (-kind["preventable"], -kind["failures"], kind["name"]))
+    return [FailureKind(**kind) for kind in ordered]
 
 
-def _scenes(columns: Columns) -> dict[str, FamilyScenes]:
+def _scenes(families: Sequence[str], scenes: Sequence[Plain]) -> dict[str, FamilyScenes]:
     places: defaultdict[str, list[int]] = defaultdict(list)
-    for place, family in enumerate(columns["families"]):
+    for place, family in enumerate(families):
         places[family].append(place)
-    scenes = columns["scene"]
     return {family: _family_scenes([scenes[place] for place in of], of) for family, of in places.items()}
 
 

@@ -13,9 +13,8 @@ from risk_sac.run_folder.results import Contact
 from risk_sac.series import Series
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign, StoredContact, StoredRun
-from service.views.bodies import series_file
 from service.views.on_demand import OnDemandCache
-from service.views.series import load_arrays, series_body
+from service.views.series import load_arrays, series_body, series_file
 
 MM = 3  # decimals of a metre
 

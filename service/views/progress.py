@@ -1,10 +1,10 @@
-"""How far a campaign is and when it will end. Pure."""
+"""Campaigns as they are answered: how far one is and when it will end. Pure."""
 
 import math
 from collections.abc import Sequence
 
 from risk_sac.config import METHODS
-from risk_sac.records import Progress, RunMetrics, State
+from risk_sac.records import Campaign, CampaignSummary, Progress, RunMetrics, State
 from service.store.stored import StoredCampaign, StoredRun
 from service.store.tables import TALLIED
 
@@ -14,6 +14,17 @@ AVERAGED = ("window_ecr", "window_pcr", "dual_variable", "temperature")
 LOOKS = 20  # polls of a client from now to the end of a campaign
 SOONEST_S, LATEST_S = 1, 30
 LEARNING = {name for name, method in METHODS.items() if method.learns}
+
+
+def campaign_body(campaign: StoredCampaign, workers: int) -> Campaign:
+    """A campaign in full; `workers` as `progress` has it."""
+    return Campaign(**dict(summary_body(campaign, workers)), runs=campaign.runs, spec=campaign.spec)
+
+
+def summary_body(campaign: StoredCampaign, workers: int) -> CampaignSummary:
+    """A campaign in a list; `workers` as `progress` has it."""
+    stored = {name: getattr(campaign, name) for name in CampaignSummary.model_fields.keys() - {"progress"}}
+    return CampaignSummary(**stored, progress=progress(campaign, workers))
 
 
 def progress(campaign: StoredCampaign, workers: int) -> Progress:

@@ -1,4 +1,4 @@
-"""Full time series of a contact, from the file its worker wrote."""
+"""Failures as they are answered, with the time series from the file that a worker wrote."""
 
 import hashlib
 import io
@@ -11,11 +11,33 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.records import Failure, Triage
+from risk_sac.run_folder.results import FAILURES
 from risk_sac.series import Series
 from risk_sac.types import Kind, Role, Signal
 from service.errors import SeriesLost
+from service.settings import ServiceSettings
+from service.store.stored import StoredContact
 
 _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
+
+
+def failure_body(campaign_id: str, contact: StoredContact, triage: Triage | None, settings: ServiceSettings) -> Failure:
+    """A contact with its time series, or with why there is none, and with its triage."""
+    series, problem = None, None
+    try:
+        series = load_series(*series_file(campaign_id, contact, settings))
+    except SeriesLost as error:
+        problem = str(error)
+    return Failure(**dict(contact.episode), series=series, series_problem=problem, triage=triage)
+
+
+def series_file(campaign_id: str, contact: StoredContact, settings: ServiceSettings) -> tuple[Path, str | None]:
+    """Path and SHA-256 of a contact's time series; SeriesLost if none was recorded."""
+    if contact.series is None:
+        raise SeriesLost("no time series was recorded")
+    folder = settings.run_folder(campaign_id, contact.episode.run_id) / FAILURES
+    return folder / contact.series, contact.series_sha256
 
 
 def load_series(path: Path, sha256: str | None) -> Series:

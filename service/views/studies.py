@@ -1,21 +1,29 @@
-"""Studies of a failure, which need the simulator, in a helper process, see `risk_sac.failures.study`."""
+"""What helper processes make: studies of a failure, which need the simulator, and tables of all episodes.
 
+A table is made in a process of its own because the packages take 150 MB.
+"""
+
+import contextlib
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from risk_sac.config import EgoConfig
 from risk_sac.execution.helper import ANSWER, QUESTION
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
-from service.errors import NotPlayable, OutdatedError
+from risk_sac.run_folder.results import RESULTS
+from service.errors import NotPlayable, OutdatedError, StorageError
 from service.settings import ServiceSettings
-from service.views.bodies import series_file
 from service.views.on_demand import WALL_S, Helper, OnDemandCache
 from service.views.pictures import ContactOfARun
-from service.views.series import load_arrays
+from service.views.series import load_arrays, series_file
 
 logger = logging.getLogger(__name__)
+
+TABLES_KEPT = 1  # of some megabytes each
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,4 +70,40 @@ class Studies(OnDemandCache[Study]):
         if result.status != 0:
             logger.error("a study ended with status %d: %s", result.status, result.log)
             raise NotPlayable("its process was lost; the log has the reason")
+        return result.answer
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """The episodes in folders of runs, as they are at a time."""
+
+    folders: tuple[Path, ...]
+    written_ns: tuple[int, ...]
+    """When the results of each run were."""
+    format: FormatName
+
+    @classmethod
+    def of(cls, folders: Sequence[Path], format: FormatName) -> "Table":
+        """The table of those runs that have results by now."""
+        written_ns = {}
+        for folder in folders:
+            with contextlib.suppress(FileNotFoundError):
+                written_ns[folder] = (folder / RESULTS).stat().st_mtime_ns
+        return cls(tuple(written_ns), tuple(written_ns.values()), format)
+
+
+class Tables(OnDemandCache[Table]):
+    """Tables, made one at a time; StorageError where one cannot be made."""
+
+    def __init__(self, helper: Helper) -> None:
+        super().__init__(self._written, "tables", TABLES_KEPT)
+        self._helper = helper
+
+    def _written(self, table: Table) -> bytes:
+        folders = map(str, table.folders)
+        result = self._helper.run("risk_sac", ["export", *folders, "--format", table.format, "--out", ANSWER])
+        if result.status != 0:
+            reason = f"more than {WALL_S:g} s" if result.timed_out else f"status {result.status}"
+            logger.error("a table of episodes was not made (%s): %s", reason, result.log)
+            raise StorageError("the table of episodes cannot be made; the log has the reason")
         return result.answer

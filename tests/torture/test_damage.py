@@ -21,8 +21,8 @@ from risk_sac.run_folder.results import FAILURES, RESULTS
 from service.errors import StorageError
 from service.settings import ServiceSettings
 from service.store.reading import Store
-from service.views.bodies import failure_body
 from service.views.reports import Reports
+from service.views.series import failure_body
 from tests.server import servers
 
 SPEC = {

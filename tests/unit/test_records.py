@@ -43,7 +43,7 @@ from service.app import create_app
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.writing import Ledger
-from service.views.bodies import failure_body
+from service.views.series import failure_body
 from risk_sac.execution.messages import EpisodeDone, decode, encode
 from tests.builders import collision, episode_record, run_metrics
 

@@ -30,11 +30,10 @@ from service.api.posted_campaign import PostedCampaign, documented_campaign
 from service.errors import NotFoundError
 from service.runs.manager import LOG
 from service.store.stored import StoredCampaign
-from service.views.bodies import campaign_body, summary_body
 from service.views.curves import Curves, curves
 from service.views.failure_table import FailureTable, failure_table
 from service.views.logs import log_tail
-from service.views.progress import retry_after_s
+from service.views.progress import campaign_body, retry_after_s, summary_body
 from service.views.totals import results
 
 LISTED = "campaigns"

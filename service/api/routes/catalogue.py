@@ -1,7 +1,6 @@
 """What can be posted."""
 
-from dataclasses import asdict
-from typing import Literal
+from typing import Literal, TypeVar
 
 from fastapi import APIRouter
 
@@ -12,6 +11,8 @@ from risk_sac.records import Record
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import requirements_from_odd, widest
+
+R = TypeVar("R", bound=Record)
 
 
 class SceneParameter(Record):
@@ -132,9 +133,7 @@ def list_families() -> Families:
             name=family.name,
             summary=family.summary,
             horizon_steps=family.horizon_steps,
-            parameters=[
-                SceneParameter.model_validate(parameter, from_attributes=True) for parameter in family.space.parameters
-            ],
+            parameters=[_told(SceneParameter, parameter) for parameter in family.space.parameters],
             adversaries=list(family.adversaries),
             odd=family.odd,
             odd_limits=widest(family.odd),
@@ -142,26 +141,13 @@ def list_families() -> Families:
         )
         for family in FAMILIES.values()
     ]
-    signals = [Signal(name=name, **asdict(signal)) for name, signal in SIGNALS.items()]
-    return Families(items=items, signals=signals)
+    return Families(items=items, signals=[_told(Signal, signal, name=name) for name, signal in SIGNALS.items()])
 
 
 @router.get("/formats")
 def list_formats() -> ExportFormats:
     """Formats that failures and episodes can be exported in."""
-    items = [
-        ExportFormat(
-            name=name,
-            title=row.title,
-            what=row.what,
-            of=row.of,
-            suffix=row.suffix,
-            media_type=row.media_type,
-            missing=list(row.missing),
-        )
-        for name, row in FORMATS.items()
-    ]
-    return ExportFormats(items=items)
+    return ExportFormats(items=[_told(ExportFormat, row, name=name) for name, row in FORMATS.items()])
 
 
 @router.get("/egos")
@@ -178,10 +164,16 @@ def list_egos() -> Egos:
         )
         for name, summary in PROFILES.items()
     ]
-    return Egos(items=[*models, *(Ego.model_validate(card, from_attributes=True) for card in cards())])
+    return Egos(items=[*models, *(_told(Ego, card) for card in cards())])
 
 
 @router.get("/methods")
 def list_methods() -> Methods:
     """Search methods as rows of a table."""
-    return Methods(items=[NamedMethod(name=name, **dict(method)) for name, method in METHODS.items()])
+    return Methods(items=[_told(NamedMethod, method, name=name) for name, method in METHODS.items()])
+
+
+def _told(record: type[R], row: object, **named: str) -> R:
+    """The record of a row of a table; `named`: what the row itself does not say."""
+    said = {name: getattr(row, name) for name in record.model_fields.keys() - named.keys()}
+    return record.model_validate(said | named)

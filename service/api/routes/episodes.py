@@ -14,7 +14,7 @@ from service.api.context import CurrentCaller, Service
 from service.api.posted import documented, read_posted
 from service.store.finding import Judged
 from service.store.stored import StoredPage
-from service.views.bodies import failure_body
+from service.views.series import failure_body
 
 # Text of any language, with tabs and new lines; other control characters could hide or reorder what is shown.
 TEXT = r"^[^\x00-\x08\x0b\x0c\x0e-\x1f\x7f]*$"

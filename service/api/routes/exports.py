@@ -15,8 +15,7 @@ from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, problem
 from service.api.context import AskedCampaign, Service
 from service.api.routes.pictures import CROWDED, PLAYED, Asked, Headers, made
 from service.errors import ConflictError
-from service.views.studies import Study
-from service.views.tables import Table
+from service.views.studies import Study, Table
 
 LACKING = problem(501, "The service lacks a package that makes this format")
 NOTHING_YET = problem(409, "No run has played an episode yet")
