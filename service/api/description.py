@@ -17,8 +17,7 @@ from risk_sac.config.methods import RunMethod
 from risk_sac.records import StateChange
 from service.api.answers.responses import WAIT, header
 from service.api.guards.gate import HEALTH, PUBLIC
-from service.api.posted import input_schemas
-from service.api.posted_campaign import campaign_schemas
+from service.api.posted import campaign_schemas, input_schemas
 from service.api.routes.episodes import PostedTriage
 from service.api.routes.regressions import PostedRegression
 

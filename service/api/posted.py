@@ -1,18 +1,31 @@
-"""Posted JSON, read strictly: `"3"` and `true` are no numbers, as the API's description says."""
+"""Posted JSON, read strictly: `"3"` and `true` are no numbers, as the API's description says.
 
+A campaign is of families, or of places of an uploaded network, which become families here.
+"""
+
+import codecs
 import json
 from collections.abc import Collection
 from http import HTTPStatus
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
-from fastapi import Request
+from fastapi import Depends, Request
+from fastapi.concurrency import run_in_threadpool
 from fastapi.exceptions import RequestValidationError
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError, model_validator
+from pydantic_core import from_json
 
-from service.api.answers.problems import ProblemError, Reason
+from risk_sac.config import CampaignSpec, Settings
+from risk_sac.errors import ConfigError
+from risk_sac.scenario.maps.found import Pattern
+from service.api.answers.problems import ProblemError, Reason, invalid, invalid_field
+from service.api.context import Caller, Context, CurrentCaller, Service
+from service.errors import NotFoundError
 
 MOST_MISTAKES = 50  # that a refusal names one by one
+MOST_COMMAS = 10_000  # about as many values; validating them holds up all other requests
 REFERENCE = "#/components/schemas/{model}"
+ON_MAP = "CampaignOnMap"
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -22,32 +35,111 @@ async def read_posted(request: Request, model: type[Model]) -> Model:
 
     Not a body parameter: FastAPI validates the parsed JSON, where strictness would refuse arrays for tuples.
     """
+    content, _ = await _read_json(request)
+    return _validated(content, model)
+
+
+async def _read_json(request: Request) -> tuple[bytes, Any]:
+    """The body as JSON, as it came and parsed; a problem unless it is JSON, of reasonable size, without repeats."""
     media_type(request, ["application/json"])
-    return read_content(await request.body(), model)
-
-
-def read_content(content: bytes, model: type[Model]) -> Model:
-    """The content of a body; raises what `read_posted` does."""
+    content = (await request.body()).removeprefix(codecs.BOM_UTF8)
+    if content.count(b",") > MOST_COMMAS:
+        raise invalid(f"the body has more than {MOST_COMMAS} values; wanted fewer: split the request")
     try:
-        posted = model.model_validate_json(content, strict=True)
+        value = from_json(content)  # which also refuses what is nested too deep for the json module
+    except ValueError as error:
+        detail = f"the body is no JSON: {error}"
+        raise ProblemError(HTTPStatus.BAD_REQUEST, Reason.MALFORMED_JSON, detail) from error
+    json.loads(content, object_pairs_hook=_refuse_repeats)
+    return content, value
+
+
+def _refuse_repeats(pairs: list[tuple[str, Any]]) -> None:
+    """Refuses an object that has a field twice: of the two, readers differ in which one counts."""
+    seen = set[str]()
+    for name, _ in pairs:
+        if name in seen:
+            raise invalid(f"the body has the field {name[:200]!r} twice in one object; wanted it once")
+        seen.add(name)
+
+
+def _validated(content: bytes, model: type[Model]) -> Model:
+    try:
+        return model.model_validate_json(content, strict=True)
     except ValidationError as error:
-        if error.error_count() > MOST_MISTAKES:  # naming a million of them would keep the server busy for minutes
-            detail = f"the body has {error.error_count()} mistakes; wanted none. Up to {MOST_MISTAKES} would be named"
-            raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail) from error
+        if error.error_count() > MOST_MISTAKES:  # naming them all would keep the server busy
+            wanted = f"wanted none. Up to {MOST_MISTAKES} would be named"
+            raise invalid(f"the body has {error.error_count()} mistakes; {wanted}") from error
         found = [item | {"loc": ("body", *item["loc"])} for item in error.errors()]
         raise RequestValidationError(found, body=model) from error  # the model: it knows which fields there are
-    refuse_repeats(content)
-    return posted
 
 
-def refuse_repeats(content: bytes) -> None:
-    """Refuses JSON that has a field twice in one object."""
-    json.loads(content, object_pairs_hook=_without_repeats)
+def media_type(request: Request, wanted: Collection[str]) -> str:
+    """Returns the media type of a body; raises a 415 unless it is wanted, and one for a packed body."""
+    given = request.headers.get("content-type", "")
+    declared = given.partition(";")[0].strip().lower()
+    if declared not in wanted:
+        example = f"curl -H 'content-type: {next(iter(wanted))}' --data-binary @FILE"
+        remedy = f"wanted {' or '.join(wanted)}: send the file alone, as in `{example}`"
+        raise _unsupported(f"content-type is {given[:100]!r}; {remedy}")
+    encoding = request.headers.get("content-encoding", "identity")
+    if encoding.strip().lower() != "identity":
+        raise _unsupported(f"content-encoding is {encoding[:100]!r}; wanted none: send the body as it is")
+    return declared
 
 
-def documented(model: type[BaseModel]) -> dict[str, Any]:
-    """How a route says that it takes such a body."""
-    schema = {"$ref": REFERENCE.format(model=model.__name__)}
+def _unsupported(detail: str) -> ProblemError:
+    return ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, Reason.UNSUPPORTED_MEDIA_TYPE, detail)
+
+
+class Ground(Settings):
+    """Where on a network a campaign is run."""
+
+    network: Annotated[str, Field(max_length=40)]
+    """Id of an uploaded network."""
+    pattern: Pattern
+    place: Annotated[str, Field(min_length=1, max_length=200)] | None = None
+    """Where the pattern is played; one of the network's places."""
+    places: Literal["all"] | None = None
+    """In place of `place`: wherever the pattern fits."""
+
+    @model_validator(mode="after")
+    def _one_or_all(self) -> Self:
+        if (self.place is None) == (self.places is None):
+            raise ConfigError("place", "both or neither", 'either place, one of the network\'s, or places: "all"')
+        return self
+
+
+async def _campaign(request: Request, service: Service, caller: CurrentCaller) -> CampaignSpec:
+    content, value = await _read_json(request)
+    if isinstance(value, dict) and "network" in value:
+        if "families" in value:
+            wanted = "either families or a network with its places, not both"
+            raise invalid_field("families", value["families"], wanted)
+        where = {name: value.pop(name) for name in Ground.model_fields if name in value}
+        ground = _validated(json.dumps(where).encode(), Ground)
+        families = await run_in_threadpool(_families, ground, service, caller)
+        content = json.dumps({"families": families} | value).encode()
+    spec = _validated(content, CampaignSpec)
+    if "\0" in spec.label:  # which PostgreSQL does not take
+        raise invalid_field("label", spec.label, "text without NUL")
+    return spec
+
+
+PostedCampaign = Annotated[CampaignSpec, Depends(_campaign)]
+
+
+def _families(ground: Ground, service: Context, caller: Caller) -> list[str]:
+    try:
+        return service.surveys.keep(ground.network, caller.sees, ground.pattern, ground.place)
+    except NotFoundError as error:
+        raise invalid_field("network", ground.network, "the id of one of GET /v1/networks") from error
+
+
+def documented(*models: str) -> dict[str, Any]:
+    """How a route says that it takes a body of one of these schemas."""
+    schemas = [{"$ref": REFERENCE.format(model=model)} for model in models]
+    schema = {"anyOf": schemas} if len(schemas) > 1 else schemas[0]
     return {"requestBody": {"required": True, "content": {"application/json": {"schema": schema}}}}
 
 
@@ -58,31 +150,20 @@ def input_schemas(model: type[BaseModel]) -> dict[str, Any]:
     return parts | {model.__name__: schema}
 
 
-def _without_repeats(pairs: list[tuple[str, Any]]) -> None:
-    """Refuses an object that has a field twice: of the two, readers differ in which one counts."""
-    seen = set[str]()
-    for name, _ in pairs:
-        if name in seen:
-            detail = f"the body has the field {name!r} twice in one object; wanted it once"
-            raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.INVALID_FIELD, detail)
-        seen.add(name)
-
-
-def media_type(request: Request, wanted: Collection[str]) -> str:
-    """Returns the media type of a body; raises a 415 unless it is wanted, and one for a packed body."""
-    given = request.headers.get("content-type", "")
-    declared = given.partition(";")[0].strip().lower()
-    if declared not in wanted:
-        example = f"curl -H 'content-type: {next(iter(wanted))}' --data-binary @FILE"
-        detail = (
-            f"content-type is {given[:100]!r}; wanted {' or '.join(wanted)}: send the file alone, as in `{example}`"
-        )
-        raise _unsupported(detail)
-    encoding = request.headers.get("content-encoding", "identity")
-    if encoding.strip().lower() != "identity":
-        raise _unsupported(f"content-encoding is {encoding[:100]!r}; wanted none: send the body as it is")
-    return declared
-
-
-def _unsupported(detail: str) -> ProblemError:
-    return ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, Reason.UNSUPPORTED_MEDIA_TYPE, detail)
+def campaign_schemas() -> dict[str, Any]:
+    """JSON schemas of both kinds of campaign, as components of the API's description."""
+    schemas = input_schemas(CampaignSpec)
+    plain, ground = schemas[CampaignSpec.__name__], input_schemas(Ground)[Ground.__name__]
+    reference = f"{REFERENCE}/properties/{{name}}"
+    fields = {
+        name: {"$ref": reference.format(model=CampaignSpec.__name__, name=name)}
+        for name in plain["properties"]
+        if name != "families"
+    }
+    schemas[ON_MAP] = plain | {
+        "title": ON_MAP,
+        "description": "A pattern at places of an uploaded network × methods × seeds on one equal budget.",
+        "properties": ground["properties"] | fields,
+        "required": ground["required"],
+    }
+    return schemas

@@ -195,9 +195,6 @@ def _problem(request: Request, error: Exception) -> ProblemError:
 
 def _invalid_request(error: RequestValidationError) -> ProblemError:
     found = error.errors()
-    if any(item["type"] == "json_invalid" for item in found):
-        detail = f"the body is no JSON: {found[0]['ctx']['error']}"
-        return ProblemError(HTTPStatus.BAD_REQUEST, Reason.MALFORMED_JSON, detail)
     errors = [_of_validation(item, error.body) for item in causes(found)]
     return invalid("; ".join(f"{item.field}: {item.message}".removeprefix(": ") for item in errors), *errors)
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import PlainTextResponse
 
 from risk_sac import __version__, problem
-from risk_sac.config import FamilyName, MethodName
+from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.records import Campaign, CampaignPage, Record, Results, State, wire
 from service.api.answer_cache import kept
 from service.api.answers.pages import TIERS, Cursor, Limit, Tier
@@ -26,7 +26,7 @@ from service.api.answers.responses import (
     UNKNOWN,
 )
 from service.api.context import Caller, Context, CurrentCaller, Service
-from service.api.posted_campaign import PostedCampaign, documented_campaign
+from service.api.posted import ON_MAP, PostedCampaign, documented
 from service.errors import NotFoundError
 from service.runs.manager import LOG
 from service.store.stored import StoredCampaign
@@ -37,6 +37,7 @@ from service.views.progress import campaign_body, retry_after_s, summary_body
 from service.views.totals import results
 
 LISTED = "campaigns"
+EITHER_KIND = documented(CampaignSpec.__name__, ON_MAP)
 POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON
 IdempotencyKey = Annotated[
     str | None,
@@ -55,7 +56,7 @@ LOG_TEXT = TAGGED | {200: TAGGED[200] | {"content": {"text/plain": {"schema": {"
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
 
 
-@router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=documented_campaign())
+@router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=EITHER_KIND)
 def post_campaign(
     spec: PostedCampaign, service: Service, caller: CurrentCaller, idempotency_key: IdempotencyKey = None
 ) -> Response:
@@ -64,7 +65,7 @@ def post_campaign(
     return _accepted(campaign, service)
 
 
-@router.post("/check", status_code=204, responses=MALFORMED | NOT_JSON, openapi_extra=documented_campaign())
+@router.post("/check", status_code=204, responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
 def check_campaign(spec: PostedCampaign) -> Response:
     """Say what is wrong with a campaign, as posting it would; nothing is kept, and no quota counts it."""
     problem.checked_campaign(spec)

@@ -98,7 +98,7 @@ def get_failure(campaign_id: str, failure_id: str, service: Service, caller: Cur
     return as_json(failure_body(campaign_id, contact, triage, service.settings))
 
 
-@router.put("/failures/{failure_id}/triage", responses=MALFORMED | NOT_JSON, openapi_extra=documented(PostedTriage))
+@router.put("/failures/{failure_id}/triage", responses=MALFORMED | NOT_JSON, openapi_extra=documented("PostedTriage"))
 def put_triage(
     campaign_id: str,
     failure_id: str,

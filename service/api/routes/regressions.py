@@ -39,7 +39,7 @@ async def _posted(request: Request) -> PostedRegression:
     return await read_posted(request, PostedRegression)
 
 
-@router.post("", status_code=202, responses=POSTING, openapi_extra=documented(PostedRegression))
+@router.post("", status_code=202, responses=POSTING, openapi_extra=documented("PostedRegression"))
 async def post_regression(
     posted: Annotated[PostedRegression, Depends(_posted)], response: Response, service: Service, caller: CurrentCaller
 ) -> CampaignRegression:
