@@ -76,7 +76,8 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         lifespan=lifespan,
         redirect_slashes=False,
         generate_unique_id_function=lambda route: route.name,
-        docs_url=None,  # the routes have pages that need no network
+        openapi_url=None,  # the routes have all of these, packed once, and pages that need no network
+        docs_url=None,
         redoc_url=None,
     )
     shown = (episodes, pictures, exports, events, reports, evidence)

@@ -1,6 +1,7 @@
 """Settings of the server process: RISK_SAC_* environment variables, or files of these names in a folder of secrets."""
 
 import os
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -13,6 +14,7 @@ from risk_sac.execution.ray.settings import RaySettings
 from risk_sac.run_folder.verified import TIMES
 
 MOST_WORKERS = 1024
+ROOT_PATH = re.compile(r"^(/[A-Za-z0-9._~-]{1,100}){0,10}$")
 SECRETS = os.environ.get("RISK_SAC_SECRETS_DIR")
 
 
@@ -85,6 +87,10 @@ class ServiceSettings(RaySettings, BaseSettings):
 
     allowed_hosts: Names = ["localhost", "127.0.0.1", "[::1]"]
     """Host headers that are answered, a JSON list; `*` answers all. The address listened on is always one of them."""
+    root_path: Annotated[str, Field(pattern=ROOT_PATH)] = ""
+    """Path that a proxy in front has the service at, such as `/sim`, and takes off the requests."""
+    trusted_proxies: Names = []
+    """Addresses of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are believed, a JSON list."""
     cors_origins: Names = []
     """Origins whose web pages may call the service, a JSON list."""
     max_connections: Annotated[int, Field(ge=1)] | None = None

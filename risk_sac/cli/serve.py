@@ -16,6 +16,7 @@ def add(commands: Commands) -> None:
     serve.add_argument("--host", metavar="ADDRESS", help="(default: 127.0.0.1)")
     serve.add_argument("--port", type=int, help="(default: 8000)")
     serve.add_argument("--data-dir", type=Path, metavar="DIR", help="(default: data)")
+    serve.add_argument("--root-path", metavar="PATH", help="that a proxy in front has the service at, such as /sim")
 
     keys = commands.add_parser(
         "keys", help="create, list and revoke the service's API keys", add_help=False, prefix_chars="\0"
@@ -26,7 +27,7 @@ def add(commands: Commands) -> None:
 
 def _serve(options: argparse.Namespace) -> int:
     """Replaces this process: the method's code never imports the service."""
-    given = {"HOST": options.host, "PORT": options.port, "DATA_DIR": options.data_dir}
+    given = {"HOST": options.host, "PORT": options.port, "DATA_DIR": options.data_dir, "ROOT_PATH": options.root_path}
     settings = {f"RISK_SAC_{name}": str(value) for name, value in given.items() if value is not None}
     os.execve(sys.executable, [sys.executable, "-m", "service"], ARENAS | os.environ | settings)
 

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 from risk_sac import __version__
 from risk_sac.client.errors import ClientError, Refused, StreamLost, UnexpectedAnswer, Unreachable
 from risk_sac.errors import ConfigError
+from risk_sac.loopback import is_loopback
 from risk_sac.records import Record
 
 logger = logging.getLogger(__name__)
@@ -42,7 +43,13 @@ class Transport:
         if key is not None:
             headers["Authorization"] = f"Bearer {key}"
         self.url = url
-        self._http = httpx.Client(base_url=url, headers=headers, timeout=timeout_s)
+        try:
+            self._http = httpx.Client(
+                base_url=url, headers=headers, timeout=timeout_s, trust_env=not is_loopback(httpx.URL(url).host)
+            )
+        except (ImportError, ValueError, httpx.InvalidURL) as error:
+            remedy = "mend HTTP_PROXY, HTTPS_PROXY, ALL_PROXY or NO_PROXY of the environment, or unset it"
+            raise ConfigError("proxy", f"what cannot be used ({error})", remedy=remedy) from error
         self._timeout_s = timeout_s
         self.patience_s = patience_s
 

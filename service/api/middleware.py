@@ -8,15 +8,15 @@ from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from risk_sac.loopback import is_loopback
 from service.api.answer_cache import AnswerCache
-from service.api.answers.representations import takes
+from service.api.answers.representations import LEAST_BYTES, takes
 from service.api.guards.connections import BodyLimit
 from service.api.guards.gate import Gate
 from service.api.observe import Observe
 from service.keys.made import AuthEnabledFlag
-from service.settings import ServiceSettings
+from service.settings import ROOT_PATH, ServiceSettings
 
-LEAST_BYTES = 2000  # of what is packed
 GZIP_LEVEL = 4  # of 9; those above take several times as long for a few hundredths less
 
 
@@ -37,6 +37,7 @@ def add_middleware(app: FastAPI, settings: ServiceSettings, made: AuthEnabledFla
     app.add_middleware(SecurityHeaders)
     app.add_middleware(Head)
     app.add_middleware(Observe, latencies=latencies)
+    app.add_middleware(ForwardedPrefix)
 
 
 class Compression(GZipMiddleware):
@@ -94,6 +95,24 @@ class SecurityHeaders:
             await send(message)
 
         await self._app(scope, receive, send_with_headers)
+
+
+class ForwardedPrefix:
+    """ASGI middleware: links begin with what a proxy on this machine says that it took off the path.
+
+    It is believed without being configured, because nothing but the links of its own answer depends on it.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes on, with the prefix as the root path unless the settings have one."""
+        if scope["type"] == "http" and not scope.get("root_path") and is_loopback((scope.get("client") or [""])[0]):
+            prefix = Headers(scope=scope).get("x-forwarded-prefix", "").rstrip("/")
+            if prefix and ROOT_PATH.fullmatch(prefix):
+                scope.update(root_path=prefix, path=prefix + scope["path"])
+        await self._app(scope, receive, send)
 
 
 class Head:

@@ -1,12 +1,12 @@
 """The keys as a running server sees them, and where it may listen."""
 
-import ipaddress
 import logging
 import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from risk_sac.errors import ConfigError
+from risk_sac.loopback import is_loopback
 from service.errors import KeysError
 from service.keys.file import Document, Key, KeyFile, missing, split
 from service.keys.made import AuthEnabledFlag
@@ -91,14 +91,6 @@ def _signature(path: Path) -> _Signature:
     except OSError as error:
         return (error.errno or 0,)
     return status.st_ino, status.st_mtime_ns, status.st_ctime_ns, status.st_size
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only processes of this machine reach a server that listens there."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def check_exposure(settings: ServiceSettings) -> None:

@@ -14,6 +14,7 @@ from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.remote.messages import METHODS, PROTOCOL, SERVICE, command_of, observation, start_request
 from risk_sac.egos.seam import Command, Episode, Perceived
 from risk_sac.errors import EgoFailed
+from risk_sac.loopback import is_loopback
 from risk_sac.types import Floats
 
 VERSION = "ego_version"
@@ -47,7 +48,9 @@ class RemoteEgo:
           EgoFailed: no answer comes in time, or the ego is of another version.
         """
         if self._channel is None:
-            self._channel = grpc.insecure_channel(self._address, options=OPTIONS)
+            proxied = int(not is_loopback(self._address.rpartition(":")[0]))
+            options = [*OPTIONS, ("grpc.enable_http_proxy", proxied)]
+            self._channel = grpc.insecure_channel(self._address, options=options)
             self._call = {name: self._channel.unary_unary(f"/{SERVICE}/{name}") for name in ("Start", "Close")}
         self._end()
         self._session, self._path = str(uuid.uuid4()), None

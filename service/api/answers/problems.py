@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import compile_path
+from starlette.types import Scope
 
 from risk_sac.config.invalid import LONGEST_VALUE, causes, field_error, shown
 from risk_sac.errors import ConfigError
@@ -152,6 +153,11 @@ def problem_response(path: str, problem: ProblemError) -> JSONResponse:
     return JSONResponse(content, problem.status, headers=headers, media_type="application/problem+json")
 
 
+def route_path(scope: Scope) -> str:
+    """The path of a request without the one that a proxy in front has the service at."""
+    return str(scope["path"]).removeprefix(scope.get("root_path", ""))
+
+
 async def _answer(request: Request, error: Exception) -> JSONResponse:
     problem = error if isinstance(error, ProblemError) else _problem(request, error)
     return problem_response(request.url.path, problem)
@@ -248,7 +254,7 @@ def _methods(request: Request, of_first: str) -> set[str]:
     A path without parameters is meant before one with them, as OpenAPI has it: `check` is no campaign's id.
     """
     paths: dict[str, dict[str, Any]] = request.app.openapi()["paths"]
-    asked = request.url.path
+    asked = route_path(request.scope)
     matching = [paths[asked]] if asked in paths else [paths[p] for p in paths if compile_path(p)[0].match(asked)]
     found = {method.upper() for methods in matching for method in methods} or set(of_first.split(", "))
     return found | {"HEAD"} if "GET" in found else found

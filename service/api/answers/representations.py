@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from risk_sac.records import wire
 
+LEAST_BYTES = 2000  # of what is packed
 _QUALITY = re.compile(r"\s*q\s*=\s*([01](?:\.\d{0,3})?)\s*", re.IGNORECASE)
 
 
@@ -72,6 +73,11 @@ def cacheable(request: Request, *parts: str, others: Mapping[str, str] = {}) -> 
     if has(request, headers["ETag"]):
         raise NotModified(headers)
     return headers
+
+
+def link(request: Request, path: str) -> str:
+    """The path of a route, below the one that a proxy in front has the service at."""
+    return str(request.scope.get("root_path", "")) + path
 
 
 def as_json(record: BaseModel) -> Response:

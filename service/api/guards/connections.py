@@ -17,7 +17,7 @@ import uvicorn
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
-from service.api.answers.problems import ProblemError, Reason, problem_response
+from service.api.answers.problems import ProblemError, Reason, problem_response, route_path
 from service.settings import ServiceSettings
 
 OWN_FILES = 64  # that the server may have open without any connection: database, log, keys, reports, uploads
@@ -25,6 +25,7 @@ WORKER_FILES = 4  # for each worker
 FEWEST = 8
 BACKLOG = 2048  # connections that the kernel queues until they are accepted
 UNREAD_S = 60.0  # for which a client may take nothing of its answer
+MOST_PIPELINED = 32  # requests that wait on one connection for the answer to an earlier one; browsers send none
 CALM_S = 60.0  # between two log lines about a full room
 UPLOADS = "/v1/networks"
 
@@ -37,7 +38,9 @@ class Server(uvicorn.Server):
     def __init__(self, app: ASGIApp, settings: ServiceSettings, **options: Any) -> None:
         room = Room(settings)
         http = cast(type[asyncio.Protocol], partial(Connection, room=room))
-        super().__init__(uvicorn.Config(app, http=http, backlog=room.accepted_at_once, **options))
+        options |= {"backlog": room.accepted_at_once, "root_path": settings.root_path}
+        options |= {"proxy_headers": bool(settings.trusted_proxies), "forwarded_allow_ips": settings.trusted_proxies}
+        super().__init__(uvicorn.Config(app, http=http, **options))
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Starts to listen, with a long queue of connections that are not accepted yet."""
@@ -54,12 +57,8 @@ class Room:
     def __init__(self, settings: ServiceSettings) -> None:
         self.head_s = settings.head_timeout_s
         self.owing: dict[Connection, None] = {}  # those that owe a request head, longest first
-        descriptors = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-        self.accepted_at_once = max(4, min(BACKLOG, descriptors // 32))
-        workers = settings.max_workers if settings.executor == "local" else 0
-        # Closed connections may still hold their descriptors when the next ones are accepted.
-        possible = max(FEWEST, descriptors - OWN_FILES - WORKER_FILES * workers - 4 * self.accepted_at_once)
-        self._most = min(possible, settings.max_connections or possible)
+        self.accepted_at_once = _accepted_at_once()
+        self._most = most_connections(settings)
         self._full_at = float("-inf")
 
     def enter(self, connection: "Connection") -> None:
@@ -76,6 +75,19 @@ class Room:
             connection.refuse(f"{self._most} connections are open; wanted fewer: try again in 1 s")
         else:
             longest.transport.abort()
+
+
+def most_connections(settings: ServiceSettings) -> int:
+    """How many connections may be open: as many as there are descriptors for, or fewer if the settings say so."""
+    descriptors = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    workers = settings.max_workers if settings.executor == "local" else 0
+    # Closed connections may still hold their descriptors when the next ones are accepted.
+    possible = max(FEWEST, descriptors - OWN_FILES - WORKER_FILES * workers - 4 * _accepted_at_once())
+    return min(possible, settings.max_connections or possible)
+
+
+def _accepted_at_once() -> int:
+    return max(4, min(BACKLOG, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 32))
 
 
 class Connection(HttpToolsProtocol):
@@ -106,6 +118,8 @@ class Connection(HttpToolsProtocol):
             self._head_due.cancel()
         self._room.owing.pop(self, None)
         super().on_headers_complete()
+        if len(self.pipeline) > MOST_PIPELINED:
+            self.transport.abort()
 
     def on_response_complete(self) -> None:
         """Expects the next request head, unless it has come already."""
@@ -166,7 +180,7 @@ class BodyLimit:
             await self._app(scope, receive, send)
             return
         settings = self._settings
-        limit = settings.max_upload_bytes if scope["path"].startswith(UPLOADS) else settings.max_body_bytes
+        limit = settings.max_upload_bytes if route_path(scope).startswith(UPLOADS) else settings.max_body_bytes
         if int(headers.get(b"content-length", 0)) > limit:  # uvicorn has checked that it is a number
             await problem_response(scope["path"], _too_large(limit))(scope, receive, send)
             return

@@ -11,13 +11,15 @@ from http import HTTPStatus
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.answers.problems import ProblemError, Reason, problem_response
+from risk_sac.loopback import is_loopback
+from service.api.answers.problems import ProblemError, Reason, problem_response, route_path
 from service.api.context import CALLER, LOCAL, Caller, check_scope
+from service.api.guards.connections import most_connections
 from service.errors import KeysError
 from service.keys.file import REMEDY
 from service.keys.file import Scope as KeyScope
 from service.keys.made import AuthEnabledFlag
-from service.keys.ring import KeyRing, is_loopback
+from service.keys.ring import KeyRing
 from service.settings import ServiceSettings
 
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # methods that change nothing
@@ -31,7 +33,7 @@ RequestHeaders = Mapping[bytes, bytes]
 
 
 class Gate:
-    """ASGI middleware: host, origin, key, rate and scope, in this order."""
+    """ASGI middleware: host, origin, key, rate, scope and share of the connections, in this order."""
 
     def __init__(self, app: ASGIApp, settings: ServiceSettings, made: AuthEnabledFlag) -> None:
         self._app = app
@@ -39,6 +41,7 @@ class Gate:
         self._origins = frozenset(origin.lower() for origin in settings.cors_origins)
         self._rate = RateLimit(settings.rate_limit)
         self._keys = KeyRing(settings.keys_file, made)
+        self._shares = Shares(most_connections(settings))
         self._keyless = is_loopback(settings.host)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -49,10 +52,13 @@ class Gate:
         headers = dict(scope["headers"])
         try:
             self._check(scope, headers)
+            caller: Caller | None = scope.get(CALLER)
+            key_id = None if caller is None else caller.key_id
+            self._shares.take(key_id)
         except ProblemError as error:
             await problem_response(scope["path"], error)(scope, receive, send)
             return
-        caller, ended = scope.get(CALLER), False
+        ended = False
 
         async def send_while_let_in(message: Message) -> None:
             nonlocal ended
@@ -62,13 +68,16 @@ class Gate:
                 ended, message = True, {"type": "http.response.body"}  # of a stream that its key does not outlive
             await send(message)
 
-        await self._app(scope, receive, send_while_let_in)
+        try:
+            await self._app(scope, receive, send_while_let_in)
+        finally:
+            self._shares.give_back(key_id)
 
     def _check(self, scope: Scope, headers: RequestHeaders) -> None:
         """Lets the caller in, or raises ProblemError."""
         check_host(scope, headers, self._hosts)
         check_origin(scope["method"], headers, self._origins)
-        path, method = scope["path"], scope["method"]
+        path, method = route_path(scope), scope["method"]
         if path in HEALTH:  # not counted, or a flood from one address would make the service look ill
             return
         address = scope["client"][0] if scope.get("client") else ""
@@ -130,6 +139,32 @@ class RateLimit:
         if self._counts[who] > self._per_second:
             detail = f"rate is more than {self._per_second} requests per second; wanted fewer: wait 1 s"
             raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.RATE_LIMITED, detail, headers={"Retry-After": "1"})
+
+
+class Shares:
+    """Bounds the requests that each key has open, such as streams, so that one key cannot take all connections."""
+
+    def __init__(self, connections: int) -> None:
+        self._connections = connections
+        self._open = Counter[str]()
+
+    def take(self, key_id: str | None) -> None:
+        """Counts a request; refuses it where its key has its share: one is left for a key that has none open yet."""
+        if key_id is None:
+            return
+        keys = len(self._open.keys() | {key_id})
+        share = max(1, self._connections // (keys + 1))
+        if self._open[key_id] >= share:
+            detail = f"this key has {share} requests open, its share of the connections; wanted fewer: wait 1 s"
+            headers = {"Retry-After": "1"}
+            raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.CONNECTIONS_BUSY, detail, headers=headers)
+        self._open[key_id] += 1
+
+    def give_back(self, key_id: str | None) -> None:
+        """Counts the end of a request."""
+        if key_id is not None:
+            self._open[key_id] -= 1
+            self._open += Counter()  # without keys that have none open
 
 
 def allowed_hosts(hosts: Iterable[str]) -> frozenset[str]:

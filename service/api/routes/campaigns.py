@@ -12,7 +12,7 @@ from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.records import Campaign, CampaignPage, Record, Results, State, wire
 from service.api.answer_cache import kept
 from service.api.answers.pages import TIERS, Cursor, Limit, Tier
-from service.api.answers.representations import cacheable, entity_tag
+from service.api.answers.representations import cacheable, entity_tag, link
 from service.api.answers.responses import (
     ACCEPTED,
     INVALID,
@@ -58,11 +58,15 @@ router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE
 
 @router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=EITHER_KIND)
 def post_campaign(
-    spec: PostedCampaign, service: Service, caller: CurrentCaller, idempotency_key: IdempotencyKey = None
+    request: Request,
+    spec: PostedCampaign,
+    service: Service,
+    caller: CurrentCaller,
+    idempotency_key: IdempotencyKey = None,
 ) -> Response:
     """Queue a campaign: families × methods × seeds on one equal budget."""
     campaign = service.manager.submit(spec, project=caller.project, key=idempotency_key)
-    return _accepted(campaign, service)
+    return _accepted(request, campaign, service)
 
 
 @router.post("/check", status_code=204, responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
@@ -105,10 +109,10 @@ def list_campaigns(
 
 
 @router.post("/{campaign_id}/cancel", status_code=202, response_model=Campaign, responses=UNKNOWN | ACCEPTED)
-def cancel_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> Response:
+def cancel_campaign(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """Stop a campaign and keep what it found; changes nothing once it has ended. With an `admin` key any project's."""
     campaign = service.manager.cancel(campaign_id, caller.sees)
-    return _accepted(campaign, service)
+    return _accepted(request, campaign, service)
 
 
 @router.delete("/{campaign_id}", status_code=204, responses=UNKNOWN | NOT_ENDED)
@@ -195,8 +199,8 @@ def _digest(content: bytes) -> str:
     return blake2b(content, digest_size=8).hexdigest()
 
 
-def _accepted(campaign: StoredCampaign, service: Context) -> Response:
-    headers = {"Location": f"/v1/campaigns/{campaign.id}"} | _retry_after(campaign, service)
+def _accepted(request: Request, campaign: StoredCampaign, service: Context) -> Response:
+    headers = {"Location": link(request, f"/v1/campaigns/{campaign.id}")} | _retry_after(campaign, service)
     body = wire(campaign_body(campaign, service.manager.workers))
     return Response(body, status_code=202, headers=headers, media_type="application/json")
 

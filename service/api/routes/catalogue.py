@@ -3,6 +3,7 @@
 from typing import Literal, TypeVar
 
 from fastapi import APIRouter
+from pydantic import BaseModel
 
 from risk_sac.config import METHODS, EgoConfig, FamilyName, Method, MethodName, Odd, Requirement
 from risk_sac.egos.registry import cards
@@ -12,7 +13,7 @@ from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import requirements_from_odd, widest
 
-R = TypeVar("R", bound=Record)
+R = TypeVar("R", bound=BaseModel)
 
 
 class SceneParameter(Record):

@@ -11,6 +11,7 @@ from risk_sac.scenario.maps.documents import MAX_ROADS
 from risk_sac.scenario.maps.unpack import MAX_BYTES, MAX_FILES
 from service.api.answers.pages import Cursor, Limit
 from service.api.answers.problems import ProblemError, Reason
+from service.api.answers.representations import link
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, WAIT, Responses, header, problem
 from service.api.context import CurrentCaller, Service
 from service.api.posted import media_type
@@ -79,7 +80,7 @@ async def post_network(
     except TimeoutError as error:
         detail = f"the body took longer than {RECEIVE_S} s; wanted it faster"
         raise ProblemError(HTTPStatus.REQUEST_TIMEOUT, Reason.UPLOAD_TOO_SLOW, detail) from error
-    response.headers["Location"] = f"/v1/networks/{network.id}"
+    response.headers["Location"] = link(request, f"/v1/networks/{network.id}")
     return network
 
 

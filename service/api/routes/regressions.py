@@ -9,6 +9,7 @@ from pydantic import Field
 from risk_sac.config import EgoConfig
 from risk_sac.config.base import Settings
 from risk_sac.failures.cases import CampaignRegression
+from service.api.answers.representations import link
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses, header, problem
 from service.api.context import CurrentCaller, Service
 from service.api.posted import documented, read_posted
@@ -41,12 +42,16 @@ async def _posted(request: Request) -> PostedRegression:
 
 @router.post("", status_code=202, responses=POSTING, openapi_extra=documented("PostedRegression"))
 async def post_regression(
-    posted: Annotated[PostedRegression, Depends(_posted)], response: Response, service: Service, caller: CurrentCaller
+    posted: Annotated[PostedRegression, Depends(_posted)],
+    request: Request,
+    response: Response,
+    service: Service,
+    caller: CurrentCaller,
 ) -> CampaignRegression:
     """Play the distinct failures of a campaign against another ego; posting the same again gives the one there is."""
     campaign = await run_in_threadpool(service.store.campaign, posted.campaign_id, caller.sees)
     regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego)
-    response.headers["Location"] = f"/v1/regressions/{regression.id}"
+    response.headers["Location"] = link(request, f"/v1/regressions/{regression.id}")
     return regression
 
 

@@ -18,7 +18,7 @@ from risk_sac.records import Record
 from risk_sac.report import Comparison, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
-from service.api.answers.representations import accepted, cacheable
+from service.api.answers.representations import accepted, cacheable, link
 from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNACCEPTABLE, UNKNOWN, Responses
 from service.api.context import AskedCampaign, Context, Service
 from service.store.stored import StoredCampaign
@@ -142,7 +142,7 @@ def get_clusters(request: Request, service: Service, campaign: AskedCampaign) ->
 def list_figures(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """The figures that the finished runs allow: how the methods search, what they reach, λ and α."""
     report, headers = reported(request, service, campaign, "figures")
-    items = [Figure(name=name, files=_files(campaign.id, name)) for name in report.figures]
+    items = [Figure(name=name, files=_files(request, campaign.id, name)) for name in report.figures]
     body = Figures(complete=not report.comparison.missing, items=items)
     return Response(body.model_dump_json(), headers=headers, media_type=MEDIA_TYPES["json"])
 
@@ -180,8 +180,8 @@ def reported(
     return report, headers
 
 
-def _files(campaign_id: str, name: str) -> list[FigureFile]:
-    path = f"/v1/campaigns/{campaign_id}/figures/{name}"
+def _files(request: Request, campaign_id: str, name: str) -> list[FigureFile]:
+    path = link(request, f"/v1/campaigns/{campaign_id}/figures/{name}")
     return [FigureFile(format=each, media_type=MEDIA_TYPES[each], href=f"{path}.{each}") for each in FORMATS]
 
 

@@ -33,14 +33,14 @@ export function hasKey(): boolean {
   return sessionStorage.getItem(KEY) !== null;
 }
 
-/** A call by its path from the API's root, such as `v1/campaigns`; throws a Problem, or a TypeError if nobody answers. */
+/** A call by its path from the API's root, such as `v1/campaigns`, or by an answer's link; throws a Problem, or a TypeError if nobody answers. */
 export async function call(path: string, init: RequestInit = {}): Promise<Response> {
   const headers = new Headers(init.headers);
   const key = sessionStorage.getItem(KEY);
   if (key !== null && !headers.has("Authorization")) headers.set("Authorization", `Bearer ${key}`);
   let response: Response;
   try {
-    response = await fetch(BASE + path, { ...init, headers });
+    response = await fetch(new URL(path, BASE), { ...init, headers });
   } catch (error) {
     if (!init.signal?.aborted) connected.set(false);
     throw error;

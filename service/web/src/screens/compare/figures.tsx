@@ -49,9 +49,9 @@ function Picture({ figure }: { figure: Figure }) {
   const title = titleOf(figure.name);
   const [refused, setRefused] = useState("");
   const drawn = figure.files.find((file) => file.format === "svg") ?? figure.files[0];
-  const { url, error } = usePicture(drawn?.href.slice(1));
+  const { url, error } = usePicture(drawn?.href);
   const save = (file: Figure["files"][number]) =>
-    download(file.href.slice(1), `${figure.name}.${file.format}`).then(() => setRefused(""), (problem: Error) => setRefused(problem.message));
+    download(file.href, `${figure.name}.${file.format}`).then(() => setRefused(""), (problem: Error) => setRefused(problem.message));
   return (
     <figure class="picture">
       <div class="paper">{url ? <img src={url} alt={title} /> : <span class="faint">{error ?? "Loading …"}</span>}</div>
