@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.loopback import is_loopback
 from service.errors import KeysError
 from service.keys.__main__ import main
 from service.keys.file import KeyFile, Scope
