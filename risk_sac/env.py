@@ -87,10 +87,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     # The state of an episode, set by `_start`.
     layout: Layout  # where everybody started
+    trace: Trace  # all that is recorded of it
     _adversaries: Adversaries
     _frame: Frame
     _measures: Measures
-    _trace: Trace
     _steps: int
     _inside_limits: bool
     _teleported: bool
@@ -146,7 +146,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         contact = None
         if self._measures.assessment.touched:
             contact = find_contact(before, self._frame, relative_view(self._frame))
-        self._trace.append(self._frame, self._measures, action)
+        self.trace.append(self._frame, self._measures, action)
         collision = None if contact is None else self._judge(contact)
         self._touched |= self._in_contact()
         cost = self._cost(before, self._frame, previous, self._measures)
@@ -163,11 +163,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         if collision is not None:
             info["collision"] = collision
         return self._observe(), reward, collision is not None, truncated, info
-
-    @property
-    def trace(self) -> Trace:
-        """Everything recorded since the last reset."""
-        return self._trace
 
     def signal_heads(self) -> bytes:
         """SUMO's letter of each link of each signal now, the signals in the order of their names."""
@@ -194,7 +189,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = CarefulReflex(self._ground) if self.problem.ego.profile == "careful" else None
         self._gauge.reset()
-        self._trace = Trace(self._gauge.names)
+        self.trace = Trace(self._gauge.names)
         self._steps = 0
         self._inside_limits, self._teleported = True, False
         self._touched: set[str] = set()
@@ -213,12 +208,12 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """Traffic, before anybody attacks: SUMO drives all vehicles, and pedestrians go on as the scene says."""
         self._frame = start
         self._measures = self._measure(None)
-        self._trace.append(start, self._measures, None)
+        self.trace.append(start, self._measures, None)
         for _ in range(round(LEAD_IN_S / STEP_S)):
             self._sim.walk_on()
             before, self._frame = self._frame, self._sim.step()
             self._measures = self._measure(before)
-            self._trace.append(self._frame, self._measures, None)
+            self.trace.append(self._frame, self._measures, None)
 
     def _measure(self, before: Frame | None) -> Measures:
         return self._gauge.measure(self._frame, before, self._perception.seen)
@@ -285,11 +280,11 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             visible_for_s=self._perception.in_view_for(other, frame.time_s),
             ever_visible=self._perception.ever_seen(other),
         )
-        return collision_of(contact, frame, self._released_s, self.evidence(), self._trace.since_release, facts)
+        return collision_of(contact, frame, self._released_s, self.evidence(), self.trace.since_release, facts)
 
     def evidence(self) -> Evidence:
         """What a judge may look at, of the episode so far."""
-        return Evidence.from_series(self._trace.series(), self._ground, self._released_s)
+        return Evidence.from_series(self.trace.series(), self._ground, self._released_s)
 
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.problem.family.horizon_steps

@@ -64,7 +64,7 @@ def frame_view(state: Floats) -> RelativeView:
     x, y, vx, vy = others[0], others[1], others[2], others[3]
     cos, sin, half_length, half_width = others[4], others[5], others[6], others[7]
     cos_ego, sin_ego = math.cos(state[HEADING, 0]), math.sin(state[HEADING, 0])
-    ego_half_length, ego_half_width = state[LENGTH, 0] / 2, state[WIDTH, 0] / 2
+    ego_a, ego_b = state[LENGTH, 0] / 2, state[WIDTH, 0] / 2
     separation, reach = np.empty((4, n)), np.empty((4, n))
     gap, overlap = np.empty(n), np.empty(n, dtype=np.bool_)
     for i in range(n):
@@ -81,10 +81,10 @@ def frame_view(state: Floats) -> RelativeView:
         separation[1, i] = y[i]
         separation[2, i] = x[i] * cos[i] + y[i] * sin[i]
         separation[3, i] = y[i] * cos[i] - x[i] * sin[i]
-        reach[0, i] = ego_half_length + a * c + b * s
-        reach[1, i] = ego_half_width + a * s + b * c
-        reach[2, i] = a + ego_half_length * c + ego_half_width * s
-        reach[3, i] = b + ego_half_length * s + ego_half_width * c
+        reach[0, i] = ego_a + a * c + b * s
+        reach[1, i] = ego_b + a * s + b * c
+        reach[2, i] = a + ego_a * c + ego_b * s
+        reach[3, i] = b + ego_a * s + ego_b * c
         squared_from_ego = squared_from_other = 0.0
         for axis in range(4):
             clear = max(abs(separation[axis, i]) - reach[axis, i], 0.0)
@@ -94,24 +94,22 @@ def frame_view(state: Floats) -> RelativeView:
                 squared_from_other += clear * clear
         gap[i] = math.sqrt(max(squared_from_ego, squared_from_other))
         overlap[i] = gap[i] == 0.0
+    ego_vx = state[VX, 0] * cos_ego + state[VY, 0] * sin_ego
+    ego_vy = state[VY, 0] * cos_ego - state[VX, 0] * sin_ego
     return RelativeView(
-        x,
-        y,
-        vx,
-        vy,
-        cos,
-        sin,
-        half_length,
-        half_width,
-        state[VX, 0] * cos_ego + state[VY, 0] * sin_ego,
-        state[VY, 0] * cos_ego - state[VX, 0] * sin_ego,
-        ego_half_length,
-        ego_half_width,
-        separation,
-        reach,
-        gap,
-        overlap,
+        x, y, vx, vy, cos, sin, half_length, half_width, ego_vx, ego_vy, ego_a, ego_b, separation, reach, gap, overlap
     )
+
+
+@compiled
+def speed_along(view: RelativeView, i: int, axis: int) -> float:
+    """Relative velocity along one of the separating axes."""
+    vx, vy, cos, sin = view.vx[i], view.vy[i], view.cos[i], view.sin[i]
+    if axis == 0:
+        return vx
+    if axis == 1:
+        return vy
+    return vx * cos + vy * sin if axis == 2 else vy * cos - vx * sin
 
 
 @compiled
@@ -126,17 +124,9 @@ def time_to_contact(view: RelativeView) -> Floats:
     n = len(view.x)
     ttc = np.empty(n)
     for i in range(n):
-        vx, vy, cos, sin = view.vx[i], view.vy[i], view.cos[i], view.sin[i]
         enter, leave = -np.inf, np.inf
         for axis in range(4):
-            if axis == 0:
-                speed = vx
-            elif axis == 1:
-                speed = vy
-            elif axis == 2:
-                speed = vx * cos + vy * sin
-            else:
-                speed = vy * cos - vx * sin
+            speed = speed_along(view, i, axis)
             if abs(speed) < NO_MOTION:
                 speed = NO_MOTION
             centre, half = -view.separation[axis, i] / speed, view.reach[axis, i] / abs(speed)

@@ -57,28 +57,9 @@ def _texts() -> Iterator[str]:
     for code in (*range(1, 33), 127, 133, 160, 0x2028, 0x202E, 0xFEFF, 0xFFFD, 0xFFFE, 0x1F600, 0x10FFFF):
         yield f"ttc_s{chr(code)}>= 1"
         yield f"ttc{chr(code)}_s >= 1"
-    yield from (
-        " " * 500,
-        "\t" * 500,
-        "\n" * 500,
-        "\0",
-        "\ud800",
-        "é" * 500,
-        "é̂̃̄" * 100,
-        "()" * 250,
-        "[]" * 250,
-        "," * 500,
-    )
-    yield from (
-        P + " " * 400,
-        "x" * 501,
-        P * 100,
-        P + ")" * 400,
-        "a" * 10_000,
-        f"{P} and " * 1000,
-        "(" * 100_000,
-        "𐀀" * 500,
-    )
+    yield from (character * 500 for character in " \t\n,é𐀀")
+    yield from ("\0", "\ud800", "é̂̃̄" * 100, "()" * 250, "[]" * 250, "x" * 501, "a" * 10_000, "(" * 100_000)
+    yield from (P + " " * 400, P * 100, P + ")" * 400, f"{P} and " * 1000)
 
 
 def _numbers() -> Iterator[str]:
@@ -87,14 +68,8 @@ def _numbers() -> Iterator[str]:
         yield f"ttc_s >= {number}"
         yield f"ttc_s * {number} >= {number} * {number}"
         yield f"ttc_s / {number} >= 1"
-    yield from (
-        "ttc_s / 0 >= 1",
-        "ttc_s / 0.0 >= 1",
-        "ttc_s / -1 >= 1",
-        "ttc_s / (1 - 1) >= 1",
-        "1 / ttc_s >= 1",
-        "0 / 0 >= 0",
-    )
+    yield from (f"ttc_s / {divisor} >= 1" for divisor in ("0", "0.0", "-1", "(1 - 1)"))
+    yield from ("1 / ttc_s >= 1", "0 / 0 >= 0")
     yield from ("*".join(["ego_speed_mps"] * n) + " >= 1" for n in range(2, 12))
     yield from ("1e9 * " * n + "0 >= ttc_s" for n in range(1, 9))
 

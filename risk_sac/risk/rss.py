@@ -32,11 +32,7 @@ SCALED_LOW, SCALED_HIGH = -3.0, 2.0
 def stopping(speed_mps: float, response_s: float, accel_mps2: float, brake_mps2: float) -> float:
     """Way until standstill, (v + v_ρ) ρ/2 + v_ρ |v_ρ| / (2 b) with v_ρ = v + ρ a, m; negative if it moves away.
 
-    Args:
-      speed_mps: v, towards the other.
-      response_s: ρ, in which it accelerates.
-      accel_mps2: a.
-      brake_mps2: b, with which it brakes thereafter.
+    v is towards the other; it accelerates with a in the response time ρ and brakes with b thereafter.
     """
     after = speed_mps + response_s * accel_mps2
     return (speed_mps + after) * (response_s / 2) + after * abs(after) / (2 * brake_mps2)
@@ -72,15 +68,20 @@ def lateral(closing_ego_mps: float, closing_other_mps: float, parameters: RssPar
     Deviation: the paper's formula has v_i,ρ² for v_i,ρ |v_i,ρ|. The two differ for a vehicle that moves away after ρ.
     It goes on doing so while it brakes, as Def. 6 says in words; v² would count that way as closing in.
 
-    Args:
-      closing_ego_mps: the ego's lateral speed towards the other; negative when it moves away.
-      closing_other_mps: the other's towards the ego.
-      parameters: of both.
+    Each speed is towards the other vehicle, negative when it moves away.
     """
     p = parameters
-    ego = stopping(closing_ego_mps, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2)
-    other = stopping(closing_other_mps, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2)
-    return p.fluctuation_m + max(ego + other, 0.0)
+    braked = p.lateral_accel_mps2, p.lateral_brake_mps2
+    return _lateral(closing_ego_mps, braked, closing_other_mps, braked, p)
+
+
+@compiled
+def _lateral(
+    ego_mps: float, ego: tuple[float, float], other_mps: float, other: tuple[float, float], p: RssParameters
+) -> float:
+    """`lateral` for two that accelerate and brake differently."""
+    ways = stopping(ego_mps, p.response_s, ego[0], ego[1]) + stopping(other_mps, p.response_s, other[0], other[1])
+    return p.fluctuation_m + max(ways, 0.0)
 
 
 class Margins(NamedTuple):
@@ -114,6 +115,7 @@ def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Marg
     n = len(view.x)
     longitudinal, sideways, scaled = np.empty(n), np.empty(n), np.empty(n)
     ego = max(view.ego_vx, 0.0)
+    own = p.lateral_accel_mps2, p.lateral_brake_mps2
     ego_way = stopping(ego, p.response_s, p.accel_mps2, p.brake_min_mps2)
     for i in range(n):
         along, across = view.vx[i] + view.ego_vx, view.vy[i] + view.ego_vy  # the other's velocity in the ego's axes
@@ -141,22 +143,14 @@ def margins(view: RelativeView, walks: Bools, parameters: RssParameters) -> Marg
         larger = longitudinal[i] / max(lengthwise, distance)
 
         side = 1.0 if view.y[i] >= 0.0 else -1.0
-        distance = p.fluctuation_m + max(
-            stopping(side * view.ego_vy, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2)
-            + stopping(-side * across, p.response_s, accel_y, brake_y),
-            0.0,
-        )
+        distance = _lateral(side * view.ego_vy, own, -side * across, (accel_y, brake_y), p)
         clear = abs(view.y[i]) - view.reach[1, i] - distance
         larger = max(larger, clear / max(crosswise, distance))
         if not walks[i]:
             side = 1.0 if view.separation[3, i] >= 0.0 else -1.0
             ego_closing = side * (view.ego_vy * view.cos[i] - view.ego_vx * view.sin[i])
             closing = side * (along * view.sin[i] - across * view.cos[i])
-            distance = p.fluctuation_m + max(
-                stopping(ego_closing, p.response_s, accel_y, brake_y)
-                + stopping(closing, p.response_s, p.lateral_accel_mps2, p.lateral_brake_mps2),
-                0.0,
-            )
+            distance = _lateral(ego_closing, (accel_y, brake_y), closing, own, p)
             other_clear = abs(view.separation[3, i]) - view.reach[3, i] - distance
             larger = max(larger, other_clear / max(crosswise, distance))
             clear = max(clear, other_clear)

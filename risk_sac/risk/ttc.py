@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from risk_sac.geometry import RelativeView
+from risk_sac.geometry import RelativeView, speed_along
 from risk_sac.jit import compiled
 from risk_sac.types import Bools, Floats
 
@@ -47,24 +47,16 @@ def time_to_encounter(view: RelativeView, walks: Bools) -> Floats:
     slope, start = np.zeros(LINES), np.zeros(LINES)  # of each line over t; the last one is zero
     ego = math.hypot(view.ego_vx, view.ego_vy)
     for i in range(n):
-        cos, sin = view.cos[i], view.sin[i]
-        along, across = abs(cos), abs(sin)
+        along, across = abs(view.cos[i]), abs(view.sin[i])
         anywhere, other = DRIFT_MPS, math.hypot(view.vx[i] + view.ego_vx, view.vy[i] + view.ego_vy)
         if walks[i]:
             anywhere, other = WALK_MPS, 0.0  # it turns as it likes, and has no course
+        courses = ego + other * along, other * across, other + ego * along, ego * across  # speeds along the axes
         for axis in range(4):
-            if axis == 0:
-                speed, closing = view.vx[i], ego + other * along
-            elif axis == 1:
-                speed, closing = view.vy[i], other * across
-            elif axis == 2:
-                speed, closing = view.vx[i] * cos + view.vy[i] * sin, other + ego * along
-            else:
-                speed, closing = view.vy[i] * cos - view.vx[i] * sin, ego * across
-            closing = anywhere + SPEED_SHARE * closing
+            closing = anywhere + SPEED_SHARE * courses[axis]
             for side in range(2):
                 sign = 1.0 - 2.0 * side
-                slope[2 * axis + side] = sign * speed / closing
+                slope[2 * axis + side] = sign * speed_along(view, i, axis) / closing
                 start[2 * axis + side] = (sign * view.separation[axis, i] - view.reach[axis, i]) / closing
         behind_m = max(-view.ego_half_length - view.x[i], 0.0)
         encounter[i] = _least(slope, start) + BEHIND_S_PER_M * behind_m

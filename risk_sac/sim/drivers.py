@@ -33,6 +33,8 @@ class Driver:
     Attributes:
       telling: whether it is held to a speed at present.
       cruise_mps: the speed it is told to keep where nothing else binds; below 0 SUMO chooses.
+      period: its reaction time in steps.
+      step: how many there have been.
       wanted_mps2: the acceleration that it decided on; None if nothing binds it.
     """
 
@@ -42,23 +44,18 @@ class Driver:
         """Looks up the model of the vehicle, which can brake by at most `emergency_mps2`."""
         self._vehicle = vehicle
         self.cruise_mps = cruise_mps
-        self._period = round(reaction_s / STEP_S)
+        self.period = round(reaction_s / STEP_S)
         self._emergency_mps2 = emergency_mps2
-        self._step = 0
+        self.step = 0
         self.wanted_mps2: float | None = None
         self.telling = False
         get = libsumo.vehicle
         get.setSpeed(vehicle, cruise_mps)
         self._accel, self._min_gap = get.getAccel(vehicle), get.getMinGap(vehicle)
 
-    @property
-    def due(self) -> bool:
-        """Whether it decides anew in this step."""
-        return self._step % self._period == 0
-
     def tell(self, speed_mps: float, accel_mps2: float) -> None:
         """Tells SUMO how fast the vehicle may drive in the next step, given its speed and acceleration."""
-        self._step += 1
+        self.step += 1
         if self.wanted_mps2 is None:
             if self.telling:
                 libsumo.vehicle.setSpeedMode(self._vehicle, SAFE_MODE)
@@ -154,7 +151,7 @@ class Drivers:
 
     def _tell_ego(self, ego: Driver, reading: Reading, belief: Belief, braking_mps2: float) -> None:
         speed, accel = reading.speed_and_accel[0]
-        if ego.due:
+        if ego.step % ego.period == 0:
             ego.wanted_mps2 = self._decide(ego, 0, reading, belief.state, belief.known)
         ego.tell(speed, accel)
         if braking_mps2:

@@ -91,19 +91,9 @@ class VehicleControl:
                 self._behind_per_m = float(self._bends[SOON, index(self._bends, self._at_m)])
             self._path, self._bends = along.path, bends(along.path, self.limits)
         self._at_m = along.station_m
+        motion, wanted = (self.speed_mps, self.accel_mps2, self.lateral_mps), (drive, steer, intended_mps2)
         self.speed_mps, self.accel_mps2, self.lateral_mps = _drive(
-            self._bounds,
-            self._bends,
-            along.station_m,
-            self._behind_per_m,
-            self.speed_mps,
-            self.accel_mps2,
-            self.lateral_mps,
-            drive,
-            steer,
-            room.left_m,
-            room.right_m,
-            intended_mps2,
+            self._bounds, self._bends, along.station_m, self._behind_per_m, motion, wanted, tuple(room)
         )
         return VehicleCommand(self.speed_mps, self.lateral_mps)
 
@@ -114,16 +104,12 @@ def _drive(
     bends: Floats,
     station_m: float,
     behind_per_m: float,
-    speed: float,
-    accel: float,
-    lateral: float,
-    drive: float,
-    steer: float,
-    left_m: float,
-    right_m: float,
-    intended: float,
+    motion: tuple[float, float, float],
+    wanted: tuple[float, float, float],
+    room: tuple[float, ...],
 ) -> tuple[float, float, float]:
-    """Speed, acceleration and lateral speed of the next step."""
+    """Speed, acceleration and lateral speed of the next step, from those of this one; arguments as of `step`."""
+    (speed, accel, lateral), (drive, steer, intended) = motion, wanted
     limits = Bounds(*bounds)
     at, soon = index(bends, station_m), index(bends, station_m + speed * limits.preview_s)
     behind = behind_per_m if station_m < BODY_M else 0.0
@@ -132,7 +118,8 @@ def _drive(
     accel = _accelerate(limits, speed, accel, drive, intended, curvature, ahead, cap)
     after = clip(speed + accel * STEP_S, 0.0, limits.speed_mps)
     left_over = max(limits.curvature_per_m - curvature, CORRECTION_PER_M)
-    return after, accel, _steer(limits, speed, after, lateral, steer, left_m, right_m, left_over)
+    room_m = max((room[0] if steer >= 0 else room[1]) - EDGE_M, 0.0)
+    return after, accel, _steer(limits, speed, after, lateral, steer, room_m, left_over)
 
 
 @compiled
@@ -166,8 +153,7 @@ def _steer(
     speed: float,
     lateral: float,
     steer: float,
-    left_m: float,
-    right_m: float,
+    room_m: float,
     curvature: float,
 ) -> float:
     """Moves across the lane as a car can: on a path whose curvature is bounded, so not at a standstill.
@@ -175,7 +161,6 @@ def _steer(
     Keeping its heading, a car that brakes loses lateral speed with the longitudinal; `limits.slip` is such that
     this alone is within the limit on lateral acceleration, and both bounds below always leave something.
     """
-    room_m = max((left_m if steer >= 0 else right_m) - EDGE_M, 0.0)
     # The heading θ that leaves room to turn back at curvature κ after the d metres of a full braking, in which a tight
     # bend may leave nothing for turning: θ d + θ² / 2κ = room.
     stopping_m = speed**2 / (2 * limits.brake_mps2)

@@ -1,13 +1,11 @@
 """Which failures are different ones: by signature first, then by cells of what varies within it.
 
-Choice: fixed cells, not the distance to failures found before. Whether a failure lies in an empty cell may depend on
-the order, how many cells are filled does not: a run that resumes, or two that are pooled, count alike, and the count
-never falls. The edges are where people begin to die (30 km/h) and where a driver had time to act; eight cells at most,
-for what a signature holds is one failure at several speeds rather than several failures.
+Choice: fixed cells, not the distance to failures found before: the number of filled cells does not depend on the
+order, so a resumed run or two pooled runs count alike. The edges are where people begin to die (30 km/h) and where a
+driver had time to act.
 
-A fixed taxonomy is coarser: distinct failures may be many of one kind, its cells say how wide a search looks. The grid
-is the same for all families and methods, so that counts compare, and most of it is empty: a pedestrian has no zones,
-and nobody cuts in from behind.
+A fixed taxonomy (`FailureKind`) is coarser: its cells say how wide a search looks. The grid is the same for all
+families and methods, so that counts compare, and most of it is empty.
 """
 
 from bisect import bisect_right
@@ -17,20 +15,13 @@ from typing import NamedTuple
 from risk_sac.errors import NotFinite
 from risk_sac.records import Collision, ConflictType, Judgement
 
-
-class Axis(NamedTuple):
-    """One feature and the edges between its cells."""
-
-    name: str
-    edges: tuple[float, ...]
-
-
 KMH = 1 / 3.6
-AXES = (
-    Axis("ego_speed_mps", (30 * KMH,)),
-    Axis("other_speed_mps", (30 * KMH,)),
-    Axis("from_conflict_s", (2.0,)),  # what the careful driver needs to be at full braking
-)
+# The edges between the cells of each feature.
+EDGES = {
+    "ego_speed_mps": (30 * KMH,),
+    "other_speed_mps": (30 * KMH,),
+    "from_conflict_s": (2.0,),  # what the careful driver needs to be at full braking
+}
 Cell = tuple[int, ...]
 # Choice: seen too late for any driver (0.6 s), too late for a careful one (2 s), or in time.
 VISIBLE_S = (0.6, 2.0)
@@ -58,14 +49,14 @@ def cell_of(collision: Collision) -> Cell:
     from_conflict_s = collision.time_s - judged.conflict_s if judged else 0.0
     values = (collision.ego_speed_mps, collision.other_speed_mps, from_conflict_s)
     if any(value != value for value in values):
-        named = dict(zip((axis.name for axis in AXES), values, strict=True))
+        named = dict(zip(EDGES, values, strict=True))
         raise NotFinite(f"collision at {collision.time_s:g} s has {named}; wanted no NaN")
     return cell(values)
 
 
 def cell(values: Sequence[float]) -> Cell:
-    """The cell of these values of `AXES`."""
-    return tuple(bisect_right(axis.edges, value) for axis, value in zip(AXES, values, strict=True))
+    """The cell of these values of the features of `EDGES`."""
+    return tuple(bisect_right(edges, value) for edges, value in zip(EDGES.values(), values, strict=True))
 
 
 def niche_of(collision: Collision) -> tuple[str, Cell]:

@@ -56,21 +56,12 @@ def broken(evidence: Evidence, striker: int, conflict: Conflict) -> tuple[str, .
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         return ("pedestrian_on_red",) if pedestrian_on_red(evidence, striker) else ()
     rules = {
-        "red_light": ran_red(evidence, striker),
+        "red_light": _entered_on(evidence, striker, RED),
         "priority": took_priority(evidence, striker, conflict),
         "wrong_direction": wrong_direction(evidence, striker),
         "speeding": speeding(evidence, striker),
     }
     return tuple(name for name, broke in rules.items() if broke)
-
-
-def ran_red(evidence: Evidence, striker: int) -> bool:
-    """Whether the vehicle passed a stop line on red in the last 6 s.
-
-    Its signal then goes from red to none. From red to another colour it turned, unless the vehicle came into a
-    junction in that step and it is the next junction's.
-    """
-    return _entered_on(evidence, striker, RED)
 
 
 def took_priority(evidence: Evidence, striker: int, conflict: Conflict) -> bool:
@@ -112,7 +103,11 @@ def pedestrian_on_red(evidence: Evidence, striker: int) -> bool:
 
 
 def _entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
-    """Whether a vehicle passed a stop line while its signal showed one of these letters, in the last 6 s."""
+    """Whether a vehicle passed a stop line while its signal showed one of these letters, in the last 6 s.
+
+    Its signal then goes from them to none. To another letter it turned, unless the vehicle came into a junction in that
+    step and it is the next junction's.
+    """
     e, first = evidence, evidence.since(JUNCTION_S)
     link = e.link[first:, actor]
     shown = _is_any(link[:-1], letters)

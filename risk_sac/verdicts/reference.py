@@ -17,7 +17,7 @@ from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path
-from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, drive, replay
+from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, drive
 
 # Who perceives, and how long after the conflict began. Choice: fsm and rss look out from the beginning of the conflict
 # on, not before, and perceive what they themselves hold to be dangerous: all drivers judge the same conflict.
@@ -35,7 +35,8 @@ def reference_outcomes(evidence: Evidence, striker: int, conflict: Conflict) -> 
 
     `r157_ttc` speaks of cut-ins only and is left out of everything else.
     """
-    path, track = ego_path(evidence), striker_track(evidence, striker)
+    path, motion = ego_path(evidence), recorded_motion(evidence, striker)
+    track = motion._replace(heading=np.unwrap(motion.heading))
     outcomes = {
         name: _outcome(evidence, path, track, driver, conflict.frame, perceives_s)
         for name, (driver, perceives_s) in DRIVERS.items()
@@ -50,18 +51,6 @@ def grade(outcomes: Mapping[str, ReferenceOutcome]) -> Grade:
     if outcomes["careful"].avoids:
         return Grade.CAREFUL
     return Grade.IDEAL if outcomes["ideal"].avoids else Grade.UNAVOIDABLE
-
-
-def replayed_contact_s(evidence: Evidence, striker: int) -> float:
-    """When the recorded motions touch, from the release: a check of the rollout's means; inf if they never do."""
-    path, track = ego_path(evidence), striker_track(evidence, striker)
-    return float(evidence.time_s[0] + replay(path, recorded_size(evidence, 0), track, evidence.step_s))
-
-
-def striker_track(evidence: Evidence, striker: int) -> Body[Floats]:
-    """The striker's recorded motion, its heading without jumps of 2π."""
-    motion = recorded_motion(evidence, striker)
-    return motion._replace(heading=np.unwrap(motion.heading))
 
 
 def _outcome(

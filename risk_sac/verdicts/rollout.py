@@ -45,21 +45,6 @@ class Ending(NamedTuple):
 
 
 @compiled
-def place(track: Body[Floats], frame: float) -> Pose:
-    """Where the body is at a fraction of a frame; at the record's end, after it."""
-    last = len(track.x) - 1
-    if frame >= last:
-        return track.x[last], track.y[last], track.heading[last]
-    k = int(frame)
-    share = frame - k
-    return (
-        track.x[k] + share * (track.x[k + 1] - track.x[k]),
-        track.y[k] + share * (track.y[k + 1] - track.y[k]),
-        track.heading[k] + share * (track.heading[k + 1] - track.heading[k]),
-    )
-
-
-@compiled
 def drive(
     driver: int,
     path: Path,
@@ -87,7 +72,8 @@ def drive(
     s, braking, wanted, danger_s = path.s[first], 0.0, 0.0, math.inf
     lead, passing = 0.0, speed
     last = len(track.x) - 1
-    pose, other = pose_at(path, s), place(track, float(first))
+    frames = Path(track.x, track.y, track.heading, np.arange(last + 1) * 1.0)  # the striker's poses over the frames
+    pose, other = pose_at(path, s), pose_at(frames, float(first))
     looks = driver in (FUZZY, RSS)
     for step in range(1, round(horizon_s / FINE_S) + 1):
         since = (step - 1) * FINE_S
@@ -124,7 +110,7 @@ def drive(
             if own_frame < last:  # it stays, while the recorded ego may come past
                 lead = s - path.s[last]
             break
-        pose, other = pose_at(path, s), place(track, own_frame)
+        pose, other = pose_at(path, s), pose_at(frames, min(own_frame, last))
         if own_frame > last:
             beyond_s = (own_frame - last) * step_s
             other = other[0] + beyond_s * track.vx[last], other[1] + beyond_s * track.vy[last], other[2]
@@ -143,17 +129,3 @@ def _wanted(driver: int, path: Path, s: float, speed: float, braking: float, siz
     reach = abs(math.sin(seen.turn_rad)) * other.size.half_length + abs(math.cos(seen.turn_rad)) * other.size.half_width
     situation = Situation(seen, speed, braking, size.half_width, reach, across)
     return fuzzy(situation) if driver == FUZZY else rss(situation)
-
-
-@compiled
-def replay(path: Path, size: Size, track: Body[Floats], step_s: float) -> float:
-    """When the recorded ego first touches the striker, s from the first frame; inf if it never does."""
-    last = len(track.x) - 1
-    per_step = round(step_s / FINE_S)
-    for step in range(last * per_step + 1):
-        frame = step / per_step
-        k = min(int(frame), max(last - 1, 0))
-        s = path.s[k] + (frame - k) * (path.s[min(k + 1, last)] - path.s[k])
-        if touches(pose_at(path, s), size, place(track, frame), track.size):
-            return frame * step_s
-    return math.inf

@@ -23,7 +23,6 @@ from risk_sac.types import STEP_S, Floats, Scene
 
 each_family = pytest.mark.parametrize("family", ["low", "mixed", "dense"])
 UNDISTURBED_SEEDS = range(9100, 9130)
-RANDOM_SEEDS = range(9100, 9106)
 CONTACT_SEEDS = range(9100, 9140)
 CONTACT_STEPS = round(3.0 / STEP_S)
 MOVED = 0.1  # of a scale
@@ -120,12 +119,6 @@ def idle(env: RiskSacEnv) -> Policy:
     return lambda _: np.zeros(env.action_size, dtype=np.float32)
 
 
-def uniform(env: RiskSacEnv, seed: int) -> Policy:
-    """Drawn anew in every step."""
-    generator = np.random.default_rng(seed)
-    return lambda _: generator.uniform(-1, 1, env.action_size).astype(np.float32)
-
-
 def statistics(env: RiskSacEnv, seeds: range, policy: Callable[[int], Policy]) -> tuple[Statistics, int]:
     """What the episodes say, and how many ended in a contact."""
     traces, costs, contacts = [], [], 0
@@ -147,13 +140,6 @@ def test_undisturbed_traffic_meets_the_requirements_costs_nothing_and_touches_no
     assert found.clipped < 0.01, found
     assert found.cost <= 0.05, found
     assert all(0.5 <= median <= 3.0 for median in found.median.values()), found
-
-
-@each_family
-def test_uniformly_random_actions_cost_much(family: FamilyName) -> None:
-    with closing(environment(family, controlled=True)) as env:
-        found, _ = statistics(env, RANDOM_SEEDS, lambda seed: uniform(env, seed))
-    assert found.cost >= 0.4, found
 
 
 @each_family

@@ -76,13 +76,6 @@ def test_readme_makes_the_environment_in_a_fresh_interpreter(line: str) -> None:
     assert said.stdout == "5\n"
 
 
-def test_readme_names_every_environment() -> None:
-    assert {name for name in gym.registry if name.startswith("RiskSAC/")} == {
-        f"RiskSAC/{family.capitalize()}-v0" for family in FAMILIES
-    }
-    assert all(f"{family.capitalize()}-v0" in README for family in FAMILIES)
-
-
 def test_the_package_alone_is_cheap_to_import() -> None:
     program = "import sys, risk_sac\nprint(sorted({'gymnasium', 'numpy', 'torch', 'pydantic'} & set(sys.modules)))"
     said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
@@ -126,12 +119,6 @@ def test_every_number_is_finite_and_an_episode_ends_at_the_horizon_or_at_a_conta
             *_, (_, _, terminated, truncated, info) = outcomes
             assert terminated == ("collision" in info)
             assert truncated == (len(outcomes) - 1 == FAMILIES[family].horizon_steps)
-
-
-def test_the_time_left_runs_down_to_zero(low: RiskSacEnv) -> None:
-    outcomes = episode(low, 0)
-    assert outcomes[0][0][-1] == 1.0
-    assert outcomes[1][0][-1] == pytest.approx(1 - 1 / 150)
 
 
 def refusal(env: RiskSacEnv, scene: Scene) -> str | None:
@@ -377,17 +364,6 @@ def test_the_trace_holds_every_frame_of_the_episode(family: FamilyName) -> None:
     assert np.nanmax(np.abs(series["rss_lateral_m"])) <= LATERAL_CAP_M
     assert env.trace.min_robustness == after.min()
     assert env.trace.min_ttc_s == series["least_ttc_s"][LEAD_IN_STEPS:].min()
-
-
-@each_family
-def test_what_happened_before_the_release_does_not_count(family: FamilyName) -> None:
-    with closing(make_default(family)) as env:
-        env.reset(seed=2)
-        before = env.trace.measures[0]
-        worse = before._replace(soft_min=-9.0, signals=before.signals | {"ttc_s": 0.0})
-        env.trace.measures[0] = worse
-        assert env.trace.min_robustness > -9.0
-        assert env.trace.min_ttc_s > 0.0
 
 
 @each_family

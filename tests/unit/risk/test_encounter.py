@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from risk_sac.geometry import RelativeView, relative_view, time_to_contact
+from risk_sac.geometry import RelativeView, relative_view
 from risk_sac.risk.ttc import BEHIND_S_PER_M, DRIFT_MPS, SPEED_SHARE, WALK_MPS, time_to_encounter
 from tests.builders import frame_of
 
@@ -70,21 +70,6 @@ def test_who_comes_from_behind_fades_out() -> None:
     assert beside == pytest.approx(4.0)
     assert behind == pytest.approx(4.0 + 0.5 * BEHIND_S_PER_M)
     assert farther > behind
-
-
-@settings(deadline=None)  # the first call compiles
-@given(speed, others.filter(lambda other: other[0] > 0), st.booleans())
-def test_it_is_at_most_the_time_to_collision(ego_mps: float, other: Other, walks: bool) -> None:
-    [ttc] = time_to_contact(view_of(ego_mps, other))
-    assert encounter(ego_mps, other, walks=walks) <= ttc + 1e-6
-
-
-@settings(deadline=None)  # the first call compiles
-@given(speed, others, st.booleans())
-def test_left_and_right_are_alike(ego_mps: float, other: Other, walks: bool) -> None:
-    x, y, heading, vx, vy = other
-    mirrored = encounter(ego_mps, (x, -y, -heading, vx, -vy), walks=walks)
-    assert mirrored == pytest.approx(encounter(ego_mps, other, walks=walks), abs=1e-6)
 
 
 @pytest.mark.parametrize("miss_m", np.arange(0.0, 6.0, 0.05).tolist())

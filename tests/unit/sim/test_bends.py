@@ -70,14 +70,6 @@ def test_every_cap_can_be_braked_to(radius: float, turn: float) -> None:
     assert np.all(square[:-1] - square[1:] <= 2 * LIMITS.approach_mps2 * GRID_M + 1e-6)
 
 
-@settings(max_examples=30)
-@given(radii, st.floats(0.3, math.pi), st.floats(0.2, 4))
-def test_left_and_right_bends_ask_the_same(radius: float, turn: float, piece: float) -> None:
-    left, right = (bends(road(radius, turn_rad=turn, piece_m=piece, left=left), LIMITS) for left in (True, False))
-    assert left[CAP] == pytest.approx(right[CAP])
-    assert left[HERE] == pytest.approx(right[HERE])
-
-
 def test_a_heading_that_passes_pi_is_no_bend() -> None:
     got = bends(with_headings(math.pi - 0.01, -math.pi + 0.01, -math.pi + 0.01), LIMITS)
     assert max(got[HERE]) == pytest.approx(0.02 / BODY_M)

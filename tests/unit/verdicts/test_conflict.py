@@ -166,12 +166,6 @@ def test_an_ego_that_drifts_into_its_neighbour_is_in_conflict_on_a_collision_cou
     assert conflict.time_s < evidence.time_s[-1]
 
 
-def test_contact_in_the_only_frame(found: Staged) -> None:
-    evidence = stage(straight(0.0, 0.0, 0.0, 10.0), straight(3.0, 0.0, 0.0, 0.0))
-    assert len(evidence.time_s) == 1
-    assert found(evidence).frame == 0
-
-
 @pytest.mark.parametrize(
     ("evidence", "smells"),
     [
