@@ -104,12 +104,11 @@ def frame_view(state: Floats) -> RelativeView:
 @compiled
 def speed_along(view: RelativeView, i: int, axis: int) -> float:
     """Relative velocity along one of the separating axes."""
-    vx, vy, cos, sin = view.vx[i], view.vy[i], view.cos[i], view.sin[i]
-    if axis == 0:
-        return vx
-    if axis == 1:
-        return vy
-    return vx * cos + vy * sin if axis == 2 else vy * cos - vx * sin
+    vx, vy = float(view.vx[i]), float(view.vy[i])
+    if axis >= 2:
+        cos, sin = float(view.cos[i]), float(view.sin[i])
+        vx, vy = vx * cos + vy * sin, vy * cos - vx * sin
+    return vx if axis % 2 == 0 else vy
 
 
 @compiled

@@ -72,7 +72,9 @@ def drive(
     s, braking, wanted, danger_s = path.s[first], 0.0, 0.0, math.inf
     lead, passing = 0.0, speed
     last = len(track.x) - 1
-    frames = Path(track.x, track.y, track.heading, np.arange(last + 1) * 1.0)  # the striker's poses over the frames
+    frames = Path(
+        track.x, track.y, track.heading, np.arange(last + 1).astype(np.float64)
+    )  # the striker's poses over the frames
     pose, other = pose_at(path, s), pose_at(frames, float(first))
     looks = driver in (FUZZY, RSS)
     for step in range(1, round(horizon_s / FINE_S) + 1):
