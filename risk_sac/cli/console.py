@@ -4,6 +4,7 @@ import argparse
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any, TypeAlias
 
 from rich.box import SIMPLE_HEAD
@@ -18,6 +19,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.table import Table
+
+from risk_sac.run_folder.durable import replace_file
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs
@@ -36,6 +39,28 @@ def add_command(
     parser = commands.add_parser(name, help=summary)
     parser.set_defaults(command=run)
     return parser
+
+
+def number(type_: type[int] | type[float], least: float, most: float = math.inf) -> Callable[[str], float]:
+    """Type of an argument that is a number in [least, most]."""
+
+    def parsed(text: str) -> float:
+        value = type_(text)
+        if not (least <= value <= most and math.isfinite(value)):
+            wanted = f"{least:g} or more" if most == math.inf else f"{least:g} to {most:g}"
+            raise argparse.ArgumentTypeError(f"got {text!r}; wanted {wanted}")
+        return value
+
+    parsed.__name__ = "number"  # so argparse calls it
+    return parsed
+
+
+def write_out(file: Path, content: bytes, what: str = "", said_on: Console = console) -> None:
+    """Write a file that the user named, with the folders that it lacks, and say so."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    replace_file(file, content)
+    if what:
+        said_on.print(f"{what}: {file}", markup=False, soft_wrap=True)
 
 
 def complain(message: str) -> None:

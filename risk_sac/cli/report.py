@@ -5,10 +5,9 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from risk_sac.cli.console import OK, Commands, add_command, console
+from risk_sac.cli.console import OK, Commands, add_command, write_out
 from risk_sac.cli.regress import read_baseline
 from risk_sac.errors import ConfigError
-from risk_sac.run_folder.durable import replace_file
 
 if TYPE_CHECKING:
     from risk_sac.report.evidence.folders import Found
@@ -51,9 +50,7 @@ def _report(options: argparse.Namespace) -> int:
     else:
         document = report(found.comparison, evidence, origin)
         content = html(document) if format_ == "html" else markdown(document)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    replace_file(options.out, content.encode())
-    console.print(f"Report: {options.out}", soft_wrap=True)
+    write_out(options.out, content.encode(), "Report")
     return OK
 
 

@@ -201,7 +201,9 @@ def test_what_cannot_run_is_exit_status_2_without_a_traceback(
     assert printed.out == ""
 
 
-@pytest.mark.parametrize("bad", [["--max-ecr", "2"], ["--max-pcr", "x"], ["--timeout", "0"], ["--timeout", "nan"]])
+@pytest.mark.parametrize(
+    "bad", [["--max-ecr", "2"], ["--max-pcr", "x"], ["--max-pcr", "inf"], ["--timeout", "0"], ["--timeout", "nan"]]
+)
 def test_bad_arguments_are_exit_status_2(bad: list[str], call: Callable[..., int]) -> None:
     with pytest.raises(SystemExit, match="2"):
         call("watch", "c1", *bad)

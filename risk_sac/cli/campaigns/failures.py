@@ -10,15 +10,13 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.campaigns.output import add_campaign_command, at_least_one, print_answer
-from risk_sac.cli.console import OK, Commands, in_words, notes, or_dash, printable
+from risk_sac.cli.campaigns.output import add_campaign_command, add_limit, print_answer
+from risk_sac.cli.console import OK, Commands, in_words, notes, or_dash, printable, write_out
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
 from risk_sac.records import Grade
-from risk_sac.run_folder.durable import replace_file
 
-LISTED = 20
 FILTERS = {
     "run": "of this run",
     "broke": "whose striker broke this, such as red_light",
@@ -35,7 +33,7 @@ def add(commands: Commands) -> None:
     for name, which in FILTERS.items():
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only those {which}")
     parser.add_argument("--raw", action="store_true", help="contacts too that a rule refused")
-    parser.add_argument("--limit", type=at_least_one, default=LISTED, metavar="N", help=f"at most (default: {LISTED})")
+    add_limit(parser)
 
     parser = add_campaign_command(commands, "show", _show, "one failure in words and as a picture")
     _add_failure(parser)
@@ -75,9 +73,7 @@ def _bundle(options: argparse.Namespace) -> int:
     file = options.out or Path(f"{options.failure}.npz")
     with Client.from_environment(options.url) as client:
         content = client.bundle(options.id, options.failure, core=options.core)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    replace_file(file, content)
-    notes.print(f"Bundle: {file}", markup=False, soft_wrap=True)
+    write_out(file, content, "Bundle", notes)
     return OK
 
 
@@ -85,12 +81,11 @@ def _show(options: argparse.Namespace) -> int:
     picture = options.out or Path(f"{options.failure}.png")
     if picture.suffix != ".png":
         raise ConfigError("--out", f"{str(picture)!r}", "a name that ends in .png")
-    picture.parent.mkdir(parents=True, exist_ok=True)
     with Client.from_environment(options.url) as client:
         failure = client.failure(options.id, options.failure)
-        picture.write_bytes(client.picture(options.id, options.failure, options.twin))
+        drawn = client.picture(options.id, options.failure, options.twin)
     print_answer(options, failure, "\n".join(_lines(failure)))
-    notes.print(f"Drawn: {picture}", markup=False, soft_wrap=True)
+    write_out(picture, drawn, "Drawn", notes)
     return OK
 
 

@@ -1,7 +1,6 @@
 """Whether a campaign found more than it may have: what the exit status of a CI job says. Pure."""
 
 import argparse
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,14 +16,6 @@ from risk_sac.metrics import wilson_interval
 JudgedBy = Literal["interval", "rate"]
 JUDGED_BY: tuple[JudgedBy, ...] = get_args(JudgedBy)
 COUNTED = {"ECR": "valid failure", "PCR": "preventable failure"}
-
-
-def rate(text: str) -> float:
-    """A rate, from the command line."""
-    value = float(text)
-    if not math.isfinite(value) or not 0 <= value <= 1:
-        raise argparse.ArgumentTypeError(f"got {text!r}; wanted a rate in [0, 1]")
-    return value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,18 +5,26 @@ import itertools
 import time
 from pathlib import Path
 
-from risk_sac.cli.campaigns.output import add_campaign_command, at_least_one, campaigns_table, line, print_answer
+from risk_sac.cli.campaigns.output import add_campaign_command, add_limit, campaigns_table, line, print_answer
 from risk_sac.cli.campaigns.watch import shown
-from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, Commands, add_command, complain, notes
+from risk_sac.cli.console import (
+    ABOVE,
+    COULD_NOT_RUN,
+    EGO,
+    OK,
+    Commands,
+    add_command,
+    complain,
+    notes,
+    write_out,
+)
 from risk_sac.cli.regress import cases_table, junit
 from risk_sac.cli.report import OUT, format_of
 from risk_sac.client import Client
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.cases import Regression
 from risk_sac.records import State
-from risk_sac.run_folder.durable import replace_file
 
-LISTED = 20
 POLL_S = 0.5
 FILTERS = ("state", "family", "method", "label")
 
@@ -26,7 +34,7 @@ def add(commands: Commands) -> None:
     parser = add_command(commands, "list", _list, "campaigns, newest first")
     for name in FILTERS:
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only with this {name}")
-    parser.add_argument("--limit", type=at_least_one, default=LISTED, metavar="N", help=f"at most (default: {LISTED})")
+    add_limit(parser)
 
     parser = add_campaign_command(commands, "cancel", _cancel, "stop a campaign; what it found stays")
     parser.add_argument("--wait", action="store_true", help="until it has ended")
@@ -73,9 +81,7 @@ def _report(options: argparse.Namespace) -> int:
     format_ = format_of(options.out)
     with Client.from_environment(options.url) as client:
         content = client.report(options.id, format_, options.regression)
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    replace_file(options.out, content.encode())
-    notes.print(f"Report: {options.out}", markup=False, soft_wrap=True)
+    write_out(options.out, content.encode(), "Report", notes)
     return OK
 
 
@@ -91,7 +97,6 @@ def _regress(options: argparse.Namespace) -> int:
         return COULD_NOT_RUN
     found = Regression(ego=regression.ego, cases=regression.cases)
     if options.junit is not None:
-        options.junit.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(options.junit, junit(found))
+        write_out(options.junit, junit(found))
     print_answer(options, regression, cases_table(found))
     return OK if found.passed else ABOVE

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons
-from risk_sac.cli.console import Commands, add_command, console, counted, on_one_line, or_dash
+from risk_sac.cli.console import Commands, add_command, console, counted, number, on_one_line, or_dash
 from risk_sac.client import CampaignSummary, Results
 from risk_sac.records import wire
 
@@ -30,20 +30,17 @@ def add_campaign_command(
     return parser
 
 
+def add_limit(parser: argparse.ArgumentParser) -> None:
+    """Add the flag that bounds a list."""
+    parser.add_argument("--limit", type=number(int, 1), default=20, metavar="N", help="at most (default: %(default)s)")
+
+
 def print_answer(options: argparse.Namespace, answer: Answer, text: Table | str) -> None:
     """Prints the answer as JSON where that is wanted, and the text otherwise."""
     if options.json:
         console.out(json.dumps(_plain(answer), allow_nan=False), highlight=False)
     else:
         console.print(text, markup=False, soft_wrap=isinstance(text, str))
-
-
-def at_least_one(text: str) -> int:
-    """A number of rows, from the command line."""
-    number = int(text)
-    if number < 1:
-        raise argparse.ArgumentTypeError(f"got {text}; wanted 1 or more")
-    return number
 
 
 def line(campaign: CampaignSummary) -> str:

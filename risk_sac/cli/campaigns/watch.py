@@ -2,7 +2,6 @@
 
 import argparse
 import itertools
-import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,16 +10,17 @@ from pathlib import Path
 from rich.progress import BarColumn, Progress
 
 from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, campaign_flags, ego_flag
-from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, rate, verdict
+from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, verdict
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.cli.campaigns.output import add_campaign_command, figures, line, print_answer, results_table
-from risk_sac.cli.console import OK, Board, Commands, add_command, columns, complain, notes
+from risk_sac.cli.console import OK, Board, Commands, add_command, columns, complain, notes, number
 from risk_sac.client import Campaign, Client, Episode, Results
 from risk_sac.config.spec_file import read_campaign
 from risk_sac.errors import ConfigError
 from risk_sac.records import Grade
 
 SEEDS = 1  # where none are named
+RATE = number(float, 0, 1)
 NAMED_FAILURES = 5  # of a run, in a JUnit report
 
 
@@ -45,7 +45,7 @@ def add(commands: Commands) -> None:
 
 def _add_watch_flags(parser: argparse.ArgumentParser) -> None:
     _add_gate_flags(parser)
-    parser.add_argument("--timeout", type=_seconds, metavar="S", help="give up after so many seconds")
+    parser.add_argument("--timeout", type=number(float, 0.001), metavar="S", help="give up after so many seconds")
 
 
 def _prepare(options: argparse.Namespace) -> None:
@@ -114,31 +114,16 @@ def _first_failures(client: Client, campaign_id: str, run_id: str) -> list[Episo
 
 
 def _add_gate_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--max-ecr", type=rate, metavar="X", help="exit with 1 unless every ECR is within it")
-    parser.add_argument("--max-pcr", type=rate, metavar="X", help="exit with 1 unless every PCR is within it")
+    parser.add_argument("--max-ecr", type=RATE, metavar="X", help="exit with 1 unless every ECR is within it")
+    parser.add_argument("--max-pcr", type=RATE, metavar="X", help="exit with 1 unless every PCR is within it")
     preventable = "exit with 1 if a family and method has found more distinct preventable failures"
-    parser.add_argument("--max-preventable", type=at_least_none, metavar="N", help=preventable)
+    parser.add_argument("--max-preventable", type=number(int, 0), metavar="N", help=preventable)
     known = "exit with 1 if a kind of failure is not in what `results --json` printed of an earlier campaign"
     parser.add_argument("--no-new-failures", type=Path, metavar="KNOWN.json", help=known)
     judged = "what has to lie within: the upper end of the rate's 95 %% interval, or the rate (default: interval)"
     parser.add_argument("--judge-by", choices=JUDGED_BY, default=JUDGED_BY[0], help=judged)
     cases = "report for CI: a suite per family, a case per run and per method, failures named"
     parser.add_argument("--junit", type=Path, metavar="FILE.xml", help=cases)
-
-
-def at_least_none(text: str) -> int:
-    """A count, from the command line."""
-    count = int(text)
-    if count < 0:
-        raise argparse.ArgumentTypeError(f"got {text}; wanted 0 or more")
-    return count
-
-
-def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not math.isfinite(seconds) or seconds <= 0:
-        raise argparse.ArgumentTypeError(f"got {text}; wanted a time above 0")
-    return seconds
 
 
 LINE_S = 10.0  # between two lines, unless the state changes

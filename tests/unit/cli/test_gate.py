@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from risk_sac.cli.campaigns.gate import Bounds, rate, verdict
+from risk_sac.cli.campaigns.gate import Bounds, verdict
 from risk_sac.client import Results
 from risk_sac.errors import ConfigError
 
@@ -166,9 +166,3 @@ def test_a_campaign_that_goes_on_cannot_be_judged_yet() -> None:
 
 def test_a_method_without_an_episode_is_not_above() -> None:
     assert verdict(results("succeeded", {"ecr": None, "pcr": None}), by_rate(ecr=0.0, pcr=0.0))[0] == 0
-
-
-@pytest.mark.parametrize("text", ["-0.1", "1.1", "nan", "inf"])
-def test_a_bound_is_a_rate(text: str) -> None:
-    with pytest.raises(argparse.ArgumentTypeError, match="wanted a rate"):
-        rate(text)
