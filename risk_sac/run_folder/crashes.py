@@ -67,7 +67,7 @@ class CrashGuard:
     ) -> None:
         faulthandler.disable()
         if self._others:
-            faulthandler.enable()
+            faulthandler.enable(2)  # `sys.stderr` may have no descriptor, as in a notebook
         self._log.close()
         os.close(self._current)
 

@@ -21,10 +21,10 @@ from risk_sac.execution.jobs import ATTEMPTS
 RISK_SAC = [sys.executable, "-m", "risk_sac"]
 # Small networks and a short warm-up, so that the few episodes learn; two contacts in twelve episodes or so.
 SPEC = """
-methods: [random, no-adversary, sac]
+methods: [random, sac]
 families: [low, mixed]
 seeds: [0, 1]
-budget: {episodes: 9, evaluation_episodes: 1}
+budget: {episodes: 9}
 learner:
   agent: {hidden_sizes: [32, 32], batch_size: 32, warmup_steps: 100}
   warm_start: {episodes: 1}
@@ -32,7 +32,7 @@ learner:
   checkpoint_every: 2
 """
 FLAGS = ["--spec", "spec.yaml", "--families", "low", "--episodes", "6", "--jobs", "2", "--verify", "1", "--out", "out"]
-RUNS = 6
+RUNS = 4
 
 
 @pytest.fixture(scope="module")
@@ -60,16 +60,15 @@ def test_report_holds_cells_tests_runs_and_figures(whole: Path) -> None:
     stored = table(whole)
     assert stored["complete"] is True
     assert stored["command"] == "risk-sac evaluate " + " ".join(FLAGS)
-    assert [cell["method"] for cell in stored["cells"]] == 2 * ["random", "no-adversary", "sac"]
-    assert [cell["episodes"] for cell in stored["cells"]] == 3 * [12] + 3 * [2]
+    assert [(cell["method"], cell["episodes"]) for cell in stored["cells"]] == [("random", 12), ("sac", 12)]
     assert all(cell["seeds"] == [0, 1] for cell in stored["cells"])
-    assert len(stored["tests"]) == 2 * 6 + 2 * 5
+    assert len(stored["tests"]) == 6
     assert len({row["digest"] for row in stored["runs"]}) == RUNS
     assert "libsumo" in stored["versions"]
     assert stored["platform"]["cpu"]
     names = {path.name for path in (whole / "out" / "figures").iterdir()}
     assert {"ecr_low.png", "ecr_low.svg", "bars_ofd.png", "alpha_low.svg"} <= names
-    assert len((whole / "out" / "table.csv").read_text().splitlines()) == 7
+    assert len((whole / "out" / "table.csv").read_text().splitlines()) == 3
 
 
 def test_command_on_the_page_gives_the_digest_of_the_row(whole: Path) -> None:
@@ -123,7 +122,7 @@ def test_an_interrupted_comparison_goes_on_and_equals_one_that_never_was(whole: 
     partial = table(tmp_path)
     assert 0 < len(partial["runs"]) < RUNS
     assert len(partial["runs"]) + len(partial["missing"]) == RUNS
-    assert any(re.match(r"stopped after \d of 7 episodes", run["reason"]) for run in partial["missing"])
+    assert any(re.match(r"stopped after \d of 6 episodes", run["reason"]) for run in partial["missing"])
     assert "## Missing" in (tmp_path / "out" / "table.md").read_text()
 
     resumed = subprocess.run([*RISK_SAC, "evaluate", *FLAGS], capture_output=True, text=True, cwd=tmp_path)
@@ -151,21 +150,8 @@ def crash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], No
     return arrange
 
 
-ONE = [
-    "--families",
-    "low",
-    "--methods",
-    "random",
-    "--seeds",
-    "1",
-    "--first-seed",
-    "4",
-    "--episodes",
-    "1",
-    "--verify",
-    "0",
-    "--out",
-]
+ONE = ["--families", "low", "--methods", "random", "--seeds", "1", "--first-seed", "4", "--episodes", "1"]
+ONE += ["--verify", "0", "--out"]
 
 
 def test_a_crashed_run_is_tried_again(crash: Callable[[int], None], tmp_path: Path) -> None:
@@ -219,13 +205,9 @@ def test_two_comparisons_do_not_share_a_folder(
 @pytest.mark.parametrize(
     ("flags", "complaint"),
     [
-        (["--families", "high"], "families[0]: "),
-        (["--methods", "sac", "magic"], "methods[1]: "),
         (["--seeds", "0"], "seeds: got 0; wanted 1 to 100 seeds"),
         (["--seeds", "1", "--first-seed", "-1"], "seeds[0]: "),
-        (["--episodes", "0"], "budget.episodes: "),
         (["--jobs", "0"], "jobs: got 0; wanted at least one process"),
-        (["--spec", "nowhere.yaml"], "spec: "),
     ],
 )
 def test_wrong_settings_are_one_line_and_leave_no_folder(

@@ -1,12 +1,4 @@
-import math
-
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
-from risk_sac.metrics import METRICS, RATIOS, Tally, outcome_features, wilson_interval
-from risk_sac.metrics.features import Spread
+from risk_sac.metrics import METRICS, RATIOS, Tally, wilson_interval
 from risk_sac.metrics.rows import (
     cost_rate,
     effective_collision_rate,
@@ -16,16 +8,9 @@ from risk_sac.metrics.rows import (
     steps_per_distinct_failure,
 )
 from risk_sac.records import Counts, RunMetrics
-from tests.unit.metrics.episodes import JUDGED, any_collision, feed
+from tests.unit.metrics.episodes import JUDGED, feed
 
 FORMULAS = {metric.name: metric.formula for metric in METRICS}
-
-
-def dispersion_of(features):
-    spread = Spread()
-    for each in features:
-        spread.add(each)
-    return outcome_dispersion(Tally(horizon_steps=1, failures=len(features), distance=spread.distance))
 
 
 def test_formula_literals():
@@ -110,17 +95,3 @@ def test_a_metric_is_read_from_the_metrics_of_a_run():
     assert distinct.value(metrics) == 1000 * 4 / 518
     assert ecr.interval(metrics.ecr, Counts(episodes=8)) == wilson_interval(5, 8)
     assert distinct.interval(1.0, Counts(episodes=8)) is None
-
-
-def test_dispersion_literals():
-    assert dispersion_of(np.array([[0.0] * 4, [1.0] * 4])) == pytest.approx(1.0)
-    corners = np.array([[0.0, 0, 0, 0], [0.6, 0, 0, 0], [0.6, 0.8, 0, 0]])
-    assert dispersion_of(corners) == pytest.approx((0.6 + 0.8 + 1.0) / 3 / 2)
-
-
-@settings(deadline=None)
-@given(st.lists(any_collision, min_size=2, max_size=12))
-def test_dispersion_agrees_with_all_pairs(hits):
-    features = np.array([outcome_features(hit) for hit in hits])
-    pairs = [math.dist(a, b) for i, a in enumerate(features) for b in features[:i]]
-    assert dispersion_of(features) == pytest.approx(sum(pairs) / len(pairs) / 2, abs=1e-12)

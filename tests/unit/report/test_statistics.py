@@ -1,12 +1,9 @@
-import math
-
 import numpy as np
 import pytest
 import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.metrics import bootstrap_interval
 from risk_sac.report.paired import holm, pairs_needed, smallest_p, vargha_delaney, wilcoxon_p
 
 differences = st.lists(st.integers(-6, 6).map(lambda tenths: tenths / 10), max_size=10)
@@ -32,12 +29,6 @@ def test_wilcoxon_literals(values, p):
 def test_wilcoxon_takes_rounding_for_ties():
     assert wilcoxon_p([0.3 - 0.1, 0.2, -0.2]) == wilcoxon_p([0.2, 0.2, -0.2]) == 1.0
     assert wilcoxon_p([0.1 + 0.2 - 0.3, 1.0, 2.0]) == wilcoxon_p([1.0, 2.0])
-
-
-@given(st.lists(st.integers(1, 1000), min_size=1, max_size=12, unique=True), st.randoms())
-def test_wilcoxon_agrees_with_scipy_where_nothing_ties(ranks, random):
-    values = [rank * random.choice((-1, 1)) for rank in ranks]
-    assert wilcoxon_p(values) == pytest.approx(scipy.stats.wilcoxon(values, method="exact").pvalue)
 
 
 @given(differences)
@@ -83,12 +74,3 @@ def test_a12_by_hand():
     assert vargha_delaney([1, 2], [3, 4]) == 0
     assert vargha_delaney([1, 2], [1, 2]) == 0.5
     assert vargha_delaney([1, 3, 5], [2, 3]) == pytest.approx((0 + 1.5 + 2) / 6)
-
-
-def test_paired_interval_covers_a_known_mean_about_as_often_as_it_says():
-    random = np.random.default_rng(0)
-    covered = 0
-    for _ in range(200):
-        low, high = bootstrap_interval(list(random.normal(0.3, 1.0, size=20)), 0)
-        covered += low <= 0.3 <= high
-    assert math.isclose(covered / 200, 0.93, abs_tol=0.05)
