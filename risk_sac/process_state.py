@@ -1,0 +1,185 @@
+"""Settings that a process has once, such as its locale, kept apart for us and for foreign code.
+
+    state = Preserved()
+    with state:             # while it is imported, made, begun, closed
+        ego = make_ego()
+    with state.quick:       # while it answers: some microseconds, and the rarer settings are not looked at
+        ego.act(perceived)
+
+What foreign code changes holds again when it runs next, and never for us. Random state is not kept, because nothing of
+ours draws from a generator that is shared.
+"""
+
+import contextlib
+import gc
+import locale
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+import warnings
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+TINY = 5e-324  # is 0 where a library has told the processor to flush such numbers
+_INITIAL_TORCH = ("float32", True, 1, False)
+
+
+class Setting(NamedTuple):
+    """How a setting is read and set."""
+
+    read: Callable[[], Any]
+    set: Callable[[Any], object]
+
+
+def preserved() -> "Preserved":
+    """State of foreign code that has changed nothing yet."""
+    return Preserved()
+
+
+class _Swap:
+    """Exchanges some settings for those of the foreign code, for the time of a block."""
+
+    def __init__(self, settings: Sequence[Setting], theirs: dict[Setting, Any]) -> None:
+        self._settings, self._theirs = settings, theirs
+        self._ours: list[Any] = []
+
+    def __enter__(self) -> Self:
+        self._ours = [setting.read() for setting in self._settings]
+        for setting, value in self._theirs.items():
+            if setting in self._settings:
+                setting.set(value)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for setting, ours in zip(self._settings, self._ours, strict=True):
+            left = setting.read()
+            if left != ours:
+                self._theirs[setting] = left
+                setting.set(ours)
+            elif setting in self._theirs:
+                del self._theirs[setting]
+
+
+class Preserved(_Swap):
+    """Exchanges all settings; `quick` those that cost little to read, which foreign code changes most."""
+
+    def __init__(self) -> None:
+        theirs: dict[Setting, Any] = {}
+        super().__init__((*QUICK, *OTHERS), theirs)
+        self.quick = _Swap(QUICK, theirs)
+
+
+def _folder() -> str | None:
+    try:
+        return os.getcwd()
+    except FileNotFoundError:  # it was deleted
+        return None
+
+
+def _enter(folder: str | None) -> None:
+    with contextlib.suppress(OSError):  # it may be gone by now
+        os.chdir(folder or ".")
+
+
+def _handlers() -> tuple[Any, ...]:
+    return tuple(map(signal.getsignal, SIGNALS))
+
+
+def _handle(handlers: Sequence[Any]) -> None:
+    if threading.current_thread() is not threading.main_thread():
+        return  # where none could have been set, either
+    for number, handler in zip(SIGNALS, handlers, strict=True):
+        if handler is not None:  # None: it was not set from Python
+            signal.signal(number, handler)
+
+
+def _filter(filters: Sequence[Any]) -> None:
+    warnings.resetwarnings()  # so that Python forgets what it has decided by the old ones
+    warnings.filters[:] = filters  # type: ignore[index]
+
+
+def _torch() -> Any:
+    torch = sys.modules.get("torch")
+    if torch is None:
+        return None
+    return (
+        str(torch.get_default_dtype()).removeprefix("torch."),
+        torch.is_grad_enabled(),
+        torch.get_num_threads(),
+        torch.are_deterministic_algorithms_enabled(),
+    )
+
+
+def _set_torch(values: Any) -> None:
+    torch = sys.modules["torch"]
+    dtype, gradients, threads, deterministic = values or _INITIAL_TORCH
+    torch.set_default_dtype(getattr(torch, dtype))
+    torch.set_grad_enabled(gradients)
+    torch.set_num_threads(threads)
+    torch.use_deterministic_algorithms(deterministic)
+
+
+def _device() -> Any:
+    torch = sys.modules.get("torch")
+    return None if torch is None else torch.get_default_device()
+
+
+def _flush(flushed: bool) -> None:
+    if "torch" in sys.modules:  # else there is no way to say it
+        sys.modules["torch"].set_flush_denormal(flushed)
+
+
+def _streams() -> tuple[Any, ...]:
+    return sys.stdin, sys.stdout, sys.stderr
+
+
+def _set_streams(streams: tuple[Any, ...]) -> None:
+    sys.stdin, sys.stdout, sys.stderr = streams
+
+
+def _set_environment(wanted: dict[str, str]) -> None:
+    for name in os.environ.keys() - wanted.keys():
+        del os.environ[name]
+    os.environ.update(wanted)
+
+
+def _umask() -> int:
+    umask = os.umask(0o77)
+    os.umask(umask)
+    return umask
+
+
+QUICK = (
+    Setting(_folder, _enter),
+    Setting(lambda: locale.setlocale(locale.LC_ALL), lambda name: locale.setlocale(locale.LC_ALL, name)),
+    Setting(_handlers, _handle),
+    Setting(lambda: tuple(warnings.filters), _filter),
+    Setting(np.geterr, lambda modes: np.seterr(**modes)),
+    Setting(_torch, _set_torch),
+    Setting(lambda: TINY * 1.0 == 0.0, _flush),
+    Setting(_streams, _set_streams),
+    Setting(sys.getrecursionlimit, sys.setrecursionlimit),
+    Setting(gc.isenabled, lambda enabled: gc.enable() if enabled else gc.disable()),
+)
+OTHERS = (
+    Setting(lambda: dict(os.environ), _set_environment),
+    Setting(_umask, os.umask),
+    Setting(np.get_printoptions, lambda options: np.set_printoptions(**options)),
+    Setting(socket.getdefaulttimeout, socket.setdefaulttimeout),
+    Setting(
+        lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()),
+        lambda mask: signal.pthread_sigmask(signal.SIG_SETMASK, mask),
+    ),
+    Setting(lambda: logging.root.level, logging.root.setLevel),
+    Setting(lambda: logging.root.manager.disable, logging.disable),
+    Setting(_device, lambda device: sys.modules["torch"].set_default_device(device)),
+)

@@ -1,0 +1,101 @@
+"""What foreign code does to its process holds for it, and not for us."""
+
+import gc
+import io
+import locale
+import logging
+import os
+import signal
+import socket
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from risk_sac.process_state import TINY, Preserved, preserved
+
+
+def reset_signal() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def replace_streams() -> None:
+    sys.stdout = sys.stderr = io.StringIO()
+
+
+QUICK: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
+    "folder": (lambda: os.chdir("/"), os.getcwd),
+    "signals": (reset_signal, lambda: signal.getsignal(signal.SIGINT)),
+    "locale": (lambda: locale.setlocale(locale.LC_CTYPE, "C"), lambda: locale.setlocale(locale.LC_ALL)),
+    "warnings": (lambda: warnings.simplefilter("error"), lambda: list(warnings.filters)),
+    "arithmetic": (lambda: np.seterr(all="raise"), np.geterr),
+    "dtype": (lambda: torch.set_default_dtype(torch.float64), torch.get_default_dtype),
+    "gradients": (lambda: torch.set_grad_enabled(False), torch.is_grad_enabled),
+    "threads": (lambda: torch.set_num_threads(3), torch.get_num_threads),
+    "deterministic": (lambda: torch.use_deterministic_algorithms(True), torch.are_deterministic_algorithms_enabled),
+    "denormals": (lambda: torch.set_flush_denormal(True), lambda: TINY * 1.0 == 0.0),
+    "streams": (replace_streams, lambda: (sys.stdout, sys.stderr)),
+    "recursion": (lambda: sys.setrecursionlimit(700), sys.getrecursionlimit),
+    "garbage": (gc.disable, gc.isenabled),
+}
+OTHERS: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
+    "environment": (lambda: os.environ.update(HOME="/nowhere", TZ="Mars"), lambda: dict(os.environ)),
+    "umask": (lambda: os.umask(0o777), lambda: (os.umask(mask := os.umask(0o22)), mask)[1]),
+    "print options": (lambda: np.set_printoptions(precision=1), np.get_printoptions),
+    "timeout": (lambda: socket.setdefaulttimeout(0.001), socket.getdefaulttimeout),
+    "blocked": (
+        lambda: signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM]),
+        lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()),
+    ),
+    "logging": (lambda: logging.disable(), lambda: logging.root.manager.disable),
+    "device": (lambda: torch.set_default_device("meta"), torch.get_default_device),
+}
+
+
+@pytest.mark.parametrize("name", [*QUICK, *OTHERS])
+def test_what_foreign_code_changes_holds_for_it_and_not_for_us(name: str) -> None:
+    change, read = (QUICK | OTHERS)[name]
+    state: Preserved = preserved()
+    block = state.quick if name in QUICK else state
+    before = read()
+    with block:
+        change()
+        theirs = read()
+    assert theirs != before
+    assert read() == before
+    with block:
+        assert read() == theirs
+    assert read() == before
+
+
+def test_what_it_puts_back_is_forgotten_and_an_error_passes(tmp_path: Path) -> None:
+    state, here = preserved(), os.getcwd()
+    with pytest.raises(SystemExit), state:
+        sys.exit(os.chdir(tmp_path))
+    assert os.getcwd() == here
+    with state:
+        os.chdir(here)
+    os.chdir(tmp_path)
+    try:
+        with state:
+            assert Path.cwd() == tmp_path
+    finally:
+        os.chdir(here)
+
+
+def test_a_folder_that_is_gone_is_no_error(tmp_path: Path) -> None:
+    here, gone = os.getcwd(), tmp_path / "gone"
+    gone.mkdir()
+    os.chdir(gone)
+    try:
+        with preserved():
+            gone.rmdir()
+        with preserved():
+            os.chdir(here)
+    finally:
+        os.chdir(here)
