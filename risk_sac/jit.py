@@ -6,11 +6,14 @@ keep the measures from costing several times the simulation.
 
 import hashlib
 import re
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+
+from risk_sac.machine import user_cache
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 SETTINGS = vars(numba.config)
@@ -35,15 +38,25 @@ def _sources() -> dict[Path, str]:
 
 
 def _cache_folder() -> str:
-    """A folder for what the sources of today compile to.
+    """A folder for what the sources of today compile to; empty where none can be written.
 
     numba looks at a function's own file only: after a change in a file whose functions it calls, the function would be
-    taken from disk with the old ones in it.
+    taken from disk with the old ones in it. The folders that it chooses by itself are not named by a digest either.
     """
     digest = hashlib.sha256()
     for _, text in sorted(_sources().items()):
         digest.update(text.encode())
-    return str(Path(SETTINGS["CACHE_DIR"] or HERE / "__pycache__") / digest.hexdigest()[:16])
+    cache = user_cache()
+    own = [HERE / "__pycache__"] if cache is None else [HERE / "__pycache__", cache / "risk-sac" / "compiled"]
+    for place in [Path(SETTINGS["CACHE_DIR"])] if SETTINGS["CACHE_DIR"] else own:
+        folder = place.absolute() / digest.hexdigest()[:16]
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=folder).close()
+        except OSError:
+            continue
+        return str(folder)
+    return ""
 
 
 SETTINGS["CACHE_DIR"] = _cache_folder()
@@ -51,7 +64,4 @@ SETTINGS["CACHE_DIR"] = _cache_folder()
 
 def compiled(function: Function) -> Function:
     """Compiles on first call; the result is kept on disk for the next process where there is a place for it."""
-    try:
-        return cast(Function, numba.njit(cache=True)(function))
-    except RuntimeError:  # a read-only installation without a cache folder
-        return cast(Function, numba.njit(function))
+    return cast(Function, numba.njit(cache=bool(SETTINGS["CACHE_DIR"]))(function))

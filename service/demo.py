@@ -146,7 +146,8 @@ def _write(out: Path, campaign: Campaign, results: Results, failures: Sequence[E
 
 
 def _series(campaign_id: str, failure: Episode) -> str:
-    folder = ServiceSettings(data_dir=Path()).run_folder(campaign_id, failure.run_id)
+    settings = ServiceSettings()
+    folder = settings.run_folder(campaign_id, failure.run_id).relative_to(settings.data_dir)
     return (folder / FAILURES / series_name(failure.index)).as_posix()
 
 

@@ -5,12 +5,13 @@ import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, FilePath
+from pydantic import AfterValidator, BeforeValidator, Field, FilePath
 from pydantic_core import from_json
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from risk_sac.execution.executor import ExecutorName
 from risk_sac.execution.ray.settings import RaySettings
+from risk_sac.machine import cores
 from risk_sac.run_folder.verified import TIMES
 
 MOST_WORKERS = 1024
@@ -27,13 +28,8 @@ def _parsed(value: object) -> object:
 Names = Annotated[list[str], NoDecode, BeforeValidator(_parsed)]
 
 
-def _cores() -> int:
-    """Cores this process may use, which inside a container are fewer than the machine has."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def _most_workers(given: dict[str, Any]) -> int:
-    return MOST_WORKERS if given.get("executor") == "ray" else _cores()
+    return MOST_WORKERS if given.get("executor") == "ray" else cores()
 
 
 class ServiceSettings(RaySettings, BaseSettings):
@@ -43,7 +39,7 @@ class ServiceSettings(RaySettings, BaseSettings):
         env_prefix="RISK_SAC_", frozen=True, use_attribute_docstrings=True, secrets_dir=SECRETS
     )
 
-    data_dir: Path = Path("data")
+    data_dir: Annotated[Path, AfterValidator(Path.absolute)] = Field(default=Path("data"), validate_default=True)
     """Folder of the database, checkpoints, recorded failures, API keys and uploaded networks."""
     database_url: str | None = None
     """SQLAlchemy URL of a PostgreSQL database (`postgresql+psycopg://…`); by default SQLite in `data_dir`."""

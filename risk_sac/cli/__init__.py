@@ -1,14 +1,18 @@
 """`risk-sac`: one run or a comparison of methods without a server, pictures of failures, the server, its campaigns."""
 
 import argparse
+import os
 import shlex
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from risk_sac import __version__
 from risk_sac.cli import campaigns, egos, export, places, regress, replay, report, run, serve, show, understand
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
+from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.scenario import library
 
 EPILOG = """exit status, but of `campaigns`, which says its own: 0 done; 1 failed; 2 a wrong setting or argument;
 130 interrupted, and the same command goes on."""
@@ -17,6 +21,7 @@ EPILOG = """exit status, but of `campaigns`, which says its own: 0 done; 1 faile
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
     options = _parser().parse_args(arguments)
+    _make_absolute(options)
     options.typed = shlex.join(["risk-sac", *(sys.argv[1:] if arguments is None else arguments)])
     try:
         status: int = options.command(options)
@@ -30,6 +35,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         complain("interrupted")
         return INTERRUPTED
     return status
+
+
+def _make_absolute(options: argparse.Namespace) -> None:
+    """Makes all paths absolute, in variables too: an ego may change the working directory."""
+    for name, value in vars(options).items():
+        if isinstance(value, Path):
+            setattr(options, name, value.absolute())
+        elif isinstance(value, list):
+            setattr(options, name, [each.absolute() if isinstance(each, Path) else each for each in value])
+    for name in (registry.FILE, library.VARIABLE):
+        if os.environ.get(name):
+            os.environ[name] = os.path.abspath(os.environ[name])
 
 
 def _parser() -> argparse.ArgumentParser:

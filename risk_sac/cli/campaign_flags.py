@@ -3,13 +3,13 @@
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from risk_sac.cli.console import EGO
 from risk_sac.config import METHODS
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
+from risk_sac.run_folder.scratch import scratch_folder
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, Map
 
@@ -109,6 +109,6 @@ def families_on_map(options: argparse.Namespace) -> list[str] | None:
         raise ConfigError("pattern", "nothing", f"one of {', '.join(FINDERS)}")
     if (flags.get("place") is None) == (flags.get("places") is None):
         raise ConfigError("place", "nothing, or places too", "the id of one", "`risk-sac places MAP` lists them")
-    with TemporaryDirectory() as folder:
-        chosen = Map(present_net(options.network, Path(folder)).file)
+    with scratch_folder() as folder:
+        chosen = Map(present_net(options.network, folder).file)
         return [chosen.keep(fit) for fit in chosen.fits(options.pattern, options.place)]

@@ -16,6 +16,7 @@ from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_campaign, read_ego
 from risk_sac.egos.registry import SHIPPED, cards
+from risk_sac.machine import cores
 from risk_sac.metrics import pooled_counts, wilson_interval
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def _ladder(options: argparse.Namespace) -> int:
     from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
 
     found: dict[str, Sequence[FinishedRun]] = {}
-    jobs, executor = options.jobs or os.cpu_count() or 1, os.environ.get("RISK_SAC_EXECUTOR", "local")
+    jobs, executor = options.jobs or cores(), os.environ.get("RISK_SAC_EXECUTOR", "local")
     for name, ego in egos.items():
         with progress_bar() as bar:
             campaign, folder = spec.model_copy(update={"ego": ego}), options.out / name

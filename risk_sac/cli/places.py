@@ -5,7 +5,6 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
@@ -14,6 +13,7 @@ from rich.table import Table
 
 from risk_sac.cli.campaign_flags import MAP_HELP
 from risk_sac.cli.console import FAILED, OK, Commands, add_command, console, counted
+from risk_sac.run_folder.scratch import scratch_folder
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, Map, survey
 from risk_sac.scenario.maps.found import TITLES, Pattern, Survey
@@ -41,8 +41,8 @@ def add(commands: Commands) -> None:
 
 def _places(options: argparse.Namespace) -> int:
     patterns: tuple[Pattern, ...] = (options.pattern,) if options.pattern else tuple(FINDERS)
-    with TemporaryDirectory() as folder:
-        converted = present_net(options.network, Path(folder))
+    with scratch_folder() as folder:
+        converted = present_net(options.network, folder)
         chosen = Map(converted.file)
         found = survey(chosen.net, patterns)
         warnings = [*converted.warnings, *net_remarks(chosen.net)]

@@ -1,12 +1,12 @@
 """`risk-sac bundle`, `replay` and `verify`: failures in files that stand alone, and played again."""
 
 import argparse
-import os
 from contextlib import closing
 from pathlib import Path
 
 from risk_sac.cli.console import FAILED, OK, Commands, add_command, complain, console, counted, printable
 from risk_sac.errors import SimulationError
+from risk_sac.machine import cores
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import TIMES, distinct_failures
 
@@ -75,7 +75,7 @@ def _verify(options: argparse.Namespace) -> int:
     from risk_sac.execution.verify import verify
 
     specs = {folder: read_results(folder).spec for folder in options.runs}
-    found = verify(options.runs, options.times, os.cpu_count() or 1)
+    found = verify(options.runs, options.times, cores())
     if missing := [folder for folder in specs if folder not in found]:
         raise SimulationError(f"{missing[0]} was not verified: its run is unfinished, or cannot be replayed")
     for folder, verified in found.items():

@@ -34,6 +34,7 @@ from risk_sac.cli.console import (
 )
 from risk_sac.config import METHODS, SHIPPED, RunSpec
 from risk_sac.config.spec_file import read_campaign, read_spec
+from risk_sac.machine import cores
 from risk_sac.metrics import METRICS, Metric
 from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import Results
@@ -148,7 +149,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
 
     with progress_bar() as bar:
-        fill = os.cpu_count() or 1 if options.executor == "local" else len(spec.runs())
+        fill = cores() if options.executor == "local" else len(spec.runs())
         jobs = options.jobs if options.jobs is not None else fill
         progress = partial(drawn, Board(bar))
         evaluation = evaluate(spec, options.out, options.typed, jobs, progress, options.executor, options.verify)

@@ -5,7 +5,6 @@ DIR/runs/<family>-<method>-<seed>/       a run's folder, see `risk_sac.run_folde
 DIR/table.{json,md,csv}, DIR/figures/    see `risk_sac.report`
 """
 
-import os
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -19,6 +18,7 @@ from risk_sac.execution.executor import executor_named
 from risk_sac.execution.jobs import Job, Progress, execute, worker_program
 from risk_sac.execution.runs import STOPPING, stop_signal
 from risk_sac.execution.verify import verify
+from risk_sac.machine import cores
 from risk_sac.problem import checked_campaign
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
 from risk_sac.run_folder.durable import held, replace_file
@@ -71,7 +71,7 @@ def evaluate(
             execute(queue, chosen, jobs, progress, stopping)
         if times and not stopping():
             finished = [job.folder for job in queue if job.state == "finished"]
-            verify(finished, times, min(jobs, os.cpu_count() or 1), stopping)  # here, wherever they were executed
+            verify(finished, times, min(jobs, cores()), stopping)  # here, wherever they were executed
         comparison = _report(spec, folder, command, queue)
         return Evaluation(
             comparison=comparison,

@@ -31,6 +31,7 @@ from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, He
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.durable import LOCK, lock
+from risk_sac.run_folder.scratch import remove_temporaries
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -242,7 +243,9 @@ def take_over(folder: Path) -> IO[bytes]:
     began = time.monotonic()
     while True:
         try:
-            return lock(folder / LOCK)
+            held = lock(folder / LOCK)
+            remove_temporaries(folder, time.time())
+            return held
         except BlockingIOError as error:
             waited_s = time.monotonic() - began
             if waited_s >= GIVE_UP_S:

@@ -10,6 +10,7 @@ import hashlib
 import logging
 import os
 import re
+import time
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -18,6 +19,7 @@ from typing import IO, Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.run_folder.scratch import remove_temporaries
 
 logger = logging.getLogger(__name__)
 
@@ -108,6 +110,7 @@ def held(folder: Path) -> Iterator[None]:
         yield
         return
     with file:
+        remove_temporaries(folder, time.time())
         yield
 
 

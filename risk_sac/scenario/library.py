@@ -14,6 +14,7 @@ from pathlib import Path
 
 from risk_sac.config import FAMILY_NAME
 from risk_sac.errors import ConfigError
+from risk_sac.machine import user_cache
 from risk_sac.scenario.place import PLACES, Place
 
 VARIABLE = "RISK_SAC_PLACES"
@@ -23,12 +24,14 @@ _NEW, _GONE = ".new-", ".gone-"
 
 
 def library() -> Path:
-    """The folder; it may not be there yet."""
+    """The folder; it may not be there yet. Raises `ConfigError` where nothing says where it is."""
     told = os.environ.get(VARIABLE)
     if told:
         return Path(told)
-    cache = os.environ.get("XDG_CACHE_HOME")
-    return (Path(cache) if cache else Path.home() / ".cache") / "risk-sac" / "places"
+    cache = user_cache()
+    if cache is None:
+        raise ConfigError(VARIABLE, "nothing, and this user has no home folder", "a folder for places on maps")
+    return cache / "risk-sac" / "places"
 
 
 def keep(place: Place, net: bytes) -> str:
@@ -51,8 +54,12 @@ def put(name: str, text: bytes, net: bytes) -> None:
     if folder.is_dir():
         os.utime(folder)  # it is wanted again: see `prune`
         return
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    new = Path(tempfile.mkdtemp(prefix=_NEW, dir=folder.parent))
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        new = Path(tempfile.mkdtemp(prefix=_NEW, dir=folder.parent))
+    except PermissionError as error:
+        got = f"{folder.parent}, which cannot be written ({error.strerror})"
+        raise ConfigError(VARIABLE, got, "a folder for places on maps that can be written") from error
     new.chmod(0o755)
     (new / NET).write_bytes(net)
     (new / PLACE).write_bytes(text)
@@ -85,18 +92,20 @@ def kept(name: str) -> Place:
     return PLACES.validate_json(text).model_copy(update={"net": str((library() / name / NET).absolute())})
 
 
-def prune(folder: Path, named: Collection[str], unused_s: float) -> list[str]:
+def prune(folder: Path, named: Collection[str], unused_s: float, started_at: float) -> list[str]:
     """Removes the places of a service's library that were put there long ago and are not named; returns their names.
 
     Args:
       folder: the library; never that of a person, whose run folders are unknown.
       named: families that stay.
       unused_s: least time since a place was last put there.
+      started_at: when the service started, s since the epoch; what was half put there before is removed.
     """
     removed = []
     for path in sorted(folder.glob("*")):
         ours = FAMILY_NAME.fullmatch(path.name) is not None and path.name not in named
-        if (ours or path.name.startswith(_NEW)) and path.stat().st_mtime < time.time() - unused_s:
+        oldest = started_at if path.name.startswith(_NEW) else time.time() - unused_s
+        if (ours or path.name.startswith(_NEW)) and path.stat().st_mtime < oldest:
             path.rename(path.with_name(f"{_GONE}{path.name}"))  # so that half of it is never found
             removed += [path.name] if ours else []
     for path in folder.glob(f"{_GONE}*"):

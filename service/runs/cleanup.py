@@ -83,6 +83,7 @@ class UnusedPlaces:
     def __init__(self, folder: Path, store: Store) -> None:
         self._folder = folder
         self._store = store
+        self._started_at = time.time()
         self._looked_at = float("-inf")
 
     def remove(self) -> None:
@@ -90,7 +91,7 @@ class UnusedPlaces:
         if time.monotonic() - self._looked_at < LOOK_S:
             return
         try:
-            removed = library.prune(self._folder, self._store.families(), UNUSED_S)
+            removed = library.prune(self._folder, self._store.families(), UNUSED_S, self._started_at)
         except OSError as error:
             raise StorageError(f"the library of places cannot be tidied ({error.strerror})") from error
         self._looked_at = time.monotonic()

@@ -4,7 +4,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import risk_sac.jit
+import risk_sac.machine
 
 ASK = "from risk_sac.risk.outer import outer; print(outer(1.0))"
 OUTER = """
@@ -25,15 +28,21 @@ def inner(x):
 """
 
 
-def test_a_change_in_a_called_function_or_a_constant_is_not_hidden_by_the_cache(tmp_path: Path) -> None:
+@pytest.mark.parametrize("read_only", [False, True])
+def test_a_change_in_a_called_function_or_a_constant_is_not_hidden_by_the_cache(
+    tmp_path: Path, read_only: bool
+) -> None:
     package = tmp_path / "risk_sac"
     (package / "risk").mkdir(parents=True)
-    shutil.copy(risk_sac.jit.__file__, package / "jit.py")
+    for module in (risk_sac.jit, risk_sac.machine):
+        shutil.copy(module.__file__, package)
+    if read_only:  # to root, too
+        (package / "__pycache__").touch()
     for module in ("__init__.py", "risk/__init__.py"):
         (package / module).touch()
     (package / "risk" / "outer.py").write_text(OUTER)
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    environment |= {"PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment |= {"PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1", "XDG_CACHE_HOME": str(tmp_path / "c")}
     answers = []
     for factor, added in ((1.0, 1.0), (1.0, 1.0), (1.0, 2.0), (5.0, 2.0)):
         (package / "risk" / "inner.py").write_text(INNER.format(added))
@@ -44,4 +53,4 @@ def test_a_change_in_a_called_function_or_a_constant_is_not_hidden_by_the_cache(
         assert found.returncode == 0, found.stderr
         answers.append(float(found.stdout))
     assert answers == [2.0, 2.0, 3.0, 7.0]
-    assert list(package.rglob("*.nbi"))
+    assert list((tmp_path / "c" if read_only else package / "__pycache__").rglob("*.nbi"))

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import tempfile
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.written import BESIDE, document
 from risk_sac.failures.net import Net, boundaries
+from risk_sac.run_folder.scratch import scratch_folder
 from risk_sac.types import Floats
 
 WALL_S = 120.0  # a second suffices
@@ -19,8 +19,8 @@ WALL_S = 120.0  # a second suffices
 
 def opendrive(file: Path, net: Net, name: str) -> bytes:
     """Returns the roads of a net under the map's name; a ConfigError if netconvert cannot write them."""
-    with tempfile.TemporaryDirectory() as folder:
-        made = Path(folder) / "roads.xodr"
+    with scratch_folder() as folder:
+        made = folder / "roads.xodr"
         _netconvert("--sumo-net-file", str(file), "--opendrive-output", str(made))
         root = ET.parse(made).getroot()
     for road in root.iter("road"):

@@ -403,8 +403,8 @@ def test_places_that_nobody_names_go_when_they_are_old(tmp_path: Path, monkeypat
     (tmp_path / "of somebody else").mkdir()
     for path in (named, old, "of somebody else"):
         os.utime(tmp_path / path, (0, 0))
-    assert library.prune(tmp_path, {named}, 3600.0) == [old]
+    assert library.prune(tmp_path, {named}, 3600.0, 0.0) == [old]
     assert {path.name for path in tmp_path.iterdir()} == {named, new, "of somebody else"}
     os.utime(tmp_path / new, (0, 0))
     assert library.keep(shipped("mixed"), b"<net/>") == new  # wanted again
-    assert library.prune(tmp_path, (), 3600.0) == [named]
+    assert library.prune(tmp_path, (), 3600.0, 0.0) == [named]

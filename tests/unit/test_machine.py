@@ -1,0 +1,76 @@
+import os
+from pathlib import Path
+
+import pytest
+
+from risk_sac.errors import ConfigError
+from risk_sac.machine import cores, user_cache
+from risk_sac.scenario import library
+
+
+def machine(folder: Path, cgroup: str, mount: str, files: dict[str, str]) -> Path:
+    """A process's folder in /proc, with the files of its control groups."""
+    for name, text in files.items():
+        file = folder / "cgroup_fs" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+    (folder / "cgroup").write_text(cgroup)
+    where = str(folder / "cgroup_fs").replace(" ", "\\040")
+    (folder / "mountinfo").write_text(f"31 23 0:28 {mount.format(where)}\n")
+    return folder
+
+
+V2 = "/ {} rw,relatime shared:4 - cgroup2 cgroup2 rw,nsdelegate"
+V1 = "/ {} rw - cgroup cgroup rw,cpu,cpuacct"
+
+
+@pytest.mark.parametrize(
+    ("cgroup", "mount", "files", "wanted"),
+    [
+        ("0::/a/b", V2, {}, 8),
+        ("0::/a/b", V2, {"a/b/cpu.max": "max 100000\n", "a/cpu.max": "max 100000\n"}, 8),
+        ("0::/a/b", V2, {"a/b/cpu.max": "200000 100000\n"}, 2),
+        ("0::/a/b", V2, {"a/b/cpu.max": "max 100000\n", "a/cpu.max": "300000 100000\n"}, 3),
+        ("0::/", V2, {"cpu.max": "150000 100000\n"}, 2),
+        ("0::/a", V2, {"a/cpu.max": "10000 100000\n"}, 1),
+        ("0::/a", V2, {"a/cpu.max": "9900000 100000\n"}, 8),
+        ("0::/docker/1", "/docker/1 {} rw - cgroup2 cgroup2 rw", {"cpu.max": "400000 100000"}, 4),
+        ("0::/docker/1/a", "/docker/1 {} rw - cgroup2 cgroup2 rw", {"a/cpu.max": "400000 100000"}, 4),
+        ("4:cpu,cpuacct:/a", V1, {"a/cpu.cfs_quota_us": "250000\n", "a/cpu.cfs_period_us": "100000\n"}, 3),
+        ("4:cpu,cpuacct:/a/b", V1, {"a/cpu.cfs_quota_us": "100000", "a/cpu.cfs_period_us": "100000"}, 1),
+        ("4:cpu,cpuacct:/a", V1, {"a/cpu.cfs_quota_us": "-1", "a/cpu.cfs_period_us": "100000"}, 8),
+        ("4:memory:/a", V1, {"a/cpu.cfs_quota_us": "100000", "a/cpu.cfs_period_us": "100000"}, 8),
+        ("0::/a", V2, {"a/cpu.max": "damaged"}, 8),
+    ],
+)
+def test_as_many_cores_are_used_as_affinity_and_quotas_allow(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cgroup: str, mount: str, files: dict[str, str], wanted: int
+) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(8)))
+    folder = tmp_path / "with a blank"
+    folder.mkdir()
+    assert cores(machine(folder, cgroup, mount, files)) == wanted
+
+
+def test_without_control_groups_the_affinity_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5})
+    assert cores(tmp_path) == 3
+
+
+def homeless() -> Path:
+    raise RuntimeError("Could not determine home directory.")
+
+
+def test_a_user_without_a_home_has_no_cache_and_the_library_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("XDG_CACHE_HOME", library.VARIABLE):
+        monkeypatch.delenv(name, raising=False)
+    for home in (homeless, lambda: Path("relative")):
+        monkeypatch.setattr(Path, "home", home)
+        assert user_cache() is None
+        with pytest.raises(ConfigError, match="RISK_SAC_PLACES: got nothing, and this user has no home folder"):
+            library.library()
+    monkeypatch.setattr(Path, "home", lambda: Path("/home/x"))
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert user_cache() == Path("/home/x/.cache")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/cache")
+    assert library.library() == Path("/cache/risk-sac/places")
