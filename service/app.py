@@ -125,7 +125,7 @@ def opened(
                 tables=Tables(helper),
                 regressions=regression_queue,
                 networks=uploaded,
-                surveys=Surveys(uploaded, settings.places_dir),
+                surveys=Surveys(uploaded, settings.places_dir, helper.stopping),
                 streams=Streams(store),
                 cursors=Cursors(cursor_secret(store.engine)),
                 metrics=registry(latencies, store, manager),

@@ -1,27 +1,33 @@
 """Helper processes: one question, one answer, bounded in time and memory.
 
 `run_helper` starts `python -m risk_sac.execution.helper`, which runs the wanted program in a session of its own and
-kills that session once its starter has gone. Question and answer are files, so a program may print what it likes.
+kills that session once its starter has gone. Question and answer are files, so a program may print what it likes. A
+process that a signal ended is started again, as a worker is.
 """
 
 import contextlib
+import logging
 import os
 import resource
 import runpy
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from risk_sac.run_folder.scratch import scratch_folder
+
+logger = logging.getLogger(__name__)
+
 QUESTION, ANSWER = "{question}", "{answer}"  # arguments that stand for the paths of these files
 ANSWER_BYTES = 256 << 20  # read of an answer, at most
 LOG_BYTES = 2000  # read of the end of a log, at most
 POLL_S = 0.05
+ATTEMPTS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +66,7 @@ def run_helper(
     Args:
       program: name of a module, or path of a `.py` file.
       arguments: for it; `QUESTION` and `ANSWER` become the paths of these files.
-      wall_s: the process and all that it started are killed after this time, s.
+      wall_s: the process and all that it started are killed after this time, s; all attempts share it.
       question: content of the question file.
       memory_bytes: address space that the process may use; 0 sets no limit.
       niceness: added to that of this process.
@@ -73,30 +79,35 @@ def run_helper(
     Raises:
       OSError: the process cannot be started.
     """
-    with tempfile.TemporaryDirectory() as scratch:
+    deadline = time.monotonic() + wall_s
+    with scratch_folder() as scratch:
         paths = {QUESTION: str(Path(scratch, "question")), ANSWER: str(Path(scratch, "answer"))}
         Path(paths[QUESTION]).write_bytes(question)
         log = log or Path(scratch, "log")
         command = [sys.executable, *(["-I"] if isolated else []), "-m", "risk_sac.execution.helper"]
         command += [str(niceness), str(memory_bytes), program, *(paths.get(each, each) for each in arguments)]
-        with log.open("wb") as output:
-            process = subprocess.Popen(
-                command,
-                cwd=cwd,
-                env=environment,
-                stdin=subprocess.PIPE,  # its end tells the process that this one has gone
-                stdout=output,
-                stderr=output,
-                start_new_session=True,
-            )
-        with process:
-            timed_out = _waited(process, wall_s, stopping)
+        for _ in range(ATTEMPTS):
+            Path(paths[ANSWER]).unlink(missing_ok=True)
+            with log.open("wb") as output:
+                process = subprocess.Popen(
+                    command,
+                    cwd=cwd,
+                    env=environment,
+                    stdin=subprocess.PIPE,  # its end tells the process that this one has gone
+                    stdout=output,
+                    stderr=output,
+                    start_new_session=True,
+                )
+            with process:
+                timed_out = _waited(process, deadline, stopping)
+            if process.returncode >= 0 or timed_out or stopping():
+                break
+            logger.warning("the process of %s was ended by signal %d", program, -process.returncode)
         return HelperResult(process.returncode, _head(Path(paths[ANSWER])), _tail(log), timed_out)
 
 
-def _waited(process: subprocess.Popen[bytes], wall_s: float, stopping: Callable[[], bool]) -> bool:
+def _waited(process: subprocess.Popen[bytes], deadline: float, stopping: Callable[[], bool]) -> bool:
     """Waits for the process and kills its whole session; returns whether the time was over."""
-    deadline = time.monotonic() + wall_s
     try:
         while not stopping():
             left_s = deadline - time.monotonic()

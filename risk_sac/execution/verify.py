@@ -49,9 +49,9 @@ def verify(
     failed = [folder for folder, verified in missing.items() if verified.episodes]
     told = _replayed(failed, times, max(jobs, 1), stopping) if failed else {}
     for folder in failed:
-        if len(told[folder]) == times:
+        if len(told[folder]) >= times:  # more, if a process was killed after it had told of this run
             same = {
-                index: Repetition(times=times, same=sum(index in each for each in told[folder]))
+                index: Repetition(times=times, same=sum(index in each for each in told[folder][:times]))
                 for index in missing[folder].episodes
             }
             missing[folder] = replace(missing[folder], episodes=same)

@@ -24,6 +24,7 @@ from risk_sac.run_folder.results import FAILURES, Results, read_results, series_
 from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import distinct_failures
 
+ATTEMPTS = 3
 Prepared = Mapping[Path, tuple[Results, RiskSacEnv]]
 
 
@@ -65,17 +66,21 @@ def _repeats(folder: Path, episode: EpisodeRecord, env: RiskSacEnv) -> bool:
 
 
 def _main(file: Path, times: int, jobs: int, folders: list[Path]) -> int:
-    """The greatest exit status of the processes."""
+    """The greatest exit status of the processes; one that was killed is replaced, up to `ATTEMPTS` times."""
     runs = _prepared(file, folders)
     soft_min(np.zeros(1), 1.0)  # the first call of any compiled function loads what all of them need
     fork, statuses = multiprocessing.get_context("fork"), [0]
-    for first in range(0, times, jobs):
-        processes = [fork.Process(target=_tell, args=(file, runs)) for _ in range(first, min(first + jobs, times))]
+    left, lost = times, 0
+    while left:
+        processes = [fork.Process(target=_tell, args=(file, runs)) for _ in range(min(jobs, left))]
         for process in processes:
             process.start()
         for process in processes:
             process.join()
-            statuses.append(abs(process.exitcode or 0))
+            killed = (process.exitcode or 0) < 0 and lost < ATTEMPTS
+            lost += killed
+            left -= not killed
+            statuses.append(0 if killed else abs(process.exitcode or 0))
     return max(statuses)
 
 

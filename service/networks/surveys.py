@@ -3,7 +3,7 @@
 import json
 import os
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,10 +28,11 @@ MOST_KEPT = 200  # answers that are remembered; what a network is never changes
 class Surveys:
     """Finds places on networks; used by many threads."""
 
-    def __init__(self, networks: NetworkStore, library: Path) -> None:
-        """Starts nothing; `library` is the folder of places that campaigns are run at."""
+    def __init__(self, networks: NetworkStore, library: Path, stopping: Callable[[], bool] = lambda: False) -> None:
+        """Starts nothing; `library` is the folder of places that campaigns are run at, `stopping` ends searches."""
         self._networks = networks
         self._library = library
+        self._stopping = stopping
         self._room = threading.BoundedSemaphore(AT_ONCE)
         self._asking = threading.BoundedSemaphore(MOST_ASKING)
         self._counting = threading.Lock()
@@ -92,6 +93,7 @@ class Surveys:
                     isolated=True,
                     cwd=folder,
                     environment=environment,
+                    stopping=self._stopping,
                 )
             except OSError as error:
                 raise StorageError(f"places cannot be looked for ({error.strerror})") from error

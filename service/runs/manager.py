@@ -1,10 +1,13 @@
 """Queue, limits, launch, retry, pause, cancel, recover, delete: the only writer of the database."""
 
 import logging
+import tempfile
 import threading
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.executor import FOLDER, Cluster, Executor, Program
@@ -12,6 +15,7 @@ from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler
 from risk_sac.problem import checked_campaign
 from risk_sac.records import State, Triage, TriageState
+from risk_sac.run_folder.scratch import remove_abandoned, remove_temporaries
 from service.errors import ConflictError, OutdatedError, StorageError
 from service.runs.cleanup import Retention, UnusedPlaces, dispose, settle
 from service.runs.quota import check_quota, exhausted
@@ -78,6 +82,7 @@ class Manager:
             settle(self._settings.data_dir / "campaigns", self._store.exists)
         except OSError as error:
             raise StorageError(refused("tidying the data folder", self._settings.data_dir, error)) from error
+        threading.Thread(target=_tidy, args=(self._settings.data_dir, time.time()), name="tidy", daemon=True).start()
         resumed = self._ledger.resume()
         if resumed:
             logger.info("%d interrupted runs go back to the queue", resumed)
@@ -240,6 +245,12 @@ class Manager:
     def storage_refused(self, run: QueuedRun, reason: str) -> None:
         """See `RunStore`."""
         self._pause(reason, run)
+
+
+def _tidy(data_dir: Path, before: float) -> None:
+    """Removes what processes that were killed left half written."""
+    remove_abandoned(Path(tempfile.gettempdir()))
+    remove_temporaries(data_dir, before)
 
 
 def worker_program(settings: ServiceSettings) -> Program:

@@ -63,6 +63,7 @@ class Helper:
 
     def __init__(self, settings: ServiceSettings) -> None:
         self._niceness, self._stopping = settings.worker_niceness, threading.Event()
+        self.stopping = self._stopping.is_set
 
     def stop(self) -> None:
         """Ends the processes at work."""
@@ -77,7 +78,7 @@ class Helper:
                 question=question,
                 wall_s=WALL_S,
                 niceness=self._niceness,
-                stopping=self._stopping.is_set,
+                stopping=self.stopping,
             )
         except OSError as error:
             raise StorageError(f"no process can be started for it ({error.strerror})") from error

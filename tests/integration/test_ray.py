@@ -55,7 +55,7 @@ def folder_beside(cluster: Cluster, run: str, *others: Path) -> Path:
     found: list[Path] = []
 
     def there() -> bool:
-        found[:] = [each for each in cluster.scratch.glob(f"{run}-*/{run}") if each not in others]
+        found[:] = [each for each in cluster.scratch.glob(f"*/{run}") if each not in others]
         return len(found) == 1
 
     wait_until(there)

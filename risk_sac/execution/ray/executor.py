@@ -3,7 +3,6 @@
 import contextlib
 import logging
 import os
-import secrets
 import socket
 import subprocess
 import sys
@@ -23,6 +22,7 @@ from risk_sac.execution.mailbox import Mailbox
 from risk_sac.execution.messages import Event
 from risk_sac.execution.ray.node import Order
 from risk_sac.execution.ray.settings import ADDRESS, read_settings
+from risk_sac.run_folder.scratch import scratch_name
 from risk_sac.scenario import library
 
 logger = logging.getLogger(__name__)
@@ -86,7 +86,7 @@ class RayExecutor:
 
     def _order(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> Order:
         """An attempt, with the egos that the server's operator has registered and the run's place."""
-        scratch = self._scratch / f"{folder.name}-{secrets.token_hex(8)}"
+        scratch = self._scratch / scratch_name()
         beside: dict[str, Path] = {}
         environment = {registry.FILE: ""}  # whatever a node registers by itself does not count
         if registered := os.environ.get(registry.FILE):

@@ -5,7 +5,6 @@ It works in a folder of its node, which begins with the files of the run's folde
 """
 
 import contextlib
-import fcntl
 import os
 import shutil
 import sys
@@ -25,6 +24,7 @@ from risk_sac.execution.messages import Event
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.execution.ray.settings import ADDRESS, variable
 from risk_sac.run_folder.durable import replace_file
+from risk_sac.run_folder.scratch import claim
 
 GATHER_S = 0.25  # words within it are handed on at once
 GROWN_S = 2.0  # between two copies of files that only grow
@@ -123,34 +123,6 @@ class Attendant:
             if grown:
                 self._grown_due = time.monotonic() + max(GROWN_S, size / GROWN_BYTES_PER_S)
                 grown = False
-
-
-def claim(scratch: Path) -> int:
-    """Makes the folder of an attempt, and removes those of attempts whose actors have gone.
-
-    Returns the descriptor by which this process locks it; the kernel unlocks it when the process dies.
-    """
-    others = os.open(scratch.parent, os.O_RDONLY)
-    fcntl.flock(others, fcntl.LOCK_EX)  # else another actor takes the new folder for an old one
-    try:
-        for folder in scratch.parent.iterdir():
-            with contextlib.suppress(OSError):
-                os.close(_locked(folder))
-                shutil.rmtree(folder, ignore_errors=True)
-        scratch.mkdir(mode=0o700)
-        return _locked(scratch)
-    finally:
-        os.close(others)
-
-
-def _locked(folder: Path) -> int:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(descriptor)
-        raise
-    return descriptor
 
 
 def check(scratch: Path, expected: Versions) -> None:

@@ -60,6 +60,24 @@ def test_a_helper_that_is_not_wanted_any_more_is_killed(run, tmp_path):
     assert (result.status, result.timed_out) == (-9, False)
 
 
+@pytest.mark.parametrize("number", [9, 15, 11])
+def test_a_helper_that_a_signal_ends_is_started_again(run, tmp_path, number):
+    code = f"""
+import os, sys
+tries = len(os.listdir()) + 1
+open(str(tries), 'w').close()
+open(sys.argv[1], 'w').write('half' if tries < 3 else 'whole')
+os.kill(os.getpid(), {number}) if tries < 3 else None
+"""
+    (tmp_path / "tries").mkdir()
+    result = run(code, ANSWER, cwd=tmp_path / "tries")
+    assert (result.status, result.answer) == (0, b"whole")
+
+
+def test_a_helper_that_signals_end_again_and_again_is_given_up(run):
+    assert run("import os; print('x'); os.kill(os.getpid(), 9)").status == -9
+
+
 def test_a_helper_is_nicer_and_has_the_memory_that_it_is_given(run):
     result = run("import os; print(os.nice(0)); bytearray(1 << 30)", niceness=3, memory_bytes=1 << 29)
     assert result.log.startswith(f"{os.nice(0) + 3}\n")
