@@ -44,15 +44,6 @@ def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Clie
     assert client.table(campaign.id).startswith("# Comparison of methods")
 
 
-def test_failures_are_read_page_by_page(client: Client) -> None:
-    campaign = client.wait(client.submit(SPEC).id, timeout_s=LONG_S)
-    found = list(client.failures(campaign.id, page=2))
-    assert len({failure.id for failure in found}) == 6
-    only = list(client.failures(campaign.id, run="low-random-1"))
-    assert {failure.run_id for failure in only} == {"low-random-1"}
-    assert client.failure(campaign.id, only[0].id).index == only[0].index
-
-
 def test_the_events_tell_of_every_episode_and_of_the_end(client: Client) -> None:
     campaign = client.submit(SPEC)
     events = list(client.events(campaign.id))
@@ -63,17 +54,6 @@ def test_the_events_tell_of_every_episode_and_of_the_end(client: Client) -> None
     assert (events[-1].name, events[-1].data["run_id"], events[-1].data["state"]) == ("state", None, "succeeded")
     assert list(client.events(campaign.id, events[3].id)) == events[4:]
     assert list(client.events(campaign.id, events[-1].id)) == []
-
-
-def test_lists_are_filtered_by_the_service(client: Client) -> None:
-    other = client.submit(SPEC.model_copy(update={"label": "rare", "families": ("dense",)}))
-    client.submit(SPEC)
-    assert [each.id for each in client.campaigns(label="rare")] == [other.id]
-    assert [each.id for each in client.campaigns(family="dense", method="random")] == [other.id]
-    assert list(client.campaigns(method="sac")) == []
-    everything = [each.id for each in client.campaigns(page=2)]
-    assert other.id in everything
-    assert len(set(everything)) == len(everything)
 
 
 def test_a_campaign_is_cancelled_and_then_deleted(client: Client) -> None:
@@ -88,13 +68,6 @@ def test_a_campaign_is_cancelled_and_then_deleted(client: Client) -> None:
     with pytest.raises(Refused) as caught:
         client.campaign(campaign.id)
     assert (caught.value.status, caught.value.reason) == (404, "unknown_id")
-
-
-def test_a_wrong_spec_is_refused_with_the_field(client: Client) -> None:
-    with pytest.raises(Refused) as caught:
-        client.submit({"families": ["low"], "budget": {"episodes": 0}})
-    assert caught.value.status == 422
-    assert [field.field for field in caught.value.fields] == ["budget.episodes"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.torture)])

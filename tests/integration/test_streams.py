@@ -100,26 +100,6 @@ def test_a_stream_of_what_comes_tells_all_that_comes(shared):
     assert [first, *tail] == told_all[told_all.index(first) :]
 
 
-@pytest.mark.torture
-def test_what_was_told_first_is_told_again_in_its_order_from_every_id(serve):
-    """Followed as it happens, through a server that stops amid it and through two runs that wait and go on."""
-    service = serve("striking_worker")
-    campaign_id = service.post(seeds=[0, 1], methods=["random", "sac"], budget={"episodes": 60})
-    first = []
-    while not (first and told(first[-1]) == ("state", None, "succeeded")):
-        for event in events(service.client, campaign_id, first[-1]["id"] if first else None):
-            first.append(event)
-            if len(first) == 20:
-                service.stop(signal.SIGKILL)
-                service.start()
-                break
-    assert ("state", "low-random-0", "queued") in map(told, first)
-    assert len(first) > 100
-    assert list(events(service.client, campaign_id)) == first
-    for index, event in enumerate(first):
-        assert list(events(service.client, campaign_id, event["id"])) == first[index + 1 :]
-
-
 @pytest.mark.parametrize("kills", [2, pytest.param(5, marks=pytest.mark.torture)])
 def test_streams_through_killed_servers_tell_everything_once(serve, kills):
     """Each client comes back with the last id it has; the server is killed under them again and again."""

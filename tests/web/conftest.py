@@ -1,5 +1,6 @@
 """The page in a real browser, on a real service with a real campaign."""
 
+import fcntl
 import os
 import shutil
 from collections.abc import Callable, Iterator
@@ -8,6 +9,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+import sumo_nets
 from tests.server import ROOT, Service, servers
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
@@ -24,6 +26,8 @@ LONG_MS = 120_000  # what has not happened by then never will, however busy the 
 if EXECUTABLE:
     expect.set_options(timeout=LONG_MS)
 AXE = ROOT / "service" / "web" / "node_modules" / "axe-core" / "axe.min.js"
+NET = Path(sumo_nets.__path__[0]) / "dense" / "dense.net.xml"
+HOSTILE = "<img src=x onerror=alert(1)> a very long label " + "x" * 100
 CAMPAIGN = {
     "label": "night <b>7</b>",
     "families": ["low", "mixed"],
@@ -44,21 +48,51 @@ def browser() -> Iterator["Browser"]:
 
 
 @pytest.fixture(scope="session")
-def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
-    """A service with real workers."""
-    with servers(tmp_path_factory.mktemp("page")) as start:
+def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The data folder and the id of a finished campaign of two families, which one test process plays for all.
+
+    It has valid failures and refused contacts; its label is hostile.
+    """
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "page"
+    folder.mkdir(exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        known = folder / "campaign"
+        if not known.exists():
+            with servers(folder) as start:
+                service = start("risk_sac.execution.worker")
+                posted = service.post(**CAMPAIGN)
+                ended = service.wait(posted)
+                assert ended["state"] == "succeeded"
+                assert ended["progress"]["distinct_failures"] >= 3
+                assert ended["progress"]["raw_collisions"] > ended["progress"]["failures"]
+                service.stop()
+            known.write_text(posted)
+    return folder, known.read_text()
+
+
+@pytest.fixture(scope="session")
+def service(tmp_path_factory: pytest.TempPathFactory, played: tuple[Path, str]) -> Iterator[Service]:
+    """A service with real workers, which has the finished campaign."""
+    folder = tmp_path_factory.mktemp("page") / "data"
+    shutil.copytree(played[0] / "data", folder)
+    with servers(folder.parent) as start:
         yield start("risk_sac.execution.worker")
 
 
 @pytest.fixture(scope="session")
-def campaign(service: Service) -> str:
-    """A finished campaign of two families with valid failures and refused contacts; its label is hostile."""
-    posted = service.post(**CAMPAIGN)
-    ended = service.wait(posted)
-    assert ended["state"] == "succeeded"
-    assert ended["progress"]["distinct_failures"] >= 3
-    assert ended["progress"]["raw_collisions"] > ended["progress"]["failures"]
-    return posted
+def campaign(service: Service, played: tuple[Path, str]) -> str:
+    """The finished campaign."""
+    return played[1]
+
+
+@pytest.fixture(scope="session")
+def network(service: Service) -> str:
+    """A map that the service has, under a label that is long and hostile."""
+    headers = {"content-type": "application/xml"}
+    answer = service.client.post("/v1/networks", params={"label": HOSTILE}, content=NET.read_bytes(), headers=headers)
+    return str(answer.raise_for_status().json()["id"])
 
 
 @pytest.fixture

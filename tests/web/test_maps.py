@@ -6,22 +6,10 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
 from playwright.sync_api import Page, expect
 
-import sumo_nets
 from tests.server import Service
-
-NET = Path(sumo_nets.__path__[0]) / "dense" / "dense.net.xml"
-HOSTILE = "<img src=x onerror=alert(1)> a very long label " + "x" * 100
-
-
-@pytest.fixture(scope="module")
-def network(service: Service) -> str:
-    """A map that the service has, under a hostile label."""
-    headers = {"content-type": "application/xml"}
-    answer = service.client.post("/v1/networks", params={"label": HOSTILE}, content=NET.read_bytes(), headers=headers)
-    return str(answer.raise_for_status().json()["id"])
+from tests.web.conftest import NET
 
 
 def upload(page: Page, file: Path, label: str = "") -> None:

@@ -14,7 +14,6 @@ from playwright.sync_api import Locator, Page, expect
 from tests.server import Service
 
 DRAWN = "(canvas) => canvas.drawn"
-ACTORS, STEPS = 20, 150
 LATE_DRIVERS = ("idle", "careful")
 
 
@@ -300,59 +299,3 @@ def test_a_twin_that_cannot_be_played_says_so(
     twin = page.get_by_role("region", name="Its twin")
     expect(twin).to_contain_text("This twin cannot be played.")
     expect(twin).to_contain_text("the scene has <b>other</b> parameters now")
-
-
-@pytest.mark.torture
-def test_frames_per_second_with_many_actors(
-    failure: dict[str, Any], new_page: Callable[..., Page], service: Service, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Printed and not judged: the machine may be busy."""
-    page = new_page()
-    page.route(f"**/v1/{failure['place']}", lambda route: route.fulfill(json=crowded(failure)))
-    page.goto(f"{service.client.base_url}/page/#/{failure['place']}")
-    canvas = stage(page)
-    assert len(canvas.evaluate(DRAWN)["actors"]) == ACTORS
-    page.keyboard.press("Home")
-    page.get_by_role("button", name="Play", exact=True).click()
-    gaps = page.evaluate(
-        """() => new Promise((done) => {
-          const canvas = document.querySelector("canvas.stage"), seen = [], drawn = new Set();
-          const tick = (now) => {
-            seen.push(now);
-            drawn.add(canvas.dataset.time);
-            if (seen.length < 240) requestAnimationFrame(tick);
-            else done({ ms: seen.slice(1).map((each, k) => each - seen[k]), drawn: drawn.size });
-          };
-          requestAnimationFrame(tick);
-        })"""
-    )
-    ms = np.array(gaps["ms"])
-    with capsys.disabled():
-        print(
-            f"\nreplay of {ACTORS} actors, {STEPS} steps: {1000 / ms.mean():.1f} frames per second, "
-            f"95 % within {np.quantile(ms, 0.95):.1f} ms, {gaps['drawn']} different pictures in {len(ms) + 1} frames"
-        )
-    assert gaps["drawn"] > 100
-
-
-def crowded(failure: dict[str, Any]) -> dict[str, Any]:
-    """The failure with copies of its last actors beside it, and its time stretched to more steps."""
-    series = dict(failure["series"])
-    old = np.array(series["time_s"])
-    steps = np.linspace(0, len(old) - 1, STEPS)
-    columns = [min(k, len(series["ids"]) - 1) for k in range(ACTORS)]
-    for key, value in series.items():
-        if isinstance(value, list) and len(value) == len(old) and len(value) != len(series["ids"]):
-            value = [value[round(step)] for step in steps]
-            wide = isinstance(value[0], list) and len(value[0]) == len(failure["series"]["ids"])
-            series[key] = [[row[k] for k in columns] for row in value] if wide else value
-    for key in ("kind", "role", "length_m", "width_m"):
-        series[key] = [series[key][k] for k in columns]
-    for row in series["y_m"]:
-        for k in range(ACTORS):
-            if row[k] is not None and k >= len(failure["series"]["ids"]):
-                row[k] += 3.5 * (k - len(failure["series"]["ids"]) + 1)
-    series["ids"] = [*series["ids"], *(f"copy_{k}" for k in range(ACTORS - len(series["ids"])))]
-    end = old[-1]
-    series["time_s"] = [float(end - 0.1 * (STEPS - 1 - k)) for k in range(STEPS)]
-    return {key: value for key, value in failure.items() if key != "place"} | {"series": series}

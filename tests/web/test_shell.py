@@ -79,22 +79,6 @@ def _make_key(service: Service) -> str:
     return key
 
 
-def test_a_lost_server_is_told_of_and_its_return_noticed(new_page: Callable[..., Page], tmp_path: Path) -> None:
-    with servers(tmp_path) as start:
-        service = start()
-        page = new_page(allowed=("ERR_", "Failed to load"))
-        page.goto(f"{service.client.base_url}/page/#/campaigns/unknown")
-        expect(page.get_by_role("alert")).to_contain_text("unknown")
-        page.goto(f"{service.client.base_url}/page/#/campaigns")
-        page.get_by_role("heading", name="Campaigns").wait_for()
-        service.stop()
-        page.get_by_role("link", name="Compare").click()
-        page.get_by_role("link", name="Campaigns").click()
-        expect(page.get_by_text("The service does not answer").first).to_be_visible()
-        service.start()
-        expect(page.get_by_text("The service does not answer")).to_have_count(0)
-
-
 def test_nothing_is_served_outside_the_page(service: Service) -> None:
     for path in ("/page/../settings.py", "/page/%2e%2e/backend.py", "/page/assets/../../backend.py"):
         answer = httpx.get(f"{service.client.base_url}{path}")

@@ -1,10 +1,8 @@
 import pytest
 
 from service.api.answers.problems import ProblemError
-from service.api.context import Caller, check_scope
-from service.api.guards.gate import RateLimit, allowed_hosts, check_host, check_origin
+from service.api.guards.gate import allowed_hosts, check_host, check_origin
 from service.app import create_app
-from service.keys.file import Scope
 from service.settings import ServiceSettings
 
 
@@ -73,36 +71,6 @@ def test_only_own_and_named_pages_change_anything(origin: bytes | None, status: 
         assert refuses(check_origin, method, headers, origins) == status
     for method in ("GET", "HEAD", "OPTIONS"):
         assert refuses(check_origin, method, headers, origins) == 0
-
-
-@pytest.mark.parametrize(("scope", "reach"), [(Scope.READ, 1), (Scope.RUN, 2), (Scope.ADMIN, 3)])
-def test_a_key_reaches_as_far_as_its_scope(scope: Scope, reach: int) -> None:
-    caller = Caller("maps", scope, "k")
-    assert [refuses(check_scope, caller, wanted) for wanted in Scope] == [0] * reach + [403] * (3 - reach)
-    assert caller.sees == (None if scope is Scope.ADMIN else "maps")
-
-
-def test_each_is_counted_alone_and_told_when_to_come_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = 1000.0
-    monkeypatch.setattr("service.api.guards.gate.time.monotonic", lambda: now)
-
-    def late(times: int, *who: str) -> list[ProblemError]:
-        found = []
-        for _ in range(times):
-            try:
-                rate.count(*who)
-            except ProblemError as error:
-                found.append(error)
-        return found
-
-    rate = RateLimit(5)
-    assert late(5, "key", "a") == []
-    (refused,) = late(1, "key", "a")
-    assert (refused.status, refused.headers) == (429, {"Retry-After": "1"})
-    assert late(5, "key", "b") == []
-    assert late(5, "address", "a") == [], "an address that is called like a key is not the key"
-    now += 1
-    assert late(5, "key", "a") == []
 
 
 def test_what_the_guards_answer_is_documented_for_every_route() -> None:

@@ -66,11 +66,6 @@ def test_more_workers_never_take_longer(done, workers):
     assert 0 <= eta_s(runs, workers + 1) <= eta_s(runs, workers)
 
 
-def test_runs_that_ended_early_leave_no_work():
-    failed = changed(RUN, state=State.FAILED, episodes_done=10, busy_s=10.0)
-    assert eta_s([failed], workers=1) == 0.0
-
-
 def test_progress_counts_all_runs_and_shows_those_at_work(ledger, metrics):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random")))
     ended = changed(RUN, state=State.SUCCEEDED, episodes_done=100, failures=5, raw_collisions=9, metrics=metrics)
