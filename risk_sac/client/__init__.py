@@ -15,7 +15,6 @@ with Client("http://127.0.0.1:8000") as client:
 from risk_sac.client.client import Client, Event
 from risk_sac.client.errors import (
     ClientError,
-    FieldProblem,
     Overdue,
     Refused,
     StreamLost,
@@ -28,6 +27,7 @@ from risk_sac.records import (
     Collision,
     Episode,
     Failure,
+    FieldProblem,
     Judgement,
     Progress,
     Results,

@@ -14,9 +14,10 @@ from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 
 import httpx
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from risk_sac.errors import RiskSacError
+from risk_sac.records import FieldProblem
 
 
 class ClientError(RiskSacError):
@@ -38,17 +39,6 @@ class StreamLost(Unreachable):
     """The stream of events broke after it had begun; it continues after the last event that arrived."""
 
 
-class FieldProblem(BaseModel):
-    """What is wrong with one field."""
-
-    model_config = ConfigDict(frozen=True)
-
-    field: str  # dotted path as it was written, such as `budget.episodes`
-    message: str
-    got: str = ""
-    wanted: str = ""
-
-
 class _Problem(BaseModel):
     detail: str
     reason: str = ""
@@ -60,7 +50,7 @@ class Refused(ClientError):
 
     def __init__(self, response: httpx.Response, *, passing: bool) -> None:
         try:
-            problem = _Problem.model_validate_json(response.content)
+            problem = _Problem.model_validate_json(response.content, extra="allow")
         except ValidationError:
             problem = _Problem(detail=response.reason_phrase)
         super().__init__(f"{response.url} answered {response.status_code}: {problem.detail}")

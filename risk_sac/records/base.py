@@ -63,3 +63,14 @@ class Page(Record, Generic[T]):
     items: list[T]
     next: str | None
     """Pass as `cursor` to continue; null at the end."""
+
+
+class FieldProblem(Record):
+    """What is wrong with one field."""
+
+    field: str
+    """Dotted path as it was written, such as `budget.episodes`."""
+    message: str
+    got: str
+    """The offending value as JSON, shortened."""
+    wanted: str

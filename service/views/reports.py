@@ -3,6 +3,7 @@
 import hashlib
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from risk_sac import __version__
@@ -17,24 +18,19 @@ from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign, StoredRun
 
 
+@dataclass(frozen=True)
 class CampaignReport:
-    """One edition of a campaign's report.
+    """One edition of a campaign's report."""
 
-    Attributes:
-      comparison: its content, without commands.
-      folders: of the runs, by the digest of their specs.
-      lasting: whether it may be kept: not if a finished run's folder could not be read.
-    """
-
-    def __init__(
-        self, campaign: StoredCampaign, comparison: Comparison, folders: Mapping[str, Path], *, lasting: bool
-    ) -> None:
-        self.comparison = comparison
-        self.folders = folders
-        self.lasting = lasting
-        self._campaign_id = campaign.id
-        self._lock = threading.Lock()
-        self._drawn: dict[tuple[str, Format], bytes] = {}
+    campaign_id: str
+    comparison: Comparison
+    """Its content, without commands."""
+    folders: Mapping[str, Path]
+    """Of the runs, by the digest of their specs."""
+    lasting: bool
+    """Whether it may be kept: not if a finished run's folder could not be read."""
+    _drawn: dict[tuple[str, Format], bytes] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
     def figures(self) -> tuple[str, ...]:
@@ -44,7 +40,7 @@ class CampaignReport:
     def figure(self, name: str, format_: Format) -> bytes:
         """One figure as a file, drawn once; NotFoundError if there is no such figure."""
         if name not in self.figures:
-            message = f"campaign {self._campaign_id} has no figure {name!r}; GET its `figures` lists those there are"
+            message = f"campaign {self.campaign_id} has no figure {name!r}; GET its `figures` lists those there are"
             raise NotFoundError(message, field="name", got=name)
         with self._lock:  # a second request for a figure waits for the first
             if (name, format_) not in self._drawn:
@@ -96,7 +92,7 @@ class Reports:
                 lasting = False
         comparison = compare(campaign.spec, found, command="", reasons=reasons)
         folders = {run.spec_digest: self._settings.run_folder(campaign.id, run.id) for run in campaign.runs}
-        return CampaignReport(campaign, comparison, folders, lasting=lasting)
+        return CampaignReport(campaign.id, comparison, folders, lasting)
 
 
 def _missing(run: StoredRun) -> str:

@@ -18,7 +18,7 @@ from starlette.types import Scope
 
 from risk_sac.config.invalid import LONGEST_VALUE, causes, field_error, shown
 from risk_sac.errors import ConfigError
-from risk_sac.records import Record
+from risk_sac.records import FieldProblem, Record
 from service.api.answers.representations import NotModified
 from service.errors import (
     BusyError,
@@ -66,17 +66,6 @@ class Reason(StrEnum):
     CONNECTIONS_BUSY = "connections_busy"
     STORAGE_UNAVAILABLE = "storage_unavailable"
     MANAGER_STOPPED = "manager_stopped"
-
-
-class FieldProblem(Record):
-    """What is wrong with one field."""
-
-    field: str
-    """Dotted path as it was written, such as `budget.episodes`."""
-    message: str
-    got: str
-    """The offending value as JSON, shortened."""
-    wanted: str
 
 
 class Problem(Record):
