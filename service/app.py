@@ -112,6 +112,7 @@ def opened(
         os.environ[VARIABLE] = str(settings.places_dir.absolute())
         manager, regression_queue, helper = Manager(settings, store, executor), Regressions(settings), Helper(settings)
         uploaded = NetworkStore(settings.networks_dir)
+        surveys = Surveys(uploaded, settings.places_dir, helper.stopping)
         manager.start()
         try:
             regression_queue.start()
@@ -125,12 +126,13 @@ def opened(
                 tables=Tables(helper),
                 regressions=regression_queue,
                 networks=uploaded,
-                surveys=Surveys(uploaded, settings.places_dir, helper.stopping),
+                surveys=surveys,
                 streams=Streams(store),
                 cursors=Cursors(cursor_secret(store.engine)),
                 metrics=registry(latencies, store, manager),
             )
         finally:
             helper.stop()
+            surveys.stop()
             regression_queue.stop()
             manager.stop()

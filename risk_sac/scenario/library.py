@@ -13,7 +13,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from risk_sac.config import FAMILY_NAME
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.machine import user_cache
 from risk_sac.scenario.place import PLACES, Place
 
@@ -43,7 +43,7 @@ def keep(place: Place, net: bytes) -> str:
 
 
 def put(name: str, text: bytes, net: bytes) -> None:
-    """Puts what `files_of` returned into the library, unless it is there.
+    """Puts what `files_of` returned into the library, unless it is there and whole.
 
     Raises:
       ConfigError: it is not what its name says.
@@ -52,8 +52,13 @@ def put(name: str, text: bytes, net: bytes) -> None:
         raise ConfigError("family", f"the place {name!r} is not what its name says")
     folder = library() / name
     if folder.is_dir():
-        os.utime(folder)  # it is wanted again: see `prune`
-        return
+        try:
+            files_of(name)
+        except (ConfigError, DamagedError):
+            shutil.rmtree(folder)
+        else:
+            os.utime(folder)  # it is wanted again: see `prune`
+            return
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         new = Path(tempfile.mkdtemp(prefix=_NEW, dir=folder.parent))
@@ -72,7 +77,12 @@ def put(name: str, text: bytes, net: bytes) -> None:
 
 
 def files_of(name: str) -> tuple[bytes, bytes]:
-    """A place and the piece of net around it, as they are kept; raises `ConfigError` if missing or damaged."""
+    """A place and the piece of net around it, as they are kept.
+
+    Raises:
+      ConfigError: there is none of this name.
+      DamagedError: its files are not as they were written.
+    """
     folder = library() / name
     try:
         if not FAMILY_NAME.fullmatch(name):
@@ -82,7 +92,7 @@ def files_of(name: str) -> tuple[bytes, bytes]:
         remedy = f"name low, mixed, dense, or one that lies in {library()} ({VARIABLE} names another folder)"
         raise ConfigError("family", f"there is no place {name!r}", remedy=remedy) from None
     if not name.endswith(f"_{_digest(text, net)}"):
-        raise ConfigError("family", f"the place {name!r} in {library()} is damaged", remedy="find it on its map anew")
+        raise DamagedError(f"the place {name!r} in {library()} is damaged; name the place on its map once more")
     return text, net
 
 

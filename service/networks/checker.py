@@ -17,7 +17,7 @@ from pathlib import Path
 from risk_sac.errors import MapError
 from risk_sac.scenario.maps.convert import Converted, present_net
 from risk_sac.scenario.maps.documents import MAX_ROADS
-from risk_sac.scenario.maps.net import parse_net, read_tree
+from risk_sac.scenario.maps.read_net import parse_net, read_tree
 from risk_sac.scenario.maps.summary import net_remarks, summary
 from service.errors import UploadError
 from service.networks import limits

@@ -4,6 +4,7 @@ Whatever is there is whole: an upload is checked in a folder beside them and mov
 comes from a user, and what was sent is not kept, only what the checker wrote anew.
 """
 
+import hashlib
 import logging
 import re
 import secrets
@@ -121,6 +122,15 @@ class NetworkStore:
         """Where the files of a network are; raises what `get` does."""
         self.get(network_id, project)
         return self._path(network_id, project)
+
+    def check_files(self, folder: Path) -> None:
+        """Raises `StorageError` if a file of a network is not as the checker wrote it."""
+        with _refusals("a network cannot be read"):
+            for file in _read(folder).files:
+                if hashlib.sha256((folder / file.name).read_bytes()).hexdigest() != file.sha256:
+                    raise StorageError(
+                        f"network {folder.name} is damaged: {file.name} is not as it was written; upload the map again"
+                    )
 
     def delete(self, network_id: str, project: str | None) -> None:
         """Removes a network; at once for those who look, then from the disk."""

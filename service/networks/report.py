@@ -10,6 +10,7 @@ from risk_sac.scenario.maps.summary import Summary
 
 MEDIA_TYPES = ("application/xml", "text/xml", "application/gzip", "application/x-gzip", "application/zip")
 PLACES, PICTURE = "places.json", "places.png"  # what a search for places leaves beside the net
+PROGRESS = "progress"  # of the search, as long as it goes on
 
 
 class Kind(StrEnum):

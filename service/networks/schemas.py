@@ -72,6 +72,8 @@ class Places(Record):
 
     items: list[FoundPlace]
     elsewhere: list[Elsewhere]
+    progress: float = 1.0
+    """Share of the network that was searched; below 1 both lists are still empty."""
 
 
 class StoredNetwork(BaseModel):

@@ -9,17 +9,20 @@ memory: a search takes seconds in which a server would answer nobody.
 
 import json
 import sys
+import time
 from pathlib import Path
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.map_picture import map_png
-from risk_sac.run_folder.durable import replace_file
+from risk_sac.run_folder.durable import replace_file, write_sealed
 from risk_sac.scenario.maps.finder import FINDERS, Map, survey
 from risk_sac.scenario.maps.found import Pattern
 from service.networks.limits import MAX_PLACES, SURVEY_MEMORY_BYTES
-from service.networks.report import PICTURE, PLACES
+from service.networks.report import PICTURE, PLACES, PROGRESS
+from service.networks.schemas import Elsewhere, FoundPlace, Places
 
 NET = Path("net.xml")
+TOLD_EVERY_S = 1.0
 
 
 def main() -> None:
@@ -37,11 +40,27 @@ def main() -> None:
 
 def _survey() -> dict[str, object]:
     chosen = Map(NET)
-    found = survey(chosen.net)
-    places = {"items": [fit.told() for fit in found.fits], "elsewhere": [misfit.told() for misfit in found.misfits]}
+    found = survey(chosen.net, tell=Progress())
+    places = Places(
+        items=[FoundPlace.model_validate(fit.told()) for fit in found.fits],
+        elsewhere=[Elsewhere.model_validate(misfit.told()) for misfit in found.misfits],
+    )
     replace_file(Path(PICTURE), map_png(chosen.net, found))
-    replace_file(Path(PLACES), json.dumps(places).encode())
+    write_sealed(Path(PLACES), places)
     return {}
+
+
+class Progress:
+    """Writes the share of spots that were looked at, now and then."""
+
+    def __init__(self) -> None:
+        self._told = time.monotonic()
+
+    def __call__(self, share: float) -> None:
+        """Writes the share if the last one was written long ago."""
+        if time.monotonic() - self._told >= TOLD_EVERY_S:
+            Path(PROGRESS).write_text(f"{share:.3f}")
+            self._told = time.monotonic()
 
 
 def _keep(name: str, place: str | None = None) -> dict[str, object]:

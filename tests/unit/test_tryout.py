@@ -6,7 +6,7 @@ import pytest
 
 from risk_sac.config import EgoConfig
 from risk_sac.scenario.maps.finder import place_at
-from risk_sac.scenario.maps.net import read_net
+from risk_sac.scenario.maps.read_net import read_net
 from risk_sac.sim.sumo import NETS, SumoSimulation
 from risk_sac.tryout import ALIKE_M, LEFT, MET_M, RIGHT, Tried, meet
 

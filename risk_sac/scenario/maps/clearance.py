@@ -19,7 +19,7 @@ import numpy as np
 
 from risk_sac.scenario.ground import Point
 from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, TRUCK_LENGTH_M, TRUCK_WIDTH_M
-from risk_sac.scenario.maps.net import Lane, Link, Net
+from risk_sac.scenario.maps.net import Lane, Link, Net, once
 from risk_sac.types import Floats
 
 SAMPLED_M = 0.5
@@ -30,26 +30,18 @@ CLEAR_M = CAR_WIDTH_M / 2 + 0.1  # of the box of who waits from the middle of a 
 
 def outlines(link: Link, length_m: float, width_m: float) -> Floats:
     """Points on both sides of a vehicle, wherever it is on its way; x and y in rows, m."""
-    line = np.array([*link.source.line, *inside(link), *link.target.line])
-    station_m = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+    line = np.array([*link.source.line, *link.line, *link.target.line])
+    station_m = _stations_m(line)
     stop_m = station_m[len(link.source.line) - 1]
-    entry_m = station_m[len(link.source.line) + len(inside(link))]
+    entry_m = station_m[len(link.source.line) + len(link.line)]
     front_m = np.arange(stop_m, min(entry_m + length_m, station_m[-1]), SAMPLED_M)
 
-    def at(stations_m: Floats) -> Floats:
-        return np.array([np.interp(stations_m, station_m, each) for each in line.T])
-
-    front, rear = at(front_m), at(np.maximum(front_m - length_m, 0.0))
+    front, rear = (_points(line, station_m, at_m) for at_m in (front_m, np.maximum(front_m - length_m, 0.0)))
     (dx, dy), chord_m = front - rear, np.hypot(*(front - rear))
     forward, left = np.array([dx, dy]) / chord_m, np.array([-dy, dx]) / chord_m
     middle = front[:, :, None] - forward[:, :, None] * np.linspace(0.0, length_m, ALONG)
     sides = [middle + side * width_m / 2 * left[:, :, None] for side in (1.0, -1.0)]
     return np.concatenate([each.reshape(2, -1) for each in sides], axis=1)
-
-
-def inside(link: Link) -> list[Point]:
-    """Its way between the roads."""
-    return [point for lane in link.inside for point in lane.line]
 
 
 def is_near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> bool:
@@ -63,13 +55,14 @@ def is_near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> b
     return False
 
 
+@once
 def too_near(net: Net, link: Link) -> Link | None:
     """The way beside one across a junction that leaves two cars no room, if there is one."""
-    line, lanes = inside(link), net.edges[link.source.edge].lanes
+    lanes = net.edges[link.source.edge].lanes
     for lane in lanes[max(link.source.index - 1, 0) : link.source.index + 2]:
         for other in net.onward.get(lane.id, ()):
             beside = lane is not link.source and other.target.edge == link.target.edge
-            if beside and other.target is not link.target and _come_near(line, inside(other)):
+            if beside and other.target is not link.target and _come_near(link.line, other.line):
                 return other
     return None
 
@@ -79,7 +72,7 @@ def truck_reaches(net: Net, beside: Link, own: Link) -> bool:
 
     Where their lanes fork into several of the next road, SUMO's drivers may take any of them.
     """
-    ways = [[*each.source.line, *inside(each), *each.target.line] for each in _forks(net, own)]
+    ways = [[*each.source.line, *each.line, *each.target.line] for each in _forks(net, own)]
     points = np.concatenate([outlines(each, TRUCK_LENGTH_M, TRUCK_WIDTH_M) for each in _forks(net, beside)], axis=1)
     return any(is_near(way, x, y, CAR_WIDTH_M / 2) for way in ways for x, y in points.T.tolist())
 
@@ -116,9 +109,17 @@ def _off_m(waiting: Lane, other: Lane) -> float:
 
 def _sampled(line: Floats) -> Floats:
     """Points along a line, its corners included; x and y in rows, m."""
-    station_m = np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
-    stations_m = np.union1d(station_m, np.arange(0.0, station_m[-1], SAMPLED_M))
-    return np.array([np.interp(stations_m, station_m, each) for each in line.T])
+    station_m = _stations_m(line)
+    return _points(line, station_m, np.union1d(station_m, np.arange(0.0, station_m[-1], SAMPLED_M)))
+
+
+def _stations_m(line: Floats) -> Floats:
+    return np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+
+
+def _points(line: Floats, station_m: Floats, at_m: Floats) -> Floats:
+    """The points of a line at distances along it; x and y in rows, m."""
+    return np.array([np.interp(at_m, station_m, each) for each in line.T])
 
 
 def _cross(line: Sequence[Point], other: Sequence[Point]) -> bool:

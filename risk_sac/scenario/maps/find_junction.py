@@ -13,7 +13,7 @@ from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.clearance import ROOM_M, too_near, waits_in_the_way
 from risk_sac.scenario.maps.find_stretch import check_limit
 from risk_sac.scenario.maps.found import NoFit, Spot
-from risk_sac.scenario.maps.net import Edge, Link, Net
+from risk_sac.scenario.maps.net import Edge, Link, Net, once
 from risk_sac.scenario.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
 
@@ -122,18 +122,30 @@ def roomy(found: Track, edge: str, wanted_m: float) -> Track:
 
 def turn(net: Net, link: Link, onward_s: float) -> Track:
     """The track over a link; raises `NoFit` if something is in the way."""
+    found = _turn(net, link, onward_s)
+    if isinstance(found, str):
+        raise NoFit(found)
+    return found
+
+
+@once
+def _turn(net: Net, link: Link, onward_s: float) -> Track | str:
+    """The track over a link, or why there is none."""
     if (lane := waits_in_the_way(net, link)) is not None:
-        raise NoFit(
+        return (
             f"who turns from {link.source.edge!r} to {link.target.edge!r} waits in the junction where it reaches into "
             f"{lane.id!r}, the way of those it waits for"
         )
     if (beside := too_near(net, link)) is not None:
-        raise NoFit(
+        return (
             f"the ways of lanes {link.source.id!r} and {beside.source.id!r} to {link.target.edge!r} come nearer than "
             f"{ROOM_M} m to each other: two cannot drive there beside each other"
         )
     length_m = link.source.length_m
-    way = way_on(net, link.source, onward_s + length_m / link.source.limit_mps, through=link)
+    try:
+        way = way_on(net, link.source, onward_s + length_m / link.source.limit_mps, through=link)
+    except NoFit as why:
+        return str(why)
     return track(net, way, length_m)
 
 

@@ -1,6 +1,6 @@
 """Finds the places of a map, and keeps them as families."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -10,7 +10,8 @@ from risk_sac.scenario.maps import find_crossing, find_junction, find_stretch
 from risk_sac.scenario.maps.around import ground_around
 from risk_sac.scenario.maps.cut import cut
 from risk_sac.scenario.maps.found import Fit, Misfit, NoFit, Pattern, Spot, Survey
-from risk_sac.scenario.maps.net import Net, read_net, read_tree
+from risk_sac.scenario.maps.net import Net
+from risk_sac.scenario.maps.read_net import read_net, read_tree
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace
 
 FINDERS: dict[Pattern, ModuleType] = {
@@ -20,10 +21,20 @@ FINDERS: dict[Pattern, ModuleType] = {
 }
 
 
-def survey(net: Net, patterns: Collection[Pattern] = tuple(FINDERS)) -> Survey:
-    """All places where patterns fit, without their ground, and why elsewhere they do not."""
+def survey(
+    net: Net, patterns: Collection[Pattern] = tuple(FINDERS), tell: Callable[[float], None] = lambda share: None
+) -> Survey:
+    """All places where patterns fit, without their ground, and why elsewhere they do not.
+
+    Args:
+      net: where.
+      patterns: which.
+      tell: called with the share of spots that was looked at.
+    """
     fits, misfits = [], []
-    for spot in _spots(net, patterns):
+    spots = list(_spots(net, patterns))
+    for number, spot in enumerate(spots):
+        tell(number / len(spots))
         try:
             fits.append(Fit(spot, FINDERS[spot.pattern].place(net, spot)))
         except NoFit as error:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from risk_sac.scenario.maps.clearance import too_near
 from risk_sac.scenario.maps.found import NoFit
-from risk_sac.scenario.maps.net import Lane, Link, Net
+from risk_sac.scenario.maps.net import Lane, Link, Net, once
 from risk_sac.scenario.place import Piece, Track
 
 DRIVEN_S = 17.0  # an episode and a bit: the ego may not come to the end of the map before it is over
@@ -56,6 +56,7 @@ def way_on(net: Net, first: Lane, seconds: float, through: Link | None = None) -
     return way
 
 
+@once
 def _onward(net: Net, lane: Lane) -> list[Link]:
     return sorted(net.onward.get(lane.id, ()), key=_bend)
 

@@ -17,7 +17,7 @@ from starlette.routing import compile_path
 from starlette.types import Scope
 
 from risk_sac.config.invalid import LONGEST_VALUE, causes, field_error, shown
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import FieldProblem, Record
 from service.api.answers.representations import NotModified
 from service.errors import (
@@ -116,7 +116,16 @@ def invalid_field(field: str, got: object, wanted: str) -> ProblemError:
 
 # Errors that say what is wrong; any other is a bug of the service, of which the server logs the traceback.
 _OF_REQUESTS = (RequestValidationError, HTTPException, ProblemError, ConfigError)
-_OF_THE_SERVICE = (NotFoundError, ConflictError, QuotaError, BusyError, UploadError, StorageError, NotPlayable)
+_OF_THE_SERVICE = (
+    NotFoundError,
+    ConflictError,
+    QuotaError,
+    BusyError,
+    UploadError,
+    StorageError,
+    NotPlayable,
+    DamagedError,
+)
 
 
 def add_problem_handlers(app: FastAPI) -> None:
@@ -181,7 +190,7 @@ def _problem(request: Request, error: Exception) -> ProblemError:
             return ProblemError(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, said)
         case UploadError():
             return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.UPLOAD_REFUSED, said)
-        case StorageError():
+        case StorageError() | DamagedError():
             logger.error("%s %s: %s", request.method, request.url.path, said)
             return ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.STORAGE_UNAVAILABLE, said)
     detail = f"the service has a bug ({type(error).__name__}); its log has the traceback"

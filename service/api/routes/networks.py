@@ -18,6 +18,7 @@ from service.api.posted import media_type
 from service.networks.limits import WALL_S
 from service.networks.report import MEDIA_TYPES
 from service.networks.schemas import Network, NetworkPage, Places
+from service.networks.surveys import RETRY_AFTER_S
 
 LISTED = "networks"
 RECEIVE_S = 60  # a sender that is slower would keep others out
@@ -32,6 +33,9 @@ REFUSALS: Responses = (
 FINDING = problem(422, "Nothing can be found on the network, and `detail` says why") | problem(
     503, "The disk refuses, or there are too many searches at once", WAIT
 )
+SEARCHING: Responses = {
+    202: {"model": Places, "description": "They are still searched for; `progress` says how far", "headers": WAIT}
+}
 DRAWN: Responses = {200: {"content": {"image/png": {}}}}
 DESCRIPTION = f"""Check a SUMO road network and keep it. Its `places` are where campaigns can be run on it.
 
@@ -97,10 +101,14 @@ def get_network(network_id: str, service: Service, caller: CurrentCaller) -> Net
     return service.networks.get(network_id, caller.sees)
 
 
-@router.get("/{network_id}/places", responses=UNKNOWN | FINDING)
-def get_places(network_id: str, service: Service, caller: CurrentCaller) -> Places:
-    """Where the patterns fit on a network, and why elsewhere they do not; looked for when first asked for."""
-    return service.surveys.places(network_id, caller.sees)
+@router.get("/{network_id}/places", responses=UNKNOWN | FINDING | SEARCHING)
+def get_places(network_id: str, response: Response, service: Service, caller: CurrentCaller) -> Places:
+    """Where the patterns fit on a network, and why elsewhere they do not; searched for when first asked for."""
+    places = service.surveys.places(network_id, caller.sees)
+    if places.progress < 1:
+        response.status_code = HTTPStatus.ACCEPTED
+        response.headers["Retry-After"] = str(RETRY_AFTER_S)
+    return places
 
 
 @router.get("/{network_id}/places.png", response_class=Response, responses=UNKNOWN | FINDING | DRAWN)

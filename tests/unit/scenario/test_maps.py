@@ -11,7 +11,7 @@ from shapely.affinity import affine_transform
 
 import sumo_nets
 from risk_sac.config import EgoConfig
-from risk_sac.errors import ConfigError, MapError
+from risk_sac.errors import ConfigError, DamagedError, MapError
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, family_at, family_named
 from risk_sac.scenario.maps.around import walk_over
@@ -20,7 +20,8 @@ from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.finder import Map, place_at, survey
 from risk_sac.scenario.maps.found import NoFit
-from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net, read_net
+from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net
+from risk_sac.scenario.maps.read_net import read_net
 from risk_sac.scenario.maps.summary import net_remarks
 from risk_sac.scenario.maps.ways import way_back, way_on
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch
@@ -123,8 +124,10 @@ def test_a_kept_place_that_was_changed_is_refused(town: Map, tmp_path: Path, mon
     name = town.keep(survey(town.net, ("junction",)).fits[0])
     net = tmp_path / name / library.NET
     net.write_bytes(net.read_bytes() + b" ")
-    with pytest.raises(ConfigError, match="damaged"):
+    with pytest.raises(DamagedError, match="name the place on its map once more"):
         library.kept(name)
+    assert town.keep(survey(town.net, ("junction",)).fits[0]) == name
+    assert library.kept(name)
     with pytest.raises(ConfigError, match="there is no place 'junction_000000000000'"):
         family_named("junction_000000000000")
 

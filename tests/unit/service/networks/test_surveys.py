@@ -1,10 +1,73 @@
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from service.errors import StorageError
 from service.networks import surveys
+from service.networks.network_store import NetworkStore
+from service.networks.report import PLACES
+from service.networks.schemas import Network, Places
 from service.networks.surveys import Surveys
+from tests.hostile_networks import NET
+from tests.server import LONG_S
+
+
+@pytest.fixture
+def store(tmp_path: Path) -> NetworkStore:
+    return NetworkStore(tmp_path / "networks")
+
+
+@pytest.fixture
+def network(store: NetworkStore) -> Network:
+    with store.receive() as incoming:
+        incoming.write(NET.encode())
+        return store.add(incoming, "default", "")
+
+
+@pytest.fixture
+def searching(store: NetworkStore, tmp_path: Path) -> Iterator[Surveys]:
+    searches = Surveys(store, tmp_path / "library")
+    yield searches
+    searches.stop()
+
+
+def flip(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+
+
+def test_who_asks_too_early_is_told_of_the_progress(
+    searching: Surveys, network: Network, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(surveys, "PATIENCE_S", 0.0)
+    assert searching.places(network.id, None) == Places(items=[], elsewhere=[], progress=0.0)
+    deadline = time.monotonic() + LONG_S
+    while (found := searching.places(network.id, None)).progress < 1:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    assert [each.place for each in found.elsewhere] == ["road"]
+
+
+def test_damage_of_a_net_is_told_as_the_services_and_that_of_places_is_mended(
+    searching: Surveys, store: NetworkStore, network: Network
+) -> None:
+    found = searching.places(network.id, None)
+    folder = store.folder(network.id, None)
+    flip(folder / PLACES)
+    assert searching.places(network.id, None) == found
+    flip(folder / "net.xml")
+    assert searching.places(network.id, None) == found
+    (folder / PLACES).unlink()
+    for ask in (
+        lambda: searching.places(network.id, None),
+        lambda: searching.keep(network.id, None, "car_following", "road"),
+    ):
+        with pytest.raises(StorageError, match=f"network {network.id} is damaged: net.xml is not as it was written"):
+            ask()
+
 
 SLEEPS = """
 import time
@@ -13,14 +76,11 @@ time.sleep(600)
 """
 
 
-def test_a_search_ends_when_the_service_stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_search_ends_when_the_service_stops(
+    store: NetworkStore, network: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "surveyor.py").write_text(SLEEPS)
     monkeypatch.setattr(surveys, "SURVEYOR", str(tmp_path / "surveyor.py"))
-
-    class Networks:
-        def folder(self, network_id: str, project: str | None) -> Path:
-            return tmp_path
-
-    at_work = Surveys(Networks(), tmp_path / "places", (tmp_path / "begun").exists)  # type: ignore[arg-type]
+    begun = store.folder(network.id, None) / "begun"
     with pytest.raises(StorageError, match="places cannot be looked for"):
-        at_work.places("n1", None)
+        Surveys(store, tmp_path / "places", begun.exists).places(network.id, None)

@@ -7,7 +7,7 @@ import type { Body } from "../../api/types";
 import { usePicture } from "../../ui/picture";
 import { Shown } from "../../ui/states";
 import { count } from "../../ui/text";
-import { begin, matching, MOST_PLACES, PATTERNS, type Pattern, type Places, type Spot } from "./places";
+import { again, begin, matching, MOST_PLACES, PATTERNS, type Pattern, type Places, type Spot } from "./places";
 import { nameOf } from "./screen";
 import "./maps.css";
 
@@ -15,7 +15,7 @@ const SHOWN = 50; // rows at once
 
 export function MapScreen({ id }: { id: string }) {
   const asked = useAsked<Body<"Network">>(`v1/networks/${encodeURIComponent(id)}`);
-  const places = useAsked<Places>(asked.value ? `v1/networks/${id}/places` : null);
+  const places = useAsked<Places>(asked.value ? `v1/networks/${id}/places` : null, again);
   return (
     <Shown asked={asked} what="the map">
       {(map) => (
@@ -31,15 +31,19 @@ export function MapScreen({ id }: { id: string }) {
           </div>
           <Warnings said={map.warnings} />
           <Shown asked={places} what="the places, which may take a minute">
-            {(found) => (
-              <>
-                <Patterns id={id} found={found} />
-                <div class="map-parts">
-                  <Picture id={id} />
-                  <Listed id={id} found={found} />
-                </div>
-              </>
-            )}
+            {(found) =>
+              found.progress < 1 ? (
+                <p class="faint">Searching for places: {Math.round(100 * found.progress)} %</p>
+              ) : (
+                <>
+                  <Patterns id={id} found={found} />
+                  <div class="map-parts">
+                    <Picture id={id} />
+                    <Listed id={id} found={found} />
+                  </div>
+                </>
+              )
+            }
           </Shown>
         </div>
       )}

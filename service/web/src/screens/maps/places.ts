@@ -7,6 +7,11 @@ export type Places = Body<"Places">;
 export type Spot = Places["items"][number] | Places["elsewhere"][number];
 export type Pattern = Spot["pattern"];
 
+/** When to ask for them again, ms: as long as they are searched for. */
+export function again(found: Places): number | null {
+  return found.progress < 1 ? 2000 : null;
+}
+
 /** The patterns in the order of the API's description, with what happens in each. */
 export const PATTERNS: readonly { name: Pattern; title: string; about: string }[] = [
   { name: "car_following", title: "Car following", about: "who is ahead or beside brakes, adapts speed and cuts in" },

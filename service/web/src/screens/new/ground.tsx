@@ -3,7 +3,7 @@
 import { useAsked } from "../../api/asked";
 import { address } from "../../router";
 import { count } from "../../ui/text";
-import { matching, PATTERNS, type Pattern, type Places } from "../maps/places";
+import { again, matching, PATTERNS, type Pattern, type Places } from "../maps/places";
 import { useField } from "./form";
 import { Wrongs } from "./field";
 import type { Values } from "./schema";
@@ -30,7 +30,7 @@ export function grounded({ network, pattern, place }: Ground, body: Values): Val
 
 /** How many places that is; undefined until it is known. */
 export function useExtent(ground: Ground | null): number | undefined {
-  const found = useAsked<Places>(ground && ground.place === null ? `v1/networks/${encodeURIComponent(ground.network)}/places` : null).value;
+  const found = useAsked<Places>(ground && ground.place === null ? `v1/networks/${encodeURIComponent(ground.network)}/places` : null, again).value;
   if (ground?.place === null) return found && matching(found.items, ground.pattern, "").length;
   return ground ? 1 : undefined;
 }
