@@ -53,6 +53,14 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunSummary,
     return run(tmp_path_factory.mktemp("uninterrupted"))
 
 
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a run that was stopped after four episodes."""
+    folder = tmp_path_factory.mktemp("stopped")
+    run(folder, limit=4)
+    return folder
+
+
 def test_the_run_has_learnt_something_to_be_deterministic_about(uninterrupted: tuple[RunSummary, Listener]) -> None:
     summary, listener = uninterrupted
     assert summary.finished
@@ -73,7 +81,10 @@ print(train(RunSpec.model_validate_json(sys.argv[1]), Path(sys.argv[2]), Listene
 """
 
 
-def test_another_process_gives_the_same_results(uninterrupted: tuple[RunSummary, Listener], tmp_path: Path) -> None:
+def test_another_process_goes_on_with_a_stopped_run_as_if_it_never_stopped(
+    uninterrupted: tuple[RunSummary, Listener], stopped: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(stopped, tmp_path, dirs_exist_ok=True)
     done = subprocess.run(
         [sys.executable, "-c", ELSEWHERE, spec().model_dump_json(), str(tmp_path)],
         capture_output=True,
@@ -101,14 +112,6 @@ def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
     assert resumed.digest == expected.digest
     assert resumed.metrics == expected.metrics
     assert resumed.evaluation == expected.evaluation
-
-
-@pytest.fixture(scope="module")
-def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a run that was stopped after four episodes."""
-    folder = tmp_path_factory.mktemp("stopped")
-    run(folder, limit=4)
-    return folder
 
 
 def test_a_resumed_i_i_d_phase_draws_on_and_no_search_meets_its_scenes(tmp_path: Path) -> None:

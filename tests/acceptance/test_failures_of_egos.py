@@ -103,12 +103,6 @@ def test_sumo_itself_repeats_an_episode_in_which_it_did_not_drive_the_ego(
     assert "largest difference 0; 0 missing" in done.stdout
 
 
-@pytest.mark.parametrize("name", ["openscenario", "commonroad", "mcap"])
-def test_other_tools_have_them_too(near: Found, tell: Tell, tmp_path: Path, name: str) -> None:
-    status, _, err = tell("export", near.bundle, "--format", name, "--out", tmp_path / f"export-{name}.out")
-    assert status == 0, err
-
-
 def test_failures_of_an_ego_in_another_process_repeat(
     far: tuple[Found, str], near: Found, tell: Tell, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

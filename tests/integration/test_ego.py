@@ -121,34 +121,22 @@ PEDESTRIANS = {
         on_the_mixed_road(SIGNAL_EGO),
     ),
 }
-each_pedestrian = pytest.mark.parametrize(("present", "absent"), PEDESTRIANS.values(), ids=PEDESTRIANS)
 
 
-@each_pedestrian
-def test_a_visible_pedestrian_is_not_hit(sim: Driven, present: Layout, absent: Layout) -> None:
-    frames = drive(sim, present)
-    assert least_gap(frames) > 0.2
-    assert not np.array_equal(path(frames), path(drive(sim, absent)))
-
-
-@each_pedestrian
-def test_a_hidden_pedestrian_changes_nothing_and_is_driven_through(
+@pytest.mark.parametrize(("present", "absent"), PEDESTRIANS.values(), ids=PEDESTRIANS)
+def test_the_ego_stops_for_a_pedestrian_from_the_moment_it_sees_it(
     sim: Driven, present: Layout, absent: Layout
 ) -> None:
-    frames = drive(sim, present, seen_from=NEVER)
-    assert np.array_equal(path(frames), path(drive(sim, absent)))
-    assert least_gap(frames) == 0.0
-
-
-@each_pedestrian
-@pytest.mark.parametrize("seen_from", [15, 30])
-def test_the_ego_reacts_from_the_moment_a_pedestrian_comes_into_view(
-    sim: Driven, present: Layout, absent: Layout, seen_from: int
-) -> None:
-    late, never = path(drive(sim, present, seen_from=seen_from)), path(drive(sim, absent))
-    first = int(np.flatnonzero(np.any(late != never, axis=1))[0])
-    assert first > seen_from  # nothing before it, bit for bit
-    assert least_gap(drive(sim, present, seen_from=seen_from)) > 0.0  # still far enough to stop or to pass
+    alone, seen, hidden = drive(sim, absent), drive(sim, present), drive(sim, present, seen_from=NEVER)
+    assert least_gap(seen) > 0.2
+    assert not np.array_equal(path(seen), path(alone))
+    assert np.array_equal(path(hidden), path(alone))
+    assert least_gap(hidden) == 0.0
+    for seen_from in (15, 30):
+        late = drive(sim, present, seen_from=seen_from)
+        first = int(np.flatnonzero(np.any(path(late) != path(alone), axis=1))[0])
+        assert first > seen_from  # nothing before it, bit for bit
+        assert least_gap(late) > 0.0  # still far enough to stop or to pass
 
 
 def test_a_hidden_pedestrian_does_not_hide_the_vehicle_beside_it(sim: Driven) -> None:
@@ -197,34 +185,17 @@ def test_braking_builds_up_to_the_grip_by_its_jerk(friction: float) -> None:
     assert accel.min() == pytest.approx(-min(friction * 9.81, 9.0), abs=1e-6)
 
 
-MODELS = pytest.mark.parametrize("model", ["IDM", "ACC"])  # without dawdling, whose noise another vehicle would shift
-
-
-@MODELS
-def test_a_visible_vehicle_ahead_is_not_hit(model: str) -> None:
+@pytest.mark.parametrize("model", ["IDM", "ACC"])  # without dawdling, whose noise another vehicle would shift
+def test_the_ego_stops_for_a_vehicle_ahead_from_the_moment_it_sees_it(model: str) -> None:
     with driven(EgoConfig(car_following=model)) as sim:
-        frames = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, PARKED))
-        assert least_gap(frames) > 0.2
-        assert not np.array_equal(path(frames), path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO))))
-
-
-@MODELS
-def test_a_hidden_vehicle_ahead_does_not_slow_the_ego(model: str) -> None:
+        occupied, alone = on_the_mixed_road(MIDBLOCK_EGO, PARKED), path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO)))
+        seen, hidden, late = (drive(sim, occupied, seen_from=step) for step in (0, NEVER, 25))
+    assert least_gap(seen) > 0.2
+    assert not np.array_equal(path(seen), alone)
     # SUMO can hide a vehicle from car following and at junctions, not from lane changing: only the speed is untouched.
-    with driven(EgoConfig(car_following=model)) as sim:
-        frames = drive(sim, on_the_mixed_road(MIDBLOCK_EGO, PARKED), seen_from=NEVER)
-        alone = drive(sim, on_the_mixed_road(MIDBLOCK_EGO))
-        assert np.array_equal(path(frames)[:, 3], path(alone)[:, 3])
-        assert least_gap(frames) == 0.0
-
-
-@MODELS
-def test_the_ego_brakes_from_the_moment_a_vehicle_ahead_comes_into_view(model: str) -> None:
-    with driven(EgoConfig(car_following=model)) as sim:
-        late = path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO, PARKED), seen_from=25))
-        alone = path(drive(sim, on_the_mixed_road(MIDBLOCK_EGO)))
-    differs = np.flatnonzero(np.any(late != alone, axis=1))
-    assert differs[0] > 25
+    assert np.array_equal(path(hidden)[:, 3], alone[:, 3])
+    assert least_gap(hidden) == 0.0
+    assert np.flatnonzero(np.any(path(late) != alone, axis=1))[0] > 25
 
 
 def red_light_runner(route: tuple[str, ...]) -> VehicleStart:
@@ -233,20 +204,14 @@ def red_light_runner(route: tuple[str, ...]) -> VehicleStart:
     return VehicleStart(id="actor", role=Role.ADVERSARY, route=route, lane=2, position_m=position_m, speed_mps=11.0)
 
 
-each_side = pytest.mark.parametrize("route", [("from_west", "to_east"), ("from_east", "to_west")])
-
-
-@each_side
-def test_a_visible_vehicle_at_the_junction_is_braked_for(sim: Driven, route: tuple[str, ...]) -> None:
-    seen, alone = drive(sim, dense(red_light_runner(route)), steps=90), drive(sim, dense(), steps=90)
+@pytest.mark.parametrize("route", [("from_west", "to_east"), ("from_east", "to_west")])
+def test_the_ego_brakes_for_a_vehicle_at_the_junction_that_it_sees(sim: Driven, route: tuple[str, ...]) -> None:
+    crossed = dense(red_light_runner(route))
+    seen, hidden = (drive(sim, crossed, seen_from=step, steps=90) for step in (0, NEVER))
+    alone = drive(sim, dense(), steps=90)
     assert peak_braking(seen) > peak_braking(alone) + 3.0
     assert least_gap(seen) > 0.5
-
-
-@each_side
-def test_a_hidden_vehicle_at_the_junction_changes_nothing(sim: Driven, route: tuple[str, ...]) -> None:
-    hidden = drive(sim, dense(red_light_runner(route)), seen_from=NEVER, steps=90)
-    assert np.array_equal(path(hidden), path(drive(sim, dense(), steps=90)))
+    assert np.array_equal(path(hidden), path(alone))
     assert least_gap(hidden) == 0.0
 
 

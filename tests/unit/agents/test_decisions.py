@@ -24,13 +24,6 @@ def test_an_action_is_held_and_an_episode_begins_with_a_new_one() -> None:
     assert acts(4) == [3, 3, 3, 4]
 
 
-def test_a_decision_of_one_step_is_that_step(transition: Make) -> None:
-    step = transition(0.5, cost=0.3)
-    made = Decision(1, 0.9).add(step)
-    assert made is not None
-    assert (made.risk_reward, made.cost, made.action.tolist()) == (0.5, pytest.approx(0.3), step.action.tolist())
-
-
 def test_three_steps_make_one_transition(transition: Make) -> None:
     decision = Decision(3, 0.5)
     steps = [

@@ -60,17 +60,3 @@ def test_importance_weights_of_a_hand_computed_case() -> None:
     # N P = 4, 1, 1/4; ^-0.5 = 1/2, 1, 2; over the largest.
     weights = importance_weights(np.array([1.0, 0.25, 0.0625]), size=4, correction=0.5)
     assert weights == pytest.approx([0.25, 0.5, 1.0])
-
-
-def test_importance_weights_are_one_without_correction_or_without_bias() -> None:
-    assert importance_weights(np.array([0.7, 0.3]), 2, correction=0.0).tolist() == [1.0, 1.0]
-    assert importance_weights(np.array([0.5, 0.5]), 2, correction=1.0).tolist() == [1.0, 1.0]
-
-
-def test_full_correction_makes_the_weighted_mean_unbiased_up_to_scale() -> None:
-    generator = np.random.default_rng(2)
-    probabilities = generator.uniform(0.1, 1.0, 8)
-    probabilities /= probabilities.sum()
-    values = generator.normal(size=8)
-    weights = importance_weights(probabilities, 8, correction=1.0)
-    assert (probabilities * weights * values).sum() / (probabilities * weights).sum() == pytest.approx(values.mean())

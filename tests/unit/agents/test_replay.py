@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac.agents.priority import TermScales, priority
+from risk_sac.agents.priority import priority
 from risk_sac.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
 from risk_sac.config import ReplayConfig
 from risk_sac.errors import CheckpointError, NotFinite
@@ -135,13 +135,6 @@ def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(ran
     leaves = replay._tree[np.arange(len(replay))]
     assert np.array_equal(leaves, priority(replay._terms, replay._scales, CONFIG))
     assert replay._tree.total == pytest.approx(leaves.sum(), rel=1e-14)
-
-
-def test_rper_scales_follow_what_is_stored(random_transition: Make) -> None:
-    replay = filled(RiskPrioritizedReplay, 512, random_transition)  # a power of two: just rescaled
-    scales = TermScales.of(replay._terms[:, :512])
-    assert np.array_equal(replay._scales.lowest, scales.lowest)
-    assert np.array_equal(replay._scales.inverse_spread, scales.inverse_spread)
 
 
 def test_rper_hands_out_the_new_transitions_once_and_in_their_order(transition: Make) -> None:

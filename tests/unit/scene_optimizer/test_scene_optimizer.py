@@ -106,7 +106,7 @@ def test_same_seed_asks_the_same_scenes_and_another_seed_others(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("interrupted_at", [1, 5, 21])
+@pytest.mark.parametrize("interrupted_at", [1, 21])
 def test_resumed_run_equals_one_never_interrupted(kind, interrupted_at):
     whole = drive(kind(3, QUICK, 1), 30, bowl)
     before, after = kind(3, QUICK, 1), kind(3, QUICK, 1)
@@ -224,22 +224,6 @@ def test_repeated_scene_and_extreme_returns_do_not_break_the_model():
         assert np.isfinite(optimizer.ask()).all()
 
 
-def test_exploration_of_one_never_builds_a_model():
-    optimizer = BotorchOptimizer(2, QUICK.model_copy(update={"exploration": 1.0}), 0)
-    drive(optimizer, 20, bowl)
-    assert optimizer.state()["hyperparameters"] is None
-
-
-def test_fits_become_rarer_as_observations_accumulate():
-    optimizer = BotorchOptimizer(2, SceneOptimizerConfig(initial_scenes=10, refit_every=3, exploration=0.0), 0)
-    fitted_at = []
-    for episode in range(60):
-        u = optimizer.ask()
-        optimizer.tell(u, bowl(episode, u))
-        fitted_at.append(optimizer.state()["fitted_at"])
-    assert sorted(set(fitted_at)) == [0, 10, 13, 16, 19, 23, 28, 34, 42, 52]
-
-
 # Its Gaussian process
 
 
@@ -327,12 +311,6 @@ def test_comes_back_to_a_needle_that_a_smooth_model_does_not_see(seed):
     assert (np.abs(asked[30:] - needle)[:, :8] < 0.12).all(axis=1).mean() > 0.3  # of anywhere: 4e-6
 
 
-def test_learns_to_avoid_rejected_scenes():
-    optimizer = BotorchOptimizer(2, SceneOptimizerConfig(exploration=0.0), 0)
-    asked = drive(optimizer, 60, lambda episode, u: None if u[0] > 0.5 else float(u[1] + 0.1 * math.sin(episode)))
-    assert (asked[20:, 0] > 0.5).mean() < 0.2
-
-
 HARTMANN_RATES = np.array(
     [[10, 3, 17, 3.5, 1.7, 8], [0.05, 10, 17, 0.1, 8, 14], [3, 3.5, 1.7, 10, 17, 8], [17, 8, 0.05, 10, 0.1, 14]]
 )
@@ -352,27 +330,17 @@ def hartmann(u: Floats) -> float:
     return float((np.array([1.0, 1.2, 3.0, 3.2]) * np.exp(-squares)).sum())
 
 
-def ackley(u: Floats) -> float:
-    """One peak, 0, in a field of smaller ones."""
-    x = 8 * (u - 0.37)
-    return float(20 * np.exp(-0.2 * np.sqrt((x**2).mean())) + np.exp(np.cos(2 * np.pi * x).mean()) - 20 - np.e)
-
-
 @pytest.mark.parametrize(
-    ("function", "largest", "dimension", "noise", "share"),
-    [
-        (hartmann, 3.32237, 6, 0.0, 0.3),
-        pytest.param(ackley, 0.0, 5, 0.0, 0.6, marks=pytest.mark.torture),
-        (hartmann, 3.32237, 12, 0.2, 0.6),
-    ],
-    ids=["hartmann", "ackley", "noisy hartmann, half the parameters idle"],
+    ("dimension", "noise", "share"),
+    [(6, 0.0, 0.3), (12, 0.2, 0.6)],
+    ids=["plain", "half idle"],
 )
-def test_simple_regret_is_a_fraction_of_sobols(function, largest, dimension, noise, share):
+def test_simple_regret_is_a_fraction_of_sobols(dimension, noise, share):
     def regret(kind: type[SceneOptimizer], seed: int) -> float:
         noises = np.random.default_rng(seed).normal(scale=noise, size=80)
         optimizer = kind(dimension, SceneOptimizerConfig(), seed)
-        asked = drive(optimizer, 80, lambda episode, u: function(u) + noises[episode])
-        return largest - max(map(function, asked))
+        asked = drive(optimizer, 80, lambda episode, u: hartmann(u) + noises[episode])
+        return 3.32237 - max(map(hartmann, asked))
 
     pair = BotorchOptimizer, SobolOptimizer
     found, by_chance = (np.mean([regret(kind, seed) for seed in range(3)]) for kind in pair)
