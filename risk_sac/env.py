@@ -21,6 +21,7 @@ from risk_sac.geometry import overlapping_pairs, relative_view
 from risk_sac.observation import Encoder
 from risk_sac.observation_layout import LIMIT
 from risk_sac.problem import Problem
+from risk_sac.process_state import c_numbers
 from risk_sac.records import Collision
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import worst_rss_margin
@@ -95,6 +96,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     _inside_limits: bool
     _teleported: bool
 
+    @c_numbers()
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -120,6 +122,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
                 continue
         raise SimulationError(f"none of {FEASIBLE_TRIES} random scenes of {self.problem.family.name!r} is feasible")
 
+    @c_numbers()
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One control step of 0.1 s.
 
@@ -168,6 +171,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """SUMO's letter of each link of each signal now, the signals in the order of their names."""
         return self._sim.signal_heads()
 
+    @c_numbers()
     def close(self) -> None:
         """Ends the simulation, and lets the ego go."""
         self._sim.close()

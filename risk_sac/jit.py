@@ -23,7 +23,7 @@ IMPORT = re.compile(r"^ *from risk_sac\.([\w.]+) import", re.MULTILINE)
 
 def _sources() -> dict[Path, str]:
     """The files with compiled functions, and all that these import: functions and constants are compiled into them."""
-    texts = {path: path.read_text() for path in HERE.rglob("*.py")}
+    texts = {path: path.read_text(encoding="utf-8") for path in HERE.rglob("*.py")}
     found: dict[Path, str] = {}
     pending = [path for path, text in texts.items() if "@compiled" in text]
     while pending:

@@ -20,7 +20,8 @@ import socket
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
@@ -36,6 +37,20 @@ class Setting(NamedTuple):
 
     read: Callable[[], Any]
     set: Callable[[Any], object]
+
+
+@contextmanager
+def c_numbers() -> Iterator[None]:
+    """Read and write numbers in the C locale, as libsumo has to: in others it takes no decimal point."""
+    ours = locale.setlocale(locale.LC_NUMERIC)
+    if ours == "C":
+        yield
+        return
+    locale.setlocale(locale.LC_NUMERIC, "C")
+    try:
+        yield
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, ours)
 
 
 def preserved() -> "Preserved":

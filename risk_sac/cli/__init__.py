@@ -9,7 +9,7 @@ from pathlib import Path
 
 from risk_sac import __version__
 from risk_sac.cli import campaigns, egos, export, places, regress, replay, report, run, serve, show, understand
-from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain
+from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain, flush, prepare_streams
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.scenario import library
@@ -20,6 +20,15 @@ EPILOG = """exit status, but of `campaigns`, which says its own: 0 done; 1 faile
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
+    prepare_streams()
+    try:
+        status = _run(arguments)
+    finally:
+        written = flush()
+    return status if written else status or FAILED
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
     _make_absolute(options)
     options.typed = shlex.join(["risk-sac", *(sys.argv[1:] if arguments is None else arguments)])
@@ -28,12 +37,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ConfigError as error:
         complain(str(error))
         return MISUSED
-    except (RiskSacError, OSError) as error:
-        complain(str(error))
-        status = options.on_error
     except KeyboardInterrupt:
         complain("interrupted")
         return INTERRUPTED
+    except (RiskSacError, OSError, MemoryError) as error:
+        complain(str(error) or "there is too little memory")
+        status = options.on_error
+    except SystemExit:  # no command ends so
+        complain("code that a command has loaded ended the program; what was done until then is kept")
+        status = options.on_error or FAILED
     return status
 
 

@@ -1,11 +1,16 @@
 """What the commands share: consoles, exit statuses, and text made safe for a terminal or an XML file."""
 
 import argparse
+import codecs
+import contextlib
+import io
 import math
+import os
 import re
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import IO, Any, TypeAlias
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -24,9 +29,61 @@ from risk_sac.run_folder.durable import replace_file
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs
-console = Console(highlight=False)
-notes = Console(stderr=True, highlight=False)
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
+# What a terminal without Unicode shows of ours; "?" for other characters.
+ASCII = {"→": "->", "–": "-", "−": "-", "…": "...", "×": "x", "·": "-", "≤": "<=", "²": "2"} | {
+    "λ": "lambda",
+    "α": "alpha",
+    "ρ": "rho",
+    "\u0304": "",
+}
+
+
+class Output(Console):
+    """A console that ends no command because nothing reads it."""
+
+    def on_broken_pipe(self) -> None:
+        """Go on without output."""
+        discard(self.file)
+
+
+def discard(stream: IO[str]) -> None:
+    """Lead a stream nowhere."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, stream.fileno())
+    os.close(null)
+
+
+def prepare_streams() -> None:
+    """Let output take any character, and keep the descriptors of closed streams from files that are opened later."""
+    while (null := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(null)
+    codecs.register_error("risk-sac", _as_ascii)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="risk-sac")
+
+
+def _as_ascii(error: UnicodeError) -> tuple[str, int]:
+    assert isinstance(error, UnicodeEncodeError)
+    return "".join(ASCII.get(character, "?") for character in error.object[error.start : error.end]), error.end
+
+
+def flush() -> bool:
+    """Write what is left to write; returns False if the disk is full. Nothing is left then."""
+    written = True
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        try:
+            stream.flush()
+        except OSError as error:
+            discard(stream)
+            written &= isinstance(error, BrokenPipeError)
+    return written
+
+
+console = Output(highlight=False)
+notes = Output(stderr=True, highlight=False)
+errors = Output(stderr=True, highlight=False, soft_wrap=True)
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 """Where a group of commands adds its parsers."""
@@ -65,7 +122,8 @@ def write_out(file: Path, content: bytes, what: str = "", said_on: Console = con
 
 def complain(message: str) -> None:
     """Prints what went wrong."""
-    errors.print(printable(message), style="red", markup=False)
+    with contextlib.suppress(OSError):  # stderr may be on a full disk, too
+        errors.print(printable(message), style="red", markup=False)
 
 
 def columns(bar: BarColumn) -> tuple[ProgressColumn, ...]:

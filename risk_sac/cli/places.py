@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -54,7 +53,7 @@ def _places(options: argparse.Namespace) -> int:
             return _try_places(chosen, found, options)
     if options.json:
         fits, misfits = [fit.told() for fit in found.fits], [misfit.told() for misfit in found.misfits]
-        sys.stdout.write(json.dumps({"places": fits, "elsewhere": misfits, "warnings": warnings}) + "\n")
+        console.out(json.dumps({"places": fits, "elsewhere": misfits, "warnings": warnings}), highlight=False)
         return OK
     for warning in warnings:
         console.print(f"warning: {warning}", soft_wrap=True, markup=False)

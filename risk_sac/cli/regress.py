@@ -14,6 +14,7 @@ from rich.text import Text
 from risk_sac.cli.console import EGO, FAILED, OK, Commands, add_command, console, counted, narrow_table, printable
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
+from risk_sac.config.text import read_text
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, export, names
@@ -114,9 +115,7 @@ def _cases(paths: list[Path], ego: EgoConfig) -> Iterator["Regressed"]:
 def read_baseline(file: Path, flag: str = "--baseline") -> Regression:
     """Read the cases that `--out` wrote."""
     try:
-        return Regression.model_validate_json(file.read_bytes())
-    except FileNotFoundError as error:
-        raise ConfigError(flag, f"there is no {file}") from error
+        return Regression.model_validate_json(read_text(file, flag))
     except ValidationError as error:
         raise ConfigError(flag, f"{file} was not written by `risk-sac regress`") from error
 

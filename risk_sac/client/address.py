@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydantic import HttpUrl, TypeAdapter, ValidationError
 
+from risk_sac.config.text import read_text
 from risk_sac.errors import ConfigError
 
 DEFAULT_URL = "http://127.0.0.1:8000"
@@ -36,11 +37,7 @@ def api_key(environment: Mapping[str, str]) -> str | None:
     key, file = environment.get("RISK_SAC_API_KEY"), environment.get("RISK_SAC_API_KEY_FILE")
     if key or not file:
         return key or None
-    try:
-        return Path(file).read_text(encoding="utf-8").strip()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is no text"
-        raise ConfigError("RISK_SAC_API_KEY_FILE", f"{file} cannot be read: {reason}") from error
+    return read_text(Path(file), "RISK_SAC_API_KEY_FILE").strip()
 
 
 def checked_key(key: str) -> str:

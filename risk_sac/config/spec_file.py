@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from risk_sac.config import IID_METHODS, Budget, CampaignSpec, EgoConfig, RunSpec
 from risk_sac.config.invalid import causes, field_error
+from risk_sac.config.text import read_fields
 from risk_sac.errors import ConfigError
 
 T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)
@@ -26,7 +27,7 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
       flags: fields of RunSpec, those of its budget under their own names; None where a flag was not given.
     """
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _with_budget({"method": "risk-sac", "seed": 0} if file is None else _read_yaml(file), given)
+    data = _with_budget({"method": "risk-sac", "seed": 0} if file is None else read_fields(file, "spec"), given)
     if data.keys() & {"label", "iid", *CAMPAIGN_ONLY.values()}:
         return _only_run(data, given)
     return _validate(RunSpec, data | given)
@@ -35,7 +36,7 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
 def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping[str, Any]) -> CampaignSpec:
     """Returns the campaign described by a YAML file, overridden by flags as `read_spec` has them, else by defaults."""
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _with_budget({} if file is None else _read_yaml(file), given)
+    data = _with_budget({} if file is None else read_fields(file, "spec"), given)
     return _validate(CampaignSpec, {**defaults, **data, **given})
 
 
@@ -48,7 +49,7 @@ def read_ego(text: str) -> EgoConfig:
         return _validate(EgoConfig, {"profile": text})
     if DRIVER.fullmatch(text) and not Path(text).exists():
         return _validate(EgoConfig, {"driver": text})
-    return _validate(EgoConfig, _read_yaml(Path(text)))
+    return _validate(EgoConfig, read_fields(Path(text), "spec"))
 
 
 def campaign_yaml(spec: CampaignSpec) -> str:
@@ -61,18 +62,6 @@ def _with_budget(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     budget = {name: given.pop(name) for name in Budget.model_fields if name in given}
     stored = data.get("budget", {})
     return data | {"budget": {**stored, **budget}} if budget and isinstance(stored, dict) else data
-
-
-def _read_yaml(file: Path) -> dict[str, Any]:
-    try:
-        data = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError("spec", f"{file} cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError("spec", f"{file} is no YAML: {error}") from error
-    if not isinstance(data, dict):
-        raise ConfigError("spec", f"{file}, which holds a {type(data).__name__}", "the fields of a run or campaign")
-    return data
 
 
 def _only_run(data: dict[str, Any], picked: Mapping[str, Any]) -> RunSpec:

@@ -20,6 +20,7 @@ from pydantic import Field, ValidationError
 from risk_sac.config import EgoConfig, Settings
 from risk_sac.config.ego import EgoName
 from risk_sac.config.invalid import field_error
+from risk_sac.config.text import read_text
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.seam import Ego
 from risk_sac.errors import ConfigError
@@ -65,7 +66,7 @@ def python_card(point: EntryPoint) -> EgoCard:
     """Returns the card of the class that an entry point names; a ConfigError if it does not declare all of it."""
     file = _source(point)
     try:
-        declared = _declared(file.read_text(encoding="utf-8"), point.attr)
+        declared = _declared(file.read_bytes(), point.attr)
         declared["version"] = f"{declared.get('version', '')}+{_hash(file, '.' in point.module)}"
         return EgoCard(name=point.name, kind="python", **{"deadline_s": PYTHON_DEADLINE_S} | declared)
     except (OSError, SyntaxError, UnicodeDecodeError) as error:
@@ -176,11 +177,9 @@ def _remotes() -> Mapping[str, RemoteCard]:
     if not name:
         return {}
     try:
-        tables = tomllib.loads(Path(name).read_text(encoding="utf-8"))
+        tables = tomllib.loads(read_text(Path(name), FILE))
         return {key: RemoteCard.model_validate({"name": key, **table}) for key, table in tables.items()}
-    except OSError as error:
-        raise ConfigError(FILE, f"{name} cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, TypeError) as error:
+    except (tomllib.TOMLDecodeError, TypeError) as error:
         raise ConfigError(FILE, f"{name} is no TOML of one table for each ego: {error}") from error
     except ValidationError as error:
         raise ConfigError(FILE, str(field_error(error.errors()[0]))) from error
@@ -196,7 +195,7 @@ def _source(point: EntryPoint) -> Path:
     return Path(found.origin)
 
 
-def _declared(source: str, name: str) -> dict[str, Any]:
+def _declared(source: bytes, name: str) -> dict[str, Any]:
     """The literals that a class declares of itself."""
     for node in ast.parse(source).body:
         if isinstance(node, ast.ClassDef) and node.name == name:

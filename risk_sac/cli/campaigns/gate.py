@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, OK, counted
 from risk_sac.client import Results, Total
+from risk_sac.config.text import read_text
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
 
@@ -143,9 +144,7 @@ def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
 def _read_known(file: Path) -> Mapping[str, frozenset[str]]:
     """The kinds of failures of an earlier campaign, by family."""
     try:
-        earlier = Results.model_validate_json(file.read_bytes())
-    except OSError as error:
-        raise ConfigError("--no-new-failures", f"{file} cannot be read: {error.strerror}") from error
+        earlier = Results.model_validate_json(read_text(file, "--no-new-failures"))
     except ValidationError as error:
         expected = "what `risk-sac campaigns results ID --json` printed of an earlier campaign"
         raise ConfigError("--no-new-failures", str(file), expected) from error
