@@ -23,6 +23,7 @@ from risk_sac.sim.pilot import MovedEgo, Pilot
 from risk_sac.sim.placing import hand_over, place
 from risk_sac.sim.reading import Reader, Reading
 from risk_sac.sim.roads import Roads, Room
+from risk_sac.sim.staging import plain_name
 from risk_sac.types import STEP_S, Floats, Frame, Role
 
 NETS = files("sumo_nets")
@@ -70,7 +71,8 @@ class SumoSimulation:
         Raises:
           SimulationError: SUMO refused the layout.
         """
-        options = ["-n", str(NETS / layout.net), "-a", str(NETS / "vtypes.add.xml"), "--seed", str(seed), *OPTIONS]
+        net, types = (plain_name(str(NETS / name)) for name in (layout.net, "vtypes.add.xml"))
+        options = ["-n", net, "-a", types, "--seed", str(seed), *OPTIONS]
         try:
             if self._started:
                 libsumo.load(options)

@@ -1,5 +1,6 @@
 """Writes OpenDRIVE 1.7: what netconvert makes of the net, with turns laid along SUMO's lanes."""
 
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -20,9 +21,9 @@ WALL_S = 120.0  # a second suffices
 def opendrive(file: Path, net: Net, name: str) -> bytes:
     """Returns the roads of a net under the map's name; a ConfigError if netconvert cannot write them."""
     with scratch_folder() as folder:
-        made = folder / "roads.xodr"
-        _netconvert("--sumo-net-file", str(file), "--opendrive-output", str(made))
-        root = ET.parse(made).getroot()
+        shutil.copy(file, folder / "net.xml")
+        _netconvert(folder, "--sumo-net-file", "net.xml", "--opendrive-output", "roads.xodr")
+        root = ET.parse(folder / "roads.xodr").getroot()
     for road in root.iter("road"):
         lane = _turning(road, net)
         if lane is not None:
@@ -31,10 +32,10 @@ def opendrive(file: Path, net: Net, name: str) -> bytes:
     return document(_as_of_1_7(root, name))
 
 
-def _netconvert(*options: str) -> None:
-    """Runs netconvert through its Python entry, which finds the wheel's binary."""
+def _netconvert(folder: Path, *options: str) -> None:
+    """Runs netconvert through its Python entry, which finds the wheel's binary, in the folder of its files."""
     command = [sys.executable, "-c", "import sys, sumo; sys.exit(sumo.netconvert())", *options]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=WALL_S)
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=WALL_S)
     if done.returncode:
         why = (done.stderr.strip().splitlines() or ["it ended without a word"])[0]
         raise ConfigError("format", f"netconvert cannot write this net as OpenDRIVE: {why}")

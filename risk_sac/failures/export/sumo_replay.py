@@ -48,7 +48,8 @@ def main() -> int:
         parser.error(f"there is no {name} on the PATH; name it by --sumo")
     told = json.loads((HERE / "commands.json").read_text())
     steps = list(ET.parse(HERE / "fcd.xml").getroot())
-    command = [binary, "--configuration-file", str(HERE / "failure.sumocfg")]
+    os.chdir(HERE)  # SUMO splits paths at commas
+    command = [binary, "--configuration-file", "failure.sumocfg"]
     traci.start([*command, "--start", "--quit-on-end"] if options.gui else command)
     try:
         difference, missed = replay(told, steps, options.gui)

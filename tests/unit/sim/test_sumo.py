@@ -1,9 +1,11 @@
 """The simulation's verbs, by what SUMO then does."""
 
 import math
+import shutil
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import libsumo
 import numpy as np
@@ -16,7 +18,7 @@ from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
 from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.ego import Belief
-from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.sim.sumo import NETS, SumoSimulation
 from risk_sac.types import Frame, Role
 from tests.builders import Told, belief_of
 
@@ -44,6 +46,15 @@ def test_sumo_knows_no_pedestrians(sim: SumoSimulation, family: Family) -> None:
     frame = sim.reset(middle(family), 0)
     assert libsumo.person.getIDCount() == 0
     assert frame.ids[len(libsumo.vehicle.getIDList()) :] == family.pedestrians
+
+
+@pytest.mark.parametrize("folder", ["Tests, 2026", "a;b", "${HOME}", "100%", "ü é"])
+def test_a_net_is_loaded_whatever_its_folder_is_called(sim: SumoSimulation, tmp_path: Path, folder: str) -> None:
+    layout = middle(FAMILIES["low"])
+    (tmp_path / folder).mkdir()
+    net = tmp_path / folder / "net.xml"
+    shutil.copy(NETS / layout.net, net)
+    assert sim.reset(replace(layout, net=str(net)), 0).ids == sim.reset(layout, 0).ids
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
