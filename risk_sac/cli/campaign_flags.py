@@ -85,7 +85,12 @@ MAP_HELP = "a SUMO net, an OSM extract or OpenDRIVE, also packed"
 
 def add_map_flags(parser: argparse.ArgumentParser, *, several: bool) -> None:
     """Add the flags of a place; `several`: all places of a pattern can be asked for."""
-    parser.add_argument("--network", type=Path, metavar="MAP", help=f"in place of a family: {MAP_HELP}")
+    add_place_flags(parser, f"in place of a family: {MAP_HELP}", several=several)
+
+
+def add_place_flags(parser: argparse.ArgumentParser, what: str, *, several: bool = True) -> None:
+    """Add the flags of a place on the map that `what` describes."""
+    parser.add_argument("--network", metavar="MAP", help=what)
     parser.add_argument("--pattern", choices=list(FINDERS), help="what is played on the map")
     parser.add_argument("--place", metavar="ID", help="where; `risk-sac places MAP` lists them")
     if several:
@@ -110,5 +115,5 @@ def families_on_map(options: argparse.Namespace) -> list[str] | None:
     if (flags.get("place") is None) == (flags.get("places") is None):
         raise ConfigError("place", "nothing, or places too", "the id of one", "`risk-sac places MAP` lists them")
     with scratch_folder() as folder:
-        chosen = Map(present_net(options.network, folder).file)
+        chosen = Map(present_net(Path(options.network), folder).file)
         return [chosen.keep(fit) for fit in chosen.fits(options.pattern, options.place)]

@@ -58,6 +58,17 @@ class Event:
         return self.name == "state" and self.data.get("run_id") is None and self.data.get("state") in FINAL
 
 
+class NetworkName(Record):
+    """How an uploaded network is called."""
+
+    id: str
+    label: str
+
+
+class NetworkNames(Page[NetworkName]):
+    """Networks, newest first."""
+
+
 class Client:
     """Posts campaigns, follows them and reads what they found; may be shared by threads.
 
@@ -135,6 +146,10 @@ class Client:
         """Campaigns, newest first; read page by page as far as they are asked for."""
         query: Query = {"state": state, "family": family, "method": method, "label": label, "limit": page}
         return self._items(CampaignPage, "v1/campaigns", query)
+
+    def networks(self) -> Iterator[NetworkName]:
+        """Uploaded networks, newest first."""
+        return self._items(NetworkNames, "v1/networks", {"limit": PAGE})
 
     def campaign(self, campaign_id: str) -> Campaign:
         """State, progress and runs of a campaign."""

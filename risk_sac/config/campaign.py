@@ -18,7 +18,7 @@ from risk_sac.config.odd import Odd
 from risk_sac.errors import ConfigError
 
 SHIPPED = ("low", "mixed", "dense")
-PLACED = r"(car_following|crossing|junction)_[0-9a-f]{12}"
+PLACED = r"(car_following|crossing|junction)(_[a-z0-9_]{1,40})?_[0-9a-f]{12}"
 FAMILY_NAME = re.compile(rf"^({'|'.join(SHIPPED)}|{PLACED})$")
 
 

@@ -40,6 +40,13 @@ def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping
     return _validate(CampaignSpec, {**defaults, **data, **given})
 
 
+def read_posted(file: Path | None, flags: Mapping[str, Any]) -> CampaignSpec | dict[str, Any]:
+    """Returns a campaign to post; one on an uploaded network as fields, which the service checks."""
+    given = {name: value for name, value in flags.items() if value is not None}
+    data = _with_budget({} if file is None else _read_yaml(file), given) | given
+    return data if "network" in data else _validate(CampaignSpec, data)
+
+
 def read_ego(text: str) -> EgoConfig:
     """Returns the ego that a command line names: a profile, a registered ego, or a file with its fields.
 

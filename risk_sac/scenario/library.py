@@ -6,6 +6,7 @@ episode needs the folder that its place was kept in.
 
 import hashlib
 import os
+import re
 import shutil
 import tempfile
 import time
@@ -20,6 +21,7 @@ from risk_sac.scenario.place import PLACES, Place
 VARIABLE = "RISK_SAC_PLACES"
 NET, PLACE = "net.xml", "place.json"
 DIGITS = 12
+LONGEST_ID = 40  # of it in a name
 _NEW, _GONE = ".new-", ".gone-"
 
 
@@ -34,10 +36,17 @@ def library() -> Path:
     return cache / "risk-sac" / "places"
 
 
-def keep(place: Place, net: bytes) -> str:
-    """Puts a place and the piece of net around it into the library; returns the name of its family."""
+def keep(place: Place, net: bytes, id_: str = "") -> str:
+    """Puts a place and the piece of net around it into the library; returns the name of its family.
+
+    Args:
+      place: on the piece.
+      net: the piece, as SUMO reads it.
+      id_: how its map calls the place; the name tells it as far as it has letters and digits.
+    """
     text = place.model_copy(update={"net": NET}).model_dump_json().encode()
-    name = f"{place.pattern}_{_digest(text, net)}"
+    told = re.sub("[^a-z0-9]+", "_", id_.lower()).strip("_")[:LONGEST_ID].strip("_")
+    name = "_".join(filter(None, (place.pattern, told, _digest(text, net))))
     put(name, text, net)
     return name
 

@@ -15,6 +15,7 @@ from typing import Any
 
 import pytest
 
+import sumo_nets
 from risk_sac import cli
 from risk_sac.client import Client
 from tests.server import LONG_S, Service
@@ -178,6 +179,23 @@ def test_a_file_says_what_to_search_and_flags_go_first(answer: Callable[..., Any
     file.write_text("label: from a file\nfamilies: [low]\nmethods: [random]\nseeds: [4]\nbudget: {episodes: 6}\n")
     posted = answer("submit", "--spec", file, "--episodes", 7)["spec"]
     assert (posted["label"], posted["seeds"], posted["budget"]["episodes"]) == ("from a file", [4], 7)
+
+
+def test_a_campaign_on_an_uploaded_map_is_submitted_by_its_names(
+    service: Service, answer: Callable[..., Any], call: Callable[..., int], tmp_path: Path
+) -> None:
+    net = (Path(sumo_nets.__path__[0]) / "low" / "low.net.xml").read_bytes()
+    post = {"content": net, "params": {"label": "ring"}, "headers": {"content-type": "application/xml"}}
+    id_ = service.client.post("/v1/networks", **post).raise_for_status().json()["id"]
+    file = tmp_path / "spec.yaml"
+    file.write_text("network: ring\npattern: car_following\nplace: road\nmethods: [random]\nbudget: {episodes: 6}\n")
+    flags = ["--network", id_, "--pattern", "car_following", "--places", "all", "--methods", "random"]
+    for arguments in (["--spec", file], flags):
+        (family,) = answer("submit", *arguments)["spec"]["families"]
+        assert family.startswith("car_following_road_")
+    assert call("submit", "--spec", file, "--place", "nowhere") == 2
+    service.client.post("/v1/networks", **post).raise_for_status()
+    assert call("submit", "--spec", file) == 2  # two maps have this label
 
 
 @pytest.mark.parametrize(

@@ -9,18 +9,20 @@ from pathlib import Path
 
 from rich.progress import BarColumn, Progress
 
-from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, campaign_flags, ego_flag
+from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, add_place_flags, campaign_flags, ego_flag
 from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, verdict
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.cli.campaigns.output import add_campaign_command, figures, line, print_answer, results_table
 from risk_sac.cli.console import OK, Board, Commands, add_command, columns, complain, notes, number
 from risk_sac.client import Campaign, Client, Episode, Results
-from risk_sac.config.spec_file import read_campaign
+from risk_sac.config import CampaignSpec
+from risk_sac.config.spec_file import read_posted
 from risk_sac.errors import ConfigError
 from risk_sac.records import Grade
 
 SEEDS = 1  # where none are named
 RATE = number(float, 0, 1)
+MAP_UPLOADED = "in place of families: id or label of an uploaded map"
 NAMED_FAILURES = 5  # of a run, in a JUnit report
 
 
@@ -29,6 +31,7 @@ def add(commands: Commands) -> None:
     parser = add_command(commands, "submit", _submit, "queue a campaign")
     add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
     add_ego_flag(parser)
+    add_place_flags(parser, MAP_UPLOADED)
     parser.add_argument("--label", metavar="TEXT", help="to find it by")
     parser.add_argument(
         "--idempotency-key", metavar="KEY", help="the same key gives the same campaign, however often it is submitted"
@@ -159,14 +162,26 @@ class _Lines:
             notes.print(line(campaign), markup=False, soft_wrap=True)
 
 
+def _network_id(client: Client, called: object) -> object:
+    """The id of the uploaded network that has a label; anything else is left to the service to refuse."""
+    found = [network for network in client.networks() if called in (network.id, network.label)]
+    if len(found) > 1:
+        ids = ", ".join(network.id for network in found)
+        raise ConfigError("network", f"{called!r}, the label of {len(found)} networks", "the id of one", f"of {ids}")
+    return found[0].id if found else called
+
+
 def _submit(options: argparse.Namespace) -> int:
     for name in ("max_ecr", "max_pcr", "max_preventable", "no_new_failures", "junit", "timeout"):
         if getattr(options, name) is not None and not options.watch:
             raise ConfigError(f"--{name.replace('_', '-')}", "it without --watch", "both")
     _prepare(options)
-    flags = campaign_flags(options, SEEDS) | ego_flag(options) | {"label": options.label}
-    spec = read_campaign(options.spec, flags, {})
+    flags = campaign_flags(options, SEEDS) | ego_flag(options)
+    flags |= {name: getattr(options, name) for name in ("label", "network", "pattern", "place", "places")}
+    spec = read_posted(options.spec, flags)
     with Client.from_environment(options.url) as client:
+        if not isinstance(spec, CampaignSpec):
+            spec |= {"network": _network_id(client, spec["network"])}
         campaign = client.submit(spec, options.idempotency_key)
         if options.watch:
             notes.print(client.url_of(campaign.id), markup=False, soft_wrap=True)

@@ -92,4 +92,4 @@ class Map:
     def keep(self, fit: Fit) -> str:
         """Puts a place into the library; returns the name of its family."""
         fit = with_ground(self.net, fit)
-        return library.keep(fit.place, cut(self.net, self._root, fit))
+        return library.keep(fit.place, cut(self.net, self._root, fit), fit.spot.id)
