@@ -43,7 +43,7 @@ def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping
 def read_posted(file: Path | None, flags: Mapping[str, Any]) -> CampaignSpec | dict[str, Any]:
     """Returns a campaign to post; one on an uploaded network as fields, which the service checks."""
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _with_budget({} if file is None else _read_yaml(file), given) | given
+    data = _with_budget({} if file is None else read_fields(file, "spec"), given) | given
     return data if "network" in data else _validate(CampaignSpec, data)
 
 
