@@ -13,6 +13,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import FOLDER, Executor, Program
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import QueuedRun, Scheduler
+from risk_sac.records import State as RunState
 from risk_sac.run_folder.crashes import PATIENCE
 from risk_sac.run_folder.results import RESULTS, read_results
 
@@ -97,19 +98,14 @@ class JobStore:
                 grown.add(number)
         return grown
 
-    def succeeded(self, run: QueuedRun, result: Finished) -> None:
-        """See `RunStore`."""
-        job = self._jobs[run.number]
-        job.state, job.episodes = "finished", job.total
-
-    def failed(self, run: QueuedRun, reason: str) -> None:
-        """See `RunStore`."""
-        job = self._jobs[run.number]
-        job.state = "failed"
-        job.reason = f"{reason}; {job.episodes} of {job.total} episodes done (see {job.folder / LOG})"
-
-    def cancelled(self, run: QueuedRun) -> None:
+    def ended(self, run: QueuedRun, state: RunState, reason: str | None = None, result: Finished | None = None) -> None:
         """See `RunStore`; no job is cancelled by itself."""
+        job = self._jobs[run.number]
+        if state is RunState.SUCCEEDED:
+            job.state, job.episodes = "finished", job.total
+        else:
+            job.state = "failed"
+            job.reason = f"{reason}; {job.episodes} of {job.total} episodes done (see {job.folder / LOG})"
 
     def requeued(self, run: QueuedRun, reason: str | None) -> None:
         """See `RunStore`."""
@@ -122,7 +118,7 @@ class JobStore:
 
     def storage_refused(self, run: QueuedRun, reason: str) -> None:
         """See `RunStore`; the same command goes on once the disk has room."""
-        self.failed(run, reason)
+        self.ended(run, RunState.FAILED, reason)
 
 
 def execute(

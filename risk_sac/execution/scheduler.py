@@ -14,6 +14,7 @@ from typing import Protocol
 from risk_sac.config import RunSpec
 from risk_sac.execution.executor import Cause, Executor, Exited
 from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Started
+from risk_sac.records import State
 
 logger = logging.getLogger(__name__)
 
@@ -44,14 +45,8 @@ class RunStore(Protocol):
     def add_episodes(self, events: Sequence[tuple[int, EpisodeDone]]) -> set[int]:
         """Keeps episodes, which a resumed run tells again; returns the numbers of runs to which one was new."""
 
-    def succeeded(self, run: QueuedRun, result: Finished) -> None:
-        """It is done."""
-
-    def failed(self, run: QueuedRun, reason: str) -> None:
-        """It cannot be done."""
-
-    def cancelled(self, run: QueuedRun) -> None:
-        """It was cancelled, and its worker has left."""
+    def ended(self, run: QueuedRun, state: State, reason: str | None = None, result: Finished | None = None) -> None:
+        """It has succeeded, with a result, has failed, for a reason, or was cancelled; its worker has left."""
 
     def requeued(self, run: QueuedRun, reason: str | None) -> None:
         """It waits again; `reason` says why its worker was lost, None that the scheduler stops."""
@@ -162,13 +157,13 @@ class Scheduler:
         if active.last is not None or active.cancelled:
             self._deaths.pop(run.number, None)
         if isinstance(last, Finished) and last.finished:
-            self._store.succeeded(run, last)
+            self._store.ended(run, State.SUCCEEDED, result=last)
         elif isinstance(last, Failed) and last.storage:
             self._store.storage_refused(run, last.reason)
         elif isinstance(last, Failed):
-            self._store.failed(run, last.reason)
+            self._store.ended(run, State.FAILED, last.reason)
         elif active.cancelled:
-            self._store.cancelled(run)
+            self._store.ended(run, State.CANCELLED)
         elif self.stopping:
             self._store.requeued(run, None)
         elif isinstance(last, Finished):
@@ -187,4 +182,4 @@ class Scheduler:
             self._store.requeued(run, f"{reason}; goes on from its checkpoint")
         else:
             del self._deaths[run.number]
-            self._store.failed(run, f"{reason}; {deaths} workers in a row finished no episode")
+            self._store.ended(run, State.FAILED, f"{reason}; {deaths} workers in a row finished no episode")

@@ -59,41 +59,33 @@ def settle(campaigns: Path, exists: Callable[[str], bool]) -> None:
 
 
 class Retention:
-    """Deletes what ended `retention_days` ago, a batch at a time."""
+    """Deletes campaigns that ended `retention_days` ago, a batch at a time, and places that no campaign names."""
 
     def __init__(self, settings: ServiceSettings, store: Store) -> None:
         self._days = settings.retention_days
+        self._places = settings.places_dir
         self._store = store
-        self._looked_at = float("-inf")
+        self._started_at = time.time()
+        self._retire_at = self._prune_at = 0.0  # monotonic times
 
     def retire(self, dispose: Callable[[str], None]) -> None:
         """Deletes a batch of old campaigns with `dispose`, which takes an id, if it is time."""
-        if self._days is None or time.monotonic() - self._looked_at < RETENTION_S:
+        if self._days is None or time.monotonic() < self._retire_at:
             return
         old = self._store.ended_before(time.time() - self._days * DAY_S, BATCH)
         for campaign_id in old:
             dispose(campaign_id)
         if len(old) < BATCH:
-            self._looked_at = time.monotonic()
+            self._retire_at = time.monotonic() + RETENTION_S
 
-
-class UnusedPlaces:
-    """Removes places from the library that no campaign names."""
-
-    def __init__(self, folder: Path, store: Store) -> None:
-        self._folder = folder
-        self._store = store
-        self._started_at = time.time()
-        self._looked_at = float("-inf")
-
-    def remove(self) -> None:
-        """Removes unused places, if it is time."""
-        if time.monotonic() - self._looked_at < LOOK_S:
+    def remove_unused_places(self) -> None:
+        """Removes places that no campaign names, if it is time."""
+        if time.monotonic() < self._prune_at:
             return
         try:
-            removed = library.prune(self._folder, self._store.families(), UNUSED_S, self._started_at)
+            removed = library.prune(self._places, self._store.families(), UNUSED_S, self._started_at)
         except OSError as error:
             raise StorageError(f"the library of places cannot be tidied ({error.strerror})") from error
-        self._looked_at = time.monotonic()
+        self._prune_at = time.monotonic() + LOOK_S
         if removed:
             logger.info("%d places that no campaign names are gone", len(removed))

@@ -17,7 +17,7 @@ from risk_sac.problem import checked_campaign
 from risk_sac.records import State, Triage, TriageState
 from risk_sac.run_folder.scratch import remove_abandoned, remove_temporaries
 from service.errors import ConflictError, OutdatedError, StorageError
-from service.runs.cleanup import Retention, UnusedPlaces, dispose, settle
+from service.runs.cleanup import Retention, dispose, settle
 from service.runs.quota import check_quota, exhausted
 from service.runs.storage_pause import StoragePause, refused
 from service.settings import ServiceSettings
@@ -48,7 +48,6 @@ class Manager:
         self._lock = threading.RLock()
         self._storage = StoragePause(store, self._ledger, settings.data_dir)
         self._retention = Retention(settings, store)
-        self._unused_places = UnusedPlaces(settings.places_dir, store)
         self._thread = threading.Thread(target=self._work, name="manager", daemon=True)
 
     @property
@@ -170,7 +169,7 @@ class Manager:
         with self._pausing():
             self._scheduler.fill(self.workers)
             self._retention.retire(self._dispose)
-            self._unused_places.remove()
+            self._retention.remove_unused_places()
 
     @contextmanager
     def _pausing(self, run: QueuedRun | None = None) -> Iterator[None]:
@@ -222,20 +221,10 @@ class Manager:
             return self._ledger.add_episodes(events)
         return set()
 
-    def succeeded(self, run: QueuedRun, result: Finished) -> None:
+    def ended(self, run: QueuedRun, state: State, reason: str | None = None, result: Finished | None = None) -> None:
         """See `RunStore`."""
         with self._pausing(run):
-            self._ledger.end_run(run.number, State.SUCCEEDED, result=result)
-
-    def failed(self, run: QueuedRun, reason: str) -> None:
-        """See `RunStore`."""
-        with self._pausing(run):
-            self._ledger.end_run(run.number, State.FAILED, reason)
-
-    def cancelled(self, run: QueuedRun) -> None:
-        """See `RunStore`."""
-        with self._pausing(run):
-            self._ledger.end_run(run.number, State.CANCELLED)
+            self._ledger.end_run(run.number, state, reason, result)
 
     def requeued(self, run: QueuedRun, reason: str | None) -> None:
         """See `RunStore`."""

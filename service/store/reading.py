@@ -80,7 +80,7 @@ class Store:
             return known
         with self._reading() as session:
             row = find_campaign(session, campaign_id, project)
-            return self._shown_revision(self.revisions.learn(row.id, row.project, row.revision).revision)
+            return self._shown_revision(self.revisions.learn(row.id, row.project, row.revision))
 
     def known_revision(self, campaign_id: str, project: str | None = None) -> str | None:
         """The same if the database need not be asked for it, else None."""

@@ -4,16 +4,14 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 
-import psutil
 import pytest
 
 from risk_sac.errors import ConfigError
 from risk_sac.execution.jobs import worker_program
 from risk_sac.execution.ray.executor import RayExecutor
-from tests.ray_cluster import LONG_S, ROOT, Cluster, needs_ray, running, wait_until
+from tests.ray_cluster import LONG_S, ROOT, Cluster, needs_ray, running
 
 TINY = ["--families", "low", "--methods", "random", "--seeds", "1", "--episodes", "1", "--out", "out"]
 # As if Ray were not installed, wherever it is.
@@ -80,12 +78,6 @@ def refusal() -> ConfigError:
     [
         ({"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1"}, "RISK_SAC_RAY_ADDRESS", "nothing answers"),
         ({"RISK_SAC_RAY_ADDRESS": "somewhere"}, "RISK_SAC_RAY_ADDRESS", "wanted `auto` or HOST:PORT"),
-        ({"RISK_SAC_RAY_ADDRESS": "auto", "RISK_SAC_RAY_JOIN": "1"}, "RISK_SAC_RAY_ADDRESS", "no cluster to join"),
-        pytest.param(
-            {"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1", "RISK_SAC_RAY_JOIN": "1"},
-            *("RISK_SAC_RAY_ADDRESS", "nothing answers"),
-            marks=pytest.mark.torture,
-        ),
         ({"RISK_SAC_RAY_CPUS_PER_RUN": "3"}, "RISK_SAC_RAY_CPUS_PER_RUN", "no node of the cluster has as much"),
         ({"RISK_SAC_RAY_CPUS_PER_RUN": "none"}, "RISK_SAC_RAY_CPUS_PER_RUN", 'got "none"'),
         ({"RISK_SAC_RAY_SCRATCH_DIR": "/proc/runs"}, "RISK_SAC_RAY_SCRATCH_DIR", "cannot write to"),
@@ -142,18 +134,3 @@ def test_a_node_with_another_python_and_other_packages_is_refused_before_any_run
     python = ".".join(map(str, sys.version_info[:3]))
     assert f"python is {sys.version_info[0]}.{sys.version_info[1]}.99; wanted {python}" in str(error)
     assert "gpytorch is 0.0.1; wanted" in str(error)
-
-
-@needs_ray
-@pytest.mark.parametrize("killed", [pytest.param(False, marks=pytest.mark.torture), True])
-def test_a_machine_that_joins_is_a_node_without_room_for_as_long_as_its_bridge_lives(cluster, monkeypatch, killed):
-    monkeypatch.setenv("RISK_SAC_RAY_JOIN", "true")
-    with closing(RayExecutor(worker_program())) as executor:
-        (bridge,) = [each for each in psutil.Process().children() if "risk_sac.execution.ray.bridge" in each.cmdline()]
-        joined = bridge.children(recursive=True)
-        assert any("raylet" in each.name() for each in joined)
-        wait_until(lambda: sorted(node.slots for node in executor.cluster.nodes if node.alive) == [0, 1])
-        if killed:
-            bridge.kill()
-            assert psutil.wait_procs(joined, LONG_S)[1] == []
-    assert psutil.wait_procs(joined, LONG_S)[1] == []

@@ -74,7 +74,7 @@ def populate(file: Path, campaigns: int, runs: int) -> tuple[list[str], str]:
         database.row_factory = sqlite3.Row
         (campaign,) = database.execute("SELECT * FROM campaigns").fetchall()
         (run,) = database.execute("SELECT * FROM runs").fetchall()
-        searches = list(itertools.get(FAMILIES, METHODS))
+        searches = list(itertools.product(FAMILIES, METHODS))
         ids, now = [], time.time()
         for place in range(campaigns):
             label = RARE_LABEL if place == campaigns // 10 else LABELS[place % len(LABELS)]

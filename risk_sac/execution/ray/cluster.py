@@ -4,11 +4,7 @@ import contextlib
 import ipaddress
 import logging
 import os
-import re
 import socket
-import subprocess
-import sys
-import threading
 
 import ray
 from ray.exceptions import RayError, RayTaskError
@@ -25,9 +21,6 @@ logger = logging.getLogger(__name__)
 TOKEN_MODE = "RAY_AUTH_MODE"  # Ray's own
 HEAD_S = 10.0
 PROBE_S = 60.0
-START_S = 60.0  # after which Ray goes on trying to join
-STORE_BYTES = 80_000_000  # about the least that Ray takes
-STARTED, JOINED = "Ray runtime started", re.compile(r"Local node IP: ([\w.:]+)")
 
 
 def connect(settings: RaySettings) -> None:
@@ -39,14 +32,12 @@ def connect(settings: RaySettings) -> None:
     """
     if settings.ray_address != "auto":
         _check_head(settings.ray_address)
-    node = _join(settings) if settings.ray_join else None
     try:
         ray.init(
             address=settings.ray_address,
             log_to_driver=False,
             logging_level=logging.ERROR,
             configure_logging=False,
-            _node_ip_address=node,
         )
     except (ConnectionError, RuntimeError, ValueError, RayError) as error:
         got = f"{settings.ray_address!r}: {' '.join(str(error).split())}"
@@ -98,35 +89,6 @@ def _check_head(address: str) -> None:
     check_token(host)
 
 
-def _join(settings: RaySettings) -> str:
-    """Makes this machine a node that executes nothing, since Ray lets no client in whose machine is none.
-
-    The helper process ends the node with this process. Returns the node's address.
-    """
-    if settings.ray_address == "auto":
-        raise ConfigError(ADDRESS, "'auto', which is no cluster to join", "HOST:PORT")
-    node = subprocess.Popen(
-        [sys.executable, "-m", "risk_sac.execution.helper", "0", "0", "ray.scripts.scripts", "start",
-         f"--address={settings.ray_address}", "--num-cpus=0", f"--object-store-memory={STORE_BYTES}",
-         "--disable-usage-stats", "--block"],
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
-    )  # fmt: skip
-    assert node.stdin is not None
-    assert node.stdout is not None
-    late = threading.Timer(START_S, node.stdin.close)
-    late.start()
-    said = ""
-    for line in node.stdout:
-        said += line
-        if STARTED in line and (address := JOINED.search(said)):
-            late.cancel()
-            threading.Thread(target=node.stdout.read, daemon=True).start()
-            return address[1]
-    late.cancel()
-    got = f"{settings.ray_address!r}, which this machine cannot join ({' '.join(said[-1000:].split())})"
-    raise ConfigError(ADDRESS, got, "a cluster of the same Ray")
-
-
 def _check_nodes(settings: RaySettings) -> None:
     """Tries every node that has room: its versions, and its folder for attempts."""
     able = [node for node in nodes(settings) if node.slots]
@@ -134,19 +96,18 @@ def _check_nodes(settings: RaySettings) -> None:
         got = f"{settings.ray_cpus_per_run:g} processors and {settings.ray_memory_bytes_per_run} bytes for a run"
         raise ConfigError(variable("ray_cpus_per_run"), f"{got}; no node of the cluster has as much")
     task = ray.remote(check)
-    asked = {}
+    asked = []
     for node in able:
         there = NodeAffinitySchedulingStrategy(node.id, soft=False)
         options = task.options(num_cpus=0, max_retries=0, scheduling_strategy=there)
-        asked[options.remote(settings.ray_scratch_dir, versions())] = node.address
-    for reference, address in asked.items():
+        asked.append(options.remote(settings.ray_scratch_dir, versions()))
+    for reference in asked:
         try:
             ray.get(reference, timeout=PROBE_S)
         except RayTaskError as error:
             if isinstance(error.cause, ConfigError):
                 raise error.cause from None
-            wanted = f"risk-sac {__version__} and all that belongs to it, as on the server's machine"
-            got = f"node {address}, which cannot run what is here ({str(error.cause).partition(chr(10))[0]})"
-            raise ConfigError(ADDRESS, got, wanted) from error
+            got = f"a cluster that cannot run what is here ({str(error.cause).partition(chr(10))[0]})"
+            raise ConfigError(ADDRESS, got, f"risk-sac {__version__} with all its packages on each node") from error
         except RayError as error:  # it is gone, or does not answer in time
-            logger.warning("node %s was lost: %s", address, type(error).__name__)
+            logger.warning("a node was lost: %s", type(error).__name__)

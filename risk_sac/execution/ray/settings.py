@@ -23,8 +23,6 @@ class RaySettings(BaseSettings):
 
     ray_address: str = "auto"
     """Address of the Ray cluster's head, `HOST:PORT`; `auto`: the cluster that this machine is a part of."""
-    ray_join: bool = False
-    """Whether this machine joins the cluster by itself, as a node that executes nothing; else it is one already."""
     ray_cpus_per_run: Annotated[float, Field(gt=0, le=1024)] = 1.0
     """Processors that a run takes of its node."""
     ray_memory_bytes_per_run: Annotated[int, Field(ge=0)] = 1 << 30
