@@ -100,17 +100,6 @@ def test_view_does_not_drag_its_whole_storage_along(tmp_path):
     assert (tmp_path / "v").stat().st_size < 10_000
 
 
-def test_truncation_to_a_few_bytes_and_by_one_byte_is_noticed(path):
-    content = path.read_bytes()
-    for length in (*range(60), len(content) - 1):
-        path.write_bytes(content[:length])
-        with pytest.raises(CheckpointError, match=r"run\.ckpt"):
-            checkpoint.load(path, RUN)
-    path.write_bytes(content + b"\x00")
-    with pytest.raises(CheckpointError, match="damaged"):
-        checkpoint.load(path, RUN)
-
-
 def flipped(content, position):
     damaged = bytearray(content)
     damaged[position // 8] ^= 1 << (position % 8)
