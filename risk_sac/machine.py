@@ -1,10 +1,14 @@
 """What this machine lends this process: processors, and a folder of its user's for caches."""
 
+import errno
 import math
 import os
 import re
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
+
+UNWRITABLE = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR, errno.EEXIST)
+"""Errors of a folder that cannot be made or written, whatever room there is."""
 
 
 def cores(process: Path = Path("/proc/self")) -> int:

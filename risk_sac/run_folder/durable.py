@@ -19,6 +19,7 @@ from typing import IO, Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.machine import UNWRITABLE
 from risk_sac.run_folder.scratch import remove_temporaries
 
 logger = logging.getLogger(__name__)
@@ -101,7 +102,7 @@ def held(folder: Path) -> Iterator[None]:
         expected = "a folder that no other process is using"
         raise ConfigError("out", f"{folder}, in which another process is at work", expected) from error
     except OSError as error:
-        if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        if error.errno in UNWRITABLE:
             got = f"{folder}, which cannot be written ({error.strerror})"
             raise ConfigError("out", got, "a folder that can be written") from error
         if error.errno not in NO_LOCKS:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from risk_sac.config import FAMILY_NAME
 from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.machine import user_cache
+from risk_sac.machine import UNWRITABLE, user_cache
 from risk_sac.scenario.place import PLACES, Place
 
 VARIABLE = "RISK_SAC_PLACES"
@@ -71,7 +71,9 @@ def put(name: str, text: bytes, net: bytes) -> None:
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         new = Path(tempfile.mkdtemp(prefix=_NEW, dir=folder.parent))
-    except PermissionError as error:
+    except OSError as error:
+        if error.errno not in UNWRITABLE:
+            raise
         got = f"{folder.parent}, which cannot be written ({error.strerror})"
         raise ConfigError(VARIABLE, got, "a folder for places on maps that can be written") from error
     new.chmod(0o755)
