@@ -1,7 +1,15 @@
 """`python -m risk_sac` is `risk-sac`."""
 
-import sys
+from typing import NoReturn
 
 from risk_sac.cli import main
+from risk_sac.process_state import leave
 
-sys.exit(main())
+
+def command() -> NoReturn:
+    """Run the command line as a process of its own."""
+    leave(main())
+
+
+if __name__ == "__main__":
+    command()

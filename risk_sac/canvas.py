@@ -34,7 +34,9 @@ def picture(draw: Callable[[], Figure], formats: Sequence[str], dpi: float, styl
       style: matplotlib's settings that differ from its defaults; its types name them one by one.
     """
     files = []
-    with _DRAWING, mpl.rc_context(style | {"svg.hashsalt": "risk-sac"}):
+    with _DRAWING, mpl.rc_context():
+        mpl.rcdefaults()  # neither the user's own style nor one that an ego has set
+        mpl.rcParams.update(style | {"svg.hashsalt": "risk-sac"})
         figure = draw()
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # it is laid out now; each file would do it again, a little differently

@@ -30,9 +30,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str] | None) -> int:
     options = _parser().parse_args(arguments)
-    _make_absolute(options)
     options.typed = shlex.join(["risk-sac", *(sys.argv[1:] if arguments is None else arguments)])
     try:
+        _make_absolute(options)
         status: int = options.command(options)
     except ConfigError as error:
         complain(str(error))
@@ -40,7 +40,11 @@ def _run(arguments: Sequence[str] | None) -> int:
     except KeyboardInterrupt:
         complain("interrupted")
         return INTERRUPTED
-    except (RiskSacError, OSError, MemoryError) as error:
+    except OSError as error:
+        where = error.filename or vars(options).get("out") or ""
+        complain(f"{where}: {error.strerror or error}".removeprefix(": "))
+        status = options.on_error
+    except (RiskSacError, MemoryError) as error:
         complain(str(error) or "there is too little memory")
         status = options.on_error
     except SystemExit:  # no command ends so

@@ -19,6 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from risk_sac.process_state import leave
 from risk_sac.run_folder.scratch import scratch_folder
 
 logger = logging.getLogger(__name__)
@@ -145,10 +146,15 @@ def _main(niceness: str, memory_bytes: str, program: str, *arguments: str) -> No
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
     threading.Thread(target=_leave_with_starter, daemon=True).start()
     sys.argv[1:] = arguments  # `runpy` replaces the first
-    if program.endswith(".py"):
-        runpy.run_path(program, run_name="__main__")
-    else:
-        runpy.run_module(program, run_name="__main__", alter_sys=True)
+    status: object = 0
+    try:
+        if program.endswith(".py"):
+            runpy.run_path(program, run_name="__main__")
+        else:
+            runpy.run_module(program, run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        status = end.code or 0
+    leave(status if isinstance(status, int) else 1)
 
 
 def _leave_with_starter() -> None:

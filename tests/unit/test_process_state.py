@@ -7,6 +7,7 @@ import logging
 import os
 import signal
 import socket
+import subprocess
 import sys
 import warnings
 from collections.abc import Callable
@@ -86,6 +87,15 @@ def test_what_it_puts_back_is_forgotten_and_an_error_passes(tmp_path: Path) -> N
             assert Path.cwd() == tmp_path
     finally:
         os.chdir(here)
+
+
+def test_a_thread_that_never_ends_does_not_keep_the_process() -> None:
+    program = (
+        "import threading, time; from risk_sac.process_state import leave; "
+        "threading.Thread(target=time.sleep, args=(600,)).start(); print('done'); leave(3)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout) == (3, "done\n"), done.stderr
 
 
 def test_a_folder_that_is_gone_is_no_error(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def test_letters_that_a_terminal_lacks_are_written_in_ascii(monkeypatch: pytest.
         (SystemExit(0), 1, "ended the program"),
         (MemoryError(), 1, "too little memory"),
         (KeyboardInterrupt(), 130, "interrupted"),
-        (OSError(28, "No space left on device", "out/results.json"), 1, "No space left on device: 'out/results.json'"),
+        (OSError(28, "No space left on device", "out/results.json"), 1, "out/results.json: No space left on device"),
     ],
 )
 def test_however_a_command_ends_its_status_says_that_it_is_not_done(
