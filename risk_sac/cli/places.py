@@ -67,10 +67,12 @@ def _places(options: argparse.Namespace) -> int:
 def _tell(pattern: Pattern, found: Survey, most: int, *, why: bool) -> None:
     fits = [fit for fit in found.fits if fit.spot.pattern == pattern]
     misfits = [misfit for misfit in found.misfits if misfit.spot.pattern == pattern]
-    counts = f"{counted(len(fits), 'place')}; does not fit at {len(misfits)}"
+    rare = sum(fit.rare for fit in fits)
+    marked = f", contacts are rare at {rare} of them" if rare else ""
+    counts = f"{counted(len(fits), 'place')}{marked}; does not fit at {len(misfits)}"
     console.print(f"{TITLES[pattern]} ({pattern}): {counts}", highlight=False)
     if fits:
-        console.print(_table("what", [(fit.spot.id, fit.place.summary) for fit in fits], most))
+        console.print(_table("what", [(fit.spot.id, fit.summary) for fit in fits], most))
     if why and misfits:
         console.print(_table("why not", [(misfit.spot.id, misfit.why) for misfit in misfits], most))
 

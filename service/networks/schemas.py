@@ -59,6 +59,8 @@ class FoundPlace(Spot):
     """Where a pattern fits."""
 
     summary: str
+    rare: bool = False
+    """Contacts are rare there: nobody can cut in."""
 
 
 class Elsewhere(Spot):

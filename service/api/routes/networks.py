@@ -40,11 +40,10 @@ DRAWN: Responses = {200: {"content": {"image/png": {}}}}
 DESCRIPTION = f"""Check a SUMO road network and keep it. Its `places` are where campaigns can be run on it.
 
 The body is a net (`.net.xml`), an OpenStreetMap extract or OpenDRIVE, the same as gzip, or a zip archive of one map \
-and up to {MAX_FILES - 1} route and additional files. Its content tells what it is. A map that is no net, or an old \
-one, is converted by SUMO's netconvert; `warnings` has its remarks, the side of traffic, and whether lanes for cars, \
-signals or connections are missing. At most {MAX_BYTES >> 20} MiB once unpacked and {MAX_ROADS} edges, not counting \
-those inside junctions. What names a file, includes one or writes output is refused. What was read is written again \
-and loaded once, in at most {WALL_S} s; only that is kept, without comments, under names of the service's own."""
+and up to {MAX_FILES - 1} route and additional files. Its content tells what it is. What is no present net is \
+converted by SUMO's netconvert; `warnings` has its remarks, the side of traffic, and what is missing. At most \
+{MAX_BYTES >> 20} MiB once unpacked and {MAX_ROADS} edges outside junctions. What names a file or writes output is \
+refused. The rest is written again and loaded once, in at most {WALL_S} s; only that is kept."""
 DOCUMENTED_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,

@@ -201,7 +201,9 @@ def test_a_dead_end_is_no_missing_connection(tmp_path: Path, roads: str, says: l
     file.write_text(f"<net>{roads}</net>")
     net = read_net(file)
     assert net_remarks(net) == ["there are no traffic lights", *says]
-    assert place_at(net, "car_following", "r")
+    fit = place_at(net, "car_following", "r")
+    assert fit.rare
+    assert fit.told()["summary"].endswith("Contacts are rare here: nobody can cut in.")
 
 
 @pytest.mark.parametrize("name", ["straight_two_way.xodr", "single_road.osm"])

@@ -14,6 +14,20 @@ LEFT_STREET, RIGHT_STREET = STREET.format(id=7, side="left"), STREET.format(id=8
 RELATION = '<relation id="5"><member type="way" ref="1" role="outer"/><tag k="driving_side" v="left"/></relation>'
 UNFINISHED = osm_roundabout(clockwise=True).replace('<nd ref="903"/>', '<nd ref="404"/>')  # beyond the extract's edge
 
+MINI = '<node id="71" lat="48.7" lon="11.4"><tag k="highway" v="mini_roundabout"/><tag k="direction" v="{}"/></node>'
+
+
+def carriageways(side: int) -> str:
+    """Two carriageways of one road, 15 m apart, each with the other on its left (1) or its right (-1)."""
+    road = '<tag k="highway" v="motorway"/><tag k="ref" v="A 9"/>'
+    nodes = "".join(
+        f'<node id="{81 + i + 3 * j}" lat="{48.7 + side * j * 15 / 111_320:.7f}" lon="{11.4 + 0.002 * i}"/>'
+        for i in range(3)
+        for j in range(2)
+    )
+    there, back = (f'<nd ref="{a}"/><nd ref="{b}"/><nd ref="{c}"/>' for a, b, c in ((81, 82, 83), (86, 85, 84)))
+    return f'{nodes}<way id="61">{there}{road}</way><way id="62">{back}{road}</way>'
+
 
 @pytest.fixture
 def extract(tmp_path: Path) -> Path:
@@ -27,7 +41,15 @@ def extract(tmp_path: Path) -> Path:
         (RELATION, "relation 5 has driving_side=left"),
         (osm_roundabout(clockwise=True), "the roundabout way 99 runs clockwise"),
         (osm_roundabout(clockwise=False, oneway="-1"), "the roundabout way 99 runs clockwise"),
-        (LEFT_STREET + RIGHT_STREET + RELATION, r"way 7 has driving_side=left \(and 1 more like it\)"),
+        (
+            LEFT_STREET + RIGHT_STREET + RELATION,
+            r"way 7 has driving_side=left \(and 1 more like it\), although way 8 has driving_side=right",
+        ),
+        (osm_roundabout(clockwise=True, pieces=2), "the roundabout way 99 runs clockwise"),
+        (osm_roundabout(clockwise=True, pieces=3), "the roundabout way 99 runs clockwise"),
+        (osm_roundabout(clockwise=True, pieces=6), "the roundabout way 99 runs clockwise"),
+        (MINI.format("clockwise"), "the mini-roundabout node 71 runs clockwise"),
+        (carriageways(-1), "the carriageways of A 9 are driven on the left"),
     ],
 )
 def test_an_extract_with_left_hand_traffic_is_refused_and_says_where(extract: Path, more: str, where: str) -> None:
@@ -37,17 +59,23 @@ def test_an_extract_with_left_hand_traffic_is_refused_and_says_where(extract: Pa
 
 
 @pytest.mark.parametrize(
-    "more",
+    ("more", "where"),
     [
-        RIGHT_STREET,
-        osm_roundabout(clockwise=False),
-        osm_roundabout(clockwise=True, oneway="-1"),
-        LEFT_STREET + RIGHT_STREET + osm_roundabout(clockwise=False),  # one street has its sides swapped
+        (RIGHT_STREET, "way 8 has driving_side=right"),
+        (osm_roundabout(clockwise=False), "the roundabout way 99 runs counter-clockwise"),
+        (osm_roundabout(clockwise=True, oneway="-1"), "the roundabout way 99 runs counter-clockwise"),
+        (osm_roundabout(clockwise=False, pieces=2), "the roundabout way 99 runs counter-clockwise"),
+        (MINI.format("anticlockwise"), "the mini-roundabout node 71 runs anticlockwise"),
+        (carriageways(1), "the carriageways of A 9 are driven on the right"),
+        (  # one street has its sides swapped
+            LEFT_STREET + RIGHT_STREET + osm_roundabout(clockwise=False),
+            "way 8 has driving_side=right (and 1 more like it), although way 7 has driving_side=left",
+        ),
     ],
 )
-def test_an_extract_with_right_hand_traffic_is_read_without_a_remark(extract: Path, more: str) -> None:
+def test_an_extract_with_right_hand_traffic_says_by_what(extract: Path, more: str, where: str) -> None:
     extract.write_text(osm_town(more))
-    assert side_remarks(extract) == []
+    assert side_remarks(extract) == [f"right-hand traffic: {where}"]
 
 
 @pytest.mark.parametrize("more", ["", osm_roundabout(clockwise=True, oneway="no"), UNFINISHED])
@@ -69,7 +97,8 @@ def test_opendrive_says_by_the_rules_of_its_roads_on_which_side_people_drive(
         with pytest.raises(MapError, match="left-hand traffic: road 20 has rule=LHT; wanted"):
             side_remarks(extract)
     else:
-        assert side_remarks(extract) == ([UNKNOWN] if keeps_left is None else [])
+        (said,) = side_remarks(extract)
+        assert said == UNKNOWN if keeps_left is None else said.startswith("right-hand traffic: road 20 has rule=RHT")
 
 
 def test_roundabouts_are_read_whatever_comes_first(extract: Path) -> None:
@@ -82,9 +111,8 @@ def test_roundabouts_are_read_whatever_comes_first(extract: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ('<!DOCTYPE osm [<!ENTITY a "b">]><osm/>', "got a DOCTYPE"),
-        ("<osm><node", "is no map"),
-        (f"<osm>{osm_roundabout(clockwise=True).replace('lat=', 'height=')}</osm>", "is no map: KeyError"),
+        ("<osm><node", "the map is broken"),
+        ('<osm><node id="1" lat="north" lon="2"/></osm>', "the map is broken: ValueError"),
     ],
 )
 def test_what_is_no_extract_is_refused(extract: Path, content: str, says: str) -> None:
