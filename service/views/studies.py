@@ -23,6 +23,7 @@ from service.views.series import load_arrays, series_file
 
 logger = logging.getLogger(__name__)
 
+MISUSED = 2  # exit status of `risk-sac` for what cannot be used
 TABLES_KEPT = 1  # of some megabytes each
 
 
@@ -103,7 +104,11 @@ class Tables(OnDemandCache[Table]):
         folders = map(str, table.folders)
         result = self._helper.run("risk_sac", ["export", *folders, "--format", table.format, "--out", ANSWER])
         if result.status != 0:
-            reason = f"more than {WALL_S:g} s" if result.timed_out else f"status {result.status}"
-            logger.error("a table of episodes was not made (%s): %s", reason, result.log)
-            raise StorageError("the table of episodes cannot be made; the log has the reason")
+            logger.error("a table of episodes was not made (status %d): %s", result.status, result.log)
+            reason = f"it takes more than {WALL_S:g} s" if result.timed_out else "the log has the reason"
+            for folder in table.folders:  # a file of a run may be damaged or gone
+                if result.status == MISUSED and f"{folder}/" in result.log:
+                    reason = f"run {folder.name}: " + result.log.partition(f"{folder}/")[2].splitlines()[0]
+            rest = "`episodes` of the campaign still lists them all"
+            raise StorageError(f"the table of episodes cannot be made: {without_folders(reason)}; {rest}")
         return result.answer

@@ -19,6 +19,8 @@ from typing import Any
 import httpx
 import pytest
 
+from risk_sac.execution.helper import HelperResult
+from risk_sac.failures.question import REFUSED
 from service.settings import ServiceSettings
 from tests.contract.recorded_campaigns import ENDED_ID, LIVE_ID, Recorded, known_times_and_ids
 from tests.contract.serving import serving
@@ -71,6 +73,41 @@ def test_the_answer_is_the_recorded_one(client, name):
         file.parent.mkdir(exist_ok=True)
         file.write_text(json.dumps(answer, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     assert answer == json.loads(file.read_text(encoding="utf-8"))
+
+
+def choices(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """Each parameter of a GET that takes one of several values: path, parameter and its schema."""
+
+    def resolved(node: dict[str, Any]) -> dict[str, Any]:
+        while "$ref" in node:
+            place = document
+            for part in node["$ref"].split("/")[1:]:
+                place = place[part]
+            node = place
+        return node
+
+    for path, operations in document["paths"].items():
+        for parameter in map(resolved, operations.get("get", {}).get("parameters", [])):
+            schema = resolved(parameter["schema"])
+            some = [resolved(each) for each in schema.get("anyOf", [schema])]
+            yield from ((path, parameter, each) for each in some if "enum" in each)
+
+
+def test_every_choice_that_is_documented_is_accepted_and_no_other(client, monkeypatch):
+    refused = HelperResult(status=REFUSED, answer=b"not here", log="")
+    monkeypatch.setattr("service.views.on_demand.run_helper", lambda *_, **__: refused)
+    ids = {"campaign_id": ENDED_ID, "failure_id": "low-risk-sac-3-train-1", "run_id": "low-risk-sac-3"}
+    ids |= {"name": "ecr_low", "format": "png", "twin": "idle"}
+    seen = 0
+    for path, parameter, schema in choices(client.get("/openapi.json").json()):
+        name = parameter["name"]
+        for value in [*schema["enum"], "made-up"]:
+            given = {name: value}
+            query = given if parameter["in"] == "query" else {}
+            status = client.get(path.format(**ids | given), params=query).status_code
+            assert (status == 422) is (value == "made-up"), (path, given)
+            seen += 1
+    assert seen > 50
 
 
 def shown(response: httpx.Response) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Who may do what, on real servers: every route against every way of not being allowed."""
 
 import base64
+import itertools
 import json
 import os
 import socket
@@ -482,6 +483,21 @@ def test_keys_are_counted_apart_and_guesses_by_address(strict, calm):
         assert calm.get("/v1/methods", headers=idle).status_code == 200
     finally:
         file.open_all()
+
+
+def test_a_header_hides_no_guess_from_the_limit(strict, calm):
+    KeyFile(strict.data_dir / "keys.json").create("maps", "", Scope.READ)
+    try:
+        for name, value in (
+            ("x-forwarded-for", "10.0.0.{}"),
+            ("forwarded", "for=10.0.0.{}"),
+            ("x-real-ip", "10.0.0.{}"),
+        ):
+            addresses = itertools.count()
+            guesses = at_once(lambda: calm.get("/v1/methods", headers={name: value.format(next(addresses))}))  # noqa: B023
+            assert {answer.status_code for answer in guesses} == {401, 429}, name
+    finally:
+        KeyFile(strict.data_dir / "keys.json").open_all()
 
 
 def parts(size):

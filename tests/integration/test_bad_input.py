@@ -3,6 +3,7 @@
 import json
 
 import httpx
+import psutil
 import pytest
 
 from tests.hostile_formulas import formulas
@@ -82,6 +83,39 @@ def test_a_body_that_is_no_json_is_refused(client, body, detail):
     assert (response.status_code, response.json()["reason"]) == (400, "malformed_json")
     assert detail in response.json()["detail"]
     assert_checked_alike(client, body, response.json())
+
+
+def nested(opening, depth, closing):
+    return b'{"network": "x", "a": ' + opening * depth + b"1" + closing * depth + b"}"
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        (json.dumps({"network": "x"} | {f"field{i}": i for i in range(20_000)}).encode(), 422),
+        (json.dumps({"network": "x"} | {f"f{i}": 0 for i in range(60_000)}).encode(), 422),
+        (json.dumps({"families": [[]] * 250_000}).encode(), 422),
+        (json.dumps({"families": ["low"], "seeds": [[]] * 4000}).encode(), 422),
+        (json.dumps({"families": [[]] * 4000, "network": "x"}).encode(), 422),
+        (nested(b'{"a": ', 948, b"}"), 400),
+        (nested(b'{"a": ', 140_000, b"}"), 400),
+        (nested(b"[", 990, b"]"), 400),
+        (nested(b"[", 150, b"]"), 422),
+        (b'{"a": ' * 948 + b"1" + b"}" * 948, 400),
+    ],
+    ids=lambda each: str(each)[:40],
+)
+@pytest.mark.parametrize(
+    "path", ["/v1/campaigns", "/v1/campaigns/check", "/v1/regressions", "/v1/campaigns/c0/failures/f0/triage"]
+)
+def test_a_hostile_body_costs_no_more_than_its_size(shared, client, path, body, status):
+    server = psutil.Process(shared.process.pid)
+    before = sum(server.cpu_times()[:2])
+    method = "PUT" if path.endswith("triage") else "POST"
+    response = client.request(method, path, content=body, headers={"content-type": "application/json"})
+    assert response.status_code == status, response.text
+    assert len(response.json()["detail"]) < 20_000
+    assert sum(server.cpu_times()[:2]) - before < 0.5
 
 
 def assert_checked_alike(client, body, problem):

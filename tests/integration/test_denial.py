@@ -15,6 +15,7 @@ import pytest
 
 from service.api.guards import connections
 from service.api.routes import docs
+from service.keys.file import KeyFile, Scope
 from service.settings import ServiceSettings
 from tests.contract.serving import serving
 from tests.server import LONG_S, ROOT
@@ -111,14 +112,43 @@ def test_with_all_connections_at_work_one_more_is_refused(serve):
     service.wait_until(lambda: service.get(campaign)["state"] == "running")
 
 
+def test_a_connection_that_queues_requests_without_end_is_closed(serve, connect):
+    service = serve()
+    sent = b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n" * 100
+    for _ in range(20):
+        assert ended(connect(service, sent))
+    assert service.client.get("/healthz").status_code == 200
+
+
+def test_a_key_leaves_connections_for_others(serve, tmp_path):
+    file = KeyFile(tmp_path / "data" / "keys.json")
+    first, second = (file.create("maps", name, Scope.RUN)[1] for name in ("first", "second"))
+    service = serve(max_connections=9)
+    service.client.headers["authorization"] = f"Bearer {first}"
+    events = f"/v1/campaigns/{service.post(budget={'episodes': 100_000})}/events"
+    with contextlib.ExitStack() as streams:
+
+        def follow(key):
+            headers = {"authorization": f"Bearer {key}"}
+            client = streams.enter_context(httpx.Client(base_url=service.client.base_url, headers=headers, timeout=60))
+            return streams.enter_context(client.stream("GET", events))
+
+        assert [follow(first).status_code for _ in range(6)] == [200] * 4 + [429] * 2
+        refused = follow(first)
+        assert (refused.headers["retry-after"], json.loads(refused.read())["reason"]) == ("1", "connections_busy")
+        assert [follow(second).status_code for _ in range(2)] == [200] * 2
+        assert httpx.get(f"{service.client.base_url}/healthz").status_code == 200
+    service.wait_until(lambda: service.client.get("/v1/campaigns").status_code == 200)
+
+
 def test_who_reads_nothing_of_an_answer_is_not_waited_for_for_ever(tmp_path, monkeypatch):
     monkeypatch.setattr(connections, "UNREAD_S", 0.2)
-    most = 20 * (docs.ASSETS / docs.SCRIPT).stat().st_size
+    most = 8 * (docs.ASSETS / docs.SCRIPT).stat().st_size
     with serving(ServiceSettings(data_dir=tmp_path / "data")) as url, socket.socket() as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         client.settimeout(LONG_S)
         client.connect(("127.0.0.1", httpx.URL(url).port))
-        client.sendall(b"GET /docs/%s HTTP/1.1\r\nHost: localhost\r\n\r\n" % docs.SCRIPT.encode() * 20)
+        client.sendall(b"GET /docs/%s HTTP/1.1\r\nHost: localhost\r\n\r\n" % docs.SCRIPT.encode() * 8)
         assert client.recv(1) == b"H"
         while established(client):
             time.sleep(0.05)

@@ -117,6 +117,37 @@ def test_the_docs_need_no_network(client):
     assert client.get(page.url.join(description)).json()["openapi"]
 
 
+def test_links_lead_below_the_path_that_a_proxy_has_the_service_at(serve, client, campaign):
+    """Whether the settings name it or the proxy does; `client` is of a server that knows of none."""
+    configured = serve(root_path="/sim")
+    posted = configured.client.post("/v1/campaigns", json=SPEC)
+    assert configured.wait(posted.json()["id"])["state"] == "succeeded"
+    for asked, location in ((configured.client, posted.headers["location"]), (client, f"/sim/v1/campaigns/{campaign}")):
+        headers = {} if asked is configured.client else {"x-forwarded-prefix": "/sim"}
+
+        def get(path, asked=asked, headers=headers):
+            return asked.get(path, headers=headers).raise_for_status()
+
+        assert re.fullmatch("/sim/v1/campaigns/c[0-9a-f]+", location)
+        path = location.removeprefix("/sim")
+        assert get("/openapi.json").json()["servers"] == [{"url": "/sim"}]
+        assert get("/").json()["docs"] == "/sim/docs"
+        assert f"{asked.base_url}/sim/v1/campaigns" in get(f"{path}/table?format=md").text
+        assert get(path).json()["id"] in location
+        assert get("/page/").status_code == get("/readyz").status_code == 200
+        assert asked.post(f"{path}/cancel", headers=headers).headers["location"] == location
+        assert asked.get("/v1/nothing", headers=headers).json()["instance"] == "/sim/v1/nothing"
+        assert asked.patch(path, headers=headers).headers["allow"] == "DELETE, GET, HEAD"
+    for forged in ("sim", "//evil.example", "/a b", "/<script>", "/..%2f", "/" + "x" * 101):
+        response = client.post(f"/v1/campaigns/{campaign}/cancel", headers={"x-forwarded-prefix": forged})
+        assert response.headers["location"] == f"/v1/campaigns/{campaign}", forged
+
+
+def test_the_page_answers_get_alone(client):
+    response = client.post("/page/")
+    assert (response.status_code, response.headers["allow"]) == (405, "GET, HEAD")
+
+
 @pytest.mark.parametrize(("path", "kind"), [(b"/v1/campaigns", b"json"), (b"/v1/networks", b"xml")])
 def test_who_leaves_in_the_middle_of_a_body_is_counted_as_such(serve, path, kind):
     service = serve()

@@ -25,7 +25,7 @@ WORKER_FILES = 4  # for each worker
 FEWEST = 8
 BACKLOG = 2048  # connections that the kernel queues until they are accepted
 UNREAD_S = 60.0  # for which a client may take nothing of its answer
-MOST_PIPELINED = 32  # requests that wait on one connection for the answer to an earlier one; browsers send none
+MOST_PIPELINED = 8  # requests that wait on one connection for the answer to an earlier one; browsers send none
 CALM_S = 60.0  # between two log lines about a full room
 UPLOADS = "/v1/networks"
 

@@ -138,7 +138,8 @@ class RateLimit:
         self._counts[who] += 1
         if self._counts[who] > self._per_second:
             detail = f"rate is more than {self._per_second} requests per second; wanted fewer: wait 1 s"
-            raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.RATE_LIMITED, detail, headers={"Retry-After": "1"})
+            headers = {"Retry-After": "1", "Connection": "close"}  # and what else the connection has queued is dropped
+            raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.RATE_LIMITED, detail, headers=headers)
 
 
 class Shares:

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, WithJsonSchema
 from starlette.concurrency import run_in_threadpool
 
 from risk_sac.errors import ConfigError
-from risk_sac.failures.export.formats import FORMATS, REMEDY, ZIP, FormatName, check_carries, names
+from risk_sac.failures.export.formats import FORMATS, REMEDY, ZIP, FormatName, names
 from service.api.answers.problems import ProblemError, Reason
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, problem
 from service.api.context import AskedCampaign, Service
@@ -24,14 +24,12 @@ router = APIRouter(prefix="/v1/campaigns/{campaign_id}", responses=STORAGE | INV
 
 
 def _checked(given: str, of: Literal["failure", "episodes"]) -> FormatName:
-    if given not in FORMATS:
-        raise ConfigError("format", repr(given), f"one of: {', '.join(names(of))}")
+    if given not in names(of):
+        raise ConfigError("", repr(given), f"one of: {', '.join(names(of))}")
     name = FormatName(given)
-    row = FORMATS[name]
-    if row.of == of and row.missing:  # no mistake of the client
-        lacks = f"{name} needs {', '.join(row.missing)}, which is not installed here: {REMEDY}"
+    if missing := FORMATS[name].missing:  # no mistake of the client
+        lacks = f"{name} needs {', '.join(missing)}, which is not installed here: {REMEDY}"
         raise ProblemError(HTTPStatus.NOT_IMPLEMENTED, Reason.NOT_INSTALLED, lacks)
-    check_carries(name, of)
     return name
 
 

@@ -5,6 +5,7 @@ import pytest
 from risk_sac.client import Client
 from risk_sac.client.address import DEFAULT_URL, api_key
 from risk_sac.errors import ConfigError
+from tests.unit.client.scripted_server import Server, campaign
 
 
 @pytest.mark.parametrize(
@@ -42,6 +43,30 @@ def test_a_key_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="nowhere cannot be read: No such file") as caught:
         api_key({"RISK_SAC_API_KEY_FILE": str(tmp_path / "nowhere")})
     assert caught.value.field == "RISK_SAC_API_KEY_FILE"
+
+
+PROXIES = ("http_proxy", "https_proxy", "all_proxy", "no_proxy")
+
+
+@pytest.mark.parametrize("proxy", ["http://127.0.0.1:9", "socks5://127.0.0.1:9", "nonsense://x"])
+@pytest.mark.parametrize("name", PROXIES[:3])
+def test_loopback_is_reached_whatever_proxy_there_is(
+    name: str, proxy: str, server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(name, proxy)
+    server.answer(200, campaign())
+    for host in ("127.0.0.1", "localhost", "[::ffff:127.0.0.1]"):
+        with Client(f"http://{host}:{server.server_port}", patience_s=0.1) as client:
+            assert client.campaign("c1").id == "c1"
+
+
+@pytest.mark.parametrize(("name", "value"), [("all_proxy", "socks5://127.0.0.1:9"), ("https_proxy", "nonsense://x")])
+def test_a_proxy_that_cannot_be_used_is_named(name: str, value: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    for each in PROXIES:
+        monkeypatch.delenv(each, raising=False)
+    monkeypatch.setenv(name, value)
+    with pytest.raises(ConfigError, match=r"proxy: .*mend HTTP_PROXY"):
+        Client("https://search.example")
 
 
 def test_the_url_comes_from_the_argument_the_environment_or_the_default(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -70,6 +70,13 @@ def test_each_answer_has_the_whole_deadline() -> None:
             assert ego.act(perceived(0.1 * step)) == Control(1.0, 0.0)
 
 
+def test_loopback_is_reached_whatever_proxy_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("grpc_proxy", "https_proxy", "http_proxy"):
+        monkeypatch.setenv(name, "http://127.0.0.1:9")
+    with talking(lambda requests: map(keeping, requests)) as ego:
+        assert ego.act(perceived(0.0)) == Control(1.0, 0.0)
+
+
 @pytest.mark.parametrize("answered", [0, 3])
 def test_who_does_not_answer_in_time_has_failed(answered: int) -> None:
     asked = threading.Event()
