@@ -1,6 +1,8 @@
 """The seam between the scheduler and the machines on which runs execute."""
 
+import contextlib
 import math
+import queue
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -83,24 +85,18 @@ class Cluster:
 
 
 class Executor(Protocol):
-    """Executes attempts at runs and reports what becomes of them; any thread may call it.
+    """Executes runs and reports what becomes of them; any thread may call it.
 
-    A run has a number. Each attempt at it has a higher number than the one before. Messages of all but the latest
-    attempt are dropped, their ends too.
+    A run is known by its number. It is submitted again only after its end was reported.
     """
 
-    def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
-        """Starts an attempt at a run, whose files go to `folder`; kills an older attempt.
-
-        Raises:
-          OSError: it cannot be started.
-          ValueError: the run has had this attempt or a later one.
-        """
+    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
+        """Starts a run, whose files go to `folder`; raises `OSError` if it cannot be started."""
 
     def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """Returns messages since the last call, by run, waiting up to `timeout_s` for one.
 
-        The last message of each latest attempt is `Exited`.
+        The last message of each run is `Exited`.
         """
 
     def cancel(self, number: int, grace_s: float) -> None:
@@ -122,6 +118,22 @@ class Executor(Protocol):
 
     def close(self) -> None:
         """Releases what it holds, once nothing is at work."""
+
+
+Messages = queue.SimpleQueue[tuple[int, Event | Exited] | None]
+"""By run, from the threads of an executor to the one that asks for `events`; None ends a wait."""
+
+
+def taken(messages: Messages, timeout_s: float) -> list[tuple[int, Event | Exited]]:
+    """Takes all messages out of a queue, waiting up to `timeout_s` for one."""
+    found = []
+    with contextlib.suppress(queue.Empty):
+        message = messages.get(timeout=timeout_s)
+        while True:
+            if message is not None:
+                found.append(message)
+            message = messages.get_nowait()
+    return found
 
 
 ExecutorName = Literal["local", "ray"]

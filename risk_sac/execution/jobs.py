@@ -81,7 +81,7 @@ class JobStore:
         number = self.waiting.popleft()
         job = self._jobs[number]
         job.state, job.attempts = "running", job.attempts + 1
-        return QueuedRun(number=number, attempt=job.attempts, spec=job.spec, folder=job.folder)
+        return QueuedRun(number=number, spec=job.spec, folder=job.folder)
 
     def not_started(self, run: QueuedRun, error: OSError) -> None:
         """See `RunStore`; what is wrong with a run's folder leaves the others alone."""

@@ -2,6 +2,7 @@
 
 import logging
 import math
+import queue
 import signal
 import threading
 import time
@@ -9,8 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import Cause, Exited, Program
-from risk_sac.execution.mailbox import Mailbox
+from risk_sac.execution.executor import Cause, Exited, Messages, Program, taken
 from risk_sac.execution.messages import Event
 from risk_sac.execution.postmortem import reason_of
 from risk_sac.execution.process import Subprocess
@@ -68,33 +68,24 @@ class LocalExecutor:
 
     def __init__(self, program: Program) -> None:
         self._program = program
-        self._mailbox = Mailbox()
+        self._messages: Messages = queue.SimpleQueue()
         self._workers: dict[int, _Worker] = {}
         self._lock = threading.Lock()
 
-    def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
+    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
         """See `Executor.submit`."""
-        self._mailbox.admit(number, attempt)
-        with self._lock:
-            overtaken = self._workers.pop(number, None)
-        if overtaken is not None:
-            overtaken.process.kill()
-        try:
-            worker = _Worker(self._program, Subprocess(self._program, spec, folder))
-        except OSError:
-            self._mailbox.dismiss(number)
-            raise
+        worker = _Worker(self._program, Subprocess(self._program, spec, folder))
         with self._lock:
             self._workers[number] = worker
-        threading.Thread(target=self._follow, args=(number, attempt, worker), name=f"run-{number}", daemon=True).start()
+        threading.Thread(target=self._follow, args=(number, worker), name=f"run-{number}", daemon=True).start()
 
     def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """See `Executor.events`."""
-        return self._mailbox.take(timeout_s)
+        return taken(self._messages, timeout_s)
 
     def wake(self) -> None:
         """See `Executor.wake`."""
-        self._mailbox.wake()
+        self._messages.put(None)
 
     def close(self) -> None:
         """Holds nothing."""
@@ -106,21 +97,20 @@ class LocalExecutor:
             if worker is not None:
                 worker.stop(grace_s)
 
-    def _follow(self, number: int, attempt: int, worker: "_Worker") -> None:
+    def _follow(self, number: int, worker: "_Worker") -> None:
         while (status := worker.process.status) is None:
-            self._pass_on(number, attempt, worker.words(LOOK_S))
+            self._pass_on(number, worker.words(LOOK_S))
             worker.look(time.monotonic())
         # What it said before it ended is there; its children may hold its output open for ever.
-        self._pass_on(number, attempt, worker.words(0))
+        self._pass_on(number, worker.words(0))
         worker.process.close()
         with self._lock:
-            if self._workers.get(number) is worker:
-                del self._workers[number]
-        self._mailbox.put(number, attempt, worker.exited(status))
+            del self._workers[number]
+        self._messages.put((number, worker.exited(status)))
 
-    def _pass_on(self, number: int, attempt: int, words: list[Event]) -> None:
+    def _pass_on(self, number: int, words: list[Event]) -> None:
         for word in words:
-            self._mailbox.put(number, attempt, word)
+            self._messages.put((number, word))
 
 
 class _Worker:

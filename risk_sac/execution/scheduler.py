@@ -26,7 +26,6 @@ class QueuedRun:
     """A run that may start."""
 
     number: int  # unique in its store
-    attempt: int  # higher than those before
     spec: RunSpec
     folder: Path
     project: str = ""
@@ -92,7 +91,7 @@ class Scheduler:
                 return
             self.active[run.number] = Active(run)
             try:
-                self._executor.submit(run.number, run.attempt, run.spec, run.folder)
+                self._executor.submit(run.number, run.spec, run.folder)
             except OSError as error:
                 del self.active[run.number]
                 self._store.not_started(run, error)

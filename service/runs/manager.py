@@ -207,9 +207,7 @@ class Manager:
                 continue
             folder = self._settings.run_folder(campaign.id, run.id)
             ids = {"campaign": campaign.id, "run": run.id}
-            return QueuedRun(
-                number=number, attempt=run.attempts + 1, spec=spec, folder=folder, project=campaign.project, ids=ids
-            )
+            return QueuedRun(number=number, spec=spec, folder=folder, project=campaign.project, ids=ids)
 
     def not_started(self, run: QueuedRun, error: OSError) -> None:
         """See `RunStore`."""

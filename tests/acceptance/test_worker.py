@@ -45,11 +45,9 @@ class Launcher:
         self.folder = folder
         self.spec = spec
         self.executor = LocalExecutor(worker_program(settings or ServiceSettings(replays=0)))
-        self.attempts = 0
 
     def submit(self) -> None:
-        self.attempts += 1
-        self.executor.submit(1, self.attempts, self.spec, self.folder)
+        self.executor.submit(1, self.spec, self.folder)
 
     def work(self, until: int | None = None, then: Do | None = None) -> tuple[list[Event], Exited, float]:
         """What one worker says, why it is gone, and how long that took after something was done to it.

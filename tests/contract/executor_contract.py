@@ -77,10 +77,8 @@ class Runs:
 
     def submit(self, code: str, number: int = 1, attempt: int = 1) -> None:
         folder = self.folder(number, attempt)
-        file = folder.with_name(f"{folder.name}.py")
-        if not file.exists():  # an attempt that is refused leaves the one at work alone
-            file.write_text(WORKER + code)
-        self.executor.submit(number, attempt, SPEC, folder)
+        folder.with_name(f"{folder.name}.py").write_text(WORKER + code)
+        self.executor.submit(number, SPEC, folder)
         self._numbers.add(number)
 
     def messages(self, ends: int = 1) -> list[tuple[int, Any]]:
@@ -222,30 +220,11 @@ class ExecutorContract:
         assert cause is Cause.CRASHED
         runs.silence()
 
-    def test_an_older_attempt_is_not_heard_any_more(self, runs: Runs) -> None:
-        # It has said something that nobody took, it goes on talking, and its end comes.
-        runs.submit(DEAF + "say('old'); touch('said')\nwhile True: say('old'); time.sleep(0.01)", attempt=3)
-        runs.wait_for(runs.folder(1, 3) / "said")
-        runs.submit("say('new'); wait_for('end'); say('last')", attempt=4)
-        assert runs.first() == (1, "new")
-        runs.silence()
-        (runs.folder(1, 4) / "end").touch()
-        assert outcome(runs.messages()) == (["last"], Cause.ENDED)
-        runs.silence()
-
     def test_the_heir_of_an_older_attempt_is_not_heard_in_the_next_one(self, runs: Runs) -> None:
         runs.submit(HEIR + "wait_for('heir'); os._exit(4)", attempt=1)
         assert outcome(runs.messages())[1] is Cause.CRASHED
         runs.submit("time.sleep(0.5); say('new'); say('last')", attempt=2)
         assert outcome(runs.messages()) == (["new", "last"], Cause.ENDED)
-
-    @pytest.mark.parametrize("attempt", [1, 2])
-    def test_an_attempt_is_newer_than_the_one_before(self, runs: Runs, attempt: int) -> None:
-        runs.submit("wait_for('end'); say('last')", attempt=2)
-        with pytest.raises(ValueError, match=f"attempt is {attempt}; run 1 is at attempt 2, so wanted a later one"):
-            runs.submit("say('other')", attempt=attempt)
-        (runs.folder(1, 2) / "end").touch()
-        assert outcome(runs.messages()) == (["last"], Cause.ENDED)
 
     def test_a_cancelled_worker_may_finish_what_it_is_at(self, runs: Runs) -> None:
         runs.submit(OBEDIENT + "say('a'); time.sleep(600)")

@@ -1,3 +1,4 @@
+import queue
 from collections.abc import Iterator
 
 import pytest
@@ -5,7 +6,6 @@ import pytest
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import MakeExecutor, Program, executor_named
 from risk_sac.execution.jobs import worker_program
-from risk_sac.execution.mailbox import Mailbox
 from risk_sac.execution.ray.executor import RayExecutor
 from tests.contract.executor_contract import ExecutorContract
 from tests.ray_cluster import Cluster, needs_ray, running
@@ -27,7 +27,7 @@ class Reused(RayExecutor):
     """One for all tests, since another client of Ray costs several seconds of a processor."""
 
     def begin_anew(self, program: Program) -> "Reused":
-        self._program, self._mailbox, self._orders = program, Mailbox(), {}
+        self._program, self._messages, self._orders = program, queue.SimpleQueue(), {}
         return self
 
     def close(self) -> None:

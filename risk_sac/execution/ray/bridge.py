@@ -71,12 +71,6 @@ class Attempt:
             self._actor.cancel.remote(grace_s)
             asyncio.get_running_loop().call_later(grace_s + HURRY_S, self.task.cancel)
 
-    def drop(self) -> None:
-        """Stops it without grace; once this returns, it writes no file any more."""
-        with self._writing:
-            self._over = True
-        self.stop(0)
-
     async def _follow(self) -> None:
         try:
             exited = await self._followed()
@@ -94,7 +88,7 @@ class Attempt:
             self._over = True
         with suppress(RayError):  # there may be no head any more
             ray.kill(self._actor)
-        self._say("said", self._order.id, [exited])
+        self._say("said", self._order.number, self._order.id, [exited])
 
     async def _followed(self) -> Exited:
         """Passes on its words, after the files that were written before them; returns its end."""
@@ -107,7 +101,7 @@ class Attempt:
             await asyncio.to_thread(self._write, files)
             exited: Exited | None = messages.pop() if messages and isinstance(messages[-1], Exited) else None
             if messages:
-                self._say("said", order.id, messages)
+                self._say("said", order.number, order.id, messages)
             if exited is not None:
                 return exited
 
@@ -171,8 +165,6 @@ class Bridge:
                 attempt.task.add_done_callback(lambda _: self._attempts.pop(order.id))
             case "cancel", id_, grace_s if id_ in self._attempts:
                 self._attempts[id_].stop(grace_s)
-            case "drop", id_ if id_ in self._attempts:
-                self._attempts[id_].drop()
             case "close", *_:
                 self._over.set()
 

@@ -3,6 +3,7 @@
 import contextlib
 import logging
 import os
+import queue
 import socket
 import subprocess
 import sys
@@ -17,8 +18,7 @@ from typing import Any
 from risk_sac.config import SHIPPED, RunSpec
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import Cause, Cluster, Exited, Program
-from risk_sac.execution.mailbox import Mailbox
+from risk_sac.execution.executor import Cause, Cluster, Exited, Messages, Program, taken
 from risk_sac.execution.messages import Event
 from risk_sac.execution.ray.node import Order
 from risk_sac.execution.ray.settings import ADDRESS, read_settings
@@ -55,8 +55,8 @@ class RayExecutor:
         self.cluster = Cluster()
         self._program = program
         self._scratch = read_settings().ray_scratch_dir
-        self._mailbox = Mailbox()
-        self._orders: dict[str, Order] = {}  # whose attempts have not ended
+        self._messages: Messages = queue.SimpleQueue()
+        self._orders: dict[int, Order] = {}  # those that have not ended, by run
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._bridge = _Bridge()
@@ -67,24 +67,16 @@ class RayExecutor:
         """See `Executor.slots`."""
         return self.cluster.slots
 
-    def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
+    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
         """See `Executor.submit`."""
-        self._mailbox.admit(number, attempt)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            order = self._order(number, attempt, spec, folder.resolve())
-        except OSError:
-            self._mailbox.dismiss(number)
-            raise
+        folder.mkdir(parents=True, exist_ok=True)
+        order = self._order(number, spec, folder.resolve())
         with self._lock:
-            for overtaken in self._orders_of(number):
-                del self._orders[overtaken.id]
-                self._bridge.say("drop", overtaken.id)
-            self._orders[order.id] = order
+            self._orders[number] = order
             if not self._bridge.say("submit", order):
                 self._lose(order)
 
-    def _order(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> Order:
+    def _order(self, number: int, spec: RunSpec, folder: Path) -> Order:
         """An attempt, with the egos that the server's operator has registered and the run's place."""
         scratch = self._scratch / scratch_name()
         beside: dict[str, Path] = {}
@@ -97,22 +89,20 @@ class RayExecutor:
             beside |= {f"places/{spec.family}/{file.name}": file for file in place.iterdir()}
             environment[library.VARIABLE] = str(scratch / "places")
         program = replace(self._program, environment=environment)
-        return Order(
-            number=number, attempt=attempt, spec=spec, program=program, folder=folder, scratch=scratch, beside=beside
-        )
+        return Order(number=number, spec=spec, program=program, folder=folder, scratch=scratch, beside=beside)
 
     def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """See `Executor.events`."""
-        return self._mailbox.take(timeout_s)
+        return taken(self._messages, timeout_s)
 
     def wake(self) -> None:
         """See `Executor.wake`."""
-        self._mailbox.wake()
+        self._messages.put(None)
 
     def cancel(self, number: int, grace_s: float) -> None:
         """See `Executor.cancel`."""
         with self._lock:
-            for order in self._orders_of(number):
+            if order := self._orders.get(number):
                 order.told_to_stop = True
                 self._bridge.say("cancel", order.id, grace_s)
 
@@ -120,9 +110,6 @@ class RayExecutor:
         """Leaves the cluster; actors that are still there end."""
         self._closed.set()
         self._bridge.close()
-
-    def _orders_of(self, number: int) -> list[Order]:
-        return [order for order in self._orders.values() if order.number == number]
 
     def _work(self) -> None:
         """Listens to one bridge after the other."""
@@ -149,16 +136,19 @@ class RayExecutor:
             if kind == "cluster":
                 before, (self.cluster,) = self.cluster.slots, content
                 if before != self.cluster.slots:
-                    self._mailbox.wake()
-            elif content[0] in self._orders:  # else another attempt has overtaken it
-                self._pass_on(self._orders[content[0]], *content[1])
+                    self._messages.put(None)
+                return
+            number, id_, messages = content
+            order = self._orders.get(number)
+            if order and order.id == id_:  # else it is the past that speaks
+                self._pass_on(order, *messages)
 
     def _pass_on(self, order: Order, *messages: Event | Exited) -> None:
         for message in messages:
             if isinstance(message, Exited):
-                del self._orders[order.id]
+                del self._orders[order.number]
                 message = replace(message, cause=Cause.ENDED) if order.told_to_stop else message
-            self._mailbox.put(order.number, order.attempt, message)
+            self._messages.put((order.number, message))
 
 
 class _Bridge:

@@ -42,7 +42,6 @@ class Order:
     """An attempt at a run."""
 
     number: int
-    attempt: int
     spec: RunSpec
     program: Program
     folder: Path  # of the run, on the server's machine
@@ -78,7 +77,7 @@ class Attendant:
         self._seen = signatures(self._folder)
         self._grown_due = 0.0
         self._local = LocalExecutor(order.program)
-        self._local.submit(1, 1, order.spec, self._folder)
+        self._local.submit(1, order.spec, self._folder)
         return str(ray.get_runtime_context().get_node_id())
 
     def poll(self, wait_s: float) -> tuple[list[Event | Exited], Files]:

@@ -78,7 +78,7 @@ def large_run():
 
 def execute(code, folder, **program):
     executor = LocalExecutor(Program(arguments=("-c", code), log="log", **program))
-    executor.submit(1, 1, large_run(), folder)
+    executor.submit(1, large_run(), folder)
     return executor
 
 

@@ -24,8 +24,8 @@ class Scripted:
         self._told = queue.SimpleQueue()
         self.submitted = []
 
-    def submit(self, number, attempt, spec, folder):
-        self.submitted.append((number, attempt))
+    def submit(self, number, spec, folder):
+        self.submitted.append(number)
         for message in self._attempts.pop(0):
             self._told.put((number, message))
 
@@ -69,7 +69,7 @@ def test_a_lost_run_is_submitted_again_as_its_next_attempt(execute, metrics):
     finished = Finished(finished=True, metrics=metrics, evaluation=None, digest="d", versions={}, wall_s=1.0)
     run, executor, manager = execute([lost], [lost], [finished, done])
     assert (run.state, run.attempts) == ("succeeded", 3)
-    assert executor.submitted == [(run.number, attempt) for attempt in (1, 2, 3)]
+    assert executor.submitted == [run.number] * 3
     assert manager.restarts == {Cause.KILLED: 2}
 
 
