@@ -3,6 +3,7 @@
 import os
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, closing, contextmanager
+from functools import partial
 
 from anyio import to_thread
 from fastapi import FastAPI
@@ -106,11 +107,13 @@ def opened(
         hold_data_folder(settings.data_dir),
         closing(Store(settings.url)) as store,
         held(store.engine),
-        made.kept(store.engine, KeyFile(settings.keys_file)),
     ):
         # Everything that plays or draws an episode, here or in a helper process, finds its place in our library.
         os.environ[VARIABLE] = str(settings.places_dir.absolute())
-        manager, regression_queue, helper = Manager(settings, store, executor), Regressions(settings), Helper(settings)
+        settle_keys = partial(made.settle, store.engine, KeyFile(settings.keys_file))
+        settle_keys()
+        manager = Manager(settings, store, executor, settle_keys)
+        regression_queue, helper = Regressions(settings), Helper(settings)
         uploaded = NetworkStore(settings.networks_dir)
         surveys = Surveys(uploaded, settings.places_dir, helper.stopping)
         manager.start()

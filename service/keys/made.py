@@ -4,23 +4,16 @@ The file of keys alone cannot tell a service that never had keys from one whose 
 it in the database in the same step, and a server notes it when it sees a file that came another way.
 """
 
-import logging
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from sqlalchemy import Engine
 
-from service.errors import StorageError
 from service.host.data_folder import hold_data_folder
 from service.keys.file import KeyFile
 from service.settings import ServiceSettings
 from service.store.database import connected, held, newest_step, present_step, sqlite_file, step_forward
 from service.store.server import keys_were_made, noting_keys
-
-logger = logging.getLogger(__name__)
-
-LOOK_S = 1.0  # between two looks at the database and the file while no key is known of
 
 
 class AuthEnabledFlag:
@@ -31,43 +24,18 @@ class AuthEnabledFlag:
     """
 
     def __init__(self) -> None:
-        self.known = False
+        self.known = self._noted = False
 
-    @contextmanager
-    def kept(self, engine: Engine, file: KeyFile) -> Iterator[None]:
-        """Keeps this and the database in step."""
-        over = threading.Event()
-        if self._settle(engine, file):
-            yield
+    def settle(self, engine: Engine, file: KeyFile) -> None:
+        """Learns from the database or tells it; to be called every now and then."""
+        if self._noted:
             return
-        thread = threading.Thread(target=self._watch, args=(engine, file, over), name="keys", daemon=True)
-        thread.start()
-        try:
-            yield
-        finally:
-            over.set()
-            thread.join()
-
-    def _watch(self, engine: Engine, file: KeyFile, over: threading.Event) -> None:
-        refusal = ""
-        while not over.wait(LOOK_S):
-            try:
-                if self._settle(engine, file):
-                    return
-            except StorageError as error:
-                if str(error) != refusal:
-                    logger.warning("whether there are API keys cannot be noted yet: %s", error)
-                refusal = str(error)
-
-    def _settle(self, engine: Engine, file: KeyFile) -> bool:
-        """Learn from the database, or tell it; whether there is nothing left to learn."""
         if keys_were_made(engine):
-            self.known = True
+            self.known = self._noted = True
         elif self.known or file.path.exists():
             self.known = True
             with noting_keys(engine):
-                pass
-        return self.known
+                self._noted = True
 
 
 def ever_made(settings: ServiceSettings) -> bool:

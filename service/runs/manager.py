@@ -5,7 +5,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -39,11 +39,15 @@ class Manager:
     Requests call `submit`, `cancel`, `triage` and `delete` from their own threads; the lock makes every step whole.
     """
 
-    def __init__(self, settings: ServiceSettings, store: Store, executor: Executor) -> None:
+    def __init__(
+        self, settings: ServiceSettings, store: Store, executor: Executor, tick: Callable[[], None] = lambda: None
+    ) -> None:
+        """Does nothing yet; `tick` is called about once a second."""
         self._settings = settings
         self._store = store
         self._ledger = Ledger(store)
         self._executor = executor
+        self._tick = tick
         self._scheduler = Scheduler(executor, self, settings.attempts)
         self._lock = threading.RLock()
         self._storage = StoragePause(store, self._ledger, settings.data_dir)
@@ -167,6 +171,7 @@ class Manager:
 
     def _tend(self) -> None:
         with self._pausing():
+            self._tick()
             self._scheduler.fill(self.workers)
             self._retention.retire(self._dispose)
             self._retention.remove_unused_places()

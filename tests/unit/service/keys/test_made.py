@@ -1,7 +1,6 @@
 """Keys that were made once, and whose file is lost."""
 
 import sqlite3
-import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -91,35 +90,35 @@ def test_a_server_notes_keys_that_it_sees_and_heeds_what_is_noted(
     file: KeyFile, store: Store, caplog: pytest.LogCaptureFixture
 ) -> None:
     _, token = file.create("maps", "", Scope.RUN)
-    with AuthEnabledFlag().kept(store.engine, file):
-        assert keys_were_made(store.engine)
+    AuthEnabledFlag().settle(store.engine, file)
+    assert keys_were_made(store.engine)
     file.path.unlink()
     made = AuthEnabledFlag()
-    with made.kept(store.engine, file):
-        ring = KeyRing(file.path, made)
-        for _ in range(3):
-            with pytest.raises(KeysError, match=r"is missing, although keys were made; restore .* create --anew`"):
-                ring.find(token)
-            with pytest.raises(KeysError, match="missing"):
-                _ = ring.open
-        _, new = file.create_anew("maps", "", Scope.RUN)
-        assert ring.find(new) is not None
-        assert ring.find(token) is None
-        assert not ring.open
+    made.settle(store.engine, file)
+    ring = KeyRing(file.path, made)
+    for _ in range(3):
+        with pytest.raises(KeysError, match=r"is missing, although keys were made; restore .* create --anew`"):
+            ring.find(token)
+        with pytest.raises(KeysError, match="missing"):
+            _ = ring.open
+    _, new = file.create_anew("maps", "", Scope.RUN)
+    assert ring.find(new) is not None
+    assert ring.find(token) is None
+    assert not ring.open
     assert caplog.text.count("missing, although") == 1, "said once"
 
 
 def test_a_server_notes_keys_that_are_made_while_nobody_asks(file: KeyFile, store: Store) -> None:
-    made, pause = AuthEnabledFlag(), threading.Event()
-    with made.kept(store.engine, file):
-        assert not made.known
-        assert KeyRing(file.path, made).open
-        with noting_keys(store.engine):
-            pass
-        while not made.known:
-            pause.wait(0.05)
-        with pytest.raises(KeysError, match="missing"):
-            _ = KeyRing(file.path, made).open
+    made = AuthEnabledFlag()
+    made.settle(store.engine, file)
+    assert not made.known
+    ring = KeyRing(file.path, made)
+    assert ring.open
+    with noting_keys(store.engine):
+        pass
+    made.settle(store.engine, file)
+    with pytest.raises(KeysError, match="missing"):
+        _ = ring.open
 
 
 def test_open_is_what_an_administrator_has_said(file: KeyFile) -> None:
@@ -152,11 +151,12 @@ def test_a_file_that_is_replaced_is_never_missing_nor_open(file: KeyFile) -> Non
 
 def test_the_first_key_is_never_missing(settings: ServiceSettings, file: KeyFile, store: Store) -> None:
     made = AuthEnabledFlag()
-    with made.kept(store.engine, file), ThreadPoolExecutor(1) as pool:
+    with ThreadPoolExecutor(1) as pool:
         ring = KeyRing(file.path, made)
         change = pool.submit(main, CREATE)
         seen = [ring.open]
         while not (change.done() and made.known):
+            made.settle(store.engine, file)
             seen.append(ring.open)  # raises where it takes the file for missing
         assert change.result() == 0
     assert sorted(seen, reverse=True) == seen, "open until there is a key, and never again"
