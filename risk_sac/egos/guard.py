@@ -3,41 +3,58 @@
 Nothing drives in the ego's place, and no rate counts the episode. `DEAD_AFTER` such episodes in a row fail the run.
 """
 
+import contextlib
+import itertools
+import logging
 import math
+import os
 import signal
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from types import FrameType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from risk_sac.egos.seam import Command, Control, Ego, Episode, Perceived, Trajectory
 from risk_sac.errors import EgoFailed
+from risk_sac.process_state import preserved
+from risk_sac.types import Floats
 
 DEADLINE, MALFORMED, CRASH = "ego_deadline", "ego_malformed", "ego_crash"  # reasons of an invalid episode
 DEAD_AFTER = 5
 MOST_POINTS = 1000
+LARGEST = 1e9  # of all numbers in an answer: beyond it sums overflow
+LONGEST_TEXT = 200
 
-Told = TypeVar("Told")
 Answer = TypeVar("Answer")
+logger = logging.getLogger(__name__)
+
+
+class Malformed(ValueError):
+    """What an ego answered is no command."""
 
 
 class Guarded:
     """An ego whose every answer is checked."""
 
-    def __init__(self, ego: Ego, deadline_s: float, *, interrupted: bool = False) -> None:
-        """Wraps an ego.
+    def __init__(self, make: Callable[[], Ego], deadline_s: float, *, foreign: bool = False) -> None:
+        """Makes the ego.
 
         Args:
-          ego: that drives.
+          make: imports and makes it.
           deadline_s: real time for each answer.
-          interrupted: whether a late ego is interrupted, as far as a signal can; else it keeps its deadline itself, or
-            is refused after it has answered.
+          foreign: whether it is code in our process. Such code is interrupted when it is late, as far as a signal can,
+            and runs with its own process-wide settings. Other egos keep their deadline, or are refused afterwards.
+
+        Raises:
+          EgoFailed: it cannot be made.
         """
-        self._ego, self._deadline_s, self._interrupted = ego, deadline_s, interrupted
-        self._alarmed = False
+        self._deadline_s, self._foreign, self._state = deadline_s, foreign, preserved()
+        with self._state if foreign else contextlib.nullcontext():
+            self._ego = self._asked(make)
 
     def reset(self, episode: Episode) -> None:
         """Begins an episode.
@@ -45,8 +62,8 @@ class Guarded:
         Raises:
           EgoFailed: it crashed, or took too long.
         """
-        self._alarmed = self._interrupted and _ready()
-        self._asked(self._ego.reset, episode)
+        with self._state if self._foreign else contextlib.nullcontext():
+            self._asked(lambda: self._ego.reset(episode))
 
     def act(self, perceived: Perceived) -> Command:
         """Returns a sound command.
@@ -54,60 +71,95 @@ class Guarded:
         Raises:
           EgoFailed: it crashed, took too long, or answered nonsense.
         """
+        with self._state.quick if self._foreign else contextlib.nullcontext():
+            return self._asked(lambda: sound(self._ego.act(perceived)))
+
+    def close(self) -> None:
+        """Closes the ego; what goes wrong is logged, since its episodes are over."""
+        try:
+            with self._state if self._foreign else contextlib.nullcontext():
+                self._asked(lambda: self._ego.close())
+        except EgoFailed as failed:
+            logger.warning("closing the ego: %s", failed)
+
+    def _asked(self, question: Callable[[], Answer]) -> Answer:
         began = time.monotonic()
-        command = self._asked(self._ego.act, perceived)
+        try:
+            if not self._foreign:
+                answer = question()
+            else:
+                try:
+                    _confine(self._deadline_s)
+                    answer = question()
+                finally:
+                    _free()
+        except BaseException as error:
+            _free()  # the alarm may have rung before the `finally` above had put it off
+            raise self._failure(error) from error
         took_s = time.monotonic() - began
         if took_s > self._deadline_s:
             raise EgoFailed(f"the ego took {took_s:.2f} s; wanted at most {self._deadline_s:g} s", reason=DEADLINE)
-        wrong = complaint(command)
-        if wrong:
-            raise EgoFailed(f"the ego answered {wrong}", reason=MALFORMED)
-        return command
+        return answer
 
-    def close(self) -> None:
-        """Closes the ego."""
-        self._ego.close()
-
-    def _asked(self, question: Callable[[Told], Answer], told: Told) -> Answer:
-        try:
-            if not self._alarmed:
-                return question(told)
-            _alarm(self._deadline_s)
-            try:
-                return question(told)
-            finally:
-                _alarm(0.0)
-        except EgoFailed:
-            raise
-        except _Overdue as overdue:
-            _alarm(0.0)  # it may have rung before the `finally` above had put it off
-            raise EgoFailed(f"the ego did not answer within {self._deadline_s:g} s", reason=DEADLINE) from overdue
-        except Exception as error:
-            raise EgoFailed(f"the ego crashed: {type(error).__name__}: {error}", reason=CRASH) from error
+    def _failure(self, error: BaseException) -> BaseException:
+        if isinstance(error, _Overdue):
+            return EgoFailed(f"the ego did not answer within {self._deadline_s:g} s", reason=DEADLINE)
+        if isinstance(error, Malformed):
+            return EgoFailed(f"the ego answered {error}", reason=MALFORMED)
+        by_user = isinstance(error, KeyboardInterrupt) and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        if by_user or (isinstance(error, EgoFailed) and not self._foreign):
+            return error
+        return EgoFailed(f"the ego crashed: {type(error).__name__}: {_text(error)}", reason=CRASH)
 
 
-def complaint(command: object) -> str:
-    """Returns what is wrong with an answer; empty if nothing is."""
-    if isinstance(command, Control):
-        try:
-            sound = math.isfinite(command.accel_mps2) and math.isfinite(command.steering_rad)
-        except TypeError:
-            sound = False
-        return "" if sound else f"{command!r}; wanted finite numbers"
-    if not isinstance(command, Trajectory):
-        return f"a {type(command).__name__}; wanted a Control or a Trajectory"
-    shapes = {np.shape(row) for row in command}
-    if len(shapes) != 1 or len(shape := shapes.pop()) != 1 or not 2 <= shape[0] <= MOST_POINTS:
-        return f"a trajectory of shapes {[np.shape(row) for row in command]}; wanted four rows of 2 to {MOST_POINTS}"
+def sound(answer: object) -> Command:
+    """Returns an ego's command in plain numbers.
+
+    Raises:
+      Malformed: it is none; whatever reading it raises counts as that.
+    """
     try:
-        finite = bool(np.isfinite(np.array(command, dtype=np.float64)).all())
-    except (TypeError, ValueError):
-        finite = False
-    if not finite:
-        return "a trajectory with what is no finite number"
-    if not (np.diff(command.time_s) > 0).all() or command.time_s[0] < 0 or np.min(command.speed_mps) < 0:
-        return "a trajectory whose times do not rise from 0 on, or whose speed is negative"
-    return ""
+        if isinstance(answer, Control):
+            return Control(_number(answer.accel_mps2), _number(answer.steering_rad))
+        if not isinstance(answer, Trajectory):
+            raise Malformed(f"a {type(answer).__name__}; wanted a Control or a Trajectory")
+        command = Trajectory(*(_row(name, getattr(answer, name)) for name in Trajectory._fields))
+    except (Malformed, _Overdue):
+        raise
+    except BaseException as error:
+        raise Malformed(f"what raises {type(error).__name__} when it is read") from error
+    if len({len(row) for row in command}) > 1:
+        raise Malformed(f"a trajectory with rows of {[len(row) for row in command]} numbers; wanted as many in each")
+    time_s = command.time_s
+    if time_s[0] < 0.0 or not (time_s[1:] > time_s[:-1]).all() or command.speed_mps.min() < 0.0:
+        raise Malformed("a trajectory whose times do not rise from 0 on, or whose speed is negative")
+    return command
+
+
+def _number(value: Any) -> float:
+    number = value.item() if getattr(value, "ndim", None) == 0 else value  # a scalar of numpy or torch
+    plain = float(number) if isinstance(number, int | float) and not isinstance(number, bool) else math.nan
+    if not abs(plain) <= LARGEST:
+        raise Malformed(f"a Control with {_text(value)!r}; wanted numbers from -{LARGEST:g} to {LARGEST:g}")
+    return plain
+
+
+def _row(name: str, values: Any) -> Floats:
+    array_like = hasattr(type(values), "__array__")
+    if not 2 <= len(values) <= MOST_POINTS:
+        raise Malformed(f"a trajectory with {len(values)} numbers as {name}; wanted 2 to {MOST_POINTS}")
+    row = np.asarray(values if array_like else list(itertools.islice(values, MOST_POINTS + 1)))
+    if row.ndim != 1 or row.dtype.kind not in "iuf" or not (np.abs(row) <= LARGEST).all():
+        shape = f"{row.dtype} of shape {row.shape}"
+        raise Malformed(f"a trajectory with {shape} as {name}; wanted a row of numbers up to {LARGEST:g}")
+    return row.astype(np.float64)
+
+
+def _text(value: object) -> str:
+    try:
+        return str(value)[:LONGEST_TEXT]
+    except BaseException:  # noqa: BLE001  # it is foreign
+        return f"a {type(value).__name__} without a text"
 
 
 class _Overdue(BaseException):
@@ -115,27 +167,39 @@ class _Overdue(BaseException):
 
 
 _armed = False
+_leave = os._exit
 
 
-def _ready() -> bool:
-    """Installs the signal handler; False outside the main thread, or if the signal has another use.
+def _confine(deadline_s: float) -> None:
+    """Until `_free`: raises `_Overdue` at each deadline, and turns `os._exit` into an exception.
 
-    A signal ends loops, sleeping and waiting of Python code, but not compiled code that never returns.
+    Only in the main thread, and the former where SIGALRM has no other use. A signal ends loops, sleeping and waiting
+    of Python code, but not compiled code that never returns.
     """
-    if threading.current_thread() is not threading.main_thread():
-        return False
-    if signal.getsignal(signal.SIGALRM) is not _ring:
-        if signal.getsignal(signal.SIGALRM) is not signal.SIG_DFL:
-            return False
-        signal.signal(signal.SIGALRM, _ring)
-    return True
-
-
-def _alarm(after_s: float) -> None:
-    """Raises `_Overdue` after each such time, in s; 0 turns it off."""
     global _armed
-    _armed = after_s > 0.0
-    signal.setitimer(signal.ITIMER_REAL, after_s, after_s)
+    if threading.current_thread() is not threading.main_thread():
+        return
+    os._exit = partial(_refuse, os.getpid())  # type: ignore[assignment]
+    if signal.getsignal(signal.SIGALRM) is signal.SIG_DFL:
+        signal.signal(signal.SIGALRM, _ring)
+    if signal.getsignal(signal.SIGALRM) is _ring:
+        _armed = True
+        signal.setitimer(signal.ITIMER_REAL, deadline_s, deadline_s)
+
+
+def _free() -> None:
+    global _armed
+    if _armed:
+        _armed = False
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, _ring)  # the ego may have replaced it
+    os._exit = _leave
+
+
+def _refuse(owner: int, status: int) -> None:
+    if os.getpid() != owner:  # a process that the ego has forked may leave
+        _leave(status)
+    raise SystemExit(status)
 
 
 def _ring(number: int, frame: FrameType | None) -> None:

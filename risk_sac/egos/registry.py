@@ -23,7 +23,7 @@ from risk_sac.config.invalid import field_error
 from risk_sac.config.text import read_text
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.seam import Ego
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, EgoFailed
 
 GROUP, FILE = "risk_sac.egos", "RISK_SAC_EGOS"
 SHIPPED = {
@@ -138,8 +138,13 @@ def load(ego: EgoConfig) -> Guarded | None:
     if isinstance(card, RemoteCard):
         from risk_sac.egos.remote.client import RemoteEgo  # here, because not everybody has grpc
 
-        return Guarded(RemoteEgo(card.name, card.address, card.version, card.deadline_s), card.deadline_s)
-    return Guarded(make(card.name, card.name)[0](), card.deadline_s, interrupted=True)
+        remote = RemoteEgo(card.name, card.address, card.version, card.deadline_s)
+        return Guarded(lambda: remote, card.deadline_s)
+    point = _points()[card.name]
+    try:
+        return Guarded(lambda: point.load()(), card.deadline_s, foreign=True)
+    except EgoFailed as failed:
+        raise _wrong(point, str(failed)) from failed
 
 
 def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
@@ -158,9 +163,7 @@ def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
     try:
         made: Callable[[], Ego] = point.load()
     except Exception as error:
-        raise ConfigError(
-            "ego.driver", f"the ego {point.name!r} ({point.value}) cannot be loaded: {type(error).__name__}: {error}"
-        ) from error
+        raise _wrong(point, f"{type(error).__name__}: {error}") from error
     return made, python_card(point)
 
 

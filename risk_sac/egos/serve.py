@@ -5,15 +5,18 @@ It is the reference for egos in other languages.
 
 import argparse
 import json
+import math
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
 import grpc
 import numpy as np
 
+from risk_sac.egos.guard import MALFORMED, Guarded
 from risk_sac.egos.registry import EgoCard, make
 from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.remote.messages import (
@@ -26,7 +29,7 @@ from risk_sac.egos.remote.messages import (
     perceived_of,
 )
 from risk_sac.egos.seam import Ego, Episode, Vehicle
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, EgoFailed
 from risk_sac.types import STEP_S, Kind, Signal
 
 MOST_SESSIONS = 64  # the oldest goes: a client that never acted closed nothing
@@ -38,15 +41,16 @@ class Sessions:
 
     def __init__(self, make_ego: Callable[[], Ego], version: str) -> None:
         self._make, self._version = make_ego, version
-        self._egos: dict[str, Ego] = {}  # by session
+        self._egos: dict[str, Guarded] = {}  # by session
         self._lock = threading.Lock()
 
     def start(self, request: Any, context: Any) -> Any:
         """Begins an episode."""
         if request.protocol != PROTOCOL:
             context.abort(grpc.StatusCode.FAILED_PRECONDITION, f"protocol {request.protocol}; wanted {PROTOCOL}")
-        ego = self._make()
-        ego.reset(episode_of(request))
+        with _told(context):
+            ego = Guarded(self._make, math.inf)
+            ego.reset(episode_of(request))
         with self._lock:
             while len(self._egos) >= MOST_SESSIONS:
                 self._egos.pop(next(iter(self._egos))).close()
@@ -63,7 +67,8 @@ class Sessions:
                     context.abort(grpc.StatusCode.NOT_FOUND, f"there is no session {name!r}")
                 if request.HasField("path"):
                     path = path_of(request.path)
-                command = self._egos[name].act(perceived_of(request, path))
+                with _told(context):
+                    command = self._egos[name].act(perceived_of(request, path))
                 yield command_message(command, request.time_s)
         finally:
             self._end(name)
@@ -78,6 +83,16 @@ class Sessions:
             ego = self._egos.pop(name, None)
         if ego is not None:
             ego.close()
+
+
+@contextmanager
+def _told(context: Any) -> Iterator[None]:
+    """Tells the client how an ego has failed; the deadline is the client's."""
+    try:
+        yield
+    except EgoFailed as failed:
+        malformed = failed.reason == MALFORMED
+        context.abort(grpc.StatusCode.INVALID_ARGUMENT if malformed else grpc.StatusCode.INTERNAL, str(failed))
 
 
 def warm_up(ego: Ego) -> None:

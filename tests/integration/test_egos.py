@@ -37,7 +37,7 @@ class Example:
         return Control(0.0, lane_keeping(perceived, self.vehicle))
 
     def close(self):
-        pass
+        raise RuntimeError("the device is gone")  # which is no end of a run
 '''
 
 
@@ -153,9 +153,11 @@ def test_a_process_of_another_version_drives_nothing(tmp_path, monkeypatch):
             play(spec_of("far"), tmp_path / "run")
 
 
-def test_invalid_episodes_are_counted_by_no_rate(install, tmp_path):
-    install("if self.steps == 30 and perceived.state[0, 0] % 2 < 1: raise ValueError('by me')")
+@pytest.mark.parametrize("fails", ["raise ValueError('by me')", "raise SystemExit(0)", "__import__('os')._exit(0)"])
+def test_invalid_episodes_are_counted_by_no_rate(install, tmp_path, fails):
+    install(f"if self.steps == 30 and perceived.state[0, 0] % 2 < 1: {fails}")
     results, records = play(spec_of("example", episodes=12), tmp_path)
+    assert results.finished
     metrics, invalid = results.metrics, [record for record in records if record.outcome is Outcome.INVALID]
     assert 0 < metrics.invalid == len(invalid) < 12
     assert {record.reason for record in invalid} == {"ego_crash"}

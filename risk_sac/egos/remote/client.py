@@ -116,7 +116,9 @@ class RemoteEgo:
                 said = f"does not speak version {PROTOCOL} of the protocol"
             elif code is grpc.StatusCode.UNAVAILABLE:  # whose details name the address
                 said = "is not there: nobody answers at the address that it is registered with"
-            raise EgoFailed(f"the ego {self._name!r} {said}", reason=CRASH) from error
+            # What is too long, or what the server itself found malformed.
+            malformed = code in (grpc.StatusCode.RESOURCE_EXHAUSTED, grpc.StatusCode.INVALID_ARGUMENT)
+            raise EgoFailed(f"the ego {self._name!r} {said}", reason=MALFORMED if malformed else CRASH) from error
 
     def _late(self) -> EgoFailed:
         return EgoFailed(f"the ego {self._name!r} did not answer within {self._deadline_s:g} s", reason=DEADLINE)

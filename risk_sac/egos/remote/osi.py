@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from google.protobuf.message import DecodeError
 
+from risk_sac.egos.guard import Malformed
 from risk_sac.egos.remote import osi_pb2
 from risk_sac.egos.road import PATH_X, PATH_Y, STATION, point_at
 from risk_sac.egos.seam import Episode, Perceived, Trajectory
@@ -50,7 +51,7 @@ class OsiEgo(ABC):
         self._numbers: dict[str, int] = {}
 
     def act(self, perceived: Perceived) -> Trajectory:
-        """Answers one step in OSI; a ValueError if the answer is no motion request."""
+        """Answers one step in OSI."""
         request = self.drive(ground_truth(perceived, self._numbers))
         return trajectory_of(request, perceived, self._vehicle.wheelbase_m / 2)
 
@@ -87,28 +88,31 @@ def trajectory_of(request: bytes, perceived: Perceived, rear_axle_m: float) -> T
       rear_axle_m: from the middle of the body back to the axle, whose middle OSI means.
 
     Raises:
-      ValueError: these bytes are no complete motion request.
+      Malformed: this is no complete motion request.
     """
+    if not isinstance(request, bytes):
+        raise Malformed(f"a {type(request).__name__}; wanted the bytes of a motion request")
     try:
         asked = osi_pb2.MotionRequest.FromString(request)
     except DecodeError as error:
-        raise ValueError(f"{len(request)} bytes that are no motion request") from error
+        raise Malformed(f"{len(request)} bytes that are no motion request") from error
     if missing := asked.FindInitializationErrors():
-        raise ValueError(f"a motion request that lacks {', '.join(missing)}")
+        raise Malformed(f"a motion request that lacks {', '.join(missing)}")
     now = perceived.state[:, 0]
     if asked.motion_request_type == TRAJECTORY:
         points = [_point(each, rear_axle_m) for each in asked.desired_trajectory.trajectory_point]
         if len(points) < 2:
-            raise ValueError(f"a motion request with {len(points)} trajectory points; expected 2 or more")
+            raise Malformed(f"a motion request with {len(points)} trajectory points; expected 2 or more")
         time_s, x_m, y_m = np.array(points).T
-        speed_mps = np.hypot(np.gradient(x_m, time_s), np.gradient(y_m, time_s))
+        with np.errstate(all="ignore"):  # a NaN or inf is refused with the whole trajectory
+            speed_mps = np.hypot(np.gradient(x_m, time_s), np.gradient(y_m, time_s))
     elif asked.HasField("desired_state"):
         then_s, x, y = _point(asked.desired_state, rear_axle_m)
         velocity = asked.desired_state.velocity
         time_s, x_m, y_m = np.array(((perceived.time_s, then_s), (now[X], x), (now[Y], y)))
         speed_mps = np.array((now[SPEED], math.hypot(velocity.x, velocity.y)))
     else:
-        raise ValueError("a motion request that lacks desired_state")
+        raise Malformed("a motion request that lacks desired_state")
     return Trajectory(np.maximum(time_s - perceived.time_s, 0.0), x_m, y_m, speed_mps)
 
 

@@ -1,16 +1,20 @@
 """A session with an ego in another process, over a stream: what is late, out of turn or gone never drives."""
 
+import math
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from typing import Any
 
 import grpc
 import numpy as np
 import pytest
 
-from risk_sac.egos import Control, Episode, Perceived
+from risk_sac.egos import Control, Episode, Perceived, Trajectory
+from risk_sac.egos.guard import Guarded
 from risk_sac.egos.remote.client import RemoteEgo
 from risk_sac.egos.remote.ego_pb2 import CloseReply, Command, Observation, StartReply
 from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message
@@ -113,6 +117,25 @@ def raising(requests: Iterator[Observation]) -> Iterator[Command]:
     raise ValueError("by me")
 
 
+def huge(requests: Iterator[Observation]) -> Iterator[Command]:
+    yield keeping(next(requests))
+    rows = dict.fromkeys(("time_s", "x_m", "y_m", "speed_mps"), np.zeros(100_000))
+    yield command_message(Trajectory(**rows), next(requests).time_s)
+
+
+class Garbage:
+    """A message that is none."""
+
+    def SerializeToString(self) -> bytes:  # noqa: N802  # as protobuf calls it
+        return b"\xff"
+
+
+def garbled(requests: Iterator[Observation]) -> Iterator[Any]:
+    yield keeping(next(requests))
+    next(requests)
+    yield Garbage()
+
+
 def silent(requests: Iterator[Observation]) -> Iterator[Command]:
     yield keeping(next(requests))
     yield Command(time_s=next(requests).time_s)
@@ -123,6 +146,8 @@ def silent(requests: Iterator[Observation]) -> Iterator[Command]:
     [
         (twice, "ego_malformed", r"answered an observation of 0\.5 s; wanted that of 0\.6 s"),
         (silent, "ego_malformed", "neither a control nor a trajectory"),
+        (huge, "ego_malformed", "larger than max"),
+        (garbled, "ego_malformed", "parsing"),
         (once, "ego_crash", "ended the session"),
         (raising, "ego_crash", "by me"),
     ],
@@ -141,6 +166,45 @@ def test_an_ego_of_the_first_version_of_the_protocol_is_told_apart() -> None:
         talking(twice, service="risk_sac.egos.v1.Ego"),
     ):
         pass
+
+
+class Saying:
+    """Does the same in each step."""
+
+    def __init__(self, says: Callable[[], Any]) -> None:
+        self._says = says
+
+    def reset(self, episode: Episode) -> None:
+        pass
+
+    def act(self, perceived: Perceived) -> Any:
+        return self._says()
+
+    def close(self) -> None:
+        sys.exit("by me")
+
+
+@pytest.mark.parametrize(
+    ("says", "reason"),
+    [
+        (lambda: None, "ego_malformed"),
+        (lambda: Control(math.nan), "ego_malformed"),
+        (lambda: sys.exit(0), "ego_crash"),
+        (lambda: 1 / 0, "ego_crash"),
+    ],
+)
+def test_what_is_wrong_with_a_served_ego_has_the_reason_that_it_has_here(says: Callable[[], Any], reason: str) -> None:
+    server, port = serve(Sessions(lambda: Saying(says), "1"), "127.0.0.1:0")
+    far = RemoteEgo("far", f"127.0.0.1:{port}", "1", PATIENT_S)
+    try:
+        for ego in (Guarded(lambda: far, PATIENT_S), Guarded(lambda: Saying(says), PATIENT_S, foreign=True)):
+            ego.reset(EPISODE)
+            with pytest.raises(EgoFailed) as failed:
+                ego.act(perceived(0.5))
+            assert failed.value.reason == reason
+            ego.close()
+    finally:
+        server.stop(0)
 
 
 class Counting:
