@@ -16,10 +16,10 @@ from pathlib import Path
 from risk_sac.cli.campaigns.gate import Bounds
 from risk_sac.cli.campaigns.output import results_table
 from risk_sac.cli.campaigns.watch import shown
-from risk_sac.cli.console import console
 from risk_sac.client import Campaign, Client, ClientError, Episode, Results, Unreachable
 from risk_sac.records import State
 from risk_sac.run_folder.results import FAILURES, series_name
+from risk_sac.terminal import console, run_command
 from service.settings import ServiceSettings
 
 START_S = 60.0
@@ -180,4 +180,4 @@ def conclude(campaign: Campaign) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_command(main))

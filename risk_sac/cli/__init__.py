@@ -9,10 +9,11 @@ from pathlib import Path
 
 from risk_sac import __version__
 from risk_sac.cli import campaigns, egos, export, places, regress, replay, report, run, serve, show, understand
-from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED, complain, flush, prepare_streams
+from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.scenario import library
+from risk_sac.terminal import complain, run_command
 
 EPILOG = """exit status, but of `campaigns`, which says its own: 0 done; 1 failed; 2 a wrong setting or argument;
 130 interrupted, and the same command goes on."""
@@ -20,12 +21,7 @@ EPILOG = """exit status, but of `campaigns`, which says its own: 0 done; 1 faile
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
-    prepare_streams()
-    try:
-        status = _run(arguments)
-    finally:
-        written = flush()
-    return status if written else status or FAILED
+    return run_command(lambda: _run(arguments))
 
 
 def _run(arguments: Sequence[str] | None) -> int:

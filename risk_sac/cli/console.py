@@ -1,19 +1,12 @@
 """What the commands share: consoles, exit statuses, and text made safe for a terminal or an XML file."""
 
 import argparse
-import codecs
-import contextlib
-import io
 import math
-import os
-import re
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import IO, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -26,65 +19,10 @@ from rich.progress import (
 from rich.table import Table
 
 from risk_sac.run_folder.durable import replace_file
+from risk_sac.terminal import Output, console, printable
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs
-# What a terminal without Unicode shows of ours; "?" for other characters.
-ASCII = {"→": "->", "–": "-", "−": "-", "…": "...", "×": "x", "·": "-", "≤": "<=", "²": "2"} | {
-    "λ": "lambda",
-    "α": "alpha",
-    "ρ": "rho",
-    "\u0304": "",
-}
-
-
-class Output(Console):
-    """A console that ends no command because nothing reads it."""
-
-    def on_broken_pipe(self) -> None:
-        """Go on without output."""
-        discard(self.file)
-
-
-def discard(stream: IO[str]) -> None:
-    """Lead a stream nowhere."""
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, stream.fileno())
-    os.close(null)
-
-
-def prepare_streams() -> None:
-    """Let output take any character, and keep the descriptors of closed streams from files that are opened later."""
-    while (null := os.open(os.devnull, os.O_RDWR)) <= 2:
-        pass
-    os.close(null)
-    codecs.register_error("risk-sac", _as_ascii)
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="risk-sac")
-
-
-def _as_ascii(error: UnicodeError) -> tuple[str, int]:
-    assert isinstance(error, UnicodeEncodeError)
-    return "".join(ASCII.get(character, "?") for character in error.object[error.start : error.end]), error.end
-
-
-def flush() -> bool:
-    """Write what is left to write; returns False if the disk is full. Nothing is left then."""
-    written = True
-    for stream in filter(None, (sys.stdout, sys.stderr)):
-        try:
-            stream.flush()
-        except OSError as error:
-            discard(stream)
-            written &= isinstance(error, BrokenPipeError)
-    return written
-
-
-console = Output(highlight=False)
-notes = Output(stderr=True, highlight=False)
-errors = Output(stderr=True, highlight=False, soft_wrap=True)
-
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 """Where a group of commands adds its parsers."""
 
@@ -112,18 +50,12 @@ def number(type_: type[int] | type[float], least: float, most: float = math.inf)
     return parsed
 
 
-def write_out(file: Path, content: bytes, what: str = "", said_on: Console = console) -> None:
+def write_out(file: Path, content: bytes, what: str = "", said_on: Output = console) -> None:
     """Write a file that the user named, with the folders that it lacks, and say so."""
     file.parent.mkdir(parents=True, exist_ok=True)
     replace_file(file, content)
     if what:
         said_on.print(f"{what}: {file}", markup=False, soft_wrap=True)
-
-
-def complain(message: str) -> None:
-    """Prints what went wrong."""
-    with contextlib.suppress(OSError):  # stderr may be on a full disk, too
-        errors.print(printable(message), style="red", markup=False)
 
 
 def columns(bar: BarColumn) -> tuple[ProgressColumn, ...]:
@@ -170,13 +102,6 @@ def or_dash(value: float | None, format_: str) -> str:
 
 # What names an ego.
 EGO = "default, perfect, careful, a registered ego, or a YAML file with the fields of a campaign's ego"
-# What XML 1.0 forbids, the other control characters, which a terminal would obey, and unpaired surrogates.
-_UNPRINTABLE = re.compile("[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
-def printable(text: str) -> str:
-    """The text without control characters, tabs and line breaks apart."""
-    return _UNPRINTABLE.sub("", text)
 
 
 def on_one_line(text: str) -> str:

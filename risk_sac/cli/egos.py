@@ -11,13 +11,14 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
-from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, add_command, complain, console, progress_bar
+from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, add_command, progress_bar
 from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_campaign, read_ego
 from risk_sac.egos.registry import SHIPPED, cards
 from risk_sac.machine import cores
 from risk_sac.metrics import pooled_counts, wilson_interval
+from risk_sac.terminal import complain, console
 
 if TYPE_CHECKING:
     from risk_sac.report import FinishedRun

@@ -4,10 +4,11 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-from risk_sac.cli.console import OK, Commands, console
+from risk_sac.cli.console import OK, Commands
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import FORMATS, Files, FormatName, check_carries, export
 from risk_sac.run_folder.results import RESULTS
+from risk_sac.terminal import console
 
 
 def add(commands: Commands) -> None:

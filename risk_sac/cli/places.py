@@ -11,12 +11,13 @@ from rich.markup import escape
 from rich.table import Table
 
 from risk_sac.cli.campaign_flags import MAP_HELP
-from risk_sac.cli.console import FAILED, OK, Commands, add_command, console, counted
+from risk_sac.cli.console import FAILED, OK, Commands, add_command, counted
 from risk_sac.run_folder.scratch import scratch_folder
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, Map, survey
 from risk_sac.scenario.maps.found import TITLES, Pattern, Survey
 from risk_sac.scenario.maps.summary import net_remarks
+from risk_sac.terminal import console
 
 if TYPE_CHECKING:
     from risk_sac.tryout import Tried

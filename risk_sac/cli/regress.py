@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.console import EGO, FAILED, OK, Commands, add_command, console, counted, narrow_table, printable
+from risk_sac.cli.console import EGO, FAILED, OK, Commands, add_command, counted, narrow_table
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.config.text import read_text
@@ -21,6 +21,7 @@ from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries,
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import RESULTS, read_results
 from risk_sac.run_folder.verified import distinct_failures
+from risk_sac.terminal import console, printable
 
 if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle

@@ -4,11 +4,12 @@ import argparse
 from contextlib import closing
 from pathlib import Path
 
-from risk_sac.cli.console import FAILED, OK, Commands, add_command, complain, console, counted, printable
+from risk_sac.cli.console import FAILED, OK, Commands, add_command, counted
 from risk_sac.errors import SimulationError
 from risk_sac.machine import cores
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import TIMES, distinct_failures
+from risk_sac.terminal import complain, console, printable
 
 
 def add(commands: Commands) -> None:

@@ -19,19 +19,7 @@ from risk_sac.cli.campaign_flags import (
     ego_flag,
     families_on_map,
 )
-from risk_sac.cli.console import (
-    FAILED,
-    INTERRUPTED,
-    OK,
-    Board,
-    Commands,
-    add_command,
-    complain,
-    console,
-    counted,
-    or_dash,
-    progress_bar,
-)
+from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, add_command, counted, or_dash, progress_bar
 from risk_sac.config import METHODS, SHIPPED, RunSpec
 from risk_sac.config.spec_file import read_campaign, read_spec
 from risk_sac.machine import cores
@@ -39,6 +27,7 @@ from risk_sac.metrics import METRICS, Metric
 from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import Results
 from risk_sac.run_folder.verified import TIMES
+from risk_sac.terminal import complain, console
 
 if TYPE_CHECKING:
     from risk_sac.execution.jobs import Job

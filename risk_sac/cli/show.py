@@ -5,13 +5,14 @@ from pathlib import Path
 
 from rich.table import Table
 
-from risk_sac.cli.console import EGO, OK, Commands, add_command, console, in_words, narrow_table
+from risk_sac.cli.console import EGO, OK, Commands, add_command, in_words, narrow_table
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
 from risk_sac.records import Judgement
 from risk_sac.run_folder.results import Results, read_results
 from risk_sac.run_folder.series import read_series
+from risk_sac.terminal import console
 
 
 def add(commands: Commands) -> None:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rich.text import Text
 
-from risk_sac.cli.console import OK, Commands, add_command, console, counted, narrow_table, printable
+from risk_sac.cli.console import OK, Commands, add_command, counted, narrow_table
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, note
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import read_verified
+from risk_sac.terminal import console, printable
 
 if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle

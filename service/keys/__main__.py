@@ -8,18 +8,17 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.terminal import Output, complain, errors, run_command
 from service.host.environment import MISUSED, read_settings
 from service.keys.file import PROJECT, Key, KeyFile, Scope, missing
 from service.keys.made import ever_made, noting
 from service.settings import ServiceSettings
 
-console = Console(highlight=False, soft_wrap=True)
-errors = Console(stderr=True, highlight=False, soft_wrap=True)
+console = Output(highlight=False, soft_wrap=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,10 +30,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             settings = settings.model_copy(update={"data_dir": options.data_dir})
         options.command(settings, options)
     except ConfigError as error:
-        errors.print(str(error), style="red", markup=False)
+        complain(str(error))
         return MISUSED
     except RiskSacError as error:
-        errors.print(str(error), style="red", markup=False)
+        complain(str(error))
         return 1
     return 0
 
@@ -128,4 +127,4 @@ def _date(time_s: float | None) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_command(main))

@@ -7,6 +7,7 @@ from contextlib import closing
 from pathlib import Path
 
 from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.terminal import complain, console, run_command
 from service.errors import StorageError
 from service.host.data_folder import create_private, hold_data_folder
 from service.host.environment import MISUSED, read_settings
@@ -20,9 +21,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         said = options.command(read_settings(), options)
     except RiskSacError as error:
-        print(error, file=sys.stderr)  # noqa: T201 - a command
+        complain(str(error))
         return MISUSED if isinstance(error, ConfigError) else 1
-    print(said)  # noqa: T201 - a command
+    console.print(said, markup=False, soft_wrap=True)
     return 0
 
 
@@ -69,4 +70,4 @@ def _existing(settings: ServiceSettings) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_command(main))

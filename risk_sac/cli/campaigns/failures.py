@@ -11,11 +11,12 @@ from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.campaigns.output import add_campaign_command, add_limit, print_answer
-from risk_sac.cli.console import OK, Commands, in_words, notes, or_dash, printable, write_out
+from risk_sac.cli.console import OK, Commands, in_words, or_dash, write_out
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
 from risk_sac.records import Grade
+from risk_sac.terminal import notes, printable
 
 FILTERS = {
     "run": "of this run",

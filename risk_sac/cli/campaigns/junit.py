@@ -10,8 +10,9 @@ from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
 from risk_sac.cli.campaigns.failures import look_command
 from risk_sac.cli.campaigns.gate import Bounds, comparisons, excesses
-from risk_sac.cli.console import counted, printable
+from risk_sac.cli.console import counted
 from risk_sac.client import Episode, Results, RunResult, Total
+from risk_sac.terminal import printable
 
 
 def junit(

@@ -7,23 +7,14 @@ from pathlib import Path
 
 from risk_sac.cli.campaigns.output import add_campaign_command, add_limit, campaigns_table, line, print_answer
 from risk_sac.cli.campaigns.watch import shown
-from risk_sac.cli.console import (
-    ABOVE,
-    COULD_NOT_RUN,
-    EGO,
-    OK,
-    Commands,
-    add_command,
-    complain,
-    notes,
-    write_out,
-)
+from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, Commands, add_command, write_out
 from risk_sac.cli.regress import cases_table, junit
 from risk_sac.cli.report import OUT, format_of
 from risk_sac.client import Client
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.cases import Regression
 from risk_sac.records import State
+from risk_sac.terminal import complain, notes
 
 POLL_S = 0.5
 FILTERS = ("state", "family", "method", "label")

@@ -11,11 +11,11 @@ from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons
-from risk_sac.cli.console import Commands, add_command, console, counted, number, on_one_line, or_dash
+from risk_sac.cli.console import Commands, add_command, counted, number, on_one_line, or_dash
 from risk_sac.client import CampaignSummary, Results
 from risk_sac.records import wire
+from risk_sac.terminal import console
 
-NAMES = ("family", "method")
 COUNTS_AND_RATES = ("epi-\nsodes", "con-\ntacts", "valid", "dis-\ntinct", "preven-\ntable", "ECR\n95 %", "PCR\n95 %")
 
 Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]
@@ -85,8 +85,8 @@ def results_table(results: Results, bounds: Bounds) -> Table:
     """
     partial = "" if results.complete else ", so far"
     table = Table(title=f"{results.campaign_id} {results.state}{partial}", box=SIMPLE_HEAD, padding=0)
-    for name in NAMES:
-        table.add_column(name, no_wrap=True)
+    table.add_column("family", overflow="fold")  # of a place on a map it is long
+    table.add_column("method", no_wrap=True)
     for name in COUNTS_AND_RATES:
         table.add_column(name, no_wrap=True, justify="right")
     for total in results.totals:

@@ -13,12 +13,13 @@ from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, add_pl
 from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, verdict
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.cli.campaigns.output import add_campaign_command, figures, line, print_answer, results_table
-from risk_sac.cli.console import OK, Board, Commands, add_command, columns, complain, notes, number
+from risk_sac.cli.console import OK, Board, Commands, add_command, columns, number
 from risk_sac.client import Campaign, Client, Episode, Results
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import read_posted
 from risk_sac.errors import ConfigError
 from risk_sac.records import Grade
+from risk_sac.terminal import complain, notes
 
 SEEDS = 1  # where none are named
 RATE = number(float, 0, 1)

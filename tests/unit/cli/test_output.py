@@ -27,13 +27,15 @@ TOTAL = ORDINARY | {
 
 
 def test_results_of_every_method_fit_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
-    totals = [TOTAL | {"method": method} for method in METHODS]
+    place = "car_following_" + "a_street_of_a_town_" * 2 + "0a1b2c3d4e5f"
+    totals = [TOTAL | {"method": method} for method in METHODS] + [TOTAL | {"family": place, "method": "sac"}]
     results = {"campaign_id": "c1", "state": "succeeded", "complete": True, "runs": [], "totals": totals}
     Console(width=80).print(results_table(Results.model_validate(results), Bounds(ecr=0.1)))
     printed = capsys.readouterr().out
     assert "…" not in printed
     assert all(f"{method} " in printed for method in METHODS)
-    assert printed.count("above") == printed.count("100 runs") == len(METHODS)
+    assert printed.count("above") == printed.count("100 runs") == len(totals)
+    assert place in "".join(line.split()[0] for line in printed.splitlines() if line.strip())
 
 
 def test_a_rate_that_may_be_above_says_up_to_where(capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from risk_sac import cli
+from risk_sac.terminal import prepare_streams
 
 EGOS = f"{sys.executable} -m risk_sac egos list"
+KEYS = f"{sys.executable} -m service.keys list"
 COMMA = """
 import locale, sys
 from contextlib import closing
@@ -40,8 +42,12 @@ def test_a_command_ends_well_whatever_reads_its_output(command: str, environment
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-def test_a_full_disk_behind_the_output_is_one_line_and_a_failure() -> None:
-    done = subprocess.run(["bash", "-c", f"{EGOS} > /dev/full"], capture_output=True, text=True, check=False)
+@pytest.mark.parametrize("command", [EGOS, KEYS])
+def test_a_full_disk_behind_the_output_is_one_line_and_a_failure(command: str, tmp_path: Path) -> None:
+    environment = os.environ | {"RISK_SAC_DATA_DIR": str(tmp_path)}
+    done = subprocess.run(
+        ["bash", "-c", f"{command} > /dev/full"], env=environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 1
     assert "No space left on device" in done.stderr
     assert done.stderr.count("\n") == 1
@@ -50,7 +56,7 @@ def test_a_full_disk_behind_the_output_is_one_line_and_a_failure() -> None:
 def test_letters_that_a_terminal_lacks_are_written_in_ascii(monkeypatch: pytest.MonkeyPatch) -> None:
     written = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, encoding="ascii"))
-    cli.prepare_streams()
+    prepare_streams()
     sys.stdout.write("contacts 3 → valid 2 … λ ≤ 1, Straße \ud800")
     sys.stdout.flush()
     assert written.getvalue() == b"contacts 3 -> valid 2 ... lambda <= 1, Stra?e ?"

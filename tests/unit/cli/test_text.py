@@ -3,7 +3,8 @@ import xml.etree.ElementTree as ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.cli.console import on_one_line, printable
+from risk_sac.cli.console import on_one_line
+from risk_sac.terminal import printable
 
 ANY = st.text(st.characters(exclude_categories=[]))
 
