@@ -26,13 +26,13 @@ from risk_sac.records import Collision
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import broken_hard_rule, soft_cost
-from risk_sac.risk.reward import risk_reward
+from risk_sac.risk.reward import risk_reward, worth
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact
-from risk_sac.sim.control import Adversaries
+from risk_sac.sim.control import Adversaries, shares_of
 from risk_sac.sim.ego import Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
@@ -127,37 +127,38 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """One control step of 0.1 s.
 
         Args:
-          action: two entries in [-1, 1] per adversary, see `risk_sac.sim.control`.
+          action: two entries in [-1, 1] per adversary, see `risk_sac.sim.control`; what is beyond is clipped.
 
         Returns:
           Observation, R_risk, whether the ego touched something, whether the horizon is reached, and
           `info` with `cost` (C_soft), `robustness` (soft minimum) and, at a contact, `collision`.
 
         Raises:
-          SimulationError: SUMO failed.
+          ValueError: the action has another shape, or entries that are no finite numbers.
+          SimulationError: SUMO failed, or the environment was not reset.
           EgoFailed: the ego cannot drive on; the episode is invalid.
         """
+        if not self._sim.running:
+            raise SimulationError("the environment has no episode to step; call reset first")
+        shares = shares_of(action, self.action_size)
         if self._controlled:
-            self._adversaries.command([min(max(share, -1.0), 1.0) for share in action.tolist()], self._sim)
+            self._adversaries.command(shares, self._sim)
         if self._reflex is not None:
             self._sim.brake(self._reflex.braking(self._frame, self._ego_path(), self._in_sight()))
         before, self._frame = self._frame, self._sim.step()
-        previous, self._measures = self._measures, self._measure(before)
+        contact = find_contact(before, self._frame)
+        previous, self._measures = self._measures, self._measure(before, 0 if contact is None else contact.other)
         self._steps += 1
         self._inside_limits &= not self._controlled or self._adversaries.keep_limits(self._frame)
         self._teleported |= bool(self._frame.teleported)
-        contact = None
-        if self._measures.assessment.touched:
-            contact = find_contact(before, self._frame, relative_view(self._frame))
-        self.trace.append(self._frame, self._measures, action)
+        self.trace.append(self._frame, self._measures, np.array(shares, dtype=np.float32))
         collision = None if contact is None else self._judge(contact)
         self._touched |= self._in_contact()
         cost = self._cost(before, self._frame, previous, self._measures)
-        worth = self._worth(collision) if collision is not None and collision.valid else 0.0
         reward = risk_reward(
             self._measures.signals["ttc_s"],
             self._measures.signals["rss_margin"],
-            worth,
+            0.0 if collision is None else worth(collision, self._reward),
             float(collision is not None and not collision.valid),
             self._reward,
         )
@@ -182,14 +183,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._unit_scene = self.problem.space.to_unit(scene)
         layout = self.layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
-        self._ground = Ground(
-            friction=layout.friction,
-            speed_limit_mps=self.problem.speed_limit_mps,
-            lane_width_m=layout.lane_width_m,
-            crossings=layout.crossings,
-            junctions=layout.junctions,
-            roadway=layout.roadway,
-        )
+        self._ground = Ground.of(layout, self.problem.speed_limit_mps)
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = CarefulReflex(self._ground) if self.problem.ego.profile == "careful" else None
         self._gauge.reset()
@@ -219,8 +213,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._measures = self._measure(before)
             self.trace.append(self._frame, self._measures, None)
 
-    def _measure(self, before: Frame | None) -> Measures:
-        return self._gauge.measure(self._frame, before, self._perception.seen)
+    def _measure(self, before: Frame | None, struck: int = 0) -> Measures:
+        return self._gauge.measure(self._frame, before, self._perception.seen, struck)
 
     def _check_feasible(self, scene: Scene) -> None:
         """C_hard of Eq. 5, when the adversaries are released."""
@@ -265,22 +259,17 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             previous.assessment.gap_m,
         )
 
-    def _worth(self, failure: Collision) -> float:
-        """Share of the bonus that a valid failure is paid."""
-        if failure.preventable:
-            return 1.0
-        return self._reward.unpreventable if failure.avoidable else self._reward.unavoidable
-
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame
-        other, pedestrian = frame.ids[contact.other], frame.kind[contact.other] == Kind.PEDESTRIAN
+        other = frame.ids[contact.other]
+        # SUMO tests bodies at the end of a step only; of a pedestrian, the ego's model was told the oracle's own box.
+        comparable = frame.kind[contact.other] == Kind.VEHICLE and relative_view(frame).overlap[contact.other - 1]
         facts = EpisodeFacts(
             teleported=self._teleported,
             spawn_overlap=self._spawn_overlap,
             inside_limits=self._inside_limits,
             touched_before=other in self._touched,
-            # Of a pedestrian, the ego's model was told the oracle's own box.
-            simulator_agrees=None if pedestrian else self._sim.lists_collision(other),
+            simulator_agrees=self._sim.lists_collision(other) if comparable else None,
             visible_for_s=self._perception.in_view_for(other, frame.time_s),
             ever_visible=self._perception.ever_seen(other),
         )

@@ -42,8 +42,7 @@ class RelativeView(NamedTuple):
     separation: Floats  # `4 x n`: signed distance of the centres along each separating axis
     reach: Floats  # `4 x n`: sum of both boxes' half extents along that axis
     gap: Floats
-    """Distance between the bodies, 0 when they touch. Exact for parallel and perpendicular bodies, else a lower
-    bound: the larger of the distances to each body's bounding box in the other's frame."""
+    """Distance between the bodies, 0 when they touch."""
     overlap: Bools
     """Whether the bodies touch or overlap (separating-axis theorem, exact)."""
 
@@ -85,20 +84,38 @@ def frame_view(state: Floats) -> RelativeView:
         reach[1, i] = ego_b + a * s + b * c
         reach[2, i] = a + ego_a * c + ego_b * s
         reach[3, i] = b + ego_a * s + ego_b * c
-        squared_from_ego = squared_from_other = 0.0
+        overlap[i] = True
         for axis in range(4):
-            clear = max(abs(separation[axis, i]) - reach[axis, i], 0.0)
-            if axis < 2:
-                squared_from_ego += clear * clear
-            else:
-                squared_from_other += clear * clear
-        gap[i] = math.sqrt(max(squared_from_ego, squared_from_other))
-        overlap[i] = gap[i] == 0.0
+            overlap[i] &= abs(separation[axis, i]) <= reach[axis, i]
+        gap[i] = 0.0 if overlap[i] else _distance(x[i], y[i], cos[i], sin[i], a, b, ego_a, ego_b)
     ego_vx = state[VX, 0] * cos_ego + state[VY, 0] * sin_ego
     ego_vy = state[VY, 0] * cos_ego - state[VX, 0] * sin_ego
     return RelativeView(
         x, y, vx, vy, cos, sin, half_length, half_width, ego_vx, ego_vy, ego_a, ego_b, separation, reach, gap, overlap
     )
+
+
+@compiled
+def _distance(x: float, y: float, cos: float, sin: float, a: float, b: float, ego_a: float, ego_b: float) -> float:
+    """Distance of two bodies that do not overlap: a corner of one of them is nearest to the other.
+
+    The other's half length and width are `a` and `b`, at (x, y) in the ego's frame.
+    """
+    squared = math.inf
+    for along in (-1.0, 1.0):
+        for across in (-1.0, 1.0):
+            px, py = along * a, across * b
+            squared = min(squared, _outside(x + px * cos - py * sin, y + px * sin + py * cos, ego_a, ego_b))
+            px, py = along * ego_a - x, across * ego_b - y
+            squared = min(squared, _outside(px * cos + py * sin, py * cos - px * sin, a, b))
+    return math.sqrt(squared)
+
+
+@compiled
+def _outside(x: float, y: float, half_length: float, half_width: float) -> float:
+    """Square of the distance from a point to a box about the origin."""
+    along, across = max(abs(x) - half_length, 0.0), max(abs(y) - half_width, 0.0)
+    return along * along + across * across
 
 
 @compiled

@@ -138,7 +138,8 @@ class Collision(Record):
     min_robustness: Least = _early("min_robustness")
     """Soft minimum of the requirements, until 1 s before the contact too."""
     simulator_agrees: bool | None
-    """Whether SUMO lists the collision within 0.3 s; null for pedestrians and for an ego that SUMO does not drive."""
+    """Whether SUMO lists it within 0.3 s; null for pedestrians, bodies that part within the step, and an ego that SUMO
+    does not drive."""
     verdicts: Mapping[str, bool] = {}
     """Validity rule → passed."""
     judgement: Judgement | None = None

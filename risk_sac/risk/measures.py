@@ -63,9 +63,9 @@ class Gauge:
         """Forgets the previous episode."""
         self._monitor.reset()
 
-    def measure(self, frame: Frame, before: Frame | None, seen: Bools) -> Measures:
-        """Measures the next frame, given the one before and which of the others the ego sees."""
-        assessment = assess(frame, self._rss, seen)
+    def measure(self, frame: Frame, before: Frame | None, seen: Bools, struck: int = 0) -> Measures:
+        """Measures the next frame, given the one before, and which of the others the ego sees and has touched."""
+        assessment = assess(frame, self._rss, seen, struck)
         signals = publish(frame, before, assessment.least)
         robustness = self._monitor.update(signals)
         return Measures(assessment, signals, robustness, soft_min(robustness[self._monitor.shapes], self._sharpness))

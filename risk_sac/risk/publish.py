@@ -55,15 +55,18 @@ class Assessment(NamedTuple):
         return seen
 
 
-def assess(frame: Frame, rss: RssParameters, seen: Bools) -> Assessment:
-    """All measures of a frame, in one compiled call."""
-    others, least, touched = _assess(frame.state, frame.kind, tuple(rss), seen)
+def assess(frame: Frame, rss: RssParameters, seen: Bools, struck: int = 0) -> Assessment:
+    """All measures of a frame, in one compiled call.
+
+    `struck` is the column of an actor that the ego touched in the step: they count as touching even if they parted.
+    """
+    others, least, touched = _assess(frame.state, frame.kind, tuple(rss), seen, struck)
     return Assessment(others, LeastMargins(*least), touched)
 
 
 @compiled
 def _assess(
-    state: Floats, kind: NDArray[np.int8], rss: tuple[float, ...], seen: Bools
+    state: Floats, kind: NDArray[np.int8], rss: tuple[float, ...], seen: Bools, struck: int
 ) -> tuple[Floats, tuple[float, float, float, float, float], bool]:
     view = frame_view(state)
     ttc_s = np.minimum(time_to_contact(view), TTC_CAP_S)
@@ -83,6 +86,9 @@ def _assess(
         others[RSS_LONGITUDINAL, i] = rss_margins.longitudinal_m[i]
         others[RSS_LATERAL, i] = rss_margins.lateral_m[i]
         others[RSS_SCALED, i], others[CHARGED, i] = rss_margins.scaled[i], charged[i]
+    if struck > 0:
+        for row in (GAP, TTC, ENCOUNTER):
+            others[row, struck - 1] = 0.0
     return others, least_margins(others, kind), touched
 
 

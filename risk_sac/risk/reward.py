@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 from risk_sac.config import LearnerConfig, Method, RewardConfig
+from risk_sac.records import Collision
 from risk_sac.types import Floats
 
 if TYPE_CHECKING:
@@ -45,6 +46,15 @@ def risk_reward(
     near_miss = config.ttc_weight * math.e ** (-ttc_s / config.ttc_scale_s)  # `**` works on all three containers
     reward: Value = sparse + (near_miss + config.rss_weight * (rss_margin < 0))
     return reward
+
+
+def worth(collision: Collision, config: RewardConfig) -> float:
+    """The share of the bonus for valid collisions that one is paid, in [0, 1]."""
+    if not collision.valid:
+        return 0.0
+    if collision.preventable:
+        return 1.0
+    return config.unpreventable if collision.avoidable else config.unavoidable
 
 
 def penalised_reward(risk_reward: Value, cost: Value, dual_variable: float) -> Value:

@@ -1,7 +1,7 @@
-"""The collision oracle: our own box test, and the contact's place and time.
+"""The collision oracle: our own box test, swept over the step, and the contact's place and time.
 
-A contact between two frames is located by bisection on the interpolated poses, so the step length does not
-matter. SUMO's list is only a cross-check.
+Between two frames positions and headings are interpolated, so bodies that cross and part within a step are found, and
+the step length does not matter. SUMO's list is only a cross-check.
 """
 
 import math
@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from risk_sac.geometry import RelativeView, contact_point, frame_view, zone
+from risk_sac.geometry import NO_MOTION, RelativeView, contact_point, frame_view, relative_view, speed_along, zone
 from risk_sac.jit import compiled
-from risk_sac.types import HEADING, WIDTH, Floats, Frame, X, Y
+from risk_sac.types import HEADING, LENGTH, VX, VY, WIDTH, Floats, Frame, X, Y
 
-BISECTIONS = 10  # of 0.1 s: locates the contact to 0.1 ms
+TOUCHING_M = 1e-5  # bodies no farther apart along any separating axis touch
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,28 +33,67 @@ class Contact:
     relative_speed_mps: float
 
 
-def find_contact(before: Frame | None, frame: Frame, view: RelativeView) -> Contact | None:
-    """The ego's first contact in the step from `before` to `frame`, or None; `view` is `relative_view(frame)`."""
-    if not view.overlap.any():
-        return None
-    touching = np.flatnonzero(view.overlap)
-    if before is None or before.ids != frame.ids:
-        return _describe(frame, int(touching[0]) + 1, frame, 1.0)
-    share, other = min((_first_touch(before.state, frame.state, int(i) + 1), int(i) + 1) for i in touching)
-    return _describe(before, other, frame, share)
+def find_contact(before: Frame | None, frame: Frame, view: RelativeView | None = None) -> Contact | None:
+    """The ego's first contact in the step from `before` to `frame`, or None.
+
+    Without a frame before, bodies that overlap touch at the frame's time; `view` is `relative_view(frame)`, if known.
+    """
+    if before is None:
+        touching = np.flatnonzero((view or relative_view(frame)).overlap)
+        return _describe(frame.state, int(touching[0]) + 1, frame, 0.0, 1.0) if len(touching) else None
+    state = before.state
+    if before.ids != frame.ids:  # actors have left
+        state = np.ascontiguousarray(state[:, [before.ids.index(id_) for id_ in frame.ids]])
+    share, other = _first_contact(state, frame.state)
+    return _describe(state, other, frame, frame.time_s - before.time_s, share) if other else None
+
+
+@compiled
+def _first_contact(before: Floats, now: Floats) -> tuple[float, int]:
+    """Share of the step after which the ego first touches another actor, and its column; 0 for none."""
+    share, found = math.inf, 0
+    for other in range(1, now.shape[1]):
+        dx, dy = now[X, other] - now[X, 0], now[Y, other] - now[Y, 0]
+        way_x, way_y = dx - (before[X, other] - before[X, 0]), dy - (before[Y, other] - before[Y, 0])
+        reach = (now[LENGTH, 0] + now[WIDTH, 0] + now[LENGTH, other] + now[WIDTH, other]) / 2
+        if math.hypot(dx, dy) <= reach + math.hypot(way_x, way_y):
+            touches = _first_touch(before, now, other)
+            if touches < share:
+                share, found = touches, other
+    return share, found
 
 
 @compiled
 def _first_touch(before: Floats, now: Floats, other: int) -> float:
-    """Share of the step, in (0, 1], after which the ego first touches `other`."""
-    low, high = 0.0, 1.0
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        if frame_view(_between(before, now, other, middle)).overlap[0]:
-            high = middle
-        else:
-            low = middle
-    return high
+    """Share of the step, in [0, 1], after which the ego first touches `other`; inf if it does not.
+
+    Conservative advancement: bodies that are clear along an axis do not touch before they could close in along it.
+    Source: Mirtich 1996, "Impulse-based dynamic simulation of rigid body systems", sec. 2.3.
+    """
+    turning = 0.0  # the most that a body's extent grows along an axis in a whole step
+    for actor in (0, other):
+        turn = now[HEADING, actor] - before[HEADING, actor]
+        turn -= math.tau * round(turn / math.tau)
+        turning += abs(turn) * math.hypot(now[LENGTH, actor], now[WIDTH, actor]) / 2
+    share = 0.0
+    while share <= 1.0:
+        pair = _between(before, now, other, share)
+        for row, position in ((VX, X), (VY, Y)):  # metres per step
+            pair[row, 0], pair[row, 1] = (
+                now[position, 0] - before[position, 0],
+                now[position, other] - before[position, other],
+            )
+        view = frame_view(pair)
+        wait = 0.0
+        for axis in range(4):
+            clear = abs(view.separation[axis, 0]) - view.reach[axis, 0]
+            if clear > TOUCHING_M:
+                closing = -math.copysign(1.0, view.separation[axis, 0]) * speed_along(view, 0, axis)
+                wait = max(wait, clear / max(max(closing, 0.0) + turning, NO_MOTION))
+        if wait == 0.0:
+            return share
+        share += wait
+    return math.inf
 
 
 @compiled
@@ -71,8 +110,8 @@ def _between(before: Floats, now: Floats, other: int, share: float) -> Floats:
     return pair
 
 
-def _describe(before: Frame, other: int, frame: Frame, share: float) -> Contact:
-    view = frame_view(_between(before.state, frame.state, other, share))
+def _describe(before: Floats, other: int, frame: Frame, step_s: float, share: float) -> Contact:
+    view = frame_view(_between(before, frame.state, other, share))
     x, y = contact_point(view)
     cos, sin = float(view.cos[0]), float(view.sin[0])
     dx, dy = x - float(view.x[0]), y - float(view.y[0])
@@ -80,7 +119,7 @@ def _describe(before: Frame, other: int, frame: Frame, share: float) -> Contact:
     side = math.copysign(1.0, float(view.y[0]))
     return Contact(
         other=other,
-        time_s=frame.time_s - (1.0 - share) * (frame.time_s - before.time_s),
+        time_s=frame.time_s - (1.0 - share) * step_s,
         x_m=x,
         y_m=y,
         ego_zone=zone(x, y, view.ego_half_length, view.ego_half_width),

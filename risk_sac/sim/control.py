@@ -66,6 +66,25 @@ class PedestrianControl:
         return clip(along + share * to_along, low, high), across + share * to_across
 
 
+def shares_of(action: object, size: int) -> list[float]:
+    """The entries of a joint action, clipped to [-1, 1].
+
+    Raises:
+      ValueError: it has another shape, or an entry that is no finite number.
+    """
+    wanted = f"shape ({size},), finite numbers in [-1, 1]"
+    try:
+        values = np.asarray(action)
+    except (ValueError, TypeError, RuntimeError) as error:  # ragged, or a tensor that needs its gradient
+        raise ValueError(f"action: got {type(action).__name__}, {error}; wanted {wanted}") from error
+    if values.shape != (size,) or values.dtype.kind not in "fiu":
+        raise ValueError(f"action: got shape {values.shape}, dtype {values.dtype}; wanted {wanted}")
+    shares: list[float] = values.tolist()
+    if not all(map(math.isfinite, shares)):
+        raise ValueError(f"action: got {shares}; wanted {wanted}")
+    return [min(max(share, -1.0), 1.0) for share in shares]
+
+
 class Adversaries:
     """Adversaries of an episode."""
 

@@ -1,7 +1,7 @@
 """An episode in SUMO behind a few verbs: reset, release, apply, step, close.
 
-libsumo holds one simulation per process. Only this package and the checker of uploaded networks call it. Pedestrians
-are points of our own dynamics that SUMO does not know, see `risk_sac.sim.lookout`.
+libsumo runs one simulation per process, see `risk_sac.sim.holder`. Only this package and the checker of uploaded
+networks call it. Pedestrians are points of our own dynamics that SUMO does not know, see `risk_sac.sim.lookout`.
 """
 
 import math
@@ -17,6 +17,7 @@ from risk_sac.scenario.layout import Layout
 from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.drivers import Drivers
 from risk_sac.sim.ego import EVERYTHING, Belief, Perception, Senses
+from risk_sac.sim.holder import LIBSUMO
 from risk_sac.sim.lookout import project
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import MovedEgo, Pilot
@@ -58,7 +59,6 @@ class SumoSimulation:
         self._ego = ego
         self._senses = senses or Perception(0.0, EVERYTHING)
         self._pilot = pilot
-        self._started = False
         self._walkers: dict[str, Walker] = {}
         self._roads = Roads()
 
@@ -69,16 +69,12 @@ class SumoSimulation:
         SUMO's models want that.
 
         Raises:
-          SimulationError: SUMO refused the layout.
+          SimulationError: SUMO refused the layout, or this process runs another simulation.
         """
         net, types = (plain_name(str(NETS / name)) for name in (layout.net, "vtypes.add.xml"))
         options = ["-n", net, "-a", types, "--seed", str(seed), *OPTIONS]
         try:
-            if self._started:
-                libsumo.load(options)
-            else:
-                libsumo.start(["sumo", *options])
-                self._started = True
+            LIBSUMO.load(self, options)
             place(layout, self._ego)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
@@ -127,6 +123,11 @@ class SumoSimulation:
     def brake(self, braking_mps2: float) -> None:
         """Makes the ego brake by at least `braking_mps2` in the next step."""
         self._reflex_mps2 = braking_mps2
+
+    @property
+    def running(self) -> bool:
+        """Whether libsumo runs this simulation: it was reset, and neither closed nor replaced since."""
+        return LIBSUMO.is_held_by(self)
 
     def step(self) -> Frame:
         """Advances 0.1 s.
@@ -242,7 +243,5 @@ class SumoSimulation:
 
     def close(self) -> None:
         """Ends the simulation; `reset` may be called again."""
-        if self._started:
-            libsumo.close()
-            self._started = False
-            self._walkers = {}
+        LIBSUMO.close(self)
+        self._walkers = {}

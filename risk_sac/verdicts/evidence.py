@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.scenario.ground import Area
+from risk_sac.scenario.layout import Layout
 from risk_sac.types import STEP_S, Bools, Floats
 
 Letters = NDArray[Any]  # as numbers
@@ -36,6 +37,12 @@ class Ground:
     crossings: tuple[Area, ...] = ()  # pedestrian crossings
     junctions: tuple[Area, ...] = ()
     roadway: tuple[Area, ...] = ()  # where vehicles drive; none: pedestrians are judged as if always on it
+
+    @classmethod
+    def of(cls, layout: Layout, speed_limit_mps: float) -> "Ground":
+        """Where a layout is."""
+        names = ("friction", "lane_width_m", "crossings", "junctions", "roadway")
+        return cls(speed_limit_mps=speed_limit_mps, **{name: getattr(layout, name) for name in names})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

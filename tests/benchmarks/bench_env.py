@@ -15,9 +15,9 @@ import pytest
 
 from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.sim import drivers, paths, placing, reading, roads, sumo
+from risk_sac.sim import drivers, holder, paths, placing, reading, roads, sumo
 
-CALLERS = (sumo, placing, reading, roads, drivers, paths)  # the modules that import libsumo
+CALLERS = (sumo, holder, placing, reading, roads, drivers, paths)  # the modules that import libsumo
 STEP_RATIO = 3.0
 RESET_MS = 20.0
 EPISODES, ROUNDS = 8, 5

@@ -1,4 +1,6 @@
 import math
+import multiprocessing
+import os
 import re
 import subprocess
 import sys
@@ -7,10 +9,12 @@ from contextlib import closing
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from gymnasium.utils.env_checker import check_env
 from shapely import Point, Polygon
 from shapely import box as shapely_box
@@ -18,7 +22,7 @@ from shapely.affinity import rotate, translate
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.env import RiskSacEnv, make_default
-from risk_sac.errors import InfeasibleScene, SceneError
+from risk_sac.errors import InfeasibleScene, SceneError, SimulationError
 from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, Grade
@@ -387,6 +391,86 @@ def test_actions_beyond_the_bounds_count_as_the_bounds(low: RiskSacEnv) -> None:
 
     assert np.array_equal(reached(1.0), reached(7.0))
     assert not np.array_equal(reached(1.0), reached(0.5))
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        np.full(6, np.nan),
+        np.array([0, 0, 0, 0, 0, np.inf]),
+        [0.0, 0.0, 0.0, 0.0, 0.0, -math.inf],
+        np.zeros(7),
+        np.zeros(5),
+        np.zeros((1, 6)),
+        0.0,
+        None,
+        np.array(["0"] * 6),
+        np.array([None] * 6),
+        np.zeros(6, dtype=complex),
+        [0.0, [0.0], 0.0],
+        [10**400] * 6,
+        {"action": 0.0},
+        torch.zeros(6, requires_grad=True),
+    ],
+    ids=lambda action: repr(action)[:30],
+)
+def test_an_action_that_is_none_is_refused_and_the_episode_goes_on(low: RiskSacEnv, action: Any) -> None:
+    expected = episode(low, 3)
+    low.reset(seed=3)
+    with pytest.raises(ValueError, match=r"^action: got .*; wanted shape \(6,\), finite numbers in \[-1, 1\]$"):
+        low.step(action)
+    generator = np.random.default_rng(0)
+    assert low.step(generator.uniform(-1, 1, 6).astype(np.float32))[1] == expected[1][1]
+
+
+@pytest.mark.parametrize("kind", [list, tuple, torch.tensor, np.float64, np.float16], ids=lambda kind: kind.__name__)
+def test_an_action_may_be_any_sequence_of_numbers(low: RiskSacEnv, kind: Any) -> None:
+    observations = []
+    for action in (np.full(6, 0.5, dtype=np.float32), kind([0.5] * 6)):
+        low.reset(seed=1)
+        observations.append(low.step(action)[0])
+    assert np.array_equal(*observations)
+
+
+def test_a_second_environment_of_a_process_is_refused_until_the_first_one_is_gone(low: RiskSacEnv) -> None:
+    expected = episode(low, 3)
+    with closing(make_default("mixed")) as second:
+        for _ in range(2):
+            with pytest.raises(SimulationError, match=r"AsyncVectorEnv"):
+                second.reset(seed=1)
+        assert same(episode(low, 3), expected)
+        low.close()
+        second.reset(seed=1)
+        with pytest.raises(SimulationError, match="call reset first"):
+            low.step(low.action_space.sample())
+        low.close()  # takes nothing from the other
+        second.step(second.action_space.sample())
+    assert same(episode(low, 3), expected)
+
+
+def test_an_environment_that_is_lost_gives_way() -> None:
+    lost = make_default("low")
+    lost.reset(seed=1)
+    lost.itself = lost  # type: ignore[attr-defined]  # a cycle
+    del lost
+    with closing(make_default("low")) as env:
+        env.reset(seed=1)
+
+
+def test_a_child_process_has_a_simulation_of_its_own(low: RiskSacEnv) -> None:
+    expected = episode(low, 3)
+    low.reset(seed=3)
+
+    def child() -> None:
+        with closing(make_default("low")) as env:
+            os._exit(0 if same(episode(env, 3), expected) else 1)
+
+    process = multiprocessing.get_context("fork").Process(target=child)
+    process.start()
+    low.step(np.zeros(6, dtype=np.float32))
+    process.join()
+    assert process.exitcode == 0
+    assert same(episode(low, 3), expected)
 
 
 def test_a_closed_environment_can_start_again(low: RiskSacEnv) -> None:

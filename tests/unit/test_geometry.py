@@ -5,8 +5,6 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from risk_sac.geometry import RelativeView, line_of_sight, overlapping_pairs, relative_view, time_to_contact
 from risk_sac.types import Bools, Floats, Frame
@@ -104,24 +102,15 @@ def test_gap_of_aligned_bodies_is_the_hand_computed_distance() -> None:
     assert view.gap.tolist() == pytest.approx([6.0, 3.0, 5.0, 5.0])  # ahead, alongside, 3-4-5 diagonal, turned
 
 
-@settings(deadline=None)  # the first call compiles
-@given(st.integers(0, 3), st.floats(-15, 15), st.floats(-15, 15), st.floats(-4, 4))
-def test_gap_is_exact_between_parallel_and_perpendicular_bodies(turns: int, x: float, y: float, ego: float) -> None:
-    frame = frame_of([(0, 0, ego, 4.6, 1.85), (x, y, ego + turns * math.pi / 2, 6.0, 2.5)])
-    bodies = boxes(frame)
-    assert relative_view(frame).gap[0] == pytest.approx(bodies[0].distance(bodies[1]), abs=1e-9)
-
-
-def test_gap_never_exceeds_the_distance_and_is_zero_only_at_contact() -> None:
+@pytest.mark.parametrize("spread_m", [9.0, 25.0])
+def test_gap_is_the_distance_that_shapely_measures(spread_m: float) -> None:
     generator = np.random.default_rng(1)
     for _ in range(20):
-        frame = random_frame(generator, 100, 25.0)
+        frame = random_frame(generator, 100, spread_m)
         bodies = boxes(frame)
-        distance = shapely.distance(bodies[0], bodies[1:])
-        gap = relative_view(frame).gap
-        assert np.all(gap <= distance + 1e-9)
+        distance, gap = shapely.distance(bodies[0], bodies[1:]), relative_view(frame).gap
+        np.testing.assert_allclose(gap, distance, atol=1e-9)
         assert np.all((gap > 0) == (distance > 0))
-        assert np.all(gap >= 0.5 * distance - 1e-9)  # a bound worth having
 
 
 def test_a_lone_ego_has_an_empty_view() -> None:

@@ -38,6 +38,12 @@ def test_a_frame_is_measured_by_the_functions_of_the_paper() -> None:
     assert measures.soft_min == soft_min(measures.robustness, 20.0)
 
 
+def test_an_actor_that_was_touched_in_the_step_and_is_past_has_no_gap_left() -> None:
+    measures = gauge().measure(behind(0.7), None, SEEN, struck=1)
+    assert measures.signals["vehicle_gap_m"] == measures.signals["ttc_s"] == measures.signals["encounter_s"] == 0.0
+    assert measures.robustness.tolist() == pytest.approx([-1.0, -0.5])
+
+
 def test_requirements_remember_the_frames_of_an_episode_and_nothing_before_it() -> None:
     subject = gauge()
     assert [m.robustness[1] for m in measured(subject, 20.0, 8.0, 20.0)] == pytest.approx([1.5, 0.3, 0.3])

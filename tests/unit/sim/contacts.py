@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from risk_sac.geometry import relative_view
 from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.types import STEP_S, Frame, Kind
 from tests.builders import frame_of
@@ -40,7 +39,7 @@ def frames(
 
 
 def contact_of(before: Frame | None, frame: Frame) -> Contact | None:
-    return find_contact(before, frame, relative_view(frame))
+    return find_contact(before, frame)
 
 
 def ego(speed_mps: float = 10.0, lateral_mps: float = 0.0) -> Actor:

@@ -2,9 +2,16 @@
 
 import math
 
+import numpy as np
 import pytest
+import shapely
+from shapely import box
+from shapely.affinity import rotate, translate
 
-from tests.builders import moved
+from risk_sac.geometry import relative_view
+from risk_sac.sim.collision import find_contact
+from risk_sac.types import HEADING, STEP_S, Frame, X, Y
+from tests.builders import frame_of, moved
 from tests.unit.sim.contacts import (
     CAR,
     CROSSING,
@@ -76,6 +83,56 @@ def test_of_two_contacts_in_a_step_the_earlier_one_is_reported() -> None:
     assert contact is not None
     assert contact.other == 2
     assert contact.time_s == pytest.approx(5.0, abs=0.001)
+
+
+def crossing(turned_rad: float = 0.0) -> tuple[Frame, Frame]:
+    """Two cars at 14 m/s cross at right angles and overlap for 87 ms between the frames; the other one also turns."""
+    x, y = 3.2557315650303864, -1.9705839164298644
+    before, frame = frames(ego(14.0), (x, y, -math.pi / 2, 0.0, -14.0, CAR), share=0.0, time_s=10.0)
+    return before, moved(frame, heading_rad=frame.heading_rad + np.array([0.0, turned_rad]))
+
+
+def at(before: Frame, frame: Frame, share: float) -> list[shapely.Polygon]:
+    """The bodies between two frames."""
+    state = before.state + share * (frame.state - before.state)
+    poses = zip(*state[[X, Y, HEADING]], frame.length_m / 2, frame.width_m / 2, strict=True)
+    return [translate(rotate(box(-a, -b, a, b), h, (0, 0), use_radians=True), x, y) for x, y, h, a, b in poses]
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("turned_rad", [0.0, 0.05, -0.05])
+def test_bodies_that_part_within_the_step_have_touched(side: int, turned_rad: float) -> None:
+    before, frame = (moved(f, y_m=side * f.y_m, heading_rad=side * f.heading_rad) for f in crossing(turned_rad))
+    assert not relative_view(before).overlap[0]
+    assert not relative_view(frame).overlap[0]
+    contact = find_contact(before, frame)
+    assert contact is not None
+    assert 10.0 < contact.time_s < 10.01
+    assert contact.lateral_offset_m * side < 0
+
+
+def test_sweeping_the_bodies_agrees_with_shapely_on_random_steps() -> None:
+    """Cars, long vehicles and pedestrians, which move by up to 3 m and turn by up to 30 degrees."""
+    generator, shares = np.random.default_rng(5), np.linspace(0.0, 1.0, 101)
+    found = parted = 0
+    for _ in range(300):
+        place, way = generator.uniform(-7, 7, (2, 2)), generator.uniform(-3, 3, (2, 2))
+        heading, turn = generator.uniform(-4, 4, 2), generator.uniform(-0.5, 0.5, 2)
+        length, width = generator.choice([(4.6, 1.85), (16.5, 2.55), (0.5, 0.5)], 2).T
+        x, y = place
+        before = frame_of(x_m=x, y_m=y, heading_rad=heading, length_m=length, width_m=width)
+        frame = moved(before, x_m=x + way[0], y_m=y + way[1], heading_rad=heading + turn)._replace(time_s=STEP_S)
+        apart = np.array([a.distance(b) for a, b in (at(before, frame, share) for share in shares)])
+        contact = find_contact(before, frame)
+        if contact is None:
+            assert apart.min() > 0.0
+            continue
+        share = contact.time_s / STEP_S
+        assert math.isclose(shapely.distance(*at(before, frame, share)), 0.0, abs_tol=2e-5)
+        assert (apart[shares < share - 1e-9] > 0.0).all()
+        found, parted = found + 1, parted + bool(apart[0] > 0.0 and apart[-1] > 0.0)
+    assert found > 50
+    assert parted > 3
 
 
 def test_bodies_apart_make_no_contact() -> None:
