@@ -35,16 +35,16 @@ def check(upload: Path) -> CheckReport:
         root = read_tree(converted.file)
         files = list(_kept(converted, sum(1 for _ in root.iter())))
     net = parse_net(root)
-    del root
     if not net.edges:
         raise UploadError("the net has no edge outside junctions; wanted roads")
     if len(net.edges) > MAX_ROADS:
         raise UploadError(f"the net has {len(net.edges)} edges; wanted at most {MAX_ROADS}: cut the map")
-    remarks = net_remarks(net)
+    found, remarks = summary(net), net_remarks(net)
+    del root, net  # makes room for the simulator's
     bind_simulator()
     said = load({kind: [file.name for file in files if file.kind is kind] for kind in Kind})
     warnings = (*remarks, *converted.warnings, *said)
-    return CheckReport(summary=summary(net), files=tuple(files), warnings=warnings[:MOST_WARNINGS])
+    return CheckReport(summary=found, files=tuple(files), warnings=warnings[:MOST_WARNINGS])
 
 
 def _kept(converted: Converted, elements: int) -> Iterator[NetworkFile]:

@@ -1,11 +1,11 @@
 """What the check of an uploaded network, and the search for its places, may cost."""
 
-CPU_S = 100  # a net of 50,000 edges takes 40
-WALL_S = 120
-MEMORY_BYTES = 3 << 30  # of address space; Python with an idle libsumo takes 0.9 GiB
+CPU_S = 150  # a net of 50,000 edges takes 45
+WALL_S = 300
+MEMORY_BYTES = 4 << 30  # of address space; Python with an idle libsumo takes 0.9 GiB
 LOG_BYTES = 64 << 10  # what the simulator may write to its log, and to any other file
 OPEN_FILES = 64
 SURVEY_S = 1800  # that a search for places may take; 50,000 edges take 150 on one core
-SURVEY_MEMORY_BYTES = 3 << 30
+SURVEY_MEMORY_BYTES = 4 << 30
 MAX_PLACES = 100  # of a campaign
 STEPS, STEP_S = 3, 0.1  # that the simulator runs

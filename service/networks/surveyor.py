@@ -17,6 +17,7 @@ from risk_sac.failures.map_picture import map_png
 from risk_sac.run_folder.durable import replace_file, write_sealed
 from risk_sac.scenario.maps.finder import FINDERS, Map, survey
 from risk_sac.scenario.maps.found import Pattern
+from risk_sac.scenario.maps.read_net import read_net
 from service.networks.limits import MAX_PLACES, SURVEY_MEMORY_BYTES
 from service.networks.report import PICTURE, PLACES, PROGRESS
 from service.networks.schemas import Elsewhere, FoundPlace, Places
@@ -39,13 +40,13 @@ def main() -> None:
 
 
 def _survey() -> dict[str, object]:
-    chosen = Map(NET)
-    found = survey(chosen.net, tell=Progress())
+    net = read_net(NET)
+    found = survey(net, tell=Progress())
     places = Places(
         items=[FoundPlace.model_validate(fit.told()) for fit in found.fits],
         elsewhere=[Elsewhere.model_validate(misfit.told()) for misfit in found.misfits],
     )
-    replace_file(Path(PICTURE), map_png(chosen.net, found))
+    replace_file(Path(PICTURE), map_png(net, found))
     write_sealed(Path(PLACES), places)
     return {}
 

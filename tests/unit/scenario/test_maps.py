@@ -14,6 +14,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, DamagedError, MapError
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, family_at, family_named
+from risk_sac.scenario.maps import convert
 from risk_sac.scenario.maps.around import walk_over
 from risk_sac.scenario.maps.clearance import too_near, truck_reaches, waits_in_the_way
 from risk_sac.scenario.maps.convert import present_net
@@ -177,6 +178,28 @@ def test_a_place_that_cannot_be_run_says_why(tmp_path: Path) -> None:
 def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str) -> None:
     file = tmp_path / "map"
     file.write_text(content)
+    with pytest.raises(MapError, match=says):
+        present_net(file, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("script", "says"),
+    [
+        (
+            "echo 'Error: odd lane' >&2; kill -SEGV $$",
+            r"SUMO's netconvert crashes on map.osm \(SIGSEGV\); .* odd lane; open",
+        ),
+        ("echo 'std::bad_alloc' >&2; exit 1", "map.osm, for which netconvert has too little time or memory; cut"),
+        ("kill -KILL $$", "map.osm, for which netconvert has too little time or memory; cut"),
+        ("echo 'Error: no nodes' >&2; exit 1", "netconvert cannot convert map.osm: no nodes"),
+    ],
+)
+def test_why_netconvert_failed_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, says: str) -> None:
+    program, file = tmp_path / "netconvert", tmp_path / "map.osm"
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+    file.write_text(osm_town())
+    monkeypatch.setattr(convert, "netconvert", lambda: (str(program), {}))
     with pytest.raises(MapError, match=says):
         present_net(file, tmp_path)
 

@@ -41,6 +41,21 @@ def test_a_good_network_passes_with_its_files(tmp_path: Path) -> None:
     assert all((tmp_path / file.name).stat().st_size == file.bytes for file in report.files)
 
 
+OF_NETEDIT = (
+    '<location netOffset="0.00,0.00" convBoundary="0.00,-3.20,100.00,0.00" projParameter="!" '
+    'origBoundary="10000000000.00,10000000000.00,-10000000000.00,-10000000000.00"/>'
+)
+
+
+def test_what_sumos_own_editor_writes_is_taken(tmp_path: Path) -> None:
+    net = NET.replace("<edge", OF_NETEDIT + "<edge", 1).replace('index="0"', 'index="7" acceleration="1" newer="x"')
+    net = net.replace("<net", '<net avoidOverlap="0" newer="x"').replace(
+        "</edge>", "<param key='a:b' value='1 2'/></edge>"
+    )
+    (tmp_path / "upload").write_text(f"\ufeff{net}".replace("><", ">\r\n<"), "utf-8")
+    assert inspect(tmp_path).warnings == ("there are no traffic lights",)
+
+
 def test_a_checker_that_crashes_refuses_the_upload(tmp_path: Path) -> None:
     assert refusal(tmp_path, "import os; os.kill(os.getpid(), 11)") == (
         "the simulator cannot load it: it was ended by SIGSEGV"
