@@ -28,6 +28,11 @@ def _parsed(value: object) -> object:
 Names = Annotated[list[str], NoDecode, BeforeValidator(_parsed)]
 
 
+def _rooted(path: object) -> object:
+    """`sim/` -> `/sim`; `/` -> nothing."""
+    return f"/{path.strip('/')}".rstrip("/") if isinstance(path, str) else path
+
+
 def _most_workers(given: dict[str, Any]) -> int:
     return MOST_WORKERS if given.get("executor") == "ray" else cores()
 
@@ -83,7 +88,7 @@ class ServiceSettings(RaySettings, BaseSettings):
 
     allowed_hosts: Names = ["localhost", "127.0.0.1", "[::1]"]
     """Host headers that are answered, a JSON list; `*` answers all. The address listened on is always one of them."""
-    root_path: Annotated[str, Field(pattern=ROOT_PATH)] = ""
+    root_path: Annotated[str, BeforeValidator(_rooted), Field(pattern=ROOT_PATH)] = ""
     """Path that a proxy in front has the service at, such as `/sim`, and takes off the requests."""
     trusted_proxies: Names = []
     """Addresses of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are believed, a JSON list."""

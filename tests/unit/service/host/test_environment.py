@@ -67,6 +67,11 @@ def test_what_is_no_list_is_named(monkeypatch: pytest.MonkeyPatch, value: str) -
         read_settings()
 
 
+@pytest.mark.parametrize(("given", "path"), [("sim", "/sim"), ("/a/b/", "/a/b"), ("/", ""), ("", "")])
+def test_a_root_path_is_taken_with_its_slashes_and_without(given: str, path: str) -> None:
+    assert ServiceSettings(root_path=given).root_path == path
+
+
 def test_a_long_value_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RISK_SAC_MAX_WORKERS", "9" * 5000)
     with pytest.raises(ConfigError, match=r"^RISK_SAC_MAX_WORKERS: got '9{79}…; wanted integer"):
