@@ -155,6 +155,18 @@ def test_who_reads_nothing_of_an_answer_is_not_waited_for_for_ever(tmp_path, mon
         assert sum(iter(lambda: len(client.recv(1 << 20)), 0)) < most
 
 
+def test_who_reads_nothing_of_an_answer_makes_room_for_others(serve):
+    service = serve(max_connections=4)
+    with contextlib.ExitStack() as stack:
+        for _ in range(8):
+            client = stack.enter_context(socket.socket())
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            client.connect(("127.0.0.1", service.port))
+            client.sendall(b"GET /docs/%s HTTP/1.1\r\nHost: localhost\r\n\r\n" % docs.SCRIPT.encode() * 8)
+        with httpx.Client(base_url=service.client.base_url, timeout=LONG_S) as newcomer:
+            service.wait_until(lambda: newcomer.get("/healthz").status_code == 200, timeout_s=connections.UNREAD_S / 2)
+
+
 def established(client):
     """Whether the server, in this process, still has its end of a connection."""
     ends = psutil.Process().net_connections("tcp")

@@ -1,7 +1,8 @@
 """Guards against clients that keep the server waiting: with connections, request heads, bodies or unread answers.
 
 A connection costs a descriptor, and the database and the workers need descriptors, too. So the number of connections
-is bounded; a newcomer takes the place of the connection that has owed a request head for longest.
+is bounded; a newcomer takes the place of the connection that has owed a request head for longest, or else of one whose
+client takes nothing of its answer.
 """
 
 import asyncio
@@ -24,6 +25,7 @@ OWN_FILES = 64  # that the server may have open without any connection: database
 WORKER_FILES = 4  # for each worker
 FEWEST = 8
 BACKLOG = 2048  # connections that the kernel queues until they are accepted
+STUCK_S = 1.0  # after which a client that takes nothing of its answer may lose its place to another one
 UNREAD_S = 60.0  # for which a client may take nothing of its answer
 MOST_PIPELINED = 8  # requests that wait on one connection for the answer to an earlier one; browsers send none
 CALM_S = 60.0  # between two log lines about a full room
@@ -57,12 +59,13 @@ class Room:
     def __init__(self, settings: ServiceSettings) -> None:
         self.head_s = settings.head_timeout_s
         self.owing: dict[Connection, None] = {}  # those that owe a request head, longest first
+        self.unread: dict[Connection, float] = {}  # those whose client takes nothing, by when that began, longest first
         self.accepted_at_once = _accepted_at_once()
         self._most = most_connections(settings)
         self._full_at = float("-inf")
 
     def enter(self, connection: "Connection") -> None:
-        """Makes room for a new connection: if there are too many, drops the one that has owed a head for longest."""
+        """Makes room for a new connection: if there are too many, drops the one that has kept the server waiting."""
         if len(connection.connections) <= self._most:  # of the server, as uvicorn counts them
             return
         now = time.monotonic()
@@ -70,11 +73,18 @@ class Room:
             logger.warning("%d connections are as many as may be; for a new one the longest idle goes", self._most)
         self._full_at = now
         longest = next(iter(self.owing))
-        del self.owing[longest]
         if longest is connection:  # all others are being answered
+            longest = next((each for each, since in self.unread.items() if now - since > STUCK_S), connection)
+        self.leave(longest)
+        if longest is connection:
             connection.refuse(f"{self._most} connections are open; wanted fewer: try again in 1 s")
         else:
             longest.transport.abort()
+
+    def leave(self, connection: "Connection") -> None:
+        """Forgets a connection."""
+        self.owing.pop(connection, None)
+        self.unread.pop(connection, None)
 
 
 def most_connections(settings: ServiceSettings) -> int:
@@ -107,7 +117,7 @@ class Connection(HttpToolsProtocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Cancels the deadlines."""
-        self._room.owing.pop(self, None)
+        self._room.leave(self)
         for timer in filter(None, (self._head_due, self._reading_due)):
             timer.cancel()
         super().connection_lost(exc)
@@ -130,11 +140,13 @@ class Connection(HttpToolsProtocol):
     def pause_writing(self) -> None:
         """Sets a deadline for the client that reads more slowly than the answer is written."""
         super().pause_writing()
+        self._room.unread[self] = time.monotonic()
         self._await_reading()
 
     def resume_writing(self) -> None:
         """Cancels that deadline."""
         super().resume_writing()
+        self._room.unread.pop(self, None)
         if self._reading_due is not None:
             self._reading_due.cancel()
 
