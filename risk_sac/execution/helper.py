@@ -19,6 +19,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from risk_sac.execution.postmortem import without_folders
 from risk_sac.process_state import leave
 from risk_sac.run_folder.scratch import scratch_folder
 
@@ -46,6 +47,13 @@ class HelperResult:
     answer: bytes
     log: str
     timed_out: bool = False
+
+    @property
+    def reason(self) -> str:
+        """Why the process failed, as any user may read it."""
+        if self.status < 0:
+            return f"its process was ended by {signal.Signals(-self.status).name}, {ATTEMPTS} times in a row"
+        return without_folders(self.log[-500:]) or f"its process ended with status {self.status}"
 
 
 def run_helper(
@@ -146,15 +154,17 @@ def _main(niceness: str, memory_bytes: str, program: str, *arguments: str) -> No
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
     threading.Thread(target=_leave_with_starter, daemon=True).start()
     sys.argv[1:] = arguments  # `runpy` replaces the first
-    status: object = 0
+    status = 0
     try:
         if program.endswith(".py"):
             runpy.run_path(program, run_name="__main__")
         else:
             runpy.run_module(program, run_name="__main__", alter_sys=True)
     except SystemExit as end:
-        status = end.code or 0
-    leave(status if isinstance(status, int) else 1)
+        status = end.code if isinstance(end.code, int) else int(end.code is not None)
+        if isinstance(end.code, str):
+            sys.stderr.write(f"{end.code}\n")  # as Python does
+    leave(status)
 
 
 def _leave_with_starter() -> None:

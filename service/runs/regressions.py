@@ -17,7 +17,6 @@ from pydantic import ValidationError
 from risk_sac.config import EgoConfig
 from risk_sac.egos.registry import pinned
 from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
-from risk_sac.execution.postmortem import without_folders
 from risk_sac.failures.bundle import code_digest
 from risk_sac.failures.cases import CampaignRegression
 from risk_sac.failures.cases import Regression as Cases
@@ -155,8 +154,7 @@ class Regressions:
         if result.answer:
             ended = {"state": State.SUCCEEDED, "cases": Cases.model_validate_json(result.answer).cases}
         else:
-            said = without_folders(result.log[-500:])
-            ended = {"state": State.FAILED, "reason": said or f"its process ended with status {result.status}"}
+            ended = {"state": State.FAILED, "reason": result.reason}
         done = asked.model_copy(update={"finished_at": datetime.now(UTC)} | ended)
         _write(file, done)
 

@@ -1,3 +1,4 @@
+import argparse
 import json
 import os
 import signal
@@ -233,3 +234,14 @@ def test_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="0"):
         cli.main(["--version"])
     assert capsys.readouterr().out == f"risk-sac {__version__}\n"
+
+
+def test_a_command_takes_all_paths_from_where_it_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("RISK_SAC_PLACES", "places")
+    monkeypatch.delenv("RISK_SAC_EGOS", raising=False)
+    options = argparse.Namespace(out=Path("run"), runs=[Path("a"), Path("/b")], name="run", seed=3)
+    cli._make_absolute(options)
+    assert vars(options) == {"out": tmp_path / "run", "runs": [tmp_path / "a", Path("/b")], "name": "run", "seed": 3}
+    assert os.environ["RISK_SAC_PLACES"] == str(tmp_path / "places")
+    assert "RISK_SAC_EGOS" not in os.environ

@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import pytest
@@ -75,3 +76,13 @@ def test_a_folder_with_damaged_results_and_the_checkpoint_of_another_run_is_left
 def test_a_contact_whose_series_is_lost_stays_a_contact(folder, finished):
     assert not (folder / "failures").exists()
     assert execute(folder).contacts == finished[1].contacts
+
+
+def test_a_run_stays_in_its_folder_though_foreign_code_changes_the_working_directory(tmp_path, monkeypatch):
+    for name in ("here", "elsewhere"):
+        (tmp_path / name).mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    spec = SPEC.model_copy(update={"budget": Budget(episodes=3)})
+    assert run(spec, Path("run"), lambda done, metrics: os.chdir(tmp_path / "elsewhere")).finished
+    assert read_results(tmp_path / "here" / "run").finished
+    assert list((tmp_path / "elsewhere").iterdir()) == []
