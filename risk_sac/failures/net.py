@@ -44,7 +44,9 @@ class Lane:
     index: int  # 0 is the rightmost
     use: LaneUse
     centre: Floats  # `k x 2`, m
+    height_m: Floats  # `k`, of the ground
     width_m: float
+    limit_mps: float
     next: list[str] = field(default_factory=list)  # lanes that follow
     heads: list[Head] = field(default_factory=list)  # at its end
 
@@ -103,7 +105,7 @@ def read_net(file: Path) -> Net:
 
 
 def _lane(lane: Any) -> Lane:
-    edge = lane.getEdge()
+    edge, shape = lane.getEdge(), np.array(lane.getShape3D())
     uses: Mapping[str, LaneUse] = {"crossing": "crossing", "internal": "inside"}
     walks = set(lane.getPermissions()) == {"pedestrian"} and edge.getFunction() != "crossing"
     return Lane(
@@ -111,8 +113,10 @@ def _lane(lane: Any) -> Lane:
         edge=edge.getID(),
         index=lane.getIndex(),
         use="sidewalk" if walks else uses.get(edge.getFunction(), "lane"),
-        centre=np.array(lane.getShape()),
+        centre=shape[:, :2],
+        height_m=shape[:, 2],
         width_m=lane.getWidth(),
+        limit_mps=lane.getSpeed(),
     )
 
 
@@ -131,14 +135,20 @@ def _connect(lanes: Mapping[str, Lane], connection: Any) -> None:
 
 
 def boundaries(centre: Floats, width_m: float) -> tuple[Floats, Floats]:
-    """Returns the left and the right edge of a lane, `k x 2` each, mitred where sides meet."""
+    """Returns the left and the right edge of a lane, `k x 2` each."""
+    return moved(centre, width_m / 2), moved(centre, -width_m / 2)
+
+
+def moved(centre: Floats, left_m: float) -> Floats:
+    """Returns a line, `k x 2`, moved to the left, mitred where its sides meet."""
     sides = np.diff(centre, axis=0)
     sides /= np.linalg.norm(sides, axis=1, keepdims=True)
     normals = np.column_stack((-sides[:, 1], sides[:, 0]))
     before, after = np.vstack((normals[:1], normals)), np.vstack((normals, normals[-1:]))
     mitre = before + after
     mitre /= (1.0 + (before * after).sum(axis=1, keepdims=True)).clip(min=0.5)
-    return centre + mitre * width_m / 2, centre - mitre * width_m / 2
+    line: Floats = centre + mitre * left_m
+    return line
 
 
 def ribbon(centre: Floats, width_m: float) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 
 from risk_sac.failures.export.formats import Files
 from risk_sac.failures.export.recorded import Actor, Recorded, colour, cycle, goal
-from risk_sac.failures.export.written import BESIDE, beside, document
+from risk_sac.failures.export.written import BESIDE, add, beside, document
 from risk_sac.failures.net import Head, Lane, boundaries
 from risk_sac.types import STEP_S, Floats
 
@@ -59,23 +59,16 @@ def _scenario(failure: Recorded, *, free: bool) -> bytes:
     )
     location = ET.SubElement(root, "location")
     for name, unknown in (("geoNameId", -999), ("gpsLatitude", 999), ("gpsLongitude", 999)):
-        _add(location, name, unknown)
+        add(location, name, unknown)
     tags = ET.SubElement(root, "scenarioTags")
-    _add(tags, "critical")
-    _add(tags, "simulated")
+    add(tags, "critical")
+    add(tags, "simulated")
     _add_roads(root, failure)
     numbered = list(enumerate(failure.actors, start=ACTORS))
     for number, actor in numbered[1:] if free else numbered:
         _add_obstacle(root, actor, number)
     _add_problem(root, failure)
     return document(root)
-
-
-def _add(parent: ET.Element, name: str, value: object = "", **attributes: object) -> ET.Element:
-    """Adds an element; numbers are written with six decimals at most."""
-    child = ET.SubElement(parent, name, {key: str(each) for key, each in attributes.items()})
-    child.text = f"{value:.6f}" if isinstance(value, float) else str(value)
-    return child
 
 
 def _add_roads(root: ET.Element, failure: Recorded) -> None:
@@ -102,65 +95,65 @@ def _add_lanelet(
     links: Mapping[str, Sequence[str]],
     sides: Mapping[str, Lane | None],
 ) -> None:
-    lanelet = _add(root, "lanelet", id=numbers[lane.id])
+    lanelet = add(root, "lanelet", id=numbers[lane.id])
     edges = boundaries(lane.centre, lane.width_m)
     for side, edge in zip(("leftBound", "rightBound"), edges, strict=True):
-        bound = _add(lanelet, side)
+        bound = add(lanelet, side)
         for point in edge:
             _add_point(bound, point)
-        _add(bound, "lineMarking", "no_marking")
+        add(bound, "lineMarking", "no_marking")
     for name, ids in links.items():
         for id_ in ids:
-            _add(lanelet, name, ref=numbers[id_])
+            add(lanelet, name, ref=numbers[id_])
     for name, beside_it in sides.items():
         if beside_it is not None:
-            _add(lanelet, name, ref=numbers[beside_it.id], drivingDir="same")
+            add(lanelet, name, ref=numbers[beside_it.id], drivingDir="same")
     walks = lane.use in ("sidewalk", "crossing")
     if lane.heads and not walks:
-        stop = _add(lanelet, "stopLine")
+        stop = add(lanelet, "stopLine")
         for edge in edges:
             _add_point(stop, edge[-1])
-        _add(stop, "lineMarking", "solid")
+        add(stop, "lineMarking", "solid")
         _refer_to_lights(stop, lane, numbers)
-    _add(lanelet, "laneletType", LANELET_TYPES[lane.use])
-    _add(lanelet, *(("userBidirectional", "pedestrian") if walks else ("userOneWay", "vehicle")))
+    add(lanelet, "laneletType", LANELET_TYPES[lane.use])
+    add(lanelet, *(("userBidirectional", "pedestrian") if walks else ("userOneWay", "vehicle")))
     _refer_to_lights(lanelet, lane, numbers)
 
 
 def _refer_to_lights(parent: ET.Element, lane: Lane, numbers: Numbers) -> None:
     for head in lane.heads:
-        _add(parent, "trafficLightRef", ref=numbers[head])
+        add(parent, "trafficLightRef", ref=numbers[head])
 
 
 def _add_point(parent: ET.Element, place: Floats) -> None:
-    point = _add(parent, "point")
+    point = add(parent, "point")
     for axis, value in zip("xyz", place.tolist(), strict=False):
-        _add(point, axis, value)
+        add(point, axis, value)
 
 
 def _add_light(root: ET.Element, failure: Recorded, lane: Lane, head: Head, number: int) -> None:
-    light = _add(root, "trafficLight", id=number)
-    phases = _add(light, "cycle")
+    light = add(root, "trafficLight", id=number)
+    phases = add(light, "cycle")
     shown = [(steps, STATES[colour(letters[head.index])]) for steps, letters in cycle(failure, head.signal)]
     for state, run in groupby(shown, itemgetter(1)):
-        phase = _add(phases, "cycleElement")
-        _add(phase, "duration", sum(steps for steps, _ in run))
-        _add(phase, "color", state)
-    _add_point(_add(light, "position"), boundaries(lane.centre, lane.width_m)[1][-1])
-    _add(light, "direction", DIRECTIONS.get(head.turn, "all"))
-    _add(light, "active", "true")
+        phase = add(phases, "cycleElement")
+        add(phase, "duration", sum(steps for steps, _ in run))
+        add(phase, "color", state)
+    _add_point(add(light, "position"), boundaries(lane.centre, lane.width_m)[1][-1])
+    add(light, "direction", DIRECTIONS.get(head.turn, "all"))
+    add(light, "active", "true")
 
 
 def _add_obstacle(root: ET.Element, actor: Actor, number: int) -> None:
-    obstacle = _add(root, "dynamicObstacle", id=number)
-    _add(obstacle, "type", actor.type)
-    box = _add(_add(obstacle, "shape"), "rectangle")
-    _add(box, "length", actor.length_m)
-    _add(box, "width", actor.width_m)
-    _add_state(_add(obstacle, "initialState"), actor, 0)
-    trajectory = _add(obstacle, "trajectory")
+    obstacle = add(root, "dynamicObstacle", id=number)
+    add(obstacle, "type", actor.type)
+    box = add(add(obstacle, "shape"), "rectangle")
+    add(box, "length", actor.length_m)
+    add(box, "width", actor.width_m)
+    _add_state(add(obstacle, "initialState"), actor, 0)
+    trajectory = add(obstacle, "trajectory")
     for frame in range(1, len(actor.time_s)):
-        _add_state(_add(trajectory, "state"), actor, frame)
+        _add_state(add(trajectory, "state"), actor, frame)
 
 
 def _add_state(state: ET.Element, actor: Actor, frame: int) -> None:
@@ -171,18 +164,18 @@ def _add_state(state: ET.Element, actor: Actor, frame: int) -> None:
     }
     if frame == 0:  # the schema wants them of an initial state
         values |= {"yawRate": 0.0, "slipAngle": 0.0}
-    _add(_add(state, "time"), "exact", frame)
-    _add_point(_add(state, "position"), np.array((actor.x_m[frame], actor.y_m[frame])))
+    add(add(state, "time"), "exact", frame)
+    _add_point(add(state, "position"), np.array((actor.x_m[frame], actor.y_m[frame])))
     for name, value in values.items():
-        _add(_add(state, name), "exact", float(value))
+        add(add(state, name), "exact", float(value))
 
 
 def _add_problem(root: ET.Element, failure: Recorded) -> None:
-    problem = _add(root, "planningProblem", id=PROBLEM)
-    _add_state(_add(problem, "initialState"), failure.ego, 0)
-    reached = _add(problem, "goalState")
-    time = _add(reached, "time")
-    _add(time, "intervalStart", failure.frames)
-    _add(time, "intervalEnd", failure.frames + LAST_STEPS)
+    problem = add(root, "planningProblem", id=PROBLEM)
+    _add_state(add(problem, "initialState"), failure.ego, 0)
+    reached = add(problem, "goalState")
+    time = add(reached, "time")
+    add(time, "intervalStart", failure.frames)
+    add(time, "intervalEnd", failure.frames + LAST_STEPS)
     number = LANELETS + list(failure.net.lanes).index(goal(failure)[0].id)
-    _add(_add(reached, "position"), "lanelet", ref=number)
+    add(add(reached, "position"), "lanelet", ref=number)

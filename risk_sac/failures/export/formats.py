@@ -57,7 +57,7 @@ FORMATS: Mapping[FormatName, Format] = {
     FormatName.OPENSCENARIO: Format(
         "OpenSCENARIO",
         "OpenSCENARIO XML 1.2 on an OpenDRIVE 1.7 road, signals included; the ego is free, or drives as recorded",
-        packages=("scenariogeneration", "sumo"),
+        packages=("scenariogeneration",),
     ),
     FormatName.COMMONROAD: Format(
         "CommonRoad", "CommonRoad XML 2020a with a planning problem for the ego, or with the ego as recorded"

@@ -1,125 +1,222 @@
-"""Writes OpenDRIVE 1.7: what netconvert makes of the net, with turns laid along SUMO's lanes."""
+"""Writes OpenDRIVE 1.7: a road for each edge of the net, and one for each lane inside a junction."""
 
-import shutil
-import subprocess
-import sys
 import xml.etree.ElementTree as ET
-from pathlib import Path
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from risk_sac.errors import ConfigError
-from risk_sac.failures.export.written import BESIDE, document
-from risk_sac.failures.net import Net, boundaries
-from risk_sac.run_folder.scratch import scratch_folder
+from risk_sac.failures.export.reference_line import ReferenceLine, reference_line
+from risk_sac.failures.export.written import BESIDE, add, document
+from risk_sac.failures.net import Lane, Net, moved, ribbon
 from risk_sac.types import Floats
 
-WALL_S = 120.0  # a second suffices
+SIGNAL_M = 5.0  # height above the road
+LANE_TYPES = {"lane": "driving", "inside": "driving", "sidewalk": "sidewalk"}
 
 
-def opendrive(file: Path, net: Net, name: str) -> bytes:
-    """Returns the roads of a net under the map's name; a ConfigError if netconvert cannot write them."""
-    with scratch_folder() as folder:
-        shutil.copy(file, folder / "net.xml")
-        _netconvert(folder, "--sumo-net-file", "net.xml", "--opendrive-output", "roads.xodr")
-        root = ET.parse(folder / "roads.xodr").getroot()
-    for road in root.iter("road"):
-        lane = _turning(road, net)
-        if lane is not None:
-            _lay(road, *lane)
-        _measure(road)
-    return document(_as_of_1_7(root, name))
+@dataclass(frozen=True, slots=True)
+class Road:
+    """Lanes side by side; those inside a junction lead from one lane to another."""
+
+    name: str
+    lanes: Sequence[Lane]  # from left to right
+    line: ReferenceLine
+    height_m: Floats  # at the corners of the line
+    number: int
+    start: Lane | None = None
+    end: Lane | None = None
+    junction: str = ""  # of a road inside one
+
+    def lane_number(self, lane: Lane) -> int:
+        """OpenDRIVE's number of one of its lanes."""
+        return -1 - self.lanes.index(lane)
 
 
-def _netconvert(folder: Path, *options: str) -> None:
-    """Runs netconvert through its Python entry, which finds the wheel's binary, in the folder of its files."""
-    command = [sys.executable, "-c", "import sys, sumo; sys.exit(sumo.netconvert())", *options]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=WALL_S)
-    if done.returncode:
-        why = (done.stderr.strip().splitlines() or ["it ended without a word"])[0]
-        raise ConfigError("format", f"netconvert cannot write this net as OpenDRIVE: {why}")
-
-
-def _as_of_1_7(root: ET.Element, name: str) -> ET.Element:
-    """Completes what netconvert calls 1.4, which fits no version's schema."""
-    header = root.find("header")
-    assert header is not None
-    header.attrib |= {"revMinor": "7", "name": name}
-    header.attrib.pop("date", None)  # the same net is the same file
+def opendrive(net: Net, name: str) -> bytes:
+    """Returns the roads of a net."""
+    numbers = count(1)
+    edges: defaultdict[str, list[Lane]] = defaultdict(list)
+    for lane in net.lanes.values():
+        if lane.use in ("lane", "sidewalk") and not lane.edge.startswith(":"):
+            edges[lane.edge].append(lane)
+    roads = {edge: _road(sorted(lanes, key=lambda lane: -lane.index), next(numbers)) for edge, lanes in edges.items()}
+    turns = [_turn(next(numbers), *turn) for turn in _turns(net)]
+    junctions = {id_: next(numbers) for id_ in dict.fromkeys(turn.junction for turn in turns)}
+    root = ET.Element("OpenDRIVE")
+    header = add(root, "header", revMajor=1, revMinor=7, name=name, version="1.00")
     header.append(ET.Comment(f" {BESIDE} has what is not in this file "))
-    for thing in root.iter("object"):  # crossings: required since 1.7
-        thing.attrib.setdefault("zOffset", "0")
-    return root
+    crossings = _crossings(net, roads)
+    for edge, road in roads.items():
+        into = {turn.junction for turn in turns if turn.end in road.lanes}
+        out_of = {turn.junction for turn in turns if turn.start in road.lanes}
+        links = {"predecessor": into, "successor": out_of}
+        ends = {end: ("junction", junctions[found]) for end, each in links.items() for found in each}
+        _write(root, road, -1, ends, crossings[edge])
+    for turn in turns:
+        sides = {"predecessor": turn.start, "successor": turn.end}
+        ends = {end: ("road", roads[lane.edge].number) for end, lane in sides.items() if lane is not None}
+        _write(root, turn, junctions[turn.junction], ends, (), roads)
+    signals = defaultdict(set)
+    for lane in net.lanes.values():
+        for head in lane.heads if lane.use == "lane" else ():
+            signals[head.signal].add(head.index)
+    for signal, indices in signals.items():
+        controller = add(root, "controller", id=signal)
+        for index in sorted(indices):
+            add(controller, "control", signalId=f"{signal}_{index}")
+    for id_, number in junctions.items():
+        junction = add(root, "junction", id=number, name=id_)
+        own = [turn for turn in turns if turn.junction == id_]
+        for place, turn in enumerate(own):
+            if turn.start is not None:
+                incoming = roads[turn.start.edge]
+                ids = {"incomingRoad": incoming.number, "connectingRoad": turn.number}
+                connection = add(junction, "connection", id=place, **ids, contactPoint="start")
+                add(connection, "laneLink", **{"from": incoming.lane_number(turn.start), "to": -1})
+    return document(root)
 
 
-def _turning(road: ET.Element, net: Net) -> tuple[Floats, float] | None:
-    """Returns middle and width of the leftmost lane of a road that bends inside a junction."""
-    edge = road.get("name", "")  # as SUMO's
-    lanes = [lane for lane in net.lanes.values() if lane.edge == edge and lane.use == "inside"]
-    if not lanes or road.find("planView/geometry/paramPoly3") is None:
-        return None
-    lane = max(lanes, key=lambda each: each.index)
-    line, width_m = [lane.centre], lane.width_m
-    while (after := next((net.lanes[name] for name in lane.next if name in net.lanes), None)) and after.use == "inside":
-        line.append(after.centre[1:])  # SUMO divides a turn where vehicles wait within the junction
-        lane = after
-    return np.concatenate(line), width_m
+def _turns(net: Net) -> Iterator[tuple[Lane, Sequence[Lane], Lane | None]]:
+    """Yields each way across a junction: the lane before it, those inside it, and the lane behind it."""
+    for start in net.lanes.values():
+        if start.use == "inside":
+            continue
+        for name in start.next:
+            inside, lane = list[Lane](), net.lanes[name]
+            while lane.use == "inside" and lane not in inside:  # SUMO divides a turn where vehicles wait within
+                inside.append(lane)
+                lane = next((net.lanes[after] for after in lane.next), lane)
+            if inside:
+                yield start, inside, None if lane in inside else lane
 
 
-def _lay(road: ET.Element, middle: Floats, width_m: float) -> None:
-    """Lays a road's reference line along the left edge of a lane, as cubics through all of its points.
-
-    netconvert bends one cubic from end to end, up to 11 cm beside the lane that SUMO's vehicles drive on.
-    """
-    plan = road.find("planView")
-    assert plan is not None  # that of a road that bends
-    edge = boundaries(middle, width_m)[0]
-    edge[[0, -1]], ends = _ends(plan[0])  # where the roads before and after it end, and the way they do
-    station = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(edge, axis=0), axis=1))))
-    through = CubicSpline(station, edge, bc_type=((1, ends[0]), (1, ends[1])))
-    plan.clear()
-    for piece, length_m in enumerate(np.diff(station)):
-        cubic, square, slope, start = through.c[:, piece]
-        heading = np.arctan2(slope[1], slope[0])
-        into = np.array([(np.cos(heading), -np.sin(heading)), (np.sin(heading), np.cos(heading))])  # the piece's frame
-        place = {"s": "0", "x": repr(float(start[0])), "y": repr(float(start[1])), "hdg": repr(float(heading))}
-        geometry = ET.SubElement(plan, "geometry", place)
-        curve = {"pRange": "normalized", "aU": "0", "aV": "0"}
-        for name, power, slopes in (("b", 1, slope), ("c", 2, square), ("d", 3, cubic)):
-            u, v = slopes @ into * length_m**power
-            curve |= {f"{name}U": repr(float(u)), f"{name}V": repr(float(v))}
-        ET.SubElement(geometry, "paramPoly3", curve)
+def _road(lanes: Sequence[Lane], number: int) -> Road:
+    """Lays a road along the middle of an edge."""
+    left, half_m = lanes[0], sum(lane.width_m for lane in lanes) / 2
+    points = moved(left.centre, left.width_m / 2 - half_m)
+    line = reference_line(points, half_m)
+    return Road(left.edge, lanes, line, left.height_m, number)
 
 
-def _ends(geometry: ET.Element) -> tuple[Floats, Floats]:
-    """Both ends of a normalised cubic, and its unit direction there, `2 x 2` each."""
-    heading = float(geometry.get("hdg", "0"))
-    outward = np.array([(np.cos(heading), np.sin(heading)), (-np.sin(heading), np.cos(heading))])
-    a, b, c, d = (np.array([float(geometry[0].get(f"{name}{axis}", "0")) for axis in "UV"]) for name in "abcd")
-    places = np.array([a, a + b + c + d]) @ outward + (float(geometry.get("x", "0")), float(geometry.get("y", "0")))
-    directions = np.array([b, b + 2.0 * c + 3.0 * d]) @ outward
-    return places, directions / np.linalg.norm(directions, axis=1, keepdims=True)
+def _turn(number: int, start: Lane, inside: Sequence[Lane], end: Lane | None) -> Road:
+    """Lays a road along the lanes inside a junction, in the directions of the roads before and after it."""
+    points = np.concatenate([inside[0].centre[:1], *(lane.centre[1:] for lane in inside)])
+    height_m = np.concatenate([inside[0].height_m[:1], *(lane.height_m[1:] for lane in inside)])
+    way_out = None if end is None else _way(end.centre[:2])
+    line = reference_line(points, inside[0].width_m / 2, _way(start.centre[-2:]), way_out)
+    junction = inside[0].edge[1:].rpartition("_")[0]
+    return Road(inside[0].id, inside[:1], line, height_m, number, start, end, junction)
 
 
-def _measure(road: ET.Element) -> None:
-    """Corrects the lengths of curves: netconvert writes that of a polyline."""
-    begins_m = 0.0
-    for geometry in road.iter("geometry"):
-        curve = geometry.find("paramPoly3")
-        if curve is not None:
-            geometry.set("length", repr(_length(curve)))
-        geometry.set("s", repr(begins_m))
-        begins_m += float(geometry.get("length", "0"))
-    road.set("length", repr(begins_m))
+def _way(side: Floats) -> Floats:
+    way: Floats = (side[1] - side[0]) / np.linalg.norm(side[1] - side[0])
+    return way
 
 
-def _length(curve: ET.Element) -> float:
-    """Of a normalised cubic, m, by Gauss-Legendre quadrature."""
-    places, weights = np.polynomial.legendre.leggauss(32)
-    p = (places + 1.0) / 2.0
-    slopes = []
-    for axis in "UV":
-        b, c, d = (float(curve.get(f"{name}{axis}", "0")) for name in "bcd")
-        slopes.append(b + 2.0 * c * p + 3.0 * d * p**2)
-    return float(np.hypot(*slopes) @ weights / 2.0)
+def _write(
+    root: ET.Element,
+    road: Road,
+    junction: int,
+    ends: Mapping[str, tuple[str, int]],
+    crossings: Sequence[Lane],
+    roads: Mapping[str, Road] | None = None,
+) -> None:
+    written = add(
+        root, "road", name=road.name, length=road.line.length_m, id=road.number, junction=junction, rule="RHT"
+    )
+    link = add(written, "link")
+    for end, (kind, number) in ends.items():
+        contact = {} if kind == "junction" else {"contactPoint": "start" if end == "successor" else "end"}
+        add(link, end, elementType=kind, elementId=number, **contact)
+    add(written, "type", s=0, type="town")
+    road.line.write(add(written, "planView"))
+    profile = add(written, "elevationProfile")
+    _add_linear(profile, "elevation", road.line.corners_m, road.height_m)
+    add(written, "lateralProfile")
+    _write_lanes(written, road, roads or {})
+    objects = add(written, "objects")
+    for crossing in crossings:
+        _write_crossing(objects, road, crossing)
+    signals = add(written, "signals")
+    drawn = set()
+    for lane in road.lanes:
+        for head in lane.heads if lane.use == "lane" else ():
+            id_ = f"{head.signal}_{head.index}"
+            if id_ not in drawn:
+                _write_signal(signals, road, lane, id_)
+            drawn.add(id_)
+
+
+def _write_lanes(written: ET.Element, road: Road, roads: Mapping[str, Road]) -> None:
+    lanes, half_m = add(written, "lanes"), sum(lane.width_m for lane in road.lanes) / 2
+    stations_m, shift_m, stretch = road.line.knots()
+    _add_linear(lanes, "laneOffset", stations_m, (half_m - shift_m) * stretch)
+    section = add(lanes, "laneSection", s=0)
+    add(add(add(section, "center"), "lane", id=0, type="none", level="false"), "link")
+    right = add(section, "right")
+    for lane in road.lanes:
+        beside = add(right, "lane", id=road.lane_number(lane), type=LANE_TYPES[lane.use], level="false")
+        link = add(beside, "link")
+        for end, other in (("predecessor", road.start), ("successor", road.end)):
+            if other is not None:
+                add(link, end, id=roads[other.edge].lane_number(other))
+        _add_linear(beside, "width", stations_m, lane.width_m * stretch, along="sOffset")
+        mark = "none" if lane.use == "inside" else "solid" if lane is road.lanes[-1] else "broken"
+        add(beside, "roadMark", sOffset=0, type=mark, weight="standard", color="standard", width=0.13)
+        add(beside, "speed", sOffset=0, max=lane.limit_mps)
+
+
+def _add_linear(parent: ET.Element, name: str, stations_m: Floats, values: Floats, along: str = "s") -> None:
+    """Adds the polynomials of a piecewise linear function."""
+    slopes = np.diff(values) / np.diff(stations_m)
+    for place, (station, value, slope) in enumerate(
+        zip(stations_m.tolist(), values.tolist(), slopes.tolist(), strict=False)
+    ):
+        if place == 0 or abs(slope - slopes[place - 1]) > 1e-6:
+            add(parent, name, **{along: station}, a=value, b=slope, c=0, d=0)
+
+
+def _write_signal(signals: ET.Element, road: Road, lane: Lane, id_: str) -> None:
+    place = road.lanes.index(lane)
+    left_m = sum(each.width_m for each in road.lanes) / 2 - sum(each.width_m for each in road.lanes[:place])
+    signal = add(
+        signals,
+        "signal",
+        id=id_,
+        s=road.line.length_m,
+        t=left_m - lane.width_m / 2,
+        orientation="+",
+        dynamic="yes",
+        zOffset=SIGNAL_M,
+        country="OpenDRIVE",
+        type="1000001",
+        subtype="-1",
+        height=0.78,
+        width=0.26,
+    )
+    add(signal, "validity", fromLane=road.lane_number(lane), toLane=road.lane_number(lane))
+
+
+def _crossings(net: Net, roads: Mapping[str, Road]) -> Mapping[str, Sequence[Lane]]:
+    """Returns the pedestrian crossings by the road whose end is nearest."""
+    found: defaultdict[str, list[Lane]] = defaultdict(list)
+    for lane in net.lanes.values():
+        if lane.use == "crossing" and roads:
+            middle = lane.centre.mean(axis=0)
+            found[min(roads, key=lambda edge: np.hypot(*(roads[edge].line.stops[-1].place - middle)))].append(lane)
+    return found
+
+
+def _write_crossing(objects: ET.Element, road: Road, crossing: Lane) -> None:
+    """Adds a crossing as an outline beside the end of a road, in the frame of that end."""
+    end = road.line.stops[-1]
+    cos, sin = end.direction
+    s, t = road.line.length_m, 0.0
+    thing = add(objects, "object", id=crossing.id, type="crosswalk", s=s, t=t, zOffset=0, orientation="none", hdg=0)
+    outline = add(thing, "outline", closed="true")
+    outward = np.array([(cos, -sin), (sin, cos)])
+    for u, v in ((ribbon(crossing.centre, crossing.width_m) - end.place) @ outward).tolist():
+        add(outline, "cornerLocal", u=u, v=v, z=0, height=0)

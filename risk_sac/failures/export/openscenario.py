@@ -21,7 +21,7 @@ FREE, AS_RECORDED, ROADS = "failure.xosc", "failure-as-recorded.xosc", "roads.xo
 LACKS = (
     "requirements and how far each was kept",
     "what the ego sees",
-    "signals of pedestrian crossings, which netconvert leaves out of OpenDRIVE",
+    "signals of pedestrian crossings",
     "friction",
     "the ego's driver",
 )
@@ -34,7 +34,7 @@ LAST_S = 20.0  # that a free ego may take
 
 def files(failure: Recorded) -> Files:
     """Two scenarios, the roads, and what neither can say."""
-    roads = opendrive(failure.net_file, failure.net, failure.name)
+    roads = opendrive(failure.net, failure.name)
     return {
         FREE: _scenario(failure, roads, free=True),
         AS_RECORDED: _scenario(failure, roads, free=False),

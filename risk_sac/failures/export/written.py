@@ -27,6 +27,13 @@ def document(root: ET.Element) -> bytes:
     return content + b"\n"
 
 
+def add(parent: ET.Element, name: str, text: object = "", /, **attributes: object) -> ET.Element:
+    """Adds an element; a number as its text has six decimals."""
+    child = ET.SubElement(parent, name, {key: str(each) for key, each in attributes.items()})
+    child.text = f"{text:.6f}" if isinstance(text, float) else str(text)
+    return child
+
+
 def beside(failure: Recorded, lacks: tuple[str, ...]) -> bytes:
     """Returns the JSON of what the format cannot carry, which `lacks` says in words."""
     manifest, series = failure.manifest, failure.series

@@ -1,0 +1,55 @@
+"""OpenDRIVE of nets with heights, read back: lanes lie where SUMO's do, and no link leads nowhere."""
+
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from risk_sac.failures.export.opendrive import opendrive
+from risk_sac.failures.net import Net, read_net
+from tests.exports.read_opendrive import dangling, middles
+
+BESIDE_M, HEIGHT_M = 0.2, 0.1
+NODES = """<nodes>
+<node id="c" x="0" y="0" z="5" type="traffic_light"/><node id="a" x="-100" y="0" z="0"/>
+<node id="b" x="100" y="10" z="9"/><node id="d" x="0" y="100" z="7"/><node id="e" x="5" y="-90" z="2"/></nodes>"""
+EDGES = """<edges>
+<edge id="ac" from="a" to="c" numLanes="3" sidewalkWidth="2"/><edge id="ca" from="c" to="a" numLanes="2"/>
+<edge id="cb" from="c" to="b" numLanes="2" shape="0,0,5 40,-8,7 70,5,8 100,10,9"/>
+<edge id="bc" from="b" to="c" numLanes="2"/><edge id="cd" from="c" to="d"/><edge id="dc" from="d" to="c" numLanes="2"/>
+<edge id="ce" from="c" to="e" numLanes="2"/><edge id="ec" from="e" to="c" numLanes="2"/></edges>"""
+BENT = """<edges><edge id="cb" from="c" to="b" numLanes="3" shape="0,0,5 50,0,6 50,30,8 75,30,8 100,10,9"/></edges>"""
+
+
+def built(folder: Path, edges: str) -> Net:
+    """The net that netconvert makes of some edges."""
+    (folder / "n.xml").write_text(NODES)
+    (folder / "e.xml").write_text(edges)
+    command = [Path(sys.executable).parent / "netconvert", "-n", "n.xml", "-e", "e.xml", "-o", "net.xml"]
+    subprocess.run([*command, "--crossings.guess"], cwd=folder, check=True, capture_output=True)
+    return read_net(folder / "net.xml")
+
+
+@pytest.mark.parametrize("edges", [EDGES, BENT], ids=["junction on a hill", "sharp bends"])
+def test_lanes_lie_where_sumos_do_at_their_height_and_links_lead_somewhere(tmp_path: Path, edges: str) -> None:
+    net = built(tmp_path, edges)
+    root = ET.fromstring(opendrive(net, "hill"))
+    found = middles(root)
+    lanes = [lane for lane in net.lanes.values() if lane.use != "crossing"]
+    lines = [shapely.LineString(points[:, :2]) for points in found]
+    assert len(root.findall("road")) >= len({lane.edge for lane in lanes if not lane.edge.startswith(":")})
+    for lane in lanes:
+        points = shapely.points(shapely.get_coordinates(shapely.segmentize(shapely.LineString(lane.centre), 0.5)))
+        apart = [shapely.distance(points, line).max() for line in lines]
+        nearest = found[int(np.argmin(apart))]
+        assert min(apart) < BESIDE_M, lane.id
+        for place, height in zip(lane.centre, lane.height_m, strict=True):
+            there = nearest[np.hypot(*(nearest[:, :2] - place).T).argmin(), 2]
+            assert there == pytest.approx(height, abs=HEIGHT_M), lane.id
+    every = shapely.MultiLineString([lane.centre for lane in lanes])
+    assert max(shapely.distance(shapely.points(points[:, :2]), every).max() for points in found) < BESIDE_M
+    assert dangling(root) == []
