@@ -1,5 +1,6 @@
 """Lays reference lines of OpenDRIVE roads along polylines: straight sides, and cubics around the corners."""
 
+import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -96,8 +97,8 @@ def reference_line(
     if way_in is not None:
         stops.append(Stop(points[0] + ways[0] * min(LEAST_ROUND_M, lengths[0] / 2), ways[0]))
     for corner, (before, after) in enumerate(pairwise(ways), start=1):
-        cos = np.linalg.norm(before + after) / 2  # of half the angle
-        lost_m = half_width_m * np.sqrt(max(1.0 - cos**2, 0.0)) / max(cos, 1e-3)
+        cos = float(np.linalg.norm(before + after)) / 2  # of half the angle
+        lost_m = half_width_m * math.sqrt(max(1.0 - cos**2, 0.0)) / max(cos, 1e-3)
         reach_m = min(max(LEAST_ROUND_M, ROOM * lost_m), lengths[corner - 1] / 2, lengths[corner] / 2)
         place = points[corner]
         stops += [Stop(place - before * reach_m, before), Stop(place + after * reach_m, after)]
