@@ -95,12 +95,30 @@ class _Swap:
 
 
 class Preserved(_Swap):
-    """Exchanges all settings; `quick` those that cost little to read, which foreign code changes most."""
+    """Exchanges all settings; `quick` those that cost little to read, which foreign code changes most.
+
+    What a `quick` block has changed of the others is put right when the next block of all begins.
+    """
 
     def __init__(self) -> None:
         theirs: dict[Setting, Any] = {}
         super().__init__((*QUICK, *OTHERS), theirs)
         self.quick = _Swap(QUICK, theirs)
+        self._left: dict[Setting, Any] = {}  # the others' values after the latest block of all
+
+    def __enter__(self) -> Self:
+        for setting, ours in self._left.items():
+            now = setting.read()
+            if now != ours:
+                self._theirs[setting] = now
+                setting.set(ours)
+        return super().__enter__()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        super().__exit__(kind, error, trace)
+        self._left = {setting: setting.read() for setting in OTHERS}
 
 
 def _folder() -> str | None:
@@ -194,17 +212,17 @@ QUICK = (
     Setting(_streams, _set_streams),
     Setting(sys.getrecursionlimit, sys.setrecursionlimit),
     Setting(gc.isenabled, lambda enabled: gc.enable() if enabled else gc.disable()),
+    Setting(_umask, os.umask),
+    Setting(socket.getdefaulttimeout, socket.setdefaulttimeout),
+    Setting(lambda: logging.root.level, logging.root.setLevel),
+    Setting(lambda: logging.root.manager.disable, logging.disable),
 )
 OTHERS = (
     Setting(lambda: dict(os.environ), _set_environment),
-    Setting(_umask, os.umask),
     Setting(np.get_printoptions, lambda options: np.set_printoptions(**options)),
-    Setting(socket.getdefaulttimeout, socket.setdefaulttimeout),
     Setting(
         lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()),
         lambda mask: signal.pthread_sigmask(signal.SIG_SETMASK, mask),
     ),
-    Setting(lambda: logging.root.level, logging.root.setLevel),
-    Setting(lambda: logging.root.manager.disable, logging.disable),
     Setting(_device, lambda device: sys.modules["torch"].set_default_device(device)),
 )

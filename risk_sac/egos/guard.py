@@ -180,9 +180,10 @@ def _confine(deadline_s: float) -> None:
     if threading.current_thread() is not threading.main_thread():
         return
     os._exit = partial(_refuse, os.getpid())  # type: ignore[assignment]
-    if signal.getsignal(signal.SIGALRM) is signal.SIG_DFL:
+    handler = signal.getsignal(signal.SIGALRM)
+    if handler is signal.SIG_DFL:
         signal.signal(signal.SIGALRM, _ring)
-    if signal.getsignal(signal.SIGALRM) is _ring:
+    if handler in (signal.SIG_DFL, _ring):
         _armed = True
         signal.setitimer(signal.ITIMER_REAL, deadline_s, deadline_s)
 
@@ -192,7 +193,8 @@ def _free() -> None:
     if _armed:
         _armed = False
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, _ring)  # the ego may have replaced it
+        if signal.getsignal(signal.SIGALRM) is not _ring:  # the ego has replaced it
+            signal.signal(signal.SIGALRM, _ring)
     os._exit = _leave
 
 

@@ -162,7 +162,7 @@ def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
         point = _points()[source]
     try:
         made: Callable[[], Ego] = point.load()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise _wrong(point, f"{type(error).__name__}: {error}") from error
     return made, python_card(point)
 

@@ -6,10 +6,11 @@ It is the reference for egos in other languages.
 import argparse
 import json
 import math
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from typing import Any
 
@@ -95,7 +96,7 @@ def _told(context: Any) -> Iterator[None]:
         context.abort(grpc.StatusCode.INVALID_ARGUMENT if malformed else grpc.StatusCode.INTERNAL, str(failed))
 
 
-def warm_up(ego: Ego) -> None:
+def warm_up(ego: Guarded) -> None:
     """Lets an ego drive one step on a straight road, so that compiling costs no deadline."""
     ego.reset(Episode(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=STEP_S))
     along, still = np.array([0.0, 50.0, 100.0]), np.zeros(3)
@@ -151,10 +152,11 @@ def main() -> None:
     parser.add_argument("--register", metavar="NAME", help=lines)
     options = parser.parse_args()
     try:
-        make_ego, card = make(options.ego, options.register or "ego")
-        warm_up(make_ego())
+        with redirect_stdout(sys.stderr):  # what the ego prints is not what is read from here
+            make_ego, card = make(options.ego, options.register or "ego")
+            warm_up(Guarded(make_ego, math.inf))
         server, port = serve(Sessions(make_ego, card.version), options.address)
-    except (ConfigError, RuntimeError) as error:
+    except (ConfigError, EgoFailed, RuntimeError) as error:
         parser.error(str(error))
     said = f"{options.ego} {card.version} listens on port {port}"
     if options.register is not None:

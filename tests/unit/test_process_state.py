@@ -43,17 +43,17 @@ QUICK: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
     "streams": (replace_streams, lambda: (sys.stdout, sys.stderr)),
     "recursion": (lambda: sys.setrecursionlimit(700), sys.getrecursionlimit),
     "garbage": (gc.disable, gc.isenabled),
+    "umask": (lambda: os.umask(0o777), lambda: (os.umask(mask := os.umask(0o22)), mask)[1]),
+    "timeout": (lambda: socket.setdefaulttimeout(0.001), socket.getdefaulttimeout),
+    "logging": (lambda: logging.disable(), lambda: logging.root.manager.disable),
 }
 OTHERS: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
     "environment": (lambda: os.environ.update(HOME="/nowhere", TZ="Mars"), lambda: dict(os.environ)),
-    "umask": (lambda: os.umask(0o777), lambda: (os.umask(mask := os.umask(0o22)), mask)[1]),
     "print options": (lambda: np.set_printoptions(precision=1), np.get_printoptions),
-    "timeout": (lambda: socket.setdefaulttimeout(0.001), socket.getdefaulttimeout),
     "blocked": (
         lambda: signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM]),
         lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()),
     ),
-    "logging": (lambda: logging.disable(), lambda: logging.root.manager.disable),
     "device": (lambda: torch.set_default_device("meta"), torch.get_default_device),
 }
 
@@ -71,6 +71,20 @@ def test_what_foreign_code_changes_holds_for_it_and_not_for_us(name: str) -> Non
     assert read() == before
     with block:
         assert read() == theirs
+    assert read() == before
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_a_quick_block_overlooks_is_put_right_at_the_next_block_of_all(name: str) -> None:
+    change, read = OTHERS[name]
+    state, before = preserved(), read()
+    with state:
+        pass
+    with state.quick:
+        change()
+    theirs = read()
+    with state:
+        assert read() == theirs != before
     assert read() == before
 
 
