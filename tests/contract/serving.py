@@ -25,7 +25,7 @@ class IdleExecutor:
         self._cancelled: list[int] = []
         self._wake = threading.Event()
 
-    def submit(self, number: int, attempt: int, spec: RunSpec, folder: Path) -> None:
+    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
         pass
 
     def cancel(self, number: int, grace_s: float) -> None:

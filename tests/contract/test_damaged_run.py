@@ -11,15 +11,25 @@ from tests.contract.serving import serving
 RUN = "low-risk-sac-3"
 
 
-@pytest.mark.parametrize("name", [RESULTS, EPISODES])
-def test_a_table_that_cannot_be_made_names_the_damaged_file_and_what_still_works(tmp_path, name):
+def flip(content: bytes) -> bytes:
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 0x80]) + content[middle + 1 :]
+
+
+def shorten(content: bytes) -> bytes:
+    """Whole lines of it."""
+    return b"".join(content.splitlines(keepends=True)[:-1])
+
+
+@pytest.mark.parametrize(
+    ("name", "damage"), [(RESULTS, flip), (RESULTS, shorten), (EPISODES, flip), (EPISODES, shorten)]
+)
+def test_a_table_that_cannot_be_made_names_the_damaged_file_and_what_still_works(tmp_path, name, damage):
     settings = ServiceSettings(data_dir=tmp_path, max_workers=1)
     with known_times_and_ids() as clock:
         Recorded(settings, clock).write()
     file = settings.run_folder(ENDED_ID, RUN) / name
-    content = bytearray(file.read_bytes())
-    content[len(content) // 2] ^= 0x80
-    file.write_bytes(content)
+    file.write_bytes(damage(file.read_bytes()))
     with serving(settings) as url, httpx.Client(base_url=f"{url}/v1/campaigns/{ENDED_ID}", timeout=600) as client:
         refused = client.get("/export", params={"format": "parquet"})
         assert (refused.status_code, refused.json()["reason"]) == (503, "storage_unavailable")

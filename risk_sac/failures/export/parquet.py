@@ -16,6 +16,7 @@ from pydantic import BaseModel
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import Files
+from risk_sac.metrics import results_digest
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.results import EPISODES, Results, read_results, records_from_lines
 from risk_sac.run_folder.verified import read_verified
@@ -42,10 +43,13 @@ def files(runs: Sequence[Path]) -> Files:
 
 def _rows(folder: Path, results: Results) -> list[dict[str, Any]]:
     """Returns the rows of one run; failures that did not repeat are refused."""
+    file = folder / EPISODES
     try:
-        records = tuple(records_from_lines((folder / EPISODES).read_bytes()))
-    except ValueError as error:
-        raise ConfigError("RESULTS", f"{folder / EPISODES} was not written by a run: {error}") from error
+        records = tuple(records_from_lines(file.read_bytes()))
+    except (OSError, ValueError) as error:
+        raise ConfigError("RESULTS", f"{file} was not written by a run: {error}") from error
+    if results.finished and results_digest(records) != results.digest:
+        raise ConfigError("RESULTS", f"{file} holds other episodes than its digest was formed over")
     spec = results.spec
     verified = read_verified(folder, results.digest or "")
     run = {
