@@ -24,8 +24,8 @@ def cores(process: Path = Path("/proc/self")) -> int:
 def _quotas(process: Path) -> Iterator[float]:
     """CPU quotas of this process's control groups and of all around them, in processors; v1 and v2."""
     try:
-        groups = [line.split(":", 2)[1:] for line in (process / "cgroup").read_text().splitlines()]
-        mounts = [line.split(" - ") for line in (process / "mountinfo").read_text().splitlines()]
+        groups = [line.split(":", 2)[1:] for line in (process / "cgroup").read_text("utf-8", "replace").splitlines()]
+        mounts = [line.split(" - ") for line in (process / "mountinfo").read_text("utf-8", "replace").splitlines()]
     except OSError:  # no Linux
         return
     for place, kind in mounts:

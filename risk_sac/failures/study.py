@@ -59,7 +59,7 @@ def _main(asked: Path, file: Path) -> int:
     try:
         file.write_bytes(answer(question))
     except (RiskSacError, ValueError) as error:
-        file.write_text(str(error))
+        file.write_text(str(error), encoding="utf-8")
         return REFUSED
     return 0
 

@@ -46,7 +46,7 @@ def main() -> int:
     binary = options.sumo or shutil.which(name) or shutil.which(name, path=os.pathsep.join(homes))
     if binary is None:
         parser.error(f"there is no {name} on the PATH; name it by --sumo")
-    told = json.loads((HERE / "commands.json").read_text())
+    told = json.loads((HERE / "commands.json").read_bytes())
     steps = list(ET.parse(HERE / "fcd.xml").getroot())
     os.chdir(HERE)  # SUMO splits paths at commas
     command = [binary, "--configuration-file", "failure.sumocfg"]
