@@ -6,7 +6,8 @@
     with state.quick:       # while it answers: some microseconds, and the rarer settings are not looked at
         ego.act(perceived)
 
-What foreign code changes holds again when it runs next, and never for us. Random state is not kept, because nothing of
+What foreign code changes holds again when it runs next, and never for us. A process that it forks ends where it would
+come back to us, since it would write the same files. Random state is not kept, because nothing of
 ours draws from a generator that is shared.
 """
 
@@ -74,8 +75,10 @@ class _Swap:
     def __init__(self, settings: Sequence[Setting], theirs: dict[Setting, Any]) -> None:
         self._settings, self._theirs = settings, theirs
         self._ours: list[Any] = []
+        self._process = 0
 
     def __enter__(self) -> Self:
+        self._process = os.getpid()
         self._ours = [setting.read() for setting in self._settings]
         for setting, value in self._theirs.items():
             if setting in self._settings:
@@ -85,6 +88,8 @@ class _Swap:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if os.getpid() != self._process:
+            os._exit(1)
         for setting, ours in zip(self._settings, self._ours, strict=True):
             left = setting.read()
             if left != ours:

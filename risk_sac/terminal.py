@@ -21,7 +21,17 @@ ASCII = {"→": "->", "–": "-", "−": "-", "…": "...", "×": "x", "·": "-"
 
 
 class Output(Console):
-    """A console that ends no command because nothing reads it."""
+    """A console that ends no command because nothing reads it, or because foreign code has closed its stream."""
+
+    @property
+    def file(self) -> IO[str]:
+        """The stream that is written to."""
+        stream = super().file
+        return io.StringIO() if stream.closed else stream
+
+    @file.setter
+    def file(self, stream: IO[str]) -> None:
+        Console.file.fset(self, stream)  # type: ignore[attr-defined]
 
     def on_broken_pipe(self) -> None:
         """Go on without output."""
@@ -50,7 +60,7 @@ def prepare_streams() -> None:
     os.close(null)
     codecs.register_error("risk-sac", _as_ascii)
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
+        if isinstance(stream, io.TextIOWrapper) and not stream.closed:
             stream.reconfigure(errors="risk-sac")
 
 
@@ -60,11 +70,13 @@ def _as_ascii(error: UnicodeError) -> tuple[str, int]:
 
 
 def flush() -> bool:
-    """Write what is left to write; returns False if the disk is full. Nothing is left then."""
+    """Write what is left to write; returns False if that is not possible. Nothing is left then."""
     written = True
     for stream in filter(None, (sys.stdout, sys.stderr)):
         try:
             stream.flush()
+        except ValueError:  # it is closed
+            written = False
         except OSError as error:
             discard(stream)
             written &= isinstance(error, BrokenPipeError)

@@ -103,6 +103,12 @@ def test_what_it_puts_back_is_forgotten_and_an_error_passes(tmp_path: Path) -> N
         os.chdir(here)
 
 
+def test_a_process_that_foreign_code_forks_does_not_come_back() -> None:
+    with preserved().quick:
+        child = os.fork()
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
+
+
 def test_a_thread_that_never_ends_does_not_keep_the_process() -> None:
     program = (
         "import threading, time; from risk_sac.process_state import leave; "
