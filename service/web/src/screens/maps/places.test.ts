@@ -2,7 +2,7 @@ import { expect, it } from "vitest";
 import { begin, matching, packagingOf, type Spot } from "./places";
 
 const SPOTS: Spot[] = [
-  { pattern: "junction", place: "-1#0", x_m: 0, y_m: 0, summary: "Junction 'A' from '-1#0': who comes from the left crosses." },
+  { pattern: "junction", place: "-1#0", x_m: 0, y_m: 0, summary: "Junction 'A' from '-1#0': who comes from the left crosses.", rare: false },
   { pattern: "crossing", place: "2&b", x_m: 1, y_m: 2, why: "'2&b' leads nowhere" },
 ];
 
