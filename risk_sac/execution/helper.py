@@ -19,6 +19,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import psutil
+
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.process_state import leave
 from risk_sac.run_folder.scratch import scratch_folder
@@ -30,6 +32,7 @@ ANSWER_BYTES = 256 << 20  # read of an answer, at most
 LOG_BYTES = 2000  # read of the end of a log, at most
 POLL_S = 0.05
 ATTEMPTS = 3
+STOPPED_S = 5.0  # after which a process that was stopped is as good as lost
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +120,7 @@ def run_helper(
 
 def _waited(process: subprocess.Popen[bytes], deadline: float, stopping: Callable[[], bool]) -> bool:
     """Waits for the process and kills its whole session; returns whether the time was over."""
+    stopped_s = 0.0
     try:
         while not stopping():
             left_s = deadline - time.monotonic()
@@ -124,6 +128,10 @@ def _waited(process: subprocess.Popen[bytes], deadline: float, stopping: Callabl
                 return True
             with contextlib.suppress(subprocess.TimeoutExpired):
                 process.wait(min(left_s, POLL_S))
+                return False
+            stopped = psutil.Process(process.pid).status() == psutil.STATUS_STOPPED
+            stopped_s = stopped_s + POLL_S if stopped else 0.0
+            if stopped_s >= STOPPED_S:
                 return False
         return False
     finally:

@@ -60,8 +60,9 @@ def test_a_helper_that_is_not_wanted_any_more_is_killed(run, tmp_path):
     assert (result.status, result.timed_out) == (-9, False)
 
 
-@pytest.mark.parametrize("number", [9, 15, 11])
-def test_a_helper_that_a_signal_ends_is_started_again(run, tmp_path, number):
+@pytest.mark.parametrize("number", [9, 15, 11, 19])
+def test_a_helper_that_a_signal_ends_or_stops_is_started_again(run, tmp_path, monkeypatch, number):
+    monkeypatch.setattr("risk_sac.execution.helper.STOPPED_S", 0.3)
     code = f"""
 import os, sys
 tries = len(os.listdir()) + 1
