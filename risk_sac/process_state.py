@@ -28,6 +28,12 @@ from typing import Any, NamedTuple, NoReturn, Self
 
 import numpy as np
 
+try:
+    # `signal.getsignal` looks for an enumeration's member, which takes nearly all of its time.
+    from _signal import getsignal as handler_of  # type: ignore[import-not-found,unused-ignore]
+except ImportError:
+    from signal import getsignal as handler_of
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 TINY = 5e-324  # is 0 where a library has told the processor to flush such numbers
 _INITIAL_TORCH = ("float32", True, 1, False)
@@ -90,8 +96,10 @@ class _Swap:
     ) -> None:
         if os.getpid() != self._process:
             os._exit(1)
-        for setting, ours in zip(self._settings, self._ours, strict=True):
-            left = setting.read()
+        now = [setting.read() for setting in self._settings]
+        if now == self._ours and not self._theirs:
+            return
+        for setting, ours, left in zip(self._settings, self._ours, now, strict=True):
             if left != ours:
                 self._theirs[setting] = left
                 setting.set(ours)
@@ -139,7 +147,7 @@ def _enter(folder: str | None) -> None:
 
 
 def _handlers() -> tuple[Any, ...]:
-    return tuple(map(signal.getsignal, SIGNALS))
+    return tuple(map(handler_of, SIGNALS))
 
 
 def _handle(handlers: Sequence[Any]) -> None:

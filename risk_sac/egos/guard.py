@@ -20,7 +20,7 @@ import numpy as np
 
 from risk_sac.egos.seam import Command, Control, Ego, Episode, Perceived, Trajectory
 from risk_sac.errors import EgoFailed
-from risk_sac.process_state import preserved
+from risk_sac.process_state import handler_of, preserved
 from risk_sac.types import Floats
 
 DEADLINE, MALFORMED, CRASH = "ego_deadline", "ego_malformed", "ego_crash"  # reasons of an invalid episode
@@ -180,8 +180,8 @@ def _confine(deadline_s: float) -> None:
     if threading.current_thread() is not threading.main_thread():
         return
     os._exit = partial(_refuse, os.getpid())  # type: ignore[assignment]
-    handler = signal.getsignal(signal.SIGALRM)
-    if handler is signal.SIG_DFL:
+    handler = handler_of(signal.SIGALRM)
+    if handler == signal.SIG_DFL:
         signal.signal(signal.SIGALRM, _ring)
     if handler in (signal.SIG_DFL, _ring):
         _armed = True
@@ -193,7 +193,7 @@ def _free() -> None:
     if _armed:
         _armed = False
         signal.setitimer(signal.ITIMER_REAL, 0.0)
-        if signal.getsignal(signal.SIGALRM) is not _ring:  # the ego has replaced it
+        if handler_of(signal.SIGALRM) is not _ring:  # the ego has replaced it
             signal.signal(signal.SIGALRM, _ring)
     os._exit = _leave
 
