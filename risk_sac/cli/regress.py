@@ -84,7 +84,7 @@ def _export(folder: Path, formats: list[FormatName], bundles: list["Bundle"]) ->
     from risk_sac.failures.export.written import write
 
     for bundle in bundles:
-        stem = f"{bundle.manifest.id}-{bundle.manifest.digest[:8]}"
+        stem = bundle.manifest.name
         write_bundle(folder / f"{stem}.npz", bundle)
         for name in formats:
             suffix = FORMATS[name].suffix

@@ -44,8 +44,7 @@ def _bundle(options: argparse.Namespace) -> int:
         return OK
     episodes = distinct_failures(results)
     for bundle in bundles(folder, results, episodes):
-        # Runs of two campaigns may have one id: the digest keeps their failures apart.
-        write_bundle(options.out / f"{bundle.manifest.id}-{bundle.manifest.digest[:8]}.npz", bundle)
+        write_bundle(options.out / f"{bundle.manifest.name}.npz", bundle)
     console.print(f"{counted(len(episodes), 'bundle')}: {options.out}", soft_wrap=True)
     return OK
 

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from risk_sac.cli.console import OK, Commands, add_command, counted, narrow_table
 from risk_sac.errors import ConfigError
-from risk_sac.failures.studied import Studied, note
+from risk_sac.failures.studied import Studied, note, valid_contact
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import read_results
@@ -57,7 +57,9 @@ def _asked(path: Path, failure: str | None) -> _Asked:
     results, folder = read_results(path), path if path.is_dir() else path.parent
     if results.digest is None:
         raise ConfigError("PATH", f"the run in {folder} is not finished")
-    (bundle,) = bundles(folder, results, [results.contact(failure).episode])
+    contact = results.contact(failure)
+    valid_contact(contact.id, contact.episode)  # before it is played
+    (bundle,) = bundles(folder, results, [contact.episode])
     return _Asked(bundle, folder, results.digest)
 
 

@@ -58,6 +58,16 @@ class Manifest(Record):
     core: Core | None = None
     """Of what was minimised."""
 
+    @property
+    def name(self) -> str:
+        """Its id with a digest of what was played: unique beyond its run."""
+        return f"{self.id}-{self.key}"
+
+    @property
+    def key(self) -> str:
+        """Digest of the run's spec and of the trajectory, eight hexadecimal digits."""
+        return hashlib.sha256(f"{self.spec.digest} {self.digest}".encode()).hexdigest()[:8]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bundle:

@@ -86,6 +86,18 @@ class Net:
         right, left = (self.lanes.get(f"{lane.edge}_{lane.index + step}") for step in (-1, 1))
         return right, left
 
+    def heights_m(self, places: Floats) -> Floats:
+        """Returns the heights at places, `n x 2`: those of the nearest lanes' middles, `n`."""
+        lines = [np.column_stack((lane.centre, lane.height_m)) for lane in self.lanes.values()]
+        starts, ends = (np.concatenate([line[cut] for line in lines]) for cut in (np.s_[:-1], np.s_[1:]))
+        sides = ends - starts
+        reach = places[:, None] - starts[:, :2]
+        share = ((reach * sides[:, :2]).sum(axis=2) / (sides[:, :2] ** 2).sum(axis=1)).clip(0.0, 1.0)
+        apart = np.linalg.norm(reach - share[:, :, None] * sides[:, :2], axis=2)
+        rows, nearest = np.arange(len(places)), apart.argmin(axis=1)
+        heights: Floats = starts[nearest, 2] + share[rows, nearest] * sides[nearest, 2]
+        return heights
+
 
 def read_net(file: Path) -> Net:
     """Reads a net of ours, or one that was checked when it was uploaded."""

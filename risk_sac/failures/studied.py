@@ -6,8 +6,9 @@ from pathlib import Path
 
 from pydantic import ValidationError, computed_field
 
+from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
-from risk_sac.records import Record
+from risk_sac.records import Collision, EpisodeRecord, Record
 from risk_sac.run_folder.durable import replace_file
 
 
@@ -40,6 +41,15 @@ class Core(Record):
     copies: int
     sentence: str
     """What happens, in words."""
+
+
+def valid_contact(id_: str, episode: EpisodeRecord) -> Collision:
+    """Returns the contact of a valid failure; a ConfigError for others, which have no core or region."""
+    collision = episode.collision
+    if collision is None or not collision.valid or collision.judgement is None:
+        why = f": it breaks {episode.reason.replace('_', ' ')}" if episode.reason else ""
+        raise ConfigError("FAILURE", f"{id_} is no valid failure{why}", remedy="choose one that is")
+    return collision
 
 
 NEEDLE = 0.5

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import ConfigError, EgoFailed, InfeasibleScene, SimulationError
+from risk_sac.errors import EgoFailed, InfeasibleScene, SimulationError
 from risk_sac.failures.bundle import Bundle, check_world
 from risk_sac.failures.recording import actions_of
-from risk_sac.failures.studied import Region, Share
+from risk_sac.failures.studied import Region, Share, valid_contact
 from risk_sac.records import Collision
 from risk_sac.scenario.space import SceneSpace
 from risk_sac.sim.sumo import OFF_ROAD
@@ -47,12 +47,10 @@ class Stage:
     def __init__(self, bundle: Bundle) -> None:
         """Plays the failure once more; a SimulationError if it does not happen here."""
         episode = bundle.manifest.episode
-        if episode.collision is None or not episode.collision.valid or episode.collision.judgement is None:
-            raise ConfigError("BUNDLE", f"{bundle.manifest.id} is no valid failure")
+        self.collision = valid_contact(bundle.manifest.id, episode)
         check_world(bundle.manifest)
         self.env = RiskSacEnv.of(bundle.manifest.spec)
         self.space = self.env.problem.space
-        self.collision: Collision = episode.collision
         self.original = Variant(
             scene=np.array([episode.scene[name] for name in self.space.names]),
             actions=_with_tail(actions_of(bundle.series), self.env.problem.family.horizon_steps),

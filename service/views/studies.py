@@ -10,10 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from risk_sac.config import EgoConfig
+from risk_sac.errors import ConfigError
 from risk_sac.execution.helper import ANSWER, QUESTION
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
+from risk_sac.failures.studied import valid_contact
 from risk_sac.run_folder.results import RESULTS
 from service.errors import NotPlayable, OutdatedError, StorageError
 from service.settings import ServiceSettings
@@ -45,6 +47,16 @@ class Studies(OnDemandCache[Study]):
     def __init__(self, settings: ServiceSettings, helper: Helper) -> None:
         super().__init__(self._answer, "failures")
         self._settings, self._helper = settings, helper
+
+    async def get(self, subject: Study) -> bytes:
+        """The answer; what has no core or region is refused before anything waits or is played."""
+        if subject.subject in ("core", "region"):
+            episode = subject.contact.episode
+            try:
+                valid_contact(episode.id, episode)
+            except ConfigError as error:
+                raise NotPlayable(error.got) from error
+        return await super().get(subject)
 
     def _answer(self, study: Study) -> bytes:
         contact = study.contact

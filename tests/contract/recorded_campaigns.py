@@ -1,5 +1,6 @@
 """Campaigns at a known time, of known ids, put into a database and a data folder as the manager and workers do it."""
 
+import itertools
 import math
 import time
 from collections.abc import Iterator, Sequence
@@ -116,7 +117,10 @@ class Clock:
 @contextmanager
 def known_times_and_ids() -> Iterator[Clock]:
     """Within it, what the service notes of time and makes up as ids is known beforehand."""
-    clock, ids = Clock(), iter((ENDED_ID, LIVE_ID, CANCELLED_ID, POSTED_ID))
+    clock, ids = (
+        Clock(),
+        itertools.chain((ENDED_ID, LIVE_ID, CANCELLED_ID, POSTED_ID), map("{:016x}".format, itertools.count())),
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(time, "time", clock)
         patch.setattr("secrets.token_bytes", bytes)

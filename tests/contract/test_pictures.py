@@ -162,6 +162,16 @@ def test_what_does_not_repeat_can_be_drawn_but_not_played(client, tmp_path):
         assert client.get(f"{FOLDER}/{RUN}-train-1/twins/{twin}").status_code == 422
 
 
+@pytest.mark.parametrize("what", ["core.npz", "region"])
+def test_what_is_no_valid_failure_has_neither_core_nor_region_and_is_not_played(client, monkeypatch, what):
+    monkeypatch.setattr(on_demand.Helper, "run", lambda *_: pytest.fail("it was played"))
+    contacts = client.get(FOLDER, params={"tier": "raw"}).json()["items"]
+    invalid = next(each["id"] for each in contacts if each["outcome"] == "degenerate")
+    answer = client.get(f"{FOLDER}/{invalid}/{what}")
+    assert (answer.status_code, answer.json()["reason"]) == (409, "not_playable")
+    assert "is no valid failure" in answer.json()["detail"]
+
+
 def test_the_picture_and_the_series_of_a_twin_are_of_one_play_and_need_not_be_sent_twice(tmp_path, monkeypatch):
     asked = []
 

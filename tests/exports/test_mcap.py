@@ -1,5 +1,6 @@
 """MCAP, read by the mcap package and by the schemas that lie in the file."""
 
+import io
 import json
 from collections import defaultdict
 from collections.abc import Callable
@@ -17,11 +18,11 @@ from tests.exports.conftest import CM
 from tests.exports.make_examples import FAMILIES
 
 
-def read(file: Path) -> tuple[dict[str, list[tuple[int, Any]]], dict[str, bytes]]:
+def read(content: bytes) -> tuple[dict[str, list[tuple[int, Any]]], dict[str, bytes]]:
     """Messages by topic, each with its time, and attachments by name."""
     found: dict[str, list[tuple[int, Any]]] = defaultdict(list)
     decoders: dict[int, Callable[[bytes], Any]] = {}
-    with file.open("rb") as stream:
+    with io.BytesIO(content) as stream:
         reader = make_reader(stream, validate_crcs=True)
         for schema, channel, message in reader.iter_messages():
             assert schema is not None
@@ -47,7 +48,7 @@ def test_bodies_and_measures_come_back(
     family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
 ) -> None:
     recorded = failure(family)
-    topics, attached = read(exported(family, FormatName.MCAP))
+    topics, attached = read(exported(family, FormatName.MCAP).read_bytes())
     assert len(topics["/actors"]) == len(topics["/measures"]) == len(topics["/tf"]) == recorded.frames
     actors = {actor.id: actor for actor in recorded.actors}
     for frame, (time_ns, scene) in enumerate(topics["/actors"]):

@@ -1,17 +1,22 @@
-"""OpenDRIVE of nets with heights, read back: lanes lie where SUMO's do, and no link leads nowhere."""
+"""Exports of nets with heights, read back: lanes and bodies are where SUMO has them, and no link leads nowhere."""
 
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 
+from risk_sac.failures.export.formats import FormatName, export
 from risk_sac.failures.export.opendrive import opendrive
+from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.net import Net, read_net
 from tests.exports.read_opendrive import dangling, middles
+from tests.exports.test_mcap import read
 
 BESIDE_M, HEIGHT_M = 0.2, 0.1
 NODES = """<nodes>
@@ -53,3 +58,23 @@ def test_lanes_lie_where_sumos_do_at_their_height_and_links_lead_somewhere(tmp_p
     every = shapely.MultiLineString([lane.centre for lane in lanes])
     assert max(shapely.distance(shapely.points(points[:, :2]), every).max() for points in found) < BESIDE_M
     assert dangling(root) == []
+
+
+def test_bodies_stand_on_the_ground_of_a_slope(failure: Callable[[str], Recorded]) -> None:
+    flat = failure("low")
+    lanes = {id_: replace(lane, height_m=lane.centre[:, 0] / 50) for id_, lane in flat.net.lanes.items()}
+    net = replace(flat.net, lanes=lanes)
+    actors = tuple(replace(actor, z_m=net.heights_m(np.column_stack((actor.x_m, actor.y_m)))) for actor in flat.actors)
+    hill = replace(flat, net=net, actors=actors)
+    for actor in actors:
+        np.testing.assert_allclose(actor.z_m, actor.x_m / 50, atol=1e-9)
+    scenario = ET.fromstring(export(FormatName.OPENSCENARIO, hill)["failure-as-recorded.xosc"])
+    places = [place for vertex in scenario.iter("Vertex") for place in vertex.iter("WorldPosition")]
+    assert len(places) == sum(len(actor.time_s) for actor in actors)
+    ahead_m = 0.5 * 6.0  # a place is that of the rear axle, at most so far behind the middle
+    assert all(abs(float(each.attrib["z"]) - float(each.attrib["x"]) / 50) < ahead_m / 50 for each in places)
+    topics, _ = read((export(FormatName.MCAP, hill))[f"{hill.name}.mcap"])
+    for _, scene in topics["/actors"]:
+        for body in (shape for entity in scene.entities for shape in (*entity.cubes, *entity.cylinders)):
+            place = body.pose.position
+            assert place.z - body.size.z / 2 == pytest.approx(place.x / 50, abs=1e-6)

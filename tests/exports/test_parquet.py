@@ -44,6 +44,21 @@ def test_every_episode_of_every_run_is_a_row_with_its_fields(runs: Path, tmp_pat
     assert {spec["family"] for spec in specs.values()} == set(RUNS)
 
 
+def test_runs_that_differ_in_their_odd_alone_keep_their_specs_and_ids_apart(tmp_path: Path) -> None:
+    run = {"family": "low", "method": "random", "seed": 5, "budget": {"episodes": 2}}
+    odds = {"dry": {}, "wet": {"environment": {"friction": {"low": 0.6, "high": 0.65}}}}
+    for name, odd in odds.items():
+        (tmp_path / "spec.json").write_text(json.dumps(run | {"odd": odd}))
+        assert main(["run", "--spec", str(tmp_path / "spec.json"), "--out", str(tmp_path / "runs" / name)]) == 0
+    file = tmp_path / "both.parquet"
+    assert main(["export", str(tmp_path / "runs"), "--format", "parquet", "--out", str(file)]) == 0
+    table = parquet.read_table(file)
+    specs = json.loads(table.schema.metadata[SPECS])
+    assert len({json.dumps(spec["odd"]) for spec in specs.values()}) == 2
+    assert set(table["run_id"].to_pylist()) == set(specs)
+    assert len(set(table["id"].to_pylist())) == table.num_rows == 4
+
+
 def test_what_is_no_run_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", str(tmp_path), "--format", "parquet", "--out", str(tmp_path / "e.parquet")]) == 2
     assert "holds no run" in capsys.readouterr().err

@@ -23,7 +23,7 @@ LACKS = (
     "requirements and how far each was kept",
     "what the ego sees",
     "the areas at corners where pedestrians walk between crossings",
-    "friction",
+    "heights and friction",
     "the ego's driver",
     "when the adversaries were released",
 )
@@ -50,7 +50,7 @@ def _scenario(failure: Recorded, *, free: bool) -> bytes:
     root = ET.Element(
         "commonRoad",
         commonRoadVersion="2020a",
-        benchmarkID="ZAM_RiskSac-1_1_T-1",
+        benchmarkID=f"ZAM_RiskSac{failure.manifest.key}-1_1_T-{1 if free else 2}",
         date=MADE,
         author="RISK-SAC",
         affiliation=f"failure {failure.name}; {BESIDE} has what is not in this file",

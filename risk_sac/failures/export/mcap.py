@@ -73,23 +73,24 @@ def _turned(heading_rad: float) -> fox.Quaternion:
 
 def _surface(lane: Lane) -> fox.SceneEntity:
     """A lane as a strip of triangles, with lines along a road's edges."""
-    left, right = boundaries(lane.centre, lane.width_m)
-    strip = np.stack((left, right), axis=1).reshape(-1, 2)
-    height = {"lane": 0.0, "inside": 0.01, "sidewalk": 0.0, "crossing": 0.02}[lane.use]
+    raised_m = {"lane": 0.0, "inside": 0.01, "sidewalk": 0.0, "crossing": 0.02}[lane.use]
+    left, right = (_points(edge, lane.height_m + raised_m) for edge in boundaries(lane.centre, lane.width_m))
+    strip = [corner for pair in zip(left, right, strict=True) for corner in pair]
     corners = [strip[k + step] for k in range(len(strip) - 2) for step in (0, 1, 2)]
-    lines = [] if lane.use != "lane" else [_line(left), _line(right)]
-    area = fox.TriangleListPrimitive(points=_points(np.array(corners), height), color=_paint(GROUND[lane.use]))
-    return fox.SceneEntity(frame_id=MAP, id=lane.id, triangles=[area], lines=lines)
-
-
-def _line(points: Floats) -> fox.LinePrimitive:
-    return fox.LinePrimitive(
-        type=fox.LinePrimitiveLineType.LineStrip, points=_points(points, 0.03), thickness=0.12, color=_paint(WHITE)
+    area = fox.TriangleListPrimitive(points=corners, color=_paint(GROUND[lane.use]))
+    return fox.SceneEntity(
+        frame_id=MAP, id=lane.id, triangles=[area], lines=[] if lane.use != "lane" else [_line(left), _line(right)]
     )
 
 
-def _points(points: Floats, height_m: float) -> list[fox.Point3]:
-    return [fox.Point3(x=float(x), y=float(y), z=height_m) for x, y in points]
+def _line(points: list[fox.Point3]) -> fox.LinePrimitive:
+    return fox.LinePrimitive(
+        type=fox.LinePrimitiveLineType.LineStrip, points=points, thickness=0.12, color=_paint(WHITE)
+    )
+
+
+def _points(points: Floats, height_m: Floats) -> list[fox.Point3]:
+    return [fox.Point3(x=x, y=y, z=z) for x, y, z in np.column_stack((points, height_m)).tolist()]
 
 
 def _actors(failure: Recorded, frame: int) -> fox.SceneUpdate:
@@ -105,10 +106,10 @@ def _body(failure: Recorded, actor: Actor, frame: int) -> fox.SceneEntity:
     tone = BLUE if column == 0 else ORANGE if actor.id == failure.collision.other_id else GREY
     paint = _paint(tone, 1.0 if seen else UNSEEN_ALPHA)
     height = HEIGHTS_M[actor.pedestrian]
-    x, y, heading = (float(values[frame]) for values in (actor.x_m, actor.y_m, actor.heading_rad))
-    pose = fox.Pose(position=fox.Vector3(x=x, y=y, z=height / 2), orientation=_turned(heading))
+    x, y, z, heading = (float(values[frame]) for values in (actor.x_m, actor.y_m, actor.z_m, actor.heading_rad))
+    pose = fox.Pose(position=fox.Vector3(x=x, y=y, z=z + height / 2), orientation=_turned(heading))
     size = fox.Vector3(x=actor.length_m, y=actor.width_m, z=height)
-    above = fox.Pose(position=fox.Vector3(x=x, y=y, z=height + 0.8), orientation=_turned(0.0))
+    above = fox.Pose(position=fox.Vector3(x=x, y=y, z=z + height + 0.8), orientation=_turned(0.0))
     speed = f"{actor.speed_mps[frame]:.3f}"
     told = {"role": actor.role.name.lower(), "speed_mps": speed, "seen_by_ego": str(seen).lower()}
     cube = fox.CubePrimitive(pose=pose, size=size, color=paint)
@@ -130,8 +131,8 @@ def _signals(failure: Recorded, frame: int) -> fox.SceneUpdate:
     for lane in failure.net.lanes.values():
         for place, head in enumerate(lane.heads):
             shown = colour(chr(failure.heads[head.signal][frame, head.index]))
-            x, y = (float(value) for value in lane.centre[-1])
-            pose = fox.Pose(position=fox.Vector3(x=x, y=y, z=4.0 + 0.7 * place), orientation=_turned(0.0))
+            x, y, z = (float(value) for value in (*lane.centre[-1], lane.height_m[-1]))
+            pose = fox.Pose(position=fox.Vector3(x=x, y=y, z=z + 4.0 + 0.7 * place), orientation=_turned(0.0))
             ball = fox.SpherePrimitive(pose=pose, size=fox.Vector3(x=0.6, y=0.6, z=0.6), color=_paint(LIGHTS[shown]))
             name = f"{head.signal}_{head.index}"
             entities.append(fox.SceneEntity(timestamp=_stamp(failure, frame), frame_id=MAP, id=name, spheres=[ball]))
@@ -144,7 +145,7 @@ def _ego_frame(failure: Recorded, frame: int) -> fox.FrameTransforms:
         timestamp=_stamp(failure, frame),
         parent_frame_id=MAP,
         child_frame_id=EGO,
-        translation=fox.Vector3(x=float(ego.x_m[frame]), y=float(ego.y_m[frame]), z=0),
+        translation=fox.Vector3(x=float(ego.x_m[frame]), y=float(ego.y_m[frame]), z=float(ego.z_m[frame])),
         rotation=_turned(float(ego.heading_rad[frame])),
     )
     return fox.FrameTransforms(transforms=[moved])

@@ -52,7 +52,8 @@ def _scenario(failure: Recorded, roads: bytes, *, free: bool) -> bytes:
         init.add_init_action(actor.id, _speed(actor))
     if free:
         x, y, heading = goal(failure)[1]
-        init.add_init_action(failure.ego.id, xosc.AcquirePositionAction(xosc.WorldPosition(x, y, 0, heading, 0, 0)))
+        (z,) = failure.net.heights_m(np.array([(x, y)]))
+        init.add_init_action(failure.ego.id, xosc.AcquirePositionAction(xosc.WorldPosition(x, y, z, heading, 0, 0)))
     act = xosc.Act("recorded", _at("begins", 0.0))
     for actor in failure.actors[1:] if free else failure.actors:
         act.add_maneuver_group(_group(actor, leaves=len(actor.time_s) < failure.frames))
@@ -113,7 +114,7 @@ def _place(actor: Actor, frame: int) -> xosc.WorldPosition:
     heading = float(actor.heading_rad[frame])
     back_m = 0.0 if actor.pedestrian else REAR_AXLE * actor.length_m
     x, y = actor.x_m[frame] - back_m * np.cos(heading), actor.y_m[frame] - back_m * np.sin(heading)
-    return xosc.WorldPosition(float(x), float(y), 0, heading, 0, 0)
+    return xosc.WorldPosition(float(x), float(y), float(actor.z_m[frame]), heading, 0, 0)
 
 
 def _speed(actor: Actor) -> xosc.AbsoluteSpeedAction:

@@ -5,6 +5,7 @@ A record within a record is a struct, and a mapping is a map.
 
 import io
 import types
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
@@ -29,19 +30,31 @@ SCALARS: Mapping[Any, pa.DataType] = {bool: pa.bool_(), int: pa.int64(), float: 
 
 
 def files(runs: Sequence[Path]) -> Files:
-    """Returns one file, with a row group for each run's folder; a ConfigError if one holds no run."""
-    results = {folder: read_results(folder) for folder in runs}
-    specs = ", ".join(f'"{each.spec.id}": {each.spec.model_dump_json()}' for each in results.values())
+    """Returns one file, with a row group for each run's folder; a ConfigError if one holds no run.
+
+    Two runs that differ in their specs and share an id get the digest of their specs behind it.
+    """
+    results: dict[str, tuple[Path, Results]] = {}
+    for folder in runs:
+        found = read_results(folder)
+        if found.finished or found.spec.digest not in results:  # the same spec gives the same rows
+            results[found.spec.digest] = folder, found
+    shared = Counter(each.spec.id for _, each in results.values())
+    ids = {
+        digest: each.spec.id if shared[each.spec.id] == 1 else f"{each.spec.id}-{digest[:8]}"
+        for digest, (_, each) in results.items()
+    }
+    specs = ", ".join(f'"{ids[digest]}": {each.spec.model_dump_json()}' for digest, (_, each) in results.items())
     schema = pa.schema([*OF_THE_RUN, SEED, *_type(EpisodeRecord)], metadata={SPECS: f"{{{specs}}}".encode()})
     content = io.BytesIO()
     with parquet.ParquetWriter(content, schema, compression="zstd") as writer:
-        for folder, each in results.items():
-            if rows := _rows(folder, each):
+        for digest, (folder, each) in results.items():
+            if rows := _rows(folder, each, ids[digest]):
                 writer.write_table(pa.Table.from_pylist(rows, schema))
     return {NAME: content.getvalue()}
 
 
-def _rows(folder: Path, results: Results) -> list[dict[str, Any]]:
+def _rows(folder: Path, results: Results, id_: str) -> list[dict[str, Any]]:
     """Returns the rows of one run; failures that did not repeat are refused."""
     file = folder / EPISODES
     try:
@@ -53,14 +66,14 @@ def _rows(folder: Path, results: Results) -> list[dict[str, Any]]:
     spec = results.spec
     verified = read_verified(folder, results.digest or "")
     run = {
-        "run_id": spec.id,
+        "run_id": id_,
         "family": spec.family,
         "method": spec.method,
         "run_seed": spec.seed,
         "ego": spec.ego.model_dump_json(),
     }
     return [
-        {"id": record.id_in(spec.id), **run, **record.model_dump()}
+        {"id": record.id_in(id_), **run, **record.model_dump()}
         for record in (verified.judged(records) if verified else records)
     ]
 

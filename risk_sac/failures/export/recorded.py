@@ -40,6 +40,7 @@ class Actor:
     time_s: Floats  # since the first frame
     x_m: Floats  # of the body's centre
     y_m: Floats
+    z_m: Floats  # of the ground
     heading_rad: Floats  # without jumps of 2π
     speed_mps: Floats
     accel_mps2: Floats
@@ -80,6 +81,7 @@ class Recorded:
         problem = Problem.from_spec(manifest.spec)
         layout = problem.family.layout(manifest.episode.scene)
         net_file = Path(str(files(WORLD))) / layout.net
+        net = read_net(net_file)
         return cls(
             manifest=manifest,
             series=series,
@@ -88,14 +90,14 @@ class Recorded:
             problem=problem,
             layout=layout,
             net_file=net_file,
-            net=read_net(net_file),
-            actors=tuple(_actor(series, column) for column in range(len(series["ids"]))),
+            net=net,
+            actors=tuple(_actor(series, column, net) for column in range(len(series["ids"]))),
         )
 
     @property
     def name(self) -> str:
-        """Its id, also used in file names."""
-        return self.manifest.id
+        """Its name, unique beyond its run; also used in file names."""
+        return self.manifest.name
 
     @property
     def ego(self) -> Actor:
@@ -141,7 +143,7 @@ class Recorded:
         return begins_s + float(self.series["time_s"][0]) + frame * STEP_S
 
 
-def _actor(series: Series, column: int) -> Actor:
+def _actor(series: Series, column: int, net: Net) -> Actor:
     last = int(np.flatnonzero(np.isfinite(series["x_m"][:, column]))[-1]) + 1
     per_frame = {name: np.asarray(series[name][:last, column], dtype=np.float64) for name in PER_FRAME}
     per_frame["heading_rad"] = np.unwrap(per_frame["heading_rad"])
@@ -152,6 +154,7 @@ def _actor(series: Series, column: int) -> Actor:
         length_m=float(series["length_m"][column]),
         width_m=float(series["width_m"][column]),
         time_s=np.arange(last, dtype=np.float64) * STEP_S,
+        z_m=net.heights_m(np.column_stack((per_frame["x_m"], per_frame["y_m"]))),
         **per_frame,
     )
 

@@ -84,11 +84,12 @@ def _told(heard: Heard, domain: str, name: str, function: Any) -> Any:
 
 def _state(id_: str) -> VehicleState:
     get = libsumo.vehicle
-    x, y = get.getPosition(id_)
+    x, y, z = get.getPosition3D(id_)
     return {
         "id": id_,
         "x": x,
         "y": y,
+        "z": z,
         "angle": get.getAngle(id_),
         "speed": get.getSpeed(id_),
         "acceleration": get.getAcceleration(id_),
@@ -164,6 +165,7 @@ def _person(step: ET.Element, walker: Actor, frame: int) -> None:
     state = {
         "x": walker.x_m[frame],
         "y": walker.y_m[frame],
+        "z": walker.z_m[frame],
         "angle": (90.0 - np.degrees(walker.heading_rad[frame])) % 360.0,  # from north, clockwise
         "speed": walker.speed_mps[frame],
     }

@@ -55,7 +55,7 @@ async def get_export(contact: Asked, format: FailureFormat, headers: Headers, se
     """One collision in a format of other tools, see `GET /v1/formats`; some are several files, and come as a zip."""
     content = await service.studies.get(Study(contact, "export", format=format))
     row = FORMATS[format]
-    name = f"{contact.episode.id}{f'-{format}' if row.media_type == ZIP else ''}{row.suffix}"
+    name = f"{contact.episode.id}-{contact.edition[:8]}{f'-{format}' if row.media_type == ZIP else ''}{row.suffix}"
     return Response(content, headers=headers | _attachment(name), media_type=row.media_type)
 
 
