@@ -202,6 +202,10 @@ def _set_streams(streams: tuple[Any, ...]) -> None:
     sys.stdin, sys.stdout, sys.stderr = streams
 
 
+def _set_path(folders: Sequence[str]) -> None:
+    sys.path[:] = folders
+
+
 def _set_environment(wanted: dict[str, str]) -> None:
     for name in os.environ.keys() - wanted.keys():
         del os.environ[name]
@@ -223,9 +227,10 @@ QUICK = (
     Setting(_torch, _set_torch),
     Setting(lambda: TINY * 1.0 == 0.0, _flush),
     Setting(_streams, _set_streams),
+    Setting(_umask, os.umask),
+    Setting(lambda: tuple(sys.path), _set_path),
     Setting(sys.getrecursionlimit, sys.setrecursionlimit),
     Setting(gc.isenabled, lambda enabled: gc.enable() if enabled else gc.disable()),
-    Setting(_umask, os.umask),
     Setting(socket.getdefaulttimeout, socket.setdefaulttimeout),
     Setting(lambda: logging.root.level, logging.root.setLevel),
     Setting(lambda: logging.root.manager.disable, logging.disable),

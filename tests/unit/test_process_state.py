@@ -40,10 +40,11 @@ QUICK: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
     "threads": (lambda: torch.set_num_threads(3), torch.get_num_threads),
     "deterministic": (lambda: torch.use_deterministic_algorithms(True), torch.are_deterministic_algorithms_enabled),
     "denormals": (lambda: torch.set_flush_denormal(True), lambda: TINY * 1.0 == 0.0),
+    "umask": (lambda: os.umask(0o777), lambda: (os.umask(mask := os.umask(0o22)), mask)[1]),
+    "modules": (sys.path.clear, lambda: list(sys.path)),
     "streams": (replace_streams, lambda: (sys.stdout, sys.stderr)),
     "recursion": (lambda: sys.setrecursionlimit(700), sys.getrecursionlimit),
     "garbage": (gc.disable, gc.isenabled),
-    "umask": (lambda: os.umask(0o777), lambda: (os.umask(mask := os.umask(0o22)), mask)[1]),
     "timeout": (lambda: socket.setdefaulttimeout(0.001), socket.getdefaulttimeout),
     "logging": (lambda: logging.disable(), lambda: logging.root.manager.disable),
 }
