@@ -34,5 +34,5 @@ class Broken(Driver):
             state=np.compress(near, p.state, axis=1),
         )
         signal = stop_at_signal(p) if p.stop_line_m < SIGHT_M else []
-        self._decided.append(idm(seen, self._vehicle, [*self._ahead(seen), *signal], HEADWAY_S))
-        return self._keeping_lane(p, self._decided.popleft())
+        self._decided.append(idm(seen, self.vehicle, [*self.ahead(seen), *signal], HEADWAY_S))
+        return self.keeping_lane(p, self._decided.popleft())

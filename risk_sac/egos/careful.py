@@ -28,7 +28,7 @@ class Careful(Driver):
     def act(self, perceived: Perceived) -> Control:
         """Follows, and brakes for what it has perceived as a risk long enough ago."""
         speed, now = float(perceived.state[SPEED, 0]), perceived.time_s
-        ahead = self._ahead(perceived)
+        ahead = self.ahead(perceived)
         if (
             time_to_collision(speed, ahead) <= RISK_TTC_S
             or needed_braking(speed, ahead) > RISK_BRAKING_MPS2
@@ -37,10 +37,10 @@ class Careful(Driver):
             self._since_s, self._last_s = (now if self._since_s is None else self._since_s), now
         elif self._since_s is not None and now - self._last_s > OVER_S:
             self._since_s = None
-        accel = self._follow(perceived, ahead, HEADWAY_S)
+        accel = self.follow(perceived, ahead, HEADWAY_S)
         if self._since_s is not None:
             # Until it has perceived the risk, it drives on; what it then does is the regulation's.
             braked_s = now - self._since_s - CAREFUL_PERCEIVES_S
-            reflex = careful(braked_s, self._vehicle.brake_mps2) if braked_s >= 0.0 else 0.0
+            reflex = careful(braked_s, self.vehicle.brake_mps2) if braked_s >= 0.0 else 0.0
             accel = min(max(accel, -RISK_BRAKING_MPS2), -reflex) if braked_s < CAREFUL_DELAY_S else min(accel, -reflex)
-        return self._keeping_lane(perceived, accel)
+        return self.keeping_lane(perceived, accel)

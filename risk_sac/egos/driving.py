@@ -28,23 +28,23 @@ class Ahead(NamedTuple):
 
 
 class Driver:
-    """Base of the shipped egos: looks out for others, and for how hard they brake."""
+    """Base of egos in Python: looks out for others, and for how hard they brake."""
 
-    _vehicle: Vehicle
+    vehicle: Vehicle
 
     def reset(self, episode: Episode) -> None:
         """Begins an episode."""
-        self._vehicle, self._step_s = episode.vehicle, episode.step_s
+        self.vehicle, self._step_s = episode.vehicle, episode.step_s
         self._speeds: dict[str, float] = {}
 
     def close(self) -> None:
         """Releases nothing."""
 
-    def _ahead(self, perceived: Perceived) -> list[Ahead]:
+    def ahead(self, perceived: Perceived) -> list[Ahead]:
         """Returns what is on a collision course at constant velocity, see `risk_sac.sim.lookout`, and what leads."""
         p, everybody = perceived, np.ones(len(perceived.ids), dtype=np.bool_)
         found = targets(
-            p.path, p.station_m, p.offset_m, 0, self._vehicle.accel_mps2, p.state, p.kind == VEHICLE, everybody
+            p.path, p.station_m, p.offset_m, 0, self.vehicle.accel_mps2, p.state, p.kind == VEHICLE, everybody
         )
         before, self._speeds = self._speeds, dict(zip(p.ids, p.state[SPEED].tolist(), strict=True))
         everything = (*found.tolist(), *leaders(p.path, p.station_m, p.offset_m, p.state, p.kind == VEHICLE).tolist())
@@ -54,12 +54,13 @@ class Driver:
         now = self._speeds[id_]
         return max(before.get(id_, now) - now, 0.0) / self._step_s
 
-    def _follow(self, perceived: Perceived, ahead: list[Ahead], headway_s: float) -> float:
+    def follow(self, perceived: Perceived, ahead: list[Ahead], headway_s: float) -> float:
         """Returns the acceleration of `idm` behind those ahead and before a signal, m/s²."""
-        return idm(perceived, self._vehicle, [*ahead, *stop_at_signal(perceived)], headway_s)
+        return idm(perceived, self.vehicle, [*ahead, *stop_at_signal(perceived)], headway_s)
 
-    def _keeping_lane(self, perceived: Perceived, accel_mps2: float) -> Control:
-        return Control(accel_mps2, lane_keeping(perceived, self._vehicle))
+    def keeping_lane(self, perceived: Perceived, accel_mps2: float) -> Control:
+        """Returns a command that keeps the lane."""
+        return Control(accel_mps2, lane_keeping(perceived, self.vehicle))
 
 
 def stop_at_signal(perceived: Perceived) -> list[Ahead]:

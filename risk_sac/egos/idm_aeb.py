@@ -29,14 +29,14 @@ class IdmAeb(Driver):
     def act(self, perceived: Perceived) -> Control:
         """Follows, warns, brakes."""
         speed, now = float(perceived.state[SPEED, 0]), perceived.time_s
-        ahead = self._ahead(perceived)
+        ahead = self.ahead(perceived)
         needed_mps2 = needed_braking(speed, ahead)
         if time_to_collision(speed, ahead) < WARN_TTC_S or needed_mps2 > WARN_MPS2:
             self._warned_s = now if self._warned_s is None else self._warned_s
         else:
             self._warned_s = None
-        accel = max(self._follow(perceived, ahead, HEADWAY_S), -CRUISE_MPS2)
+        accel = max(self.follow(perceived, ahead, HEADWAY_S), -CRUISE_MPS2)
         warned = self._warned_s is not None and now - self._warned_s >= WARNING_S
         if needed_mps2 > AT_ONCE_MPS2 or (warned and needed_mps2 > WARN_MPS2):
             accel = min(accel, -AEB_MPS2)
-        return self._keeping_lane(perceived, accel)
+        return self.keeping_lane(perceived, accel)

@@ -32,10 +32,10 @@ class RssResponder(Driver):
             self._since_s = p.time_s if self._since_s is None else self._since_s
         else:
             self._since_s = None
-        accel = self._follow(p, self._ahead(p), HEADWAY_S)
+        accel = self.follow(p, self.ahead(p), HEADWAY_S)
         if self._since_s is not None and p.time_s - self._since_s >= RSS.response_s - 1e-6:
             accel = min(accel, -RSS.brake_min_mps2)
-        return self._keeping_lane(p, accel)
+        return self.keeping_lane(p, accel)
 
 
 def dangerous(perceived: Perceived, column: int) -> bool:

@@ -51,7 +51,7 @@ def _figure(net: Net, found: Survey) -> Figure:
     axis.autoscale()
     axis.set_aspect("equal")
     axis.set(xlabel="x, m", ylabel="y, m")
-    axis.legend(loc="best", fontsize=7)
+    axis.legend(loc="upper right", fontsize=7)  # the best place takes minutes to find on a large map
     return figure
 
 

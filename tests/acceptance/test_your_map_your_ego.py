@@ -23,7 +23,9 @@ from tests.maps import osm_town
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "risk_sac" / "egos" / "README.md").read_text(encoding="utf-8")
 STORY = README.partition("## The whole way")[2].partition("\n## ")[0]
-TOLD_EPISODES, EPISODES = 80, 24  # in the story, and enough for a failure here
+TOLD_EPISODES, EPISODES = 80, 48  # in the story, and enough for a failure here
+
+PATIENCE_S = 900.0  # with a machine that is busy
 
 needs_tools = pytest.mark.skipif(
     "CI" not in os.environ and not all(map(shutil.which, ("bash", "curl", "jq"))), reason="needs bash, curl and jq"
@@ -82,7 +84,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Told]:
             **{"cwd": folder, "env": environment, "stdout": log, "stderr": log, "start_new_session": True},
         )
         try:
-            status = shell.wait()
+            status = shell.wait(PATIENCE_S)
             printed = (folder / "log").read_text(errors="replace")
             assert status == 0, printed[-4000:]
             yield Told(folder, f"http://localhost:{port}", printed)
