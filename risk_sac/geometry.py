@@ -73,9 +73,8 @@ def frame_view(state: Floats) -> RelativeView:
         x[i], y[i] = dx * cos_ego + dy * sin_ego, dy * cos_ego - dx * sin_ego
         vx[i], vy[i] = dvx * cos_ego + dvy * sin_ego, dvy * cos_ego - dvx * sin_ego
         cos[i], sin[i] = math.cos(turn), math.sin(turn)
-        a, b = state[LENGTH, i + 1] / 2, state[WIDTH, i + 1] / 2
-        half_length[i], half_width[i] = a, b
-        c, s = abs(cos[i]), abs(sin[i])
+        half_length[i], half_width[i] = state[LENGTH, i + 1] / 2, state[WIDTH, i + 1] / 2
+        c, s, a, b = abs(cos[i]), abs(sin[i]), half_length[i], half_width[i]
         separation[0, i] = x[i]
         separation[1, i] = y[i]
         separation[2, i] = x[i] * cos[i] + y[i] * sin[i]
