@@ -9,6 +9,8 @@ from pathlib import Path, PurePosixPath
 
 UNWRITABLE = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR, errno.EEXIST)
 """Errors of a folder that cannot be made or written, whatever room there is."""
+NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EBADF)
+"""Errors of a file system that locks nothing, or no folder, such as a network's."""
 
 
 def cores(process: Path = Path("/proc/self")) -> int:

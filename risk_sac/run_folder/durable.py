@@ -4,7 +4,6 @@ A sealed file is a JSON object whose last field is the SHA-256 of all bytes befo
 """
 
 import contextlib
-import errno
 import fcntl
 import hashlib
 import logging
@@ -19,7 +18,7 @@ from typing import IO, Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.machine import UNWRITABLE
+from risk_sac.machine import NO_LOCKS, UNWRITABLE
 from risk_sac.run_folder.scratch import remove_temporaries
 
 logger = logging.getLogger(__name__)
@@ -28,7 +27,6 @@ T = TypeVar("T")
 _SEAL = re.compile(rb',\n  "sha256": "([0-9a-f]{64})"\n}\n\Z')
 _END = b"\n}"
 LOCK = ".lock"  # in a folder that one process at a time may work in
-NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS)  # of a network's file system
 
 
 def replace_file(path: Path, content: bytes | memoryview, *, keep: Path | None = None, mode: int = 0o666) -> None:

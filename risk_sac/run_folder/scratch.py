@@ -11,6 +11,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from risk_sac.machine import NO_LOCKS
+
 _SCRATCH = re.compile(r"risk-sac\.[0-9a-f]{16}\.scratch")
 # Files that `durable.replace_file` writes into folders of ours, before they get their names.
 _TEMPORARY = re.compile(
@@ -54,12 +56,17 @@ def claim(folder: Path) -> int:
     remove_abandoned(folder.parent)
     while True:
         folder.mkdir(mode=0o700, exist_ok=True)
-        with contextlib.suppress(BlockingIOError, FileNotFoundError):  # another process has just removed it
+        try:
             handle = _locked(folder)
             if folder.exists():
                 return handle
             os.close(handle)
-        time.sleep(0.01)
+        except (BlockingIOError, FileNotFoundError):  # another process is just removing it
+            time.sleep(0.01)
+        except OSError as error:
+            if error.errno not in NO_LOCKS:
+                raise
+            return os.open(folder, os.O_RDONLY)  # then no other process can take it for abandoned
 
 
 def _locked(folder: Path) -> int:

@@ -1,3 +1,4 @@
+import errno
 import os
 import subprocess
 import sys
@@ -94,3 +95,13 @@ def refusing(number: int):
         raise OSError(number, os.strerror(number), str(path))
 
     return lock
+
+
+def test_a_temporary_folder_needs_no_locks(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(handle: int, how: int) -> None:
+        raise OSError(errno.EBADF, "a network's file system locks no folder")
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    with scratch_folder() as one, scratch_folder() as other:
+        assert one.is_dir()
+        assert other.is_dir()
