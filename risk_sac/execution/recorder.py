@@ -4,8 +4,6 @@ import logging
 import os
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
@@ -43,12 +41,8 @@ class Recorder:
         self._contacts: list[Contact] = []
         self._episodes = (folder / EPISODES).open("wb")
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def close(self) -> None:
+        """Closes the file of episodes."""
         self._episodes.close()
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:

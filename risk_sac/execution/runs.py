@@ -2,7 +2,7 @@
 
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -28,9 +28,13 @@ def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
       CheckpointError: the folder's checkpoint is of another run.
       OSError: the folder cannot be written.
     """
-    spec = spec.model_copy(update={"ego": Problem.from_spec(spec).ego})  # before the folder is claimed
     folder = folder.absolute()  # an ego may change the working directory
-    with held(folder), stop_signal() as stopping, Recorder(spec, folder, Watcher(progress, stopping)) as recorder:
+    spec = spec.model_copy(update={"ego": Problem.from_spec(spec).ego})  # before the folder is claimed
+    with (
+        held(folder),
+        stop_signal() as stopping,
+        closing(Recorder(spec, folder, Watcher(progress, stopping))) as recorder,
+    ):
         return recorder.finish(train(spec, folder, recorder))
 
 

@@ -17,7 +17,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import IO, TYPE_CHECKING
@@ -169,7 +169,7 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
 
     if memory_bytes:
         limit_memory(memory_bytes)  # from here on: where it ends while libsumo is loaded, the process crashes
-    with Recorder(spec, folder, reporter) as recorder:
+    with closing(Recorder(spec, folder, reporter)) as recorder:
         summary = train(spec, folder, recorder)
         recorder.finish(summary)
     found, finished = dict[Path, Verified](), summary.finished
