@@ -118,13 +118,9 @@ def _outside(x: float, y: float, half_length: float, half_width: float) -> float
 
 
 @compiled
-def speed_along(view: RelativeView, i: int, axis: int) -> float:
-    """Relative velocity along one of the separating axes."""
-    vx, vy = float(view.vx[i]), float(view.vy[i])
-    if axis >= 2:
-        cos, sin = float(view.cos[i]), float(view.sin[i])
-        vx, vy = vx * cos + vy * sin, vy * cos - vx * sin
-    return vx if axis % 2 == 0 else vy
+def along_axes(vx: float, vy: float, cos: float, sin: float) -> tuple[float, float, float, float]:
+    """A velocity along each of the separating axes; compiled code copies a whole view slowly, so it takes numbers."""
+    return vx, vy, vx * cos + vy * sin, vy * cos - vx * sin
 
 
 @compiled
@@ -140,8 +136,9 @@ def time_to_contact(view: RelativeView) -> Floats:
     ttc = np.empty(n)
     for i in range(n):
         enter, leave = -np.inf, np.inf
+        speeds = along_axes(view.vx[i], view.vy[i], view.cos[i], view.sin[i])
         for axis in range(4):
-            speed = speed_along(view, i, axis)
+            speed = speeds[axis]
             if abs(speed) < NO_MOTION:
                 speed = NO_MOTION
             centre, half = -view.separation[axis, i] / speed, view.reach[axis, i] / abs(speed)

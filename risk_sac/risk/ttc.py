@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from risk_sac.geometry import RelativeView, speed_along
+from risk_sac.geometry import RelativeView, along_axes
 from risk_sac.jit import compiled
 from risk_sac.types import Bools, Floats
 
@@ -52,11 +52,12 @@ def time_to_encounter(view: RelativeView, walks: Bools) -> Floats:
         if walks[i]:
             anywhere, other = WALK_MPS, 0.0  # it turns as it likes, and has no course
         courses = ego + other * along, other * across, other + ego * along, ego * across  # speeds along the axes
+        speeds = along_axes(view.vx[i], view.vy[i], view.cos[i], view.sin[i])
         for axis in range(4):
             closing = anywhere + SPEED_SHARE * courses[axis]
             for side in range(2):
                 sign = 1.0 - 2.0 * side
-                slope[2 * axis + side] = sign * speed_along(view, i, axis) / closing
+                slope[2 * axis + side] = sign * speeds[axis] / closing
                 start[2 * axis + side] = (sign * view.separation[axis, i] - view.reach[axis, i]) / closing
         behind_m = max(-view.ego_half_length - view.x[i], 0.0)
         encounter[i] = _least(slope, start) + BEHIND_S_PER_M * behind_m

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from risk_sac.geometry import NO_MOTION, RelativeView, contact_point, frame_view, relative_view, speed_along, zone
+from risk_sac.geometry import NO_MOTION, RelativeView, along_axes, contact_point, frame_view, relative_view, zone
 from risk_sac.jit import compiled
 from risk_sac.types import HEADING, LENGTH, VX, VY, WIDTH, Floats, Frame, X, Y
 
@@ -84,11 +84,12 @@ def _first_touch(before: Floats, now: Floats, other: int) -> float:
                 now[position, other] - before[position, other],
             )
         view = frame_view(pair)
+        ways = along_axes(view.vx[0], view.vy[0], view.cos[0], view.sin[0])
         wait = 0.0
         for axis in range(4):
             clear = abs(view.separation[axis, 0]) - view.reach[axis, 0]
             if clear > TOUCHING_M:
-                closing = -math.copysign(1.0, view.separation[axis, 0]) * speed_along(view, 0, axis)
+                closing = -math.copysign(1.0, view.separation[axis, 0]) * ways[axis]
                 wait = max(wait, clear / max(max(closing, 0.0) + turning, NO_MOTION))
         if wait == 0.0:
             return share
