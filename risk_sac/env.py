@@ -3,6 +3,7 @@
 Importing this module registers RiskSAC/Low-v0, RiskSAC/Mixed-v0 and RiskSAC/Dense-v0, and
 `gymnasium.make("risk_sac.env:RiskSAC/Low-v0")` imports it first. The reward is R_risk alone; the
 realism cost and the robustness come in `info`, because λ and the shaping belong to the learner.
+A process plays in one environment at a time: for several, use `gymnasium.vector.AsyncVectorEnv`.
 
 Source: RISK-SAC, Alg. 1, l. 5 and 8.
 """
