@@ -3,6 +3,7 @@
 import logging
 from typing import Any
 
+from risk_sac.egos.guard import CRASH
 from risk_sac.env import Observation, RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.records import Outcome
@@ -16,11 +17,11 @@ SIM_CRASH = "sim_crash"  # reason of a rejection
 
 
 class Unplayable(Exception):
-    """An episode could not be played to its end; its record gets this outcome and reason."""
+    """An episode could not be played to its end, or at all; its record gets this outcome and reason."""
 
-    def __init__(self, outcome: Outcome, reason: str) -> None:
+    def __init__(self, outcome: Outcome, reason: str, *, begun: bool = True) -> None:
         super().__init__(f"{outcome}: {reason}")
-        self.outcome, self.reason = outcome, reason
+        self.outcome, self.reason, self.begun = outcome, reason, begun
 
 
 class GuardedEnv:
@@ -37,11 +38,13 @@ class GuardedEnv:
         """Starts the episode; see `RiskSacEnv.reset`.
 
         Raises:
-          Unplayable: the episode crashed the simulator before, C_hard rejects the scene, or the ego failed.
+          Unplayable: simulator or ego crashed in the episode before, C_hard rejects the scene, or the ego failed.
         """
         self._actor, self._steps = actor, 0
         if not self._playable:
-            raise Unplayable(Outcome.REJECTED, SIM_CRASH)
+            by_ego = self._guard.by_ego(self._index)
+            why = (Outcome.INVALID, CRASH) if by_ego else (Outcome.REJECTED, SIM_CRASH)
+            raise Unplayable(*why, begun=False)
         try:
             return self._env.reset(seed=seed, options={"scene": scene})
         except InfeasibleScene as infeasible:

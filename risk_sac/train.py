@@ -15,7 +15,7 @@ import torch
 
 from risk_sac.agents.replay import Transition
 from risk_sac.config import RunSpec
-from risk_sac.guarded_env import SIM_CRASH, GuardedEnv, Unplayable
+from risk_sac.guarded_env import GuardedEnv, Unplayable
 from risk_sac.records import RECORDED, Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
@@ -149,7 +149,7 @@ def _record(
     collision: Collision | None = None,
 ) -> EpisodeRecord:
     outcome, reason = (unplayable.outcome, unplayable.reason) if unplayable else _ending(collision)
-    crashed = reason == SIM_CRASH  # then the environment's trace is of the episode before
+    begun = unplayable is None or unplayable.begun  # else the environment's trace is of the episode before
     return EpisodeRecord(
         index=len(run.records),
         phase=RECORDED[run.phase],
@@ -161,8 +161,8 @@ def _record(
         risk_return=tally.risk_return,
         shaped_return=tally.shaped_return,
         mean_cost=tally.cost / tally.steps if tally.steps else 0.0,
-        min_ttc_s=TTC_CAP_S if crashed else run.env.trace.min_ttc_s,
-        min_robustness=ROBUSTNESS_CLIP if crashed else run.env.trace.min_robustness,
+        min_ttc_s=run.env.trace.min_ttc_s if begun else TTC_CAP_S,
+        min_robustness=run.env.trace.min_robustness if begun else ROBUSTNESS_CLIP,
         dual_variable=run.searchers.agent.dual_variable,
         temperature=run.searchers.agent.temperature,
         environment_steps=run.environment_steps + tally.steps,

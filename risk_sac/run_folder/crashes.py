@@ -28,6 +28,7 @@ logger = logging.getLogger(__name__)
 LOG, COUNTS, CURRENT = "crash.log", "crashes.json", ".episode"
 FATAL = 2  # crashes at one place: the second time rules out that something else was to blame
 PATIENCE = 4  # crashes at several places
+EGO, BY_EGO = "ego, ", b"/egos/guard.py"  # of a place where the ego's code ran, whose stack has this file in it
 RESET = -1  # the step while the scene is chosen and set up
 
 
@@ -80,6 +81,10 @@ class CrashGuard:
         self._note(episode, RESET)
         return playable
 
+    def by_ego(self, episode: int) -> bool:
+        """Whether an episode is left out because its ego crashed."""
+        return any(place.startswith(EGO) for place in self._crashes.places.get(episode, []))
+
     def step(self, step: int) -> None:
         """Notes that a step of the episode begins."""
         if self._playing is not None:
@@ -95,7 +100,7 @@ class CrashGuard:
             logger.warning("%s holds %r, so a crash cannot be held against an episode", self._folder / CURRENT, note)
             return
         places = self._crashes.places.setdefault(episode, [])
-        places.append(f"step {step}, stack {_stack(traceback)}")
+        places.append(f"{EGO if BY_EGO in traceback else ''}step {step}, stack {_stack(traceback)}")
         self._write()
         logger.warning(
             "the process crashed in episode %d, step %d, which makes %d times:\n%s",

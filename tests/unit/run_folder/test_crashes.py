@@ -19,6 +19,7 @@ with CrashGuard(Path(sys.argv[1])) as guard:
                 exec(sys.argv[2])
 """
 SEGFAULT = "ctypes.string_at(0)"  # reads address 0: a real segmentation fault, which no handler can survive
+IN_EGO = f"from risk_sac.egos.guard import Guarded; Guarded(lambda: {SEGFAULT}, 60.0, foreign=True)"
 KILL = "os.kill(os.getpid(), 9)"
 
 
@@ -36,6 +37,14 @@ def test_an_episode_that_crashes_again_at_the_same_place_is_left_out_and_no_othe
     assert [play(tmp_path) for _ in range(FATAL)] == FATAL * [-11]
     assert play(tmp_path) == 0
     assert playable(tmp_path) == [0, 1, 2, 4, 5]
+
+
+@pytest.mark.parametrize(("what", "by_ego"), [(IN_EGO, True), (SEGFAULT, False)])
+def test_a_crash_in_the_ego_s_code_is_its_own(tmp_path: Path, what: str, by_ego: bool) -> None:
+    assert [play(tmp_path, what) for _ in range(FATAL)] == FATAL * [-11]
+    with CrashGuard(tmp_path) as guard:
+        assert not guard.begin(3)
+        assert guard.by_ego(3) is by_ego
 
 
 def test_crashes_at_several_places_take_longer_to_convince(tmp_path: Path) -> None:
