@@ -1,19 +1,4 @@
-"""Errors of the service; `service.api.answers.problems` maps them to HTTP statuses.
-
-RiskSacError
-└── ServiceError
-    ├── NotFoundError      no such campaign, run or failure
-    ├── ConflictError      what is asked for does not fit what there is
-    ├── QuotaError         a project, or a key, has used up its share
-    ├── KeysError          the API keys cannot be read, or have no such key
-    ├── StorageError       the database or the data folder refused
-    │   ├── OutdatedError  what a stored campaign asks for is refused by now
-    │   └── SeriesLost     the time series of a failure cannot be read
-    ├── NotPlayable        a failure does not repeat here, or cannot be played as was asked
-    ├── UploadError        an upload is refused
-    ├── BusyError          as much is at work as may be
-    └── TransitionError    a change of state that the table of transitions does not allow
-"""
+"""Errors of the service; `service.api.answers.problems` maps them to HTTP statuses."""
 
 from risk_sac.errors import RiskSacError
 

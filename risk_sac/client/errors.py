@@ -1,13 +1,4 @@
-"""Errors of the client.
-
-RiskSacError
-└── ClientError
-    ├── Unreachable        nothing answered, or the connection broke
-    │   └── StreamLost     the stream of events broke after it had begun
-    ├── Refused            the service answered with a problem (RFC 9457)
-    ├── UnexpectedAnswer   something answered that is no RISK-SAC service, or another version of it
-    └── Overdue            the campaign did not end within the time that the caller gave it
-"""
+"""Errors of the client."""
 
 import math
 from datetime import UTC, datetime

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.server import Service
 
@@ -100,6 +100,32 @@ def test_a_report_and_its_figures_can_be_taken_away(
     picture = _saved(page, figure.get_by_role("button", name="PNG"), tmp_path)
     assert picture.name == f"{name}.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_page_works_below_the_path_that_a_proxy_has_the_service_at(
+    new_page: Callable[..., Page], service: Service, methods: str
+) -> None:
+    page, base = new_page(), str(service.client.base_url)
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+
+    def forward(route: Route) -> None:
+        url, headers = (
+            route.request.url.replace("/sim/", "/", 1),
+            route.request.headers | {"x-forwarded-prefix": "/sim"},
+        )
+        route.fulfill(response=route.fetch(url=url, headers=headers))
+
+    page.route(f"{base}/sim/**", forward)
+    page.goto(f"{base}/sim/page/#/campaigns/{methods}/compare")
+    page.get_by_text("All figures").click()
+    image = page.locator("details figure img").first
+    expect(image).to_be_visible()
+    assert image.evaluate("image => image.decode().then(() => image.naturalWidth)") > 100
+    assert [url for url in asked if not url.startswith((f"{base}/sim/", "blob:"))] == []
+    page.goto(f"{base}/sim/docs")
+    expect(page.get_by_text("/v1/campaigns", exact=True).first).to_be_visible()
+    expect(page.get_by_label("Servers")).to_have_value("/sim")
 
 
 def test_two_campaigns_stand_beside_each_other(
