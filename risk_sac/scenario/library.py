@@ -45,7 +45,8 @@ def keep(place: Place, net: bytes, id_: str = "") -> str:
       id_: how its map calls the place; the name tells it as far as it has letters and digits.
     """
     text = place.model_copy(update={"net": NET}).model_dump_json().encode()
-    told = re.sub("[^a-z0-9]+", "_", id_.lower()).strip("_")[:LONGEST_ID].strip("_")
+    words = re.sub("^-", "minus_", id_.lower())  # of two directions of a road
+    told = re.sub("[^a-z0-9]+", "_", words).strip("_")[:LONGEST_ID].strip("_")
     name = "_".join(filter(None, (place.pattern, told, _digest(text, net))))
     put(name, text, net)
     return name

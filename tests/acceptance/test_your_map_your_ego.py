@@ -23,7 +23,7 @@ from tests.maps import osm_town
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "risk_sac" / "egos" / "README.md").read_text(encoding="utf-8")
 STORY = README.partition("## The whole way")[2].partition("\n## ")[0]
-TOLD_EPISODES, EPISODES = 80, 48  # in the story, and enough for a failure here
+EPISODES = 40
 
 PATIENCE_S = 900.0  # with a machine that is busy
 
@@ -68,8 +68,6 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Told]:
     (folder / "town.osm").write_text(osm_town())
     port = free_port()
     script = "\n".join(blocks(STORY, "sh")).replace(":8000", f":{port}").replace("--port 8000", f"--port {port}")
-    assert script.count(f" {TOLD_EPISODES}") == 2
-    script = script.replace(f" {TOLD_EPISODES}", f" {EPISODES}")
     script = script.replace("127.0.0.1:50051", f"127.0.0.1:{free_port()}")
     environment = os.environ | {
         "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}",

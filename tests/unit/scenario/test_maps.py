@@ -107,6 +107,8 @@ def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town:
     assert all(misfit.why for misfit in found.misfits)
     for fit in (found.fits[0], found.fits[-1]):
         name = town.keep(fit)
+        minus = "minus_" * fit.spot.id.startswith("-")
+        assert name.startswith(f"{fit.spot.pattern}_{minus}{fit.spot.id.lstrip('-').replace('#', '_')}_")
         assert town.keep(fit) == name
         family = family_named(name)
         layout = family.layout(family.space.from_unit(np.full(family.space.dimension, 0.5)).values)
