@@ -1,6 +1,7 @@
 import argparse
 import json
 import os
+import re
 import signal
 import sys
 from dataclasses import replace
@@ -176,10 +177,11 @@ def test_checkpoint_without_results_is_refused(tmp_path: Path) -> None:
         run(SPEC, tmp_path, ignore)
 
 
-def test_unwritable_folder_is_an_error_without_traceback(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("")
-    assert cli.main(["run", "--family", "low", "--method", "random", "--out", str(tmp_path / "file" / "out")]) == 1
-    assert "Traceback" not in capsys.readouterr().err
+    assert cli.main(["run", "--family", "low", "--method", "random", "--out", str(tmp_path / "file" / "out")]) == 2
+    complaint = capsys.readouterr().err
+    assert re.fullmatch(r"out: got .*/file/out, which cannot be written \(Not a directory\); wanted .*\n", complaint)
 
 
 def test_interrupt_ends_the_run_after_its_episode_and_it_goes_on(tmp_path: Path) -> None:
