@@ -36,25 +36,27 @@ def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:
         try:
             found[folder] = results, RiskSacEnv.of(results.spec)
         except RiskSacError as error:
-            _say(file, folder, error=f"{type(error).__name__}: {error}")
+            _say(file, {"folder": str(folder), "error": f"{type(error).__name__}: {error}"})
     return found
 
 
-def _say(file: Path, folder: Path, **told: object) -> None:
-    """Appends a line in one write, since several processes share the file."""
+def _say(file: Path, *lines: dict[str, object]) -> None:
+    """Appends lines in one write, since several processes share the file and any may be killed."""
     with file.open("ab", buffering=0) as output:
-        output.write(f"{json.dumps({'folder': str(folder)} | told)}\n".encode())
+        output.write("".join(f"{json.dumps(line)}\n" for line in lines).encode())
 
 
 def _tell(file: Path, runs: Prepared) -> None:
     """Replays the distinct failures of all runs, and says of each run which are the same again."""
+    lines = list[dict[str, object]]()
     for folder, (results, env) in runs.items():
         try:
             with closing(env):
                 same = [each.index for each in distinct_failures(results) if _repeats(folder, each, env)]
-            _say(file, folder, same=same)
+            lines.append({"folder": str(folder), "same": same})
         except (RiskSacError, OSError) as error:
-            _say(file, folder, error=f"{type(error).__name__}: {error}")
+            lines.append({"folder": str(folder), "error": f"{type(error).__name__}: {error}"})
+    _say(file, *lines)
 
 
 def _repeats(folder: Path, episode: EpisodeRecord, env: RiskSacEnv) -> bool:

@@ -13,6 +13,7 @@ from risk_sac.egos.registry import card_of, cards, pinned
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import CheckpointError, ConfigError, InfeasibleScene
 from risk_sac.execution.runs import run
+from risk_sac.execution.verify import verify
 from risk_sac.records import EpisodeRecord, Outcome
 from risk_sac.run_folder.results import Results
 from risk_sac.types import Frame
@@ -55,6 +56,15 @@ def install(tmp_path, monkeypatch):
         (info / "entry_points.txt").write_text("[risk_sac.egos]\nexample = example_ego:Example\n")
 
     return installed
+
+
+def test_what_an_ego_prints_spoils_no_replay(install, tmp_path, monkeypatch):
+    install("print('hello', flush=True); __import__('os').write(1, b'{}')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))  # of the helper process
+    play(spec_of("example"), tmp_path / "run")
+    (verified,) = verify([tmp_path / "run"], times=2).values()
+    assert verified.episodes
+    assert not verified.flaky
 
 
 def register(monkeypatch, folder: Path, **tables: str) -> None:
