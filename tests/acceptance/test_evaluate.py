@@ -102,7 +102,8 @@ def test_folder_of_another_comparison_is_refused_and_kept(
     before = (whole / "out" / "spec.yaml").read_bytes()
     assert cli.main(["evaluate", *FLAGS, "--seeds", "3", "--episodes", "7"]) == 2
     complaint = capsys.readouterr().err
-    assert complaint.startswith("out: got out, which holds a comparison with another seeds, budget; wanted an empty")
+    got = f"got {whole / 'out'}, which holds a comparison with another seeds, budget"
+    assert complaint.startswith(f"out: {got}; wanted an empty")
     assert (whole / "out" / "spec.yaml").read_bytes() == before
 
 
