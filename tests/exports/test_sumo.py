@@ -15,7 +15,7 @@ import sumolib
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.export.recorded import Recorded
 from tests.exports.conftest import CM
-from tests.exports.make_examples import FAMILIES, example
+from tests.exports.make_examples import FAMILIES
 
 
 def replayed(folder: Path) -> tuple[int, str]:
@@ -59,8 +59,3 @@ def test_floating_car_data_are_the_recording(
             middle = np.array((float(state.x), float(state.y))) - front_m * np.array((np.cos(heading), np.sin(heading)))
             assert np.hypot(*(middle - (actor.x_m[frame], actor.y_m[frame]))) < CM
     assert {state.id for state in [*(frames[0].vehicle or []), *(frames[0].person or [])]} == set(actors)
-
-
-def test_the_example_replays_as_well(tmp_path: Path) -> None:
-    shutil.unpack_archive(example(FormatName.SUMO), tmp_path)
-    assert replayed(tmp_path)[0] == 0

@@ -3,7 +3,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.recording import Recording
@@ -54,11 +53,6 @@ def test_earlier_places_of_a_body_that_stands_are_labelled_together() -> None:
     assert [text.get_text() for text in moving.texts][-4:] == ["−0.5 s", "−1 s", "−2 s", "−3 s"]
 
 
-def test_the_ground_on_which_the_other_is_hidden_is_explained() -> None:
-    _, speeds, *_ = draw_recording("mixed", Recording(synthetic_contact(), synthetic_series())).axes
-    assert [text.get_text() for text in speeds.get_legend().get_texts()] == ["ego", "pedestrian", "hidden from the ego"]
-
-
 def test_a_contact_that_nobody_judged_is_drawn_without_a_conflict() -> None:
     figure = draw_recording("mixed", Recording(synthetic_contact(None), synthetic_series()))
     view, *panels = figure.axes
@@ -90,14 +84,6 @@ def test_a_twin_is_drawn_beside_the_failure_on_the_same_ground_clock_and_scales(
     of_the_twin = [text.get_text() for text in rows[1][1].texts]
     assert of_the_twin == ["contact of the failure", "adversaries released"]
     assert "touched here" not in [text.get_text() for text in rows[0][1].get_legend().get_texts()]
-
-
-def test_drawing_writes_a_picture_of_sensible_size(tmp_path: Path) -> None:
-    draw("mixed", Recording(synthetic_contact(), synthetic_series()), tmp_path / "new" / "contact.png")
-    with Image.open(tmp_path / "new" / "contact.png") as picture:
-        assert picture.format == "PNG"
-        assert 800 <= picture.width <= 2000
-        assert 800 <= picture.height <= 2500
 
 
 def test_picture_of_an_unknown_format_is_refused(tmp_path: Path) -> None:

@@ -1,5 +1,4 @@
 import re
-import time
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from pathlib import Path
@@ -100,12 +99,3 @@ def test_the_roads_in_view_lie_below_everything_else_with_stripes_across_a_cross
     for shape in ground:
         assert Polygon(points(shape)).intersects(view) if shape.get("fill") != "none" else len(points(shape)) == 2
     assert 0 < len(ground) < len(surfaces(read_net(Path(sumo_nets.__path__[0]) / "mixed" / "mixed.net.xml")))
-
-
-def test_a_screen_full_of_them_is_drawn_at_once_and_small() -> None:
-    contact = synthetic_contact()
-    recording, roads = Recording(contact, synthetic_series()), roads_of("mixed", contact.episode.scene)
-    began = time.thread_time()
-    for _ in range(30):
-        assert len(thumbnail(recording, roads)) < 8000
-    assert time.thread_time() - began < 30 * 0.03
