@@ -233,7 +233,7 @@ def test_what_is_flaky_or_of_another_net_never_counts_as_fixed(failure: Path, tm
     ("arguments", "complaint"),
     [
         (["--ego", "nobody.yaml"], "nobody.yaml cannot be read"),
-        (["--ego", "default", "--baseline", "nothing.json"], "there is no nothing.json"),
+        (["--ego", "default", "--baseline", "nothing.json"], "nothing.json cannot be read"),
     ],
     ids=["no ego", "no baseline"],
 )
