@@ -52,6 +52,7 @@ class _Search:
         self.stage = Stage(bundle)
         self.left = self.stage.original
         self._most = most
+        self._random = np.random.default_rng(0)  # new copies each time: what is left would be fitted to the same ones
 
     @property
     def neutral(self) -> Floats:
@@ -76,7 +77,7 @@ class _Search:
     def _holds(self, variant: Variant) -> bool:
         """Whether enough of its copies fail; played no further than it takes to know."""
         failed = 0
-        for played, copy in enumerate(self.stage.copies(variant, SHARE, COPIES), 1):
+        for played, copy in enumerate(self.stage.copies(variant, SHARE, COPIES, self._random), 1):
             failed += self.stage.fails(copy)
             if failed == HELD or played - failed > COPIES - HELD:
                 break
@@ -86,7 +87,7 @@ class _Search:
         """What is left, as a failure of its own."""
         stage, left = self.stage, self.left
         # Other copies than those that it was chosen by.
-        held = sum(stage.fails(copy) for copy in stage.copies(left, SHARE, COPIES, seed=1))
+        held = sum(stage.fails(copy) for copy in stage.copies(left, SHARE, COPIES, self._random))
         played = play(stage.env, stage.scene(left), left.seed, left.actions)
         assert played.collision is not None  # of its own, or it would not have been taken
         episode = origin.manifest.episode.model_copy(

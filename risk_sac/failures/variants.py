@@ -86,9 +86,8 @@ class Stage:
         """Whether the ego fails as it did: a valid contact with the same striker, in the same type of conflict."""
         return alike(self.play(variant), self.collision)
 
-    def copies(self, variant: Variant, share: float, count: int, seed: int = 0) -> Iterator[Variant]:
+    def copies(self, variant: Variant, share: float, count: int, random: np.random.Generator) -> Iterator[Variant]:
         """Yields copies whose scene and actions are perturbed by up to a share."""
-        random = np.random.default_rng(seed)
         for _ in range(count):
             yield variant.perturbed(self.space, share, share, random)
 
