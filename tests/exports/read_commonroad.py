@@ -9,8 +9,8 @@ from commonroad.common.file_reader import CommonRoadFileReader
 from lxml import etree
 
 file, frames = sys.argv[1], int(sys.argv[2])
-schema = Path(commonroad.__file__).parent / "common" / "xml_definition_files" / "XML_commonRoad_XSD.xsd"
-etree.XMLSchema(etree.parse(schema)).assertValid(etree.parse(file))
+schema = next(Path(commonroad.__file__).parent.rglob("XML_commonRoad_XSD.xsd"))
+etree.XMLSchema(etree.parse(str(schema))).assertValid(etree.parse(file))
 scenario, problems = CommonRoadFileReader(file).open()
 (problem,) = problems.planning_problem_dict.values()
 obstacles = {
