@@ -131,6 +131,7 @@ def main() -> int:
     """Execute the run; returns the exit status."""
     folder, (niceness, memory_bytes, replays) = Path(sys.argv[1]), map(int, sys.argv[2:5])
     os.nice(niceness)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # so a KeyboardInterrupt is always the ego's own
     reporter = Reporter(io.FileIO(int(os.environ.pop(WORDS)), "wb"))
     _lose_what_a_full_disk_refuses()
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")

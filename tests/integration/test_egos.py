@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from risk_sac import cli
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.egos.registry import card_of, cards, pinned
 from risk_sac.env import RiskSacEnv
@@ -65,6 +66,16 @@ def test_what_an_ego_prints_spoils_no_replay(install, tmp_path, monkeypatch):
     (verified,) = verify([tmp_path / "run"], times=2).values()
     assert verified.episodes
     assert not verified.flaky
+
+
+def test_an_ego_that_interrupts_its_worker_has_crashed(install, tmp_path, monkeypatch):
+    install("raise KeyboardInterrupt")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))  # of the worker
+    flags = "--families low --methods random --seeds 1 --episodes 3 --ego example --out"
+    assert cli.main(["evaluate", *flags.split(), str(tmp_path / "out")]) == 0
+    (lines,) = (tmp_path / "out" / "runs").glob("*/episodes.jsonl")
+    records = [EpisodeRecord.model_validate_json(line) for line in lines.read_bytes().splitlines()]
+    assert [record.reason for record in records] == ["ego_crash"] * 3
 
 
 def register(monkeypatch, folder: Path, **tables: str) -> None:
