@@ -114,7 +114,7 @@ class RunState:
     def refuse_dead_ego(self) -> None:
         """Ends a run whose ego failed in each of the latest episodes.
 
-        These are not kept: the run continues from its latest checkpoint once the ego works again.
+        A resumed run goes on from the latest checkpoint.
 
         Raises:
           ConfigError: with the reason of the latest failure.
