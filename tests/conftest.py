@@ -1,4 +1,6 @@
+import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -18,3 +20,12 @@ def postgresql() -> Iterator[PostgreSql]:
         pytest.skip("PostgreSQL is not installed")
     with running(bin_) as server:
         yield server
+
+
+@pytest.fixture
+def steering_egos(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Registers the egos of tests/egos, in this process and in those that it starts."""
+    folder = str(Path(__file__).parent / "egos")
+    monkeypatch.syspath_prepend(folder)
+    others = os.environ.get("PYTHONPATH")
+    monkeypatch.setenv("PYTHONPATH", folder if not others else os.pathsep.join((folder, others)))

@@ -17,7 +17,7 @@ from risk_sac.failures.variants import Stage
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import distinct_failures, read_verified
 from tests.acceptance.conftest import Tell
-from tests.egos import served
+from tests.ego_processes import served
 
 RUN = ["--family", "low", "--method", "archive", "--seed", "41", "--episodes", "30"]
 

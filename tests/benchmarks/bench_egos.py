@@ -24,7 +24,7 @@ from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
 from risk_sac.scenario.layout import LEAD_IN_S
 from risk_sac.types import STEP_S
-from tests.egos import CPP_COMPILES, Shadow, served, served_by_cpp
+from tests.ego_processes import CPP_COMPILES, Shadow, served, served_by_cpp
 
 ROUNDS = 16
 Took = tuple[float, float]  # ms of processor time and of real time
@@ -75,7 +75,7 @@ def test_cost_of_a_step(family: str, monkeypatch: pytest.MonkeyPatch, tmp_path: 
         "sumo": EgoConfig(),
         **{name: EgoConfig(driver=name) for name in ("shadow", "idm-aeb", "r157", "rss", "broken", *far)},
     }
-    monkeypatch.setitem(SHIPPED, "shadow", "tests.egos:Shadow")
+    monkeypatch.setitem(SHIPPED, "shadow", "tests.ego_processes:Shadow")
     times: dict[str, list[Took]] = {name: [] for name in egos}
     with registered(monkeypatch, tmp_path):
         for seed in range(ROUNDS + 1):  # the first warms up

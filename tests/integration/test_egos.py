@@ -18,7 +18,7 @@ from risk_sac.execution.verify import verify
 from risk_sac.records import EpisodeRecord, Outcome
 from risk_sac.run_folder.results import Results
 from risk_sac.types import Frame
-from tests.egos import CPP_COMPILES, served, served_by_cpp
+from tests.ego_processes import CPP_COMPILES, served, served_by_cpp
 
 EXAMPLE = '''
 from risk_sac.egos import Control
