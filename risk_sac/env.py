@@ -8,7 +8,7 @@ A process plays in one environment at a time: for several, use `gymnasium.vector
 Source: RISK-SAC, Alg. 1, l. 5 and 8.
 """
 
-from typing import Any
+from typing import Any, Never
 
 import gymnasium as gym
 import numpy as np
@@ -26,7 +26,7 @@ from risk_sac.process_state import c_numbers
 from risk_sac.records import Collision
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import worst_rss_margin
-from risk_sac.risk.realism import broken_hard_rule, soft_cost
+from risk_sac.risk.realism import HardRule, broken_hard_rule, soft_cost
 from risk_sac.risk.reward import risk_reward, worth
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.families import FAMILIES
@@ -154,7 +154,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._teleported |= bool(self._frame.teleported)
         self.trace.append(self._frame, self._measures, np.array(shares, dtype=np.float32))
         collision = None if contact is None else self._judge(contact)
-        self._touched |= self._in_contact()
         cost = self._cost(before, self._frame, previous, self._measures)
         reward = risk_reward(
             self._measures.signals["ttc_s"],
@@ -191,8 +190,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self.trace = Trace(self._gauge.names)
         self._steps = 0
         self._inside_limits, self._teleported = True, False
-        self._touched: set[str] = set()
-        self._lead_in(self._sim.reset(layout, sumo_seed))
+        self._lead_in(self._sim.reset(layout, sumo_seed), scene)
         self._released_s = self._frame.time_s
         self._adversaries = Adversaries(self.problem.family, limits, self._frame)
         self._check_feasible(scene)
@@ -203,16 +201,24 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._sim.halt_walkers()
         return self._observe(), {"robustness": self._measures.soft_min}
 
-    def _lead_in(self, start: Frame) -> None:
-        """Traffic, before anybody attacks: SUMO drives all vehicles, and pedestrians go on as the scene says."""
+    def _lead_in(self, start: Frame, scene: Scene) -> None:
+        """Traffic before the release: SUMO drives all vehicles, and pedestrians go on as the scene says."""
         self._frame = start
         self._measures = self._measure(None)
         self.trace.append(start, self._measures, None)
+        self._refuse_overlap(scene)
         for _ in range(round(LEAD_IN_S / STEP_S)):
             self._sim.walk_on()
             before, self._frame = self._frame, self._sim.step()
             self._measures = self._measure(before)
             self.trace.append(self._frame, self._measures, None)
+            self._refuse_overlap(scene)
+
+    def _refuse_overlap(self, scene: Scene) -> None:
+        """C_hard of Eq. 5, in every frame up to the release: no two bodies overlap."""
+        if pairs := overlapping_pairs(self._frame.state):
+            first, second = (self._frame.ids[i] for i in pairs[0])
+            self._refuse(scene, "initial_overlap", f" by {first!r} and {second!r}")
 
     def _measure(self, before: Frame | None, struck: int = 0) -> Measures:
         return self._gauge.measure(self._frame, before, self._perception.seen, struck)
@@ -220,16 +226,18 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _check_feasible(self, scene: Scene) -> None:
         """C_hard of Eq. 5, when the adversaries are released."""
         assessment = self._measures.assessment
-        self._spawn_overlap = assessment.touched or bool(self._in_contact())
         rule = broken_hard_rule(
-            self._spawn_overlap,
             float(assessment.gap_m.min()),
             assessment.least.ttc_s,
             worst_rss_margin(assessment),
             in_conflict=self._careful_driver_in_conflict(),
         )
         if rule is not None:
-            raise InfeasibleScene(f"scene of {scene.family!r} breaks {rule}: {dict(scene.values)}", reason=rule)
+            self._refuse(scene, rule)
+
+    def _refuse(self, scene: Scene, rule: HardRule, details: str = "") -> Never:
+        message = f"scene of {scene.family!r} breaks {rule}{details}: {dict(scene.values)}"
+        raise InfeasibleScene(message, reason=rule)
 
     def _careful_driver_in_conflict(self) -> bool:
         # Wary: the policy is not handed a vehicle that hangs over beside the ego already.
@@ -240,11 +248,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _in_sight(self) -> Bools:
         return np.concatenate(([True], self._measures.assessment.seen))
-
-    def _in_contact(self) -> set[str]:
-        """Who touches somebody other than the ego."""
-        pairs = overlapping_pairs(self._frame.state)
-        return {self._frame.ids[i] for pair in pairs if pair[0] > 0 for i in pair}
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""
@@ -267,9 +270,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         comparable = frame.kind[contact.other] == Kind.VEHICLE and relative_view(frame).overlap[contact.other - 1]
         facts = EpisodeFacts(
             teleported=self._teleported,
-            spawn_overlap=self._spawn_overlap,
             inside_limits=self._inside_limits,
-            touched_before=other in self._touched,
             simulator_agrees=self._sim.lists_collision(other) if comparable else None,
             visible_for_s=self._perception.in_view_for(other, frame.time_s),
             ever_visible=self._perception.ever_seen(other),

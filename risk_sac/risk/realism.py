@@ -125,16 +125,12 @@ def soft_cost(
     return jerk / 2.0 + (excess + closeness) / 4.0
 
 
-def broken_hard_rule(
-    overlaps: bool, gap_m: float, ttc_s: float, rss_margin: float, *, in_conflict: bool
-) -> HardRule | None:
+def broken_hard_rule(gap_m: float, ttc_s: float, rss_margin: float, *, in_conflict: bool) -> HardRule | None:
     """C_hard of (5): the rule that the frame of the release breaks, or None.
 
-    `overlaps` holds for any two bodies, `in_conflict` for the careful driver in the ego's place; the rest are the ego's
-    smallest measures.
+    `in_conflict` holds for the careful driver in the ego's place; the rest are the ego's smallest measures. The rule
+    of `initial_overlap` is asked of every frame up to the release.
     """
-    if overlaps:
-        return "initial_overlap"
     if gap_m < MIN_INITIAL_GAP_M:
         return "initial_gap"
     if ttc_s < MIN_INITIAL_TTC_S:

@@ -3,7 +3,8 @@
 Source: RISK-SAC, Sec. IV-A.2.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from risk_sac.scenario.family import (
     Family,
@@ -16,7 +17,7 @@ from risk_sac.scenario.family import (
     walking,
 )
 from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S, Layout, VehicleStart, layout_at, pedestrian, vehicle
-from risk_sac.scenario.place import JunctionPlace, Leg
+from risk_sac.scenario.place import JunctionPlace, Leg, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Role
 
@@ -24,6 +25,7 @@ NEAREST_M, FARTHEST_M = 10.0, 90.0  # whoever attacks, and the ego, from the sto
 LEAST_RANGE_M = 10.0  # of those distances at a place
 STREAM_MPS, STREAM_M = 9.0, 30.0
 WIDEST_GAP_M = 40.0  # of the background
+LEAST_GAP_M = 10.0  # from a background vehicle to the others on its lane, as behind the ego in car following
 WHO = {
     "ego": "the ego",
     "oncoming": "the oncoming vehicle",
@@ -36,14 +38,13 @@ def family(name: str, place: JunctionPlace) -> Family:
     """The family that this pattern is at a place."""
 
     def layout(xi: Mapping[str, float]) -> Layout:
-        background = [
-            vehicle(f"{stream.name}_{i}", Role.BACKGROUND, stream.track, STREAM_M + i_gap, STREAM_MPS)
-            for stream in place.streams
-            for i, i_gap in enumerate((xi["background_gap_m"], 2 * xi["background_gap_m"]))
+        ego, *others = (_approach(leg, xi) for leg in (place.ego, *place.others))
+        background = _background(place, xi, (ego, *others))
+        vehicles = [each.start(Role.ADVERSARY) for each in others] + [
+            each.start(Role.BACKGROUND) for each in background
         ]
-        attackers = [_approaching(leg, Role.ADVERSARY, xi) for leg in place.others]
         walkers = () if place.walk is None else (pedestrian(place.walk, xi),)
-        return layout_at(place, xi, _approaching(place.ego, Role.EGO, xi), attackers + background, walkers)
+        return layout_at(place, xi, ego.start(Role.EGO), vehicles, walkers)
 
     signalised = place.signal is not None
     return Family(
@@ -71,10 +72,49 @@ def room_of_a_stream_m() -> float:
     return STREAM_M + 2 * WIDEST_GAP_M + CAR_LENGTH_M + LEAD_IN_S * STREAM_MPS
 
 
-def _approaching(leg: Leg, role: Role, xi: Mapping[str, float]) -> VehicleStart:
+class _Approach(NamedTuple):
+    """A vehicle on its way to the stop line."""
+
+    name: str
+    track: Track
+    before_m: float  # from its front to the stop line, at the release
+    speed_mps: float
+
+    def start(self, role: Role) -> VehicleStart:
+        return vehicle(self.name, role, self.track, self.before_m, self.speed_mps)
+
+    def taken_m(self) -> tuple[float, float]:
+        """Where no background vehicle may be at the release, or it is too close then or at the start."""
+        least_m, gains_m = CAR_LENGTH_M + LEAST_GAP_M, LEAD_IN_S * (self.speed_mps - STREAM_MPS)
+        return self.before_m - least_m + min(gains_m, 0.0), self.before_m + least_m + max(gains_m, 0.0)
+
+    def shares_lane(self, track: Track) -> bool:
+        lanes = {(piece.edge, piece.lane) for piece in track.pieces}
+        return any((piece.edge, piece.lane) in lanes for piece in self.track.pieces)
+
+
+def _approach(leg: Leg, xi: Mapping[str, float]) -> _Approach:
     options = len(leg.turns)
     track = leg.turns[min(int(xi.get(f"{leg.name}_turn", 0.0) * options), options - 1)]  # equal parts of [0, 1]
-    return vehicle(leg.name, role, track, xi[f"{leg.name}_distance_m"], xi[f"{leg.name}_speed_mps"])
+    return _Approach(leg.name, track, xi[f"{leg.name}_distance_m"], xi[f"{leg.name}_speed_mps"])
+
+
+def _background(place: JunctionPlace, xi: Mapping[str, float], others: Sequence[_Approach]) -> list[_Approach]:
+    """Two vehicles a stream.
+
+    One that would be too close to another on its lane starts behind that, or is left out where the road is too short.
+    """
+    found: list[_Approach] = []
+    for stream in place.streams:
+        track = stream.track
+        for i in (0, 1):
+            before_m = STREAM_M + (i + 1) * xi["background_gap_m"]
+            taken = [each.taken_m() for each in (*others, *found) if each.shares_lane(track)]
+            while crowded := [last_m for first_m, last_m in taken if first_m < before_m < last_m]:
+                before_m = max(crowded)
+            if before_m + CAR_LENGTH_M + LEAD_IN_S * STREAM_MPS <= track.room_m:
+                found.append(_Approach(f"{stream.name}_{i}", track, before_m, STREAM_MPS))
+    return found
 
 
 def _parameters(place: JunctionPlace) -> tuple[Parameter, ...]:

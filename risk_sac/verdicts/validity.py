@@ -14,7 +14,9 @@ from risk_sac.sim.collision import Contact
 from risk_sac.types import Floats, Kind
 from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.overlap import overlaps_before_contact
 
+RELEASE_S = 1e-6  # SUMO counts milliseconds, we add floats
 AFTER_RELEASE_S = 1.0
 GRIP_LOOKS_BACK_S = 2.0
 GRIP_WINDOW_S = 1.0
@@ -32,9 +34,7 @@ class EpisodeFacts:
     """What only the running episode knows of a contact."""
 
     teleported: bool
-    spawn_overlap: bool
     inside_limits: bool  # every adversary, up to the contact
-    touched_before: bool  # the striker's body overlapped another one earlier
     simulator_agrees: bool | None  # see `Collision`
     visible_for_s: float  # how long the ego has seen the striker without a break, 0 if it does not
     ever_visible: bool
@@ -42,14 +42,15 @@ class EpisodeFacts:
 
 def artefact_verdicts(evidence: Evidence, striker: int, conflict: Conflict, facts: EpisodeFacts) -> Mapping[str, bool]:
     """The rules of `ARTEFACT_RULES`, each with whether the contact passes it."""
+    overlaps = overlaps_before_contact(evidence)
     return {
         "no_teleport": not facts.teleported,
-        "no_spawn_overlap": not facts.spawn_overlap,
+        "no_spawn_overlap": not any(each.time_s <= RELEASE_S for each in overlaps),
         # What was there at the adversaries' release they inherited.
         "conflict_after_release": conflict.noticed_s >= AFTER_RELEASE_S - 1e-6,
         "inside_limits": facts.inside_limits,
         "inside_grip": inside_grip(evidence, striker),
-        "solid_bodies": not facts.touched_before,
+        "solid_bodies": not any(each.time_s > RELEASE_S for each in overlaps),
         "ego_model_saw": facts.simulator_agrees is not False,
     }
 

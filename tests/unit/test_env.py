@@ -159,6 +159,21 @@ def test_a_scene_is_refused_by_what_it_has_come_to_at_the_release(
     assert refusal(low, middle("low", **changes)) == rule
 
 
+def test_a_scene_is_refused_by_bodies_that_overlap_at_its_start_although_they_part_before_the_release(
+    low: RiskSacEnv,
+) -> None:
+    parameters = FAMILIES["low"].space.parameters
+    low.problem = replace(
+        low.problem,
+        space=replace(low.problem.space, parameters=tuple(replace(p, low=-100, high=100) for p in parameters)),
+    )
+    inside = {"follower_gap_m": -1.0, "lead_gap_m": 60.0, "lead_speed_mps": 14.0}
+    with pytest.raises(InfeasibleScene, match=r"initial_overlap by 'ego' and 'follower'") as refused:
+        low.reset(seed=0, options={"scene": middle("low", **inside)})
+    assert refused.value.reason == "initial_overlap"
+    assert refusal(low, middle("low", **inside | {"follower_gap_m": 5.0})) is None
+
+
 # Ego at 12.6 m/s, 30 m before the zebra; the pedestrian at the kerb, at 1.4 m/s: both are there in three seconds.
 MEETING = {
     "crossing": 0.0,

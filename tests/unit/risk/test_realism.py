@@ -92,17 +92,16 @@ def test_soft_cost_stays_in_the_unit_interval(rows: list[tuple[float, ...]]) -> 
 
 
 @pytest.mark.parametrize(
-    ("overlaps", "gap_m", "ttc_s", "rss_margin", "in_conflict", "rule"),
+    ("gap_m", "ttc_s", "rss_margin", "in_conflict", "rule"),
     [
-        (True, 0.0, 0.0, -1.0, True, "initial_overlap"),
-        (False, 0.2, 10.0, 1.0, False, "initial_gap"),
-        (False, 5.0, 0.9, 1.0, False, "initial_ttc"),
-        (False, 5.0, 2.0, -0.1, False, "initial_rss"),
-        (False, 5.0, 2.0, 0.1, True, "initial_conflict"),
-        (False, 0.5, 1.0, 0.0, False, None),
+        (0.2, 10.0, 1.0, False, "initial_gap"),
+        (5.0, 0.9, 1.0, False, "initial_ttc"),
+        (5.0, 2.0, -0.1, False, "initial_rss"),
+        (5.0, 2.0, 0.1, True, "initial_conflict"),
+        (0.5, 1.0, 0.0, False, None),
     ],
 )
 def test_each_hard_rule_is_named(
-    overlaps: bool, gap_m: float, ttc_s: float, rss_margin: float, in_conflict: bool, rule: str | None
+    gap_m: float, ttc_s: float, rss_margin: float, in_conflict: bool, rule: str | None
 ) -> None:
-    assert broken_hard_rule(overlaps, gap_m, ttc_s, rss_margin, in_conflict=in_conflict) == rule
+    assert broken_hard_rule(gap_m, ttc_s, rss_margin, in_conflict=in_conflict) == rule

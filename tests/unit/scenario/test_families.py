@@ -1,15 +1,19 @@
 from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
+from risk_sac.scenario import junction
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
-from risk_sac.scenario.layout import Layout
-from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S, TRUCK_LENGTH_M, Layout
+from risk_sac.scenario.place import PLACES, JunctionPlace
+from risk_sac.sim.sumo import NETS, SumoSimulation
 from risk_sac.types import Kind, Role, Scene
 
+LENGTHS_M = {"car": CAR_LENGTH_M, "truck": TRUCK_LENGTH_M}
 UNITS = {"m", "m/s", "s", "1"}
 APPROACH_M = 230.4  # length of the roads to the intersection of dense
 SUFFIXES = {"_m": "m", "_mps": "m/s", "_s": "s"}
@@ -134,6 +138,56 @@ def test_dense_approaches_meet_at_the_intersection(sim: SumoSimulation) -> None:
     walker = layout.pedestrians[0]
     speed, setback = scene.values["pedestrian_speed_mps"], scene.values["pedestrian_setback_m"]
     assert walker.x_m == pytest.approx(8.05 + setback + 1.5 * speed)
+
+
+@each_family
+def test_vehicles_on_one_lane_start_and_are_released_apart(family: Family) -> None:
+    for scene, layout in random_layouts(family, 5, 500):
+        for a, b in combinations((layout.ego, *layout.vehicles), 2):
+            if (a.route[0], a.lane) == (b.route[0], b.lane):
+                ahead, behind = (a, b) if a.position_m > b.position_m else (b, a)
+                gap_m = ahead.position_m - behind.position_m - LENGTHS_M[ahead.body]
+                assert gap_m >= 8.0 - 1e-9, (scene, ahead, behind)
+                if family.name == "dense":
+                    assert gap_m + LEAD_IN_S * (ahead.speed_mps - behind.speed_mps) >= 10.0 - 1e-9, (
+                        scene,
+                        ahead,
+                        behind,
+                    )
+
+
+def dense_with(**changes: float) -> dict[str, float]:
+    """How far before the stop line each vehicle of a dense scene starts."""
+    family = FAMILIES["dense"]
+    middle = family.space.from_unit(np.full(family.space.dimension, 0.5)).values
+    layout = family.layout(dict(middle) | changes)
+    return {start.id: APPROACH_M - start.position_m for start in (layout.ego, *layout.vehicles)}
+
+
+def test_background_traffic_makes_way_for_who_turns_right_from_its_lane() -> None:
+    at = {"background_gap_m": 25.0, "from_right_distance_m": 50.0, "from_right_speed_mps": 9.0}
+    elsewhere = dense_with(**at, from_right_turn=0.5)
+    beside = dense_with(**at, from_right_turn=0.9)
+    assert (elsewhere["east_0"], elsewhere["east_1"]) == pytest.approx((68.5, 93.5))  # at the release 55 and 80 m
+    assert beside["from_right"] == elsewhere["from_right"] == pytest.approx(63.5)
+    assert (beside["east_0"], beside["east_1"]) == pytest.approx((63.5 + 14.6, 93.5))
+    others = beside.keys() - {"east_0"}
+    assert {name: beside[name] for name in others} == pytest.approx({name: elsewhere[name] for name in others})
+
+
+def test_background_traffic_without_room_behind_others_is_left_out() -> None:
+    place = PLACES.validate_json((NETS / "dense" / "place.json").read_bytes())
+    assert isinstance(place, JunctionPlace)
+    short = junction.room_of_a_stream_m()
+    pieces = [piece.model_copy(update={"reach_m": short, "length_m": short}) for piece in place.streams[2].track.pieces]
+    track = place.streams[2].track.model_copy(update={"pieces": tuple(pieces)})
+    streams = [s.model_copy(update={"track": track}) if s.name == "east" else s for s in place.streams]
+    family = junction.family("dense", place.model_copy(update={"streams": tuple(streams)}))
+    values = family.space.from_unit(np.full(family.space.dimension, 0.5)).values
+    crowded = {"background_gap_m": 40.0, "from_right_turn": 0.9, "from_right_speed_mps": 13.8}
+    layouts = [family.layout(dict(values) | crowded | {"from_right_distance_m": m}) for m in (30.0, 90.0)]
+    names = [{start.id for start in layout.vehicles} for layout in layouts]
+    assert names[0] - names[1] == {"east_1"}
 
 
 def test_the_signal_offset_moves_the_cycle(sim: SumoSimulation) -> None:

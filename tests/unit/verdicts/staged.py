@@ -24,9 +24,7 @@ STREET = Ground(
 )
 CLEAN = EpisodeFacts(
     teleported=False,
-    spawn_overlap=False,
     inside_limits=True,
-    touched_before=False,
     simulator_agrees=True,
     visible_for_s=3.0,
     ever_visible=True,

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ARTEFACT_RULES, REPEATS
+from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, inside_grip, used_grip
@@ -15,9 +16,13 @@ from tests.unit.verdicts.staged import (
     leader_brakes,
     mirrored,
     pedestrian_crosses,
+    sideways,
     stage,
     straight,
 )
+
+CAR = Kind.VEHICLE
+CARS = (CAR, CAR, CAR)
 
 
 def broken(evidence: Evidence, facts: EpisodeFacts = CLEAN) -> set[str]:
@@ -34,14 +39,46 @@ def test_a_clean_contact_passes() -> None:
     ("change", "rule"),
     [
         ({"teleported": True}, "no_teleport"),
-        ({"spawn_overlap": True}, "no_spawn_overlap"),
         ({"inside_limits": False}, "inside_limits"),
-        ({"touched_before": True}, "solid_bodies"),
         ({"simulator_agrees": False}, "ego_model_saw"),
     ],
 )
 def test_each_fact_breaks_its_own_rule(change: dict[str, bool], rule: str) -> None:
     assert broken(cut_in(), replace(CLEAN, **change)) == {rule}
+
+
+def beside(x_m: float, until_s: float) -> Evidence:
+    """The ego runs into a leader; a third car drives until then through a fourth, in the lane beside, and is gone."""
+    first, second = straight(x_m, 3.3, 0.0, 14.0), straight(x_m + 3.0, 3.3, 0.0, 14.0)
+    parts = sideways(second, until_s, 40.0, 4.0)  # out of the way within a step
+    kinds = (*CARS, CAR)
+    return stage(straight(0.0, 0.0, 0.0, 14.0), straight(24.6, 0.0, 0.0, 14.0, (2.0, -8.0)), first, parts, kinds=kinds)
+
+
+@pytest.mark.parametrize(
+    ("x_m", "until_s", "rules"),
+    [
+        (-30.0, -2.0, set()),
+        (-30.0, -0.5, {"no_spawn_overlap"}),
+        (30.0, 0.05, {"no_spawn_overlap"}),
+        (-30.0, 1.0, {"no_spawn_overlap", "solid_bodies"}),
+    ],
+)
+def test_two_others_that_overlap_refuse_the_contact_wherever_they_are(
+    x_m: float, until_s: float, rules: set[str]
+) -> None:
+    record = beside(x_m, until_s)
+    assert broken(record) == rules
+    assert broken(mirrored(record)) == rules
+
+
+def test_a_striker_that_came_through_another_body_is_refused() -> None:
+    through = stage(*(straight(x, 0.0, 0.0, v) for x, v in ((0.0, 14.0), (40.0, 6.0), (42.0, 14.0))), kinds=CARS)
+    assert broken(through) >= {"no_spawn_overlap"}
+    walker = straight(30.0, 5.6, -math.pi / 2, 2.0, start_s=0.0)
+    parked = straight(30.0, 3.3, 0.0, 0.0)
+    run_into = stage(straight(-28.0, 0.0, 0.0, 14.0), walker, parked, kinds=(CAR, Kind.PEDESTRIAN, CAR))
+    assert "solid_bodies" in broken(run_into)
 
 
 def test_a_striker_that_the_road_cannot_hold_breaks_inside_grip() -> None:

@@ -20,11 +20,11 @@ export const GRADE_WORDS: Record<GradeName, GradeWords> = {
 /** Why a contact was refused: what a rule found. */
 const RULES: Record<string, string> = {
   no_teleport: "the simulator moved somebody by a jump",
-  no_spawn_overlap: "bodies overlapped at the start",
+  no_spawn_overlap: "two bodies overlapped before the release",
   conflict_after_release: "the conflict began less than 1 s after the release",
   inside_limits: "an adversary left its limits",
   inside_grip: "the striker drove beyond the road's grip",
-  solid_bodies: "somebody passed through another body",
+  solid_bodies: "two bodies overlapped before the contact",
   ego_model_saw: "SUMO does not list the collision",
   repeats: "it went another way when replayed",
   not_from_behind: "the ego was struck from behind",
