@@ -8,6 +8,7 @@ A process plays in one environment at a time: for several, use `gymnasium.vector
 Source: RISK-SAC, Alg. 1, l. 5 and 8.
 """
 
+from collections.abc import Mapping
 from typing import Any, Never
 
 import gymnasium as gym
@@ -23,7 +24,7 @@ from risk_sac.observation import Encoder
 from risk_sac.observation_layout import LIMIT
 from risk_sac.problem import Problem
 from risk_sac.process_state import c_numbers
-from risk_sac.records import Collision
+from risk_sac.records import Collision, RequirementResult, Violation
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import HardRule, broken_hard_rule, soft_cost
@@ -42,6 +43,7 @@ from risk_sac.verdicts.judge import collision_of
 from risk_sac.verdicts.online import CarefulReflex, conflicts_now
 from risk_sac.verdicts.path import Path, polyline
 from risk_sac.verdicts.validity import EpisodeFacts
+from risk_sac.verdicts.violation import requirement_results, violations_of
 
 FEASIBLE_TRIES = 100
 Observation = NDArray[np.float32]
@@ -94,8 +96,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     _frame: Frame
     _measures: Measures
     _steps: int
-    _inside_limits: bool
-    _teleported: bool
+    _contact_s: float | None  # from the release
+    _artefacts: dict[str, float]  # rule that the episode broke -> when it first did
 
     @c_numbers()
     def reset(
@@ -150,10 +152,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         contact = find_contact(before, self._frame)
         previous, self._measures = self._measures, self._measure(before, 0 if contact is None else contact.other)
         self._steps += 1
-        self._inside_limits &= not self._controlled or self._adversaries.keep_limits(self._frame)
-        self._teleported |= bool(self._frame.teleported)
+        if self._controlled and not self._adversaries.keep_limits(self._frame):
+            self._artefacts.setdefault("inside_limits", self._frame.time_s)
+        if self._frame.teleported:
+            self._artefacts.setdefault("no_teleport", self._frame.time_s)
         self.trace.append(self._frame, self._measures, np.array(shares, dtype=np.float32))
         collision = None if contact is None else self._judge(contact)
+        self._contact_s = None if collision is None else collision.time_s
         cost = self._cost(before, self._frame, previous, self._measures)
         reward = risk_reward(
             self._measures.signals["ttc_s"],
@@ -189,7 +194,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._gauge.reset()
         self.trace = Trace(self._gauge.names)
         self._steps = 0
-        self._inside_limits, self._teleported = True, False
+        self._artefacts = {}
+        self._contact_s = None
         self._lead_in(self._sim.reset(layout, sumo_seed), scene)
         self._released_s = self._frame.time_s
         self._adversaries = Adversaries(self.problem.family, limits, self._frame)
@@ -269,13 +275,22 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         # SUMO tests bodies at the end of a step only; of a pedestrian, the ego's model was told the oracle's own box.
         comparable = frame.kind[contact.other] == Kind.VEHICLE and relative_view(frame).overlap[contact.other - 1]
         facts = EpisodeFacts(
-            teleported=self._teleported,
-            inside_limits=self._inside_limits,
+            teleported="no_teleport" in self._artefacts,
+            inside_limits="inside_limits" not in self._artefacts,
             simulator_agrees=self._sim.lists_collision(other) if comparable else None,
             visible_for_s=self._perception.in_view_for(other, frame.time_s),
             ever_visible=self._perception.ever_seen(other),
         )
         return collision_of(contact, frame, self._released_s, self.evidence(), self.trace.since_release, facts)
+
+    def requirement_results(self) -> dict[str, RequirementResult]:
+        """How far each requirement was kept since the release."""
+        time_s = [round(frame.time_s - self._released_s, 6) for frame in self.trace.frames[self.trace.released :]]
+        return requirement_results(self.problem.requirements, time_s, self.trace.since_release, self._contact_s)
+
+    def violations(self, results: Mapping[str, RequirementResult]) -> tuple[Violation, ...]:
+        """Violations without contact of the requirements that count; see `violations_of`."""
+        return violations_of(results, self.trace.frames, self.trace.measures, self.evidence(), self._artefacts)
 
     def evidence(self) -> Evidence:
         """What a judge may look at, of the episode so far."""

@@ -3,6 +3,7 @@
 Everything a campaign can get wrong beyond its types is found here, without loading torch or libsumo.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 
@@ -12,6 +13,7 @@ from risk_sac.config.methods import MethodName
 from risk_sac.egos.registry import pinned
 from risk_sac.errors import ConfigError, OddError
 from risk_sac.observation_layout import observation_size
+from risk_sac.records import NO_CONTACT
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import check_requirements
 from risk_sac.scenario.families import family_named
@@ -43,8 +45,8 @@ class Problem:
         Raises:
           OddError: the ODD contradicts itself or leaves no scene.
           FormulaError: a user's requirement cannot be monitored online.
-          ConfigError: a user's requirement takes the name of a shipped one, the ego is not registered or in another
-            version, or the run takes too much memory.
+          ConfigError: a user's requirement has a shipped one's name and a formula, or neither; the ego is not
+            registered or in another version; or the run takes too much memory.
         """
         ego = pinned(spec.ego)
         family = family_named(spec.family)
@@ -55,22 +57,15 @@ class Problem:
                 f"{list(odd.dynamic.actor_kinds or ())}",
                 f"{sorted(missing)} too, which every scene of the {family.name!r} family has",
             )
-        shipped = requirements_from_odd(odd, ego.response_s)
-        check_requirements(spec.requirements, STEP_S, family.horizon_steps)
-        taken = {requirement.name for requirement in shipped}
-        for index, requirement in enumerate(spec.requirements):
-            if requirement.name in taken:
-                raise ConfigError(
-                    f"requirements[{index}].name",
-                    f"{requirement.name!r}, which a shipped requirement has",
-                    f"a name not in {sorted(taken)}",
-                )
+        shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
+        own = [_own(f"requirements[{i}]", each, shipped) for i, each in enumerate(spec.requirements)]
+        check_requirements(own, STEP_S, family.horizon_steps)
         problem = cls(
             family=family,
             odd=odd,
             space=narrow(family.space, odd),
             ego=ego,
-            requirements=(*shipped, *spec.requirements),
+            requirements=tuple((shipped | {each.name: each for each in own}).values()),
             rss=_rss_parameters(odd),
         )
         problem.check_demand(spec)
@@ -105,6 +100,21 @@ class Problem:
         """The posted limit; all roads of a family have the same."""
         limit = self.odd.scenery.speed_limit_mps
         return float("inf") if limit is None else limit.high
+
+
+def _own(field: str, requirement: Requirement, shipped: Mapping[str, Requirement]) -> Requirement:
+    """A user's requirement; where it only says what a shipped one counts as, that one."""
+    name = requirement.name
+    if name not in shipped:
+        if not requirement.formula:
+            raise ConfigError(f"{field}.formula", "none", f"one, or a shipped requirement's name: {', '.join(shipped)}")
+        return requirement
+    if requirement.formula:
+        remedy = "leave its formula out to change what it counts as, or choose another name"
+        raise ConfigError(f"{field}.name", f"{name!r}, which a shipped requirement has", remedy=remedy)
+    if name == NO_CONTACT and requirement.counts == "report":
+        raise ConfigError(f"{field}.counts", "'report'", f"'failure': a contact ends the episode, so {name} counts")
+    return shipped[name].model_copy(update={"counts": requirement.counts})
 
 
 def _rss_parameters(odd: Odd) -> RssParameters:

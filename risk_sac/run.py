@@ -52,7 +52,7 @@ class RunState:
       searchers: propose the scenes and drive the adversaries.
       reward: what the agent is trained on, and the scenes are scored by.
       records: one per episode.
-      series: time series by episode, where the ego touched something.
+      series: time series by episode, where a requirement that counts was violated.
     """
 
     def __init__(self, spec: RunSpec, folder: Path) -> None:
@@ -98,12 +98,12 @@ class RunState:
         return self.records[-1].environment_steps if self.records else 0
 
     def add(self, record: EpisodeRecord) -> RunMetrics:
-        """Adds the episode that `env` has just played, and writes the time series of a contact.
+        """Adds the episode that `env` has just played, and writes the time series of a violation.
 
         Returns:
           The metrics of its phase.
         """
-        if record.collision is not None:
+        if record.worst_violation is not None:
             file = self._folder / FAILURES / series_name(record.index)
             self.series[record.index] = write_series(file, self.env.trace.series())
         self.records.append(record)
@@ -188,7 +188,7 @@ def _series(folder: Path, records: list[EpisodeRecord], digests: Mapping[int, st
     """Time series by episode, with the digests they were written with; a damaged file is logged."""
     found = {}
     for record in records:
-        if record.collision is None:
+        if record.worst_violation is None:
             continue
         file = folder / FAILURES / series_name(record.index)
         actual = sha256(file)

@@ -5,6 +5,7 @@ of lines 13-16 in `risk_sac.agents`. The learner forms the reward of lines 9-10 
 """
 
 import time
+from collections.abc import Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +17,12 @@ import torch
 from risk_sac.agents.replay import Transition
 from risk_sac.config import RunSpec
 from risk_sac.guarded_env import GuardedEnv, Unplayable
-from risk_sac.records import RECORDED, Collision, EpisodeRecord, Outcome, RunMetrics, SeriesFile
+from risk_sac.records import RECORDED, Ending, EpisodeRecord, RequirementResult, RunMetrics, SeriesFile
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run import RunState, RunSummary
 from risk_sac.run_folder.crashes import CrashGuard
-from risk_sac.scene_optimizer import Encounter
+from risk_sac.scene_optimizer import NOBODY, Encounter
 from risk_sac.types import Floats, Scene
 
 
@@ -114,10 +115,14 @@ def episode(run: RunState, env: GuardedEnv) -> EpisodeRecord:
     except Unplayable as unplayable:
         run.searchers.tell(point, None)
         return _record(run, seed, scene, tally, unplayable=unplayable)
-    collision = info.get("collision")
-    encounter = Encounter(collision=collision, encounters_s=run.env.trace.encounters_s(run.problem.family.adversaries))
+    kept = run.env.requirement_results()
+    encounter = Encounter(
+        collision=info.get("collision"),
+        violations=run.env.violations(kept),
+        encounters_s=run.env.trace.encounters_s(run.problem.family.adversaries),
+    )
     objective = run.searchers.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
-    return _record(run, seed, scene, tally, genes=genes, objective=objective, collision=collision)
+    return _record(run, seed, scene, tally, genes=genes, objective=objective, kept=kept, encounter=encounter)
 
 
 @dataclass(slots=True)
@@ -146,17 +151,19 @@ def _record(
     unplayable: Unplayable | None = None,
     genes: Floats | None = None,
     objective: float | None = None,
-    collision: Collision | None = None,
+    kept: Mapping[str, RequirementResult] | None = None,
+    encounter: Encounter = NOBODY,
 ) -> EpisodeRecord:
-    outcome, reason = (unplayable.outcome, unplayable.reason) if unplayable else _ending(collision)
+    ending = Ending.of(encounter.collision, encounter.violations)
+    if unplayable is not None:
+        ending = Ending(unplayable.outcome, unplayable.reason, ())
     begun = unplayable is None or unplayable.begun  # else the environment's trace is of the episode before
     return EpisodeRecord(
         index=len(run.records),
         phase=RECORDED[run.phase],
         seed=seed,
         scene=scene.values,
-        outcome=outcome,
-        reason=reason,
+        **ending._asdict(),
         steps=tally.steps,
         risk_return=tally.risk_return,
         shaped_return=tally.shaped_return,
@@ -168,15 +175,10 @@ def _record(
         environment_steps=run.environment_steps + tally.steps,
         objective=objective,
         script=None if genes is None else tuple(genes.tolist()) or None,
-        collision=collision,
+        requirements=kept or {},
+        violations=encounter.violations,
+        collision=encounter.collision,
     )
-
-
-def _ending(collision: Collision | None) -> tuple[Outcome, str]:
-    """Outcome of an episode that was played to its end, and the validity rules that its contact breaks."""
-    if collision is None:
-        return Outcome.SAFE, ""
-    return (Outcome.FAILURE if collision.valid else Outcome.DEGENERATE), ", ".join(collision.broken)
 
 
 def episode_seed(run_seed: int, index: int) -> int:

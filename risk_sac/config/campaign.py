@@ -5,7 +5,7 @@ The same `CampaignSpec` is the REST body, the CLI's YAML and the stored record.
 
 import hashlib
 import re
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, StringConstraints, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
@@ -48,9 +48,13 @@ class Requirement(Settings):
     """One STL requirement over the published signals; past-time operators only."""
 
     name: Identifier
-    formula: Annotated[str, Field(min_length=1, max_length=500)]
-    scale: Annotated[float, Field(ge=1e-3, le=1e6)]
+    """One's own, or that of a shipped requirement, of which only `counts` is then given."""
+    formula: Annotated[str, Field(max_length=500)] = ""
+    """Needed for a requirement of one's own."""
+    scale: Annotated[float, Field(ge=1e-3, le=1e6)] = 1.0
     """Physical size of a clear margin, in the formula's unit; robustness is divided by it."""
+    counts: Literal["failure", "report"] = "failure"
+    """failure: an episode that violates it is a failure. report: it is measured and reported only."""
     shapes: bool = True
     """Whether it counts in the soft minimum and so in the reward's shaping; if not, it is only monitored."""
 

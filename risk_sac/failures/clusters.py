@@ -8,7 +8,7 @@ import numpy as np
 
 from risk_sac.metrics.features import outcome_features
 from risk_sac.records import Collision, EpisodeRecord, Grade, Record
-from risk_sac.verdicts.distinct import CELLS, distinct_failures, kind_of, signature_of
+from risk_sac.verdicts.distinct import CELLS, distinct_failures, kind_of
 
 WIDTH = 0.25  # of the outcome features' ranges: failures farther apart than that are not much alike
 
@@ -48,7 +48,7 @@ def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:
         collision = episode.collision
         if collision is None or not collision.valid or collision.judgement is None:
             continue
-        found[signature_of(collision)].append((name, episode, collision))
+        found[collision.signature].append((name, episode, collision))
         kinds.add(kind_of(collision, collision.judgement))
     distinct = {}
     for name, members in found.items():

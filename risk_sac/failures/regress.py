@@ -28,7 +28,6 @@ from risk_sac.records import Collision, Outcome
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import distinct_failures
 from risk_sac.types import Floats, Scene
-from risk_sac.verdicts.distinct import signature_of
 
 WORSE = (Verdict.FIXED, Verdict.NOT_COMPARABLE, Verdict.NEW_KIND, Verdict.STILL_FAILING)
 BLIND = "seen_before"  # the rule that an ego breaks by seeing nothing: no way to be fixed
@@ -58,7 +57,7 @@ def regress(bundle: Bundle, ego: EgoConfig) -> Regressed:
     case = Case(
         id=manifest.id,
         digest=manifest.digest,
-        name=signature_of(collision) if collision else "no contact",
+        name=collision.signature if collision else "no contact",
         grade=collision.judgement.grade if collision and collision.judgement else None,
         verdict=ending.verdict,
         reason=ending.reason,
@@ -138,7 +137,7 @@ def _compared(found: Collision | None, wanted: Collision) -> _Ending:
     if found is None:
         return _Ending(Verdict.FIXED, "nobody is touched")
     touched = f"touches {found.other_id} at {found.ego_speed_mps:.1f} m/s"
-    kind = signature_of(found)
+    kind = found.signature
     if alike(found, wanted):
         return _Ending(Verdict.STILL_FAILING, touched, kind)
     if found.valid:

@@ -12,7 +12,8 @@ from risk_sac.records import Counts, EpisodeRecord, Record, RunMetrics
 HISTOGRAMS = ("signatures", "conflicts_by_second", "contacts_by_second")
 
 # Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
-FIELDS_ADDED_LATER = frozenset({"judgement", "noticed_s", "script"})
+FIELDS_ADDED_LATER = frozenset({"judgement", "noticed_s", "script", "requirements", "violations", "failed"})
+EMPTY: tuple[object, ...] = (None, (), {})
 
 
 class MetricsAccumulator:
@@ -42,6 +43,7 @@ class MetricsAccumulator:
         return RunMetrics(
             **{name: getattr(tally, name) for name in (*Counts.model_fields, *HISTOGRAMS)},
             **_figures(tally),
+            requirements=tally.requirement_counts(),
             steps_per_distinct_failure=steps_per_distinct_failure(tally),
             dual_variable=self._dual_variable,
             temperature=self._temperature,
@@ -75,7 +77,7 @@ def results_digest(records: Sequence[EpisodeRecord]) -> str:
 def _plain(value: object) -> dict[str, Any]:
     """Records and mappings as dicts, shallowly; `json` comes back for what they contain."""
     if isinstance(value, Record):
-        return {name: each for name, each in value if each is not None or name not in FIELDS_ADDED_LATER}
+        return {name: each for name, each in value if each not in EMPTY or name not in FIELDS_ADDED_LATER}
     if isinstance(value, Mapping):
         return dict(value)
     raise TypeError(f"{value!r} of {type(value).__name__} has no canonical JSON; wanted a record of plain values")

@@ -91,7 +91,7 @@ def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
 
 
 def pooled_signatures(metrics: Sequence[RunMetrics]) -> dict[str, int]:
-    """Valid failures per signature over the runs, in the order in which the runs first met them."""
+    """Valid violations per signature over the runs, in the order in which the runs first met them."""
     pooled: Counter[str] = Counter()
     for each in metrics:
         pooled.update(each.signatures)

@@ -17,21 +17,21 @@ PER_STEPS = 1000  # environment steps over which the rate of distinct failures i
 
 
 def effective_collision_rate(counts: Counts) -> float:
-    """ECR: valid collisions per episode, rejected scenes included, invalid ones not; 0 without. Source: Sec. IV."""
-    return _share(counts.failures, counts.driven)
+    """ECR: valid contacts per episode, rejected scenes included, invalid ones not; 0 without. Source: Sec. IV."""
+    return _share(counts.collisions, counts.driven)
 
 
 def preventable_collision_rate(counts: Counts) -> float:
     """PCR: the preventable ones per episode."""
-    return _share(counts.preventable, counts.driven)
+    return _share(counts.preventable_collisions, counts.driven)
 
 
 def efficiency_score(tally: Tally) -> float:
     """How much of the horizon an episode saves by failing early, ES.
 
-    ES = 1 - (mean steps to the first valid collision) / T
+    ES = 1 - (mean steps to the first valid contact) / T
 
-    Choice: an episode without a valid collision counts T, and so does a rejected scene.
+    Choice: an episode without a valid contact counts T, and so does a rejected scene.
 
     Returns:
         In [0, 1]; 0 without episodes or without failures.
@@ -50,16 +50,16 @@ def cost_rate(tally: Tally) -> float:
 
 
 def outcome_dispersion(tally: Tally) -> float | None:
-    """Mean distance between two failures, OFD.
+    """Mean distance between two valid contacts, OFD.
 
     OFD = 2 / (n (n - 1)) Σ_{i<j} ||x_i - x_j|| / √(number of features)
 
     Returns:
-        In [0, 1]; None with fewer than two failures.
+        In [0, 1]; None with fewer than two.
 
     Source: RISK-SAC, Sec. IV; √features brings the largest distance to 1.
     """
-    pairs: float = tally.failures * (tally.failures - 1) / 2
+    pairs: float = tally.collisions * (tally.collisions - 1) / 2
     return tally.distance / pairs / math.sqrt(len(FEATURES)) if pairs else None
 
 
@@ -84,7 +84,7 @@ METRICS = (
     Metric(
         name="ecr",
         symbol="ECR",
-        meaning="valid failures / episodes",
+        meaning="valid contacts / episodes",
         formula=effective_collision_rate,
         field="ecr",
         trials=lambda counts: counts.driven,
@@ -92,7 +92,7 @@ METRICS = (
     Metric(
         name="pcr",
         symbol="PCR",
-        meaning="preventable failures / episodes: valid ones that the careful driver would have prevented",
+        meaning="preventable contacts / episodes: valid ones that the careful driver would have prevented",
         formula=preventable_collision_rate,
         field="pcr",
         trials=lambda counts: counts.driven,
@@ -100,7 +100,7 @@ METRICS = (
     Metric(
         name="acr",
         symbol="ACR",
-        meaning="avoidable failures / episodes: valid ones that the careful driver, or full braking at once, would "
+        meaning="avoidable contacts / episodes: valid ones that the careful driver, or full braking at once, would "
         "have prevented",
         formula=lambda counts: _share(counts.avoidable, counts.driven),
         trials=lambda counts: counts.driven,
@@ -130,7 +130,7 @@ METRICS = (
         name="es",
         symbol="ES",
         words="efficiency",
-        meaning="1 − (mean steps to the valid failure) / T; an episode without one counts the horizon T",
+        meaning="1 − (mean steps to the valid contact) / T; an episode without one counts the horizon T",
         formula=efficiency_score,
         field="efficiency",
     ),
@@ -146,7 +146,7 @@ METRICS = (
         name="ofd",
         symbol="OFD",
         words="dispersion",
-        meaning="mean distance between two valid failures of a run in outcome features, in [0, 1]",
+        meaning="mean distance between two valid contacts of a run in outcome features, in [0, 1]",
         formula=outcome_dispersion,
         field="dispersion",
     ),
@@ -169,7 +169,7 @@ METRICS = (
     Metric(
         name="covered",
         symbol="kinds",
-        meaning="cells of the fixed taxonomy of failures that a valid one lies in",
+        meaning="cells of the fixed taxonomy of contacts that a valid one lies in",
         formula=lambda tally: len(tally.kinds),
         field="covered",
         search_only=True,
@@ -209,7 +209,7 @@ RATIOS = (
         name="degenerate_rate",
         symbol="degenerate",
         meaning="all refused contacts / episodes, artefacts among them",
-        formula=lambda counts: _share(counts.raw_collisions - counts.failures, counts.driven),
+        formula=lambda counts: _share(counts.raw_collisions - counts.collisions, counts.driven),
     ),
     Ratio(
         name="rejected_rate",
@@ -220,8 +220,8 @@ RATIOS = (
     Ratio(
         name="unresponsive_share",
         symbol="unresponsive",
-        meaning="valid failures with a visible collision course of at least 1.5 s during which the ego never braked / "
-        "valid failures",
-        formula=lambda counts: counts.unresponsive / counts.failures if counts.failures else None,
+        meaning="valid contacts with a visible collision course of at least 1.5 s during which the ego never braked / "
+        "valid contacts",
+        formula=lambda counts: counts.unresponsive / counts.collisions if counts.collisions else None,
     ),
 )

@@ -15,23 +15,29 @@ from risk_sac.records.campaign import (
     Total,
 )
 from risk_sac.records.episode import (
-    ARTEFACT_RULES,
     RECORDED,
-    REPEATS,
-    Collision,
-    ConflictType,
+    Ending,
     Episode,
     EpisodePage,
     EpisodeRecord,
     Failure,
-    Grade,
-    Judgement,
     Outcome,
     Phase,
-    ReferenceOutcome,
     Repetition,
     SeriesFile,
     Triage,
     TriageState,
 )
-from risk_sac.records.run import FINAL, Counts, Funnel, Run, RunMetrics, RunResult, RunSummary, State
+from risk_sac.records.run import FINAL, Counts, Funnel, RequirementCounts, Run, RunMetrics, RunResult, RunSummary, State
+from risk_sac.records.violation import (
+    ARTEFACT_RULES,
+    NO_CONTACT,
+    REPEATS,
+    Collision,
+    ConflictType,
+    Grade,
+    Judgement,
+    ReferenceOutcome,
+    RequirementResult,
+    Violation,
+)

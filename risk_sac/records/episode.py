@@ -1,174 +1,25 @@
-"""One episode: how it ended, how its contact came about, and what people made of it."""
+"""One episode: how it ended, which requirements it violated, and how people triaged it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
-from typing import Any, Literal
-
-from pydantic import AliasChoices, Field
+from typing import Any, Literal, NamedTuple
 
 from risk_sac.records.base import Least, Page, Real, Record
 from risk_sac.records.run import Funnel
+from risk_sac.records.violation import Collision, RequirementResult, Violation
 from risk_sac.series import Series
-
-REPEATS = "repeats"  # rule that a contact fails if its replay goes another way; asked of nothing else
-# Rules among a collision's verdicts that are about the simulator or the control, not about fault.
-ARTEFACT_RULES = frozenset(
-    {
-        REPEATS,
-        "no_teleport",
-        "no_spawn_overlap",
-        "conflict_after_release",
-        "inside_limits",
-        "inside_grip",
-        "solid_bodies",
-        "ego_model_saw",
-    }
-)
 
 
 class Outcome(StrEnum):
     """How an episode ended; exactly one holds."""
 
     REJECTED = "rejected"  # C_hard refused the scene; nothing was simulated
-    SAFE = "safe"  # the horizon passed without contact
-    DEGENERATE = "degenerate"  # raw contact that a validity rule refused
-    FAILURE = "failure"  # valid collision
-    INVALID = "invalid"  # the ego failed to drive; no rate counts it
-
-
-class ConflictType(StrEnum):
-    """How the striker came into the ego's way."""
-
-    CUT_IN = "cut_in"
-    LEADER = "leader"
-    PEDESTRIAN = "pedestrian"
-    CROSSING = "crossing_vehicle"
-
-
-class Grade(StrEnum):
-    """Which reference driver would have prevented a valid failure; PCR counts `CAREFUL`."""
-
-    CAREFUL = "careful"  # the careful driver would not have touched: preventable
-    IDEAL = "ideal"  # full braking at once alone would not have
-    UNAVOIDABLE = "unavoidable"
-
-
-def _early(name: str) -> Any:
-    """A minimum that ends 1 s before the contact is called so; under its plain name in what was stored before."""
-    return Field(validation_alias=AliasChoices(f"early_{name}", name), serialization_alias=f"early_{name}")
-
-
-class ReferenceOutcome(Record):
-    """How a reference driver fares in the ego's place."""
-
-    avoids: bool
-    """No contact, or it stands when it is struck, or is struck from behind; false if it passed the striker before."""
-    impact_speed_mps: Real
-    """Of the reference driver at its contact, or where it has passed the ego; 0 if it avoids."""
-
-
-class Judgement(Record):
-    """How a contact came about, and which reference driver would have prevented it. Times count from the release."""
-
-    definitions: int
-    """Version of the definitions it was judged by."""
-    conflict_type: ConflictType
-    """How the striker came into the ego's way."""
-    conflict_s: Real
-    """When the conflict began; negative before the release."""
-    noticed_s: float | None = None
-    """The same for a wary driver, for which an actor that hangs over its line or could not stop gently is in conflict;
-    `conflict_after_release` goes by it. Null in older records."""
-    conflict_x_m: Real
-    """Where the striker was then, on the map."""
-    conflict_y_m: Real
-    position: str
-    """ahead | alongside: the striker, seen from the ego, when the conflict began."""
-    hidden: bool
-    """Whether the ego knew nothing of the striker when the conflict began."""
-    ego_manoeuvre: str
-    """straight | left_turn | right_turn | lane_change"""
-    ego_response: str
-    """none | late_braking | braking | standing | starting"""
-    ground: str
-    """lane | junction | crossing | beside_crossing: where the striker was struck."""
-    broke: tuple[str, ...]
-    """What the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red."""
-    unresponsive: bool
-    """A visible collision course of 1.5 s or more during which the ego never braked."""
-    grade: Grade | None
-    """careful | ideal | unavoidable: the driver that would have prevented it; null where it is not valid."""
-    drivers: Mapping[str, ReferenceOutcome]
-    """Reference driver → how it fares; empty where the contact is not valid."""
-    signature: str
-    """The class of failures it belongs to, in words; what differs in it is distinct."""
-
-
-class Collision(Record):
-    """The ego's first contact with another actor, with everything later tiers need to judge it."""
-
-    time_s: Real
-    """Since the adversaries' release."""
-    other_id: str
-    other_kind: str
-    """vehicle | pedestrian"""
-    other_role: str
-    """adversary | background"""
-    contact_x_m: Real
-    """Contact point ahead of the ego's centre."""
-    contact_y_m: Real
-    """Contact point to the ego's left."""
-    ego_zone: str
-    """front | left | right | rear: where the contact lies on the ego."""
-    other_zone: str
-    """The same on the other body."""
-    ego_speed_mps: Real
-    other_speed_mps: Real
-    relative_speed_mps: Real
-    lateral_offset_m: Real
-    """The other's centre across the ego's axis at contact."""
-    min_ttc_s: Least = _early("min_ttc_s")
-    """Until 1 s before the contact, at which it is 0 for every collision alike, as the episode's own minimum is."""
-    min_rss_margin_m: Least
-    visible_for_s: Real
-    """How long the ego had known of the other without a break before contact, its memory included; 0 if unseen."""
-    ego_peak_braking_mps2: Real
-    min_robustness: Least = _early("min_robustness")
-    """Soft minimum of the requirements, until 1 s before the contact too."""
-    simulator_agrees: bool | None
-    """Whether SUMO lists it within 0.3 s; null for pedestrians, bodies that part within the step, and an ego that SUMO
-    does not drive."""
-    verdicts: Mapping[str, bool] = {}
-    """Validity rule → passed."""
-    judgement: Judgement | None = None
-    """Null in what was stored before contacts were judged."""
-
-    @property
-    def valid(self) -> bool:
-        """Tier 2: every validity rule passed."""
-        return all(self.verdicts.values())
-
-    @property
-    def broken(self) -> tuple[str, ...]:
-        """The rules that it failed."""
-        return tuple(rule for rule, passed in self.verdicts.items() if not passed)
-
-    @property
-    def artefact(self) -> bool:
-        """Whether the simulator or the control made the contact, by one of `ARTEFACT_RULES`."""
-        return not ARTEFACT_RULES.isdisjoint(self.broken)
-
-    @property
-    def preventable(self) -> bool:
-        """Whether it is valid and the careful driver would have prevented it."""
-        return self.valid and self.judgement is not None and self.judgement.grade is Grade.CAREFUL
-
-    @property
-    def avoidable(self) -> bool:
-        """Whether it is valid, and the careful driver or full braking at once would have prevented it."""
-        return self.valid and self.judgement is not None and self.judgement.grade is not Grade.UNAVOIDABLE
+    SAFE = "safe"  # no requirement that counts was violated
+    DEGENERATE = "degenerate"  # one was, and a validity rule refused the violation
+    FAILURE = "failure"  # one was, and the violation is valid
+    INVALID = "invalid"  # the ego failed to answer; no rate counts it
 
 
 Phase = Literal["search", "evaluation", "iid"]
@@ -187,8 +38,10 @@ class EpisodeRecord(Record):
     scene: Mapping[str, Real]
     outcome: Outcome
     reason: str
-    """Rule that rejected the scene, validity rules that the contact failed, sim_crash, ego_deadline, ego_malformed,
+    """Rule that rejected the scene, validity rules that refused its violations, sim_crash, ego_deadline, ego_malformed,
     ego_crash or ego_off_road; else empty."""
+    failed: tuple[str, ...] = ()
+    """Requirements that count and were validly violated: what makes it a failure. Empty in older records."""
     steps: int
     risk_return: Real
     """Σ R_risk, of the risk reward alone."""
@@ -210,7 +63,22 @@ class EpisodeRecord(Record):
     """Of the run, up to and including this episode."""
     script: tuple[float, ...] | None = None
     """Genes of the scripts that the adversaries followed; null where a policy drove them."""
+    requirements: Mapping[str, RequirementResult] = {}
+    """Requirement → how far it was kept; empty where nothing was played, and in older records."""
+    violations: tuple[Violation, ...] = ()
+    """Violations without contact of requirements that count."""
     collision: Collision | None = None
+
+    @property
+    def valid_violations(self) -> tuple[Collision | Violation, ...]:
+        """What makes the episode a failure: valid violations of requirements that count, a contact first."""
+        contact = () if self.collision is None else (self.collision,)
+        return tuple(each for each in (*contact, *self.violations) if each.valid)
+
+    @property
+    def worst_violation(self) -> Collision | Violation | None:
+        """The violation that names the episode: a valid contact, the first valid violation, a refused contact."""
+        return next(iter(self.valid_violations), None) or self.collision or next(iter(self.violations), None)
 
     def id_in(self, run_id: str) -> str:
         """How the episode is called wherever it is spoken of, unique within a campaign."""
@@ -227,16 +95,38 @@ class EpisodeRecord(Record):
         return self.phase == RECORDED["evaluation"]
 
     def refused(self, rule: str) -> "EpisodeRecord":
-        """The same episode, whose contact fails one more rule; without a contact, the episode itself."""
-        if self.collision is None:
+        """The same episode, whose violations fail one more rule; without any, the episode itself."""
+        if self.worst_violation is None:
             return self
-        judgement = self.collision.judgement
-        if judgement is not None:  # drivers are asked of valid contacts alone
-            judgement = judgement.model_copy(update={"grade": None, "drivers": {}})
-        verdicts = {**self.collision.verdicts, rule: False}
-        collision = self.collision.model_copy(update={"verdicts": verdicts, "judgement": judgement})
-        ending = {"outcome": Outcome.DEGENERATE, "reason": ", ".join(collision.broken)}
-        return self.model_copy(update={"collision": collision} | ending)
+        ungraded: dict[str, Any] = {"grade": None, "drivers": {}}  # drivers are asked of what is valid alone
+        violations = tuple(
+            each.model_copy(update={"verdicts": {**each.verdicts, rule: False}, **ungraded}) for each in self.violations
+        )
+        collision = self.collision
+        if collision is not None:
+            judgement = collision.judgement and collision.judgement.model_copy(update=ungraded)
+            verdicts = {**collision.verdicts, rule: False}
+            collision = collision.model_copy(update={"verdicts": verdicts, "judgement": judgement})
+        told = {"collision": collision, "violations": violations}
+        return self.model_copy(update=told | Ending.of(collision, violations)._asdict())
+
+
+class Ending(NamedTuple):
+    """How an episode that was played to its end is recorded, by its violations of requirements that count."""
+
+    outcome: Outcome
+    reason: str
+    failed: tuple[str, ...]
+
+    @classmethod
+    def of(cls, collision: Collision | None, violations: Sequence[Violation]) -> "Ending":
+        """The ending of an episode with these violations."""
+        found: list[Collision | Violation] = [] if collision is None else [collision]
+        found += violations
+        failed = tuple(each.requirement for each in found if each.valid)
+        if failed or not found:
+            return cls(Outcome.FAILURE if failed else Outcome.SAFE, "", failed)
+        return cls(Outcome.DEGENERATE, ", ".join(dict.fromkeys(rule for each in found for rule in each.broken)), ())
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,20 +20,24 @@ class Counts(Record):
     """Scenes that were physically infeasible and not simulated."""
     raw_collisions: int = 0
     """Episodes in which the ego touched something."""
+    collisions: int = 0
+    """Valid contacts."""
     failures: int = 0
-    """Valid collisions."""
+    """Episodes in which a requirement that counts was violated, and the violation is valid."""
     distinct_failures: int = 0
-    """Valid collisions that resemble no earlier one of their run: another signature, or other outcome features."""
+    """Valid violations that resemble no earlier one of their run: another requirement, signature or features."""
     preventable: int = 0
-    """Valid collisions that the careful driver would have prevented, repetitions included."""
+    """Failures with a violation that the careful driver would have prevented, repetitions included."""
+    preventable_collisions: int = 0
+    """Valid contacts that the careful driver would have prevented."""
     avoidable: int = 0
     """These, and those that only full braking at once would have prevented."""
     distinct_preventable: int = 0
-    """The distinct ones among them: the last step of the funnel contacts → valid → distinct → preventable."""
+    """Distinct violations that the careful driver would have prevented."""
     artefacts: int = 0
     """Contacts that the simulator or the control made."""
     unresponsive: int = 0
-    """Valid collisions with a visible collision course of 1.5 s or more during which the ego never braked."""
+    """Valid contacts with a visible collision course of 1.5 s or more during which the ego never braked."""
     invalid: int = 0
     """Episodes in which the ego failed to drive; the rates leave them out."""
     environment_steps: int = 0
@@ -44,6 +48,25 @@ class Counts(Record):
         return self.episodes - self.invalid
 
 
+class RequirementCounts(Record):
+    """The funnel of one requirement: violated → valid → distinct → preventable, in episodes."""
+
+    counts: str
+    """failure | report"""
+    violated: int = 0
+    """Episodes in which it was violated after the adversaries' release."""
+    valid: int = 0
+    """Of these, those in which it counts and the violation is valid."""
+    distinct: int = 0
+    preventable: int = 0
+    """Distinct violations that the careful driver would have prevented."""
+    rate: Real = 0.0
+    """`valid` / episodes; of a requirement that is reported only, `violated` / episodes."""
+    rate_low: Real = 0.0
+    """95 % interval of Wilson."""
+    rate_high: Real = 1.0
+
+
 class RunMetrics(Counts):
     """What a run has achieved so far; rates come with their 95 % interval.
 
@@ -51,13 +74,13 @@ class RunMetrics(Counts):
     """
 
     ecr: Real
-    """Effective collision rate: valid collisions / episodes."""
+    """Effective collision rate: valid contacts / episodes."""
     ecr_low: Real
     ecr_high: Real
     window_ecr: Real
     """ECR over the newest 100 episodes."""
     pcr: Real = 0.0
-    """Preventable collision rate: valid collisions that the careful driver would have prevented / episodes."""
+    """Preventable collision rate: valid contacts that the careful driver would have prevented / episodes."""
     pcr_low: Real = 0.0
     pcr_high: Real = 1.0
     window_pcr: Real = 0.0
@@ -67,7 +90,7 @@ class RunMetrics(Counts):
     cost_rate: Real
     """Mean realism cost per step, in [0, 1]."""
     dispersion: float | None
-    """Outcome feature dispersion of the failures, in [0, 1]; null with fewer than two."""
+    """Outcome feature dispersion of the valid contacts, in [0, 1]; null with fewer than two."""
     dual_variable: Real
     """λ."""
     temperature: Real
@@ -75,23 +98,29 @@ class RunMetrics(Counts):
     steps_per_distinct_failure: float | None = None
     """Environment steps per distinct failure; null without one."""
     covered: int = 0
-    """Kinds of failures found: cells of the fixed taxonomy that a valid collision lies in."""
+    """Cells of the fixed taxonomy of contacts that a valid one lies in."""
     signatures: Mapping[str, int] = {}
-    """Signature → valid collisions, in the order in which they were first met."""
+    """Signature → valid violations, in the order in which they were first met."""
+    requirements: Mapping[str, RequirementCounts] = {}
+    """Requirement → its funnel; empty in what was stored before requirements were counted."""
     conflicts_by_second: tuple[int, ...] = ()
-    """Valid collisions by the second after the adversaries' release in which the conflict began."""
+    """Valid contacts by the second after the adversaries' release in which the conflict began."""
     contacts_by_second: tuple[int, ...] = ()
     """The same by the second of the contact."""
 
 
 class Funnel(Record):
-    """From what the ego touched to what is worth a person's time; each count is part of the one before."""
+    """From contacts to what is worth a person's time.
+
+    The steps after `contacts` count violations of every requirement that counts.
+    """
 
     contacts: int
     valid: int
+    """Failures."""
     distinct: int
     preventable: int
-    """Distinct failures that the careful driver would have prevented."""
+    """Distinct violations that the careful driver would have prevented."""
 
     @classmethod
     def of(cls, metrics: RunMetrics) -> "Funnel":

@@ -9,11 +9,13 @@ from typing import Any, TypeVar
 
 from risk_sac.config import Interval, Odd, Requirement, Scenery, Settings
 from risk_sac.errors import OddError
+from risk_sac.records import NO_CONTACT
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 MIN_TTC_S = 1.5  # below it a conflict counts as serious in traffic conflict studies
 UNDISTURBED_ENCOUNTER_S = 4.25  # what the signal encounter_s says in undisturbed traffic
+CONTACT_SCALE_M = 10.0
 PEDESTRIAN_GAP_M = 0.5  # what a driver leaves beside a pedestrian at walking pace, at the very least,
 PEDESTRIAN_GAP_PER_MPS = 0.1  # and so much more for each m/s: 1.9 m at 50 km/h
 PEDESTRIAN_SCALE_M = 11.0
@@ -121,9 +123,12 @@ def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
 def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...]:
     """The STL requirements that an ego has to meet in this ODD, thresholds included.
 
+    Contacts and entering on red make an episode a failure; the others are reported, unless a user lets them count.
+
     Choice: each scale is what undisturbed traffic leaves, so that its robustness is about 1 there and falls without
     a clip as danger grows; else the one with the smallest scale would be the soft minimum whatever happens.
 
+    - Contact: the bodies do not touch. It is no part of φ, since TTC, RSS and gaps lead up to it.
     - TTC: a second of margin after the ego's response time, and never under MIN_TTC_S. It is asked of the time to
       encounter, in which near misses count: the bare TTC is flat at its cap until a collision course begins, and then
       jumps.
@@ -146,15 +151,18 @@ def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...
     friction = odd.environment.friction
     grip_mps2 = EMERGENCY_BRAKING_MPS2 if friction is None else friction.low * GRAVITY_MPS2
     grip_mps2 = round(min(grip_mps2, EMERGENCY_BRAKING_MPS2), 2)
+    apart = "vehicle_gap_m > 0 and pedestrian_gap_m > 0"
     requirements = [
-        Requirement(name="safe_ttc", formula=f"encounter_s >= {ttc_s:g}", scale=ttc_scale_s),
-        Requirement(name="rss_margin", formula="rss_margin >= 0", scale=1.0),
+        Requirement(name=NO_CONTACT, formula=apart, scale=CONTACT_SCALE_M, shapes=False),
+        Requirement(name="safe_ttc", formula=f"encounter_s >= {ttc_s:g}", scale=ttc_scale_s, counts="report"),
+        Requirement(name="rss_margin", formula="rss_margin >= 0", scale=1.0, counts="report"),
     ]
     if "pedestrian" in (odd.dynamic.actor_kinds or ()):
         moving = f"pedestrian_gap_m >= {PEDESTRIAN_GAP_M:g} + {PEDESTRIAN_GAP_PER_MPS:g} * ego_speed_mps"
         standing = f"{STANDING_M / STANDING_MPS:g} * ego_speed_mps <= {STANDING_M:g}"
+        formula = f"{moving} or {standing}"
         requirements.append(
-            Requirement(name="pedestrian_gap", formula=f"{moving} or {standing}", scale=PEDESTRIAN_SCALE_M)
+            Requirement(name="pedestrian_gap", formula=formula, scale=PEDESTRIAN_SCALE_M, counts="report")
         )
     if set(odd.scenery.signal_types or ()) - {"none"}:
         formula = f"historically[0,{RED_LIGHT_HOLD_S:g}] (red_light_braking_mps2 <= {grip_mps2:g})"
@@ -162,7 +170,9 @@ def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...
         requirements.append(Requirement(name="no_red_light_entry", formula=formula, scale=scale))
     braking_mps2 = round(0.9 * grip_mps2, 2)
     formula = f"not historically[0,{BRAKING_HOLD_S:g}] (ego_braking_mps2 >= {braking_mps2:g})"
-    requirements.append(Requirement(name="bounded_braking", formula=formula, scale=braking_mps2, shapes=False))
+    requirements.append(
+        Requirement(name="bounded_braking", formula=formula, scale=braking_mps2, shapes=False, counts="report")
+    )
     return tuple(requirements)
 
 

@@ -18,7 +18,7 @@ from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision
 from risk_sac.scene_optimizer.base import Encounter, SceneOptimizer, State
 from risk_sac.types import Floats
-from risk_sac.verdicts.distinct import cell_of, signature_of
+from risk_sac.verdicts.distinct import cell_of
 
 INITIAL, RANDOM_SHARE = 12, 0.15  # points drawn at random: the first ones, and of the rest, where elites abound
 DEVIATIONS = (0.05, 0.15, 0.4)  # of a mutation
@@ -75,7 +75,7 @@ class Elites:
 
     def add_failure(self, point: Floats, collision: Collision, parent: Elite | None) -> None:
         """Adds a valid failure if it is the first in its niche, or worth more than that."""
-        kind = signature_of(collision)
+        kind = collision.signature
         niche = f"{kind} {cell_of(collision)}"
         known = self._failures.get(niche)
         worth = _worth(collision)

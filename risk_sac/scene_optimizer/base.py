@@ -13,7 +13,7 @@ import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
-from risk_sac.records import Collision
+from risk_sac.records import Collision, Violation
 from risk_sac.types import Floats
 
 State = dict[str, Any]
@@ -29,10 +29,12 @@ class Encounter:
 
     Attributes:
       collision: its contact, if there was one.
+      violations: of requirements that count, without contact.
       encounters_s: smallest time to encounter by adversary, s, while that is ahead and in sight and the ego moves.
     """
 
     collision: Collision | None = None
+    violations: tuple[Violation, ...] = ()
     encounters_s: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from risk_sac.errors import NotFinite
-from risk_sac.records import Collision, ConflictType, Judgement
+from risk_sac.records import Collision, ConflictType, Judgement, Violation
 
 KMH = 1 / 3.6
 # The edges between the cells of each feature.
@@ -23,6 +23,7 @@ EDGES = {
     "from_conflict_s": (2.0,),  # what the careful driver needs to be at full braking
 }
 Cell = tuple[int, ...]
+Niche = tuple[str, str, Cell]  # requirement, signature, cell
 # Choice: seen too late for any driver (0.6 s), too late for a careful one (2 s), or in time.
 VISIBLE_S = (0.6, 2.0)
 CLOSING_MPS = (5.0, 10.0)
@@ -32,66 +33,60 @@ VEHICLE_TYPES, ZONES = 3, 3  # cut-in, leader, crossing; front, left, right: a c
 CELLS = ROLES * MANOEUVRES * (VEHICLE_TYPES * ZONES + 1) * (len(VISIBLE_S) + 1) * 2 * (len(CLOSING_MPS) + 1)
 
 
-def signature_of(collision: Collision) -> str:
-    """Its judgement's; of one stored before contacts were judged, its striker."""
-    if collision.judgement is None:
-        return f"unjudged {collision.other_role} {collision.other_kind}"
-    return collision.judgement.signature
-
-
-def cell_of(collision: Collision) -> Cell:
-    """The cell of a failure within its signature.
+def cell_of(violation: Collision | Violation) -> Cell:
+    """The cell of a violation within its signature; without contact it has the ego's speed alone.
 
     Raises:
       NotFinite: a feature is NaN; infinite ones lie in the outermost cell.
     """
-    judged = collision.judgement
-    from_conflict_s = collision.time_s - judged.conflict_s if judged else 0.0
-    values = (collision.ego_speed_mps, collision.other_speed_mps, from_conflict_s)
+    values = [violation.ego_speed_mps]
+    if isinstance(violation, Collision):
+        judged = violation.judgement
+        values += [violation.other_speed_mps, violation.time_s - judged.conflict_s if judged else 0.0]
     if any(value != value for value in values):
-        named = dict(zip(EDGES, values, strict=True))
-        raise NotFinite(f"collision at {collision.time_s:g} s has {named}; wanted no NaN")
+        named = dict(zip(EDGES, values, strict=False))
+        raise NotFinite(f"{violation.requirement} violated at {violation.time_s:g} s has {named}; wanted no NaN")
     return cell(values)
 
 
 def cell(values: Sequence[float]) -> Cell:
-    """The cell of these values of the features of `EDGES`."""
-    return tuple(bisect_right(edges, value) for edges, value in zip(EDGES.values(), values, strict=True))
+    """The cell of these values of the first features of `EDGES`."""
+    return tuple(bisect_right(edges, value) for edges, value in zip(EDGES.values(), values, strict=False))
 
 
-def niche_of(collision: Collision) -> tuple[str, Cell]:
-    """What two failures share that are not distinct."""
-    return signature_of(collision), cell_of(collision)
+def niche_of(violation: Collision | Violation) -> Niche:
+    """What two violations share that are not distinct."""
+    return violation.requirement, violation.signature, cell_of(violation)
 
 
 class DistinctFailures:
     """Counts distinct failures, one by one; a policy that repeats its one way to make the ego fail is paid once."""
 
     def __init__(self) -> None:
-        self._found: set[tuple[str, Cell]] = set()
+        self._found: set[Niche] = set()
 
     @property
     def count(self) -> int:
         """Distinct failures so far; the same whatever their order."""
         return len(self._found)
 
-    def add(self, collision: Collision) -> bool:
-        """Whether a failure is distinct from all before it; it then counts among them.
+    def add(self, violation: Collision | Violation) -> bool:
+        """Whether a violation is distinct from all before it; it then counts among them.
 
         Raises:
           NotFinite: one of its features is NaN.
         """
-        niche = niche_of(collision)
+        niche = niche_of(violation)
         if niche in self._found:
             return False
         self._found.add(niche)
         return True
 
 
-def distinct_failures(collisions: Sequence[Collision]) -> tuple[int, ...]:
-    """Positions of the first of each kind among failures in order of occurrence; see `DistinctFailures`."""
+def distinct_failures(violations: Sequence[Collision | Violation]) -> tuple[int, ...]:
+    """Positions of the first of each kind among violations in order of occurrence; see `DistinctFailures`."""
     found = DistinctFailures()
-    return tuple(position for position, collision in enumerate(collisions) if found.add(collision))
+    return tuple(position for position, violation in enumerate(violations) if found.add(violation))
 
 
 class FailureKind(NamedTuple):

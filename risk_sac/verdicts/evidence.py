@@ -1,7 +1,7 @@
 """What is recorded of an episode up to its contact, as arrays: all that a judge may look at."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +83,11 @@ class Evidence:
             ground=ground,
             **values,
         )
+
+    def until(self, frame: int) -> "Evidence":
+        """The evidence up to and including a frame."""
+        over_time = ("time_s", *PER_ACTOR, "link", "known")
+        return replace(self, **{name: getattr(self, name)[: frame + 1] for name in over_time})
 
     def column(self, id_: str) -> int:
         """Column of an actor that is there in the last frame.

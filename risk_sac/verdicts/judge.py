@@ -10,12 +10,12 @@ from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.sim.collision import Contact
 from risk_sac.types import STEP_S, Frame, Kind, Role
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
+from risk_sac.verdicts.definitions import DEFINITIONS
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.labels import broken, ground, manoeuvre, response, signature
 from risk_sac.verdicts.reference import grade, reference_outcomes
 from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, validity_verdicts
 
-DEFINITIONS = 4  # raise it with whatever changes a verdict; what was judged before says by which it was
 WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
 
 

@@ -1,0 +1,47 @@
+"""The funnel of each requirement: counted over a run's episodes, and pooled over runs."""
+
+from collections.abc import Sequence
+
+from risk_sac.metrics.intervals import wilson_interval
+from risk_sac.records import Collision, RequirementCounts, RunMetrics, Violation
+from risk_sac.verdicts.distinct import DistinctFailures
+
+STEPS = ("violated", "valid", "distinct", "preventable")
+
+
+class RequirementTally:
+    """Counts the episodes that violated one requirement."""
+
+    def __init__(self, counts: str) -> None:
+        self._counts = counts
+        self.violated = self._valid = 0
+        self._distinct, self._preventable = DistinctFailures(), DistinctFailures()
+
+    def add(self, violation: Collision | Violation) -> tuple[bool, bool]:
+        """Counts a valid violation; returns whether it is distinct, and distinct among the preventable ones."""
+        new = self._distinct.add(violation)  # the only one that may refuse it
+        self._valid += 1
+        return new, violation.preventable and self._preventable.add(violation)
+
+    def counts(self, driven: int) -> RequirementCounts:
+        """The funnel so far, given the episodes that rates are taken over."""
+        steps = (self.violated, self._valid, self._distinct.count, self._preventable.count)
+        return _funnel(self._counts, steps, driven)
+
+
+def pooled_requirements(metrics: Sequence[RunMetrics]) -> dict[str, RequirementCounts]:
+    """The funnel of each requirement, summed over the runs that have it."""
+    pooled = {}
+    for name in dict.fromkeys(name for each in metrics for name in each.requirements):
+        having = [each for each in metrics if name in each.requirements]
+        own = [each.requirements[name] for each in having]
+        steps = [sum(getattr(each, step) for each in own) for step in STEPS]
+        pooled[name] = _funnel(own[-1].counts, steps, sum(each.driven for each in having))
+    return pooled
+
+
+def _funnel(counts: str, steps: Sequence[int], driven: int) -> RequirementCounts:
+    funnel = dict(zip(STEPS, steps, strict=True))
+    hits = funnel["valid" if counts == "failure" else "violated"]
+    low, high = wilson_interval(hits, driven)
+    return RequirementCounts(counts=counts, **funnel, rate=hits / max(1, driven), rate_low=low, rate_high=high)
