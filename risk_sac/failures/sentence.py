@@ -10,7 +10,8 @@ from risk_sac.records import Collision
 from risk_sac.types import STEP_S, Floats, Kind
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
-from risk_sac.verdicts.labels import ONCOMING_COS, STANDING_MPS
+from risk_sac.verdicts.labels import ONCOMING_COS
+from risk_sac.verdicts.offences import STANDING_MPS
 
 IN_LANE_M = 1.5  # who is nearer to the ego's axis leads it, or follows
 ACROSS_MPS = 0.2  # slower than that nobody changes its place in a lane

@@ -28,9 +28,10 @@ NO_CONTACT = "no_contact"  # the requirement that a contact violates
 
 
 class ConflictType(StrEnum):
-    """How the striker came into the ego's way."""
+    """How the striker came into the ego's way, or the ego into the striker's."""
 
     CUT_IN = "cut_in"
+    MERGE = "merge"  # the ego came over to a vehicle beside it, which kept its lane
     LEADER = "leader"
     PEDESTRIAN = "pedestrian"
     CROSSING = "crossing_vehicle"
@@ -85,6 +86,8 @@ class Judgement(Record):
     """lane | junction | crossing | beside_crossing: where the striker was struck."""
     broke: tuple[str, ...]
     """What the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red."""
+    ego_broke: tuple[str, ...] = ()
+    """What the ego broke: red_light, priority, wrong_direction, speeding, off_road. Empty in older records."""
     unresponsive: bool
     """A visible collision course of 1.5 s or more during which the ego never braked."""
     grade: Grade | None

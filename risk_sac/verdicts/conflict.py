@@ -13,17 +13,20 @@ from risk_sac.geometry import Size
 from risk_sac.jit import compiled
 from risk_sac.records import ConflictType
 from risk_sac.types import Bools, Floats, Kind
-from risk_sac.verdicts.along import Along, along_series, lane_conflict
+from risk_sac.verdicts.along import WANDER_M, Along, lane_conflict
 from risk_sac.verdicts.course import HORIZON_S, Body, at, entry_distance, time_to_touch, with_margin
-from risk_sac.verdicts.evidence import Evidence, soon_inside
-from risk_sac.verdicts.path import Path, recorded_path
+from risk_sac.verdicts.evidence import Evidence, inside, soon_inside
+from risk_sac.verdicts.path import Path
+from risk_sac.verdicts.recorded import column, ego_path, lane_path, recorded_motion, recorded_size, seen_along
 
+BODY_M = 0.5  # from a pedestrian's centre: what a body on the kerb reaches of the carriageway
 KERB_S = 1.0  # a pedestrian this near to the carriageway is about to step onto it
 YIELDING_MPS2 = 3.4  # what a driver who means to stop brakes with
 FIRM_MPS2 = 6.0  # what one who brakes already can go up to, without an emergency
 SAME_WAY_COS = math.cos(math.radians(30.0))
 TURNING_COS = math.cos(math.radians(60.0))
 TURN_WINDOW_S = 3.0
+OVER_S = 1.0
 SETTLED_S = 2.0  # who has been in the ego's lane for so long is its leader, and no longer cuts in
 BRIDGE = 2  # frames, 0.2 s: a conflict interrupted for no longer has not ended
 UNRESPONSIVE_S = 1.5
@@ -43,13 +46,15 @@ class Conflict:
     position: str  # ahead | alongside
     hidden: bool  # the ego knew nothing of the striker when the bodies' motion made it a conflict
     course_from: int  # first frame of the visible collision course that lasted until the contact
+    in_lane: int  # the last frame in which the ego was in its lane: that of its beginning, unless it came over before
 
 
 def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     """The conflict with the actor in column `striker`, which lasted until the contact in the last frame.
 
     A conflict begins no earlier than the ego knows of the striker; with a pedestrian that steps out from behind a
-    truck, when it comes into sight. With one that nobody could see it begins with the contact.
+    truck, when it comes into sight. With one that nobody could see it begins with the contact. Where the ego came over
+    to the striker, it begins no earlier than the ego left its place in its lane.
     """
     path = ego_path(evidence)
     known = evidence.known[:, striker]
@@ -70,10 +75,13 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     noticed = _since(begins_if_wary & known, lasts_if_wary & known)
     unseen_if_wary = _since(begins_if_wary, lasts_if_wary)
     course_from = _since(course & known, course & known)
-    if same_way and unseen_if_wary == len(course) - 1:  # neither led nor cut in: the ego itself came over
+    if same_way and unseen_if_wary == len(course) - 1:  # neither led nor cut in
         frame, unseen = course_from, _since(course, course)
+    left = left_its_lane(evidence, striker)
+    if left is not None:
+        frame, noticed, unseen = (max(left, each) for each in (frame, noticed, unseen))
     return Conflict(
-        type=_type(evidence, striker, frame, same_way, seen.across_m),
+        type=_type(evidence, striker, frame, same_way, seen.across_m, came_over=left is not None),
         frame=frame,
         time_s=float(evidence.time_s[frame]),
         noticed_s=float(evidence.time_s[min(noticed, frame)]),
@@ -82,6 +90,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
         position="ahead" if seen.gap_m[frame] > 0.0 else "alongside",
         hidden=not known[unseen],
         course_from=course_from,
+        in_lane=frame if left is None else left - 1,
     )
 
 
@@ -89,6 +98,26 @@ def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wa
     e = evidence
     offset, accel = column(e.lane_offset_m, striker), column(e.accel_mps2, striker)
     return lane_conflict(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
+
+
+def left_its_lane(evidence: Evidence, striker: int) -> int | None:
+    """The frame in which the ego left its place in its lane and so came over to the striker; None if it did not.
+
+    Choice: it came over if it moved across its lane by more than 0.375 m in the last 3 s and would not have touched the
+    striker at the contact, or within 1 s after it, had it kept its place.
+    """
+    moved = evidence.moved_across_m(0)
+    kept_place = np.abs(moved - moved[evidence.since(TURN_WINDOW_S)]) <= WANDER_M
+    if kept_place[-1]:
+        return None
+    left = int(np.flatnonzero(kept_place)[-1]) + 1
+    path = lane_path(evidence, left - 1)
+    if path is None:
+        return None
+    striking = at(recorded_motion(evidence, striker), len(moved) - 1)
+    speed, size = float(evidence.speed_mps[-1, 0]), recorded_size(evidence, 0)
+    touches = time_to_touch(path, float(path.s[-1]), speed, size, striking, OVER_S) <= OVER_S
+    return None if touches else left
 
 
 def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
@@ -128,12 +157,15 @@ def collision_courses(path: Path, speed: Floats, size: Size, motion: Body[Floats
 
 
 def _at_the_carriageway(evidence: Evidence, striker: int) -> Bools:
-    """Whether the pedestrian is on the carriageway, or at most 1 s from its kerb."""
+    """Whether the pedestrian is on the carriageway, or at most 1 s from its kerb.
+
+    It is not asked of a pedestrian that was struck beside the carriageway: the ego came to it.
+    """
     e, ground = evidence, evidence.ground
-    if not ground.roadway:
+    x, y, areas = e.x_m[:, striker], e.y_m[:, striker], ground.roadway + ground.crossings
+    if not ground.roadway or not inside(areas, x[-1:], y[-1:], BODY_M)[0]:
         return np.ones(len(e.time_s), dtype=np.bool_)
-    areas = ground.roadway + ground.crossings
-    return soon_inside(areas, e.x_m[:, striker], e.y_m[:, striker], e.vx_mps[:, striker], e.vy_mps[:, striker], KERB_S)
+    return soon_inside(areas, x, y, e.vx_mps[:, striker], e.vy_mps[:, striker], KERB_S)
 
 
 def _drives_the_same_way(evidence: Evidence, striker: int, turn_rad: Floats) -> bool:
@@ -145,34 +177,6 @@ def _drives_the_same_way(evidence: Evidence, striker: int, turn_rad: Floats) -> 
         return False
     cos = np.cos(turn_rad[evidence.since(TURN_WINDOW_S) :])
     return bool(cos.max() > SAME_WAY_COS and cos.min() > TURNING_COS)
-
-
-def ego_path(evidence: Evidence) -> Path:
-    """The ego's recorded path."""
-    return recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
-
-
-def seen_along(path: Path, evidence: Evidence, striker: int) -> Along[Floats]:
-    """The striker along the ego's path, frame by frame."""
-    size, motion = recorded_size(evidence, 0), recorded_motion(evidence, striker)
-    return along_series(path, column(evidence.speed_mps, 0), size, motion)
-
-
-def recorded_motion(evidence: Evidence, actor: int) -> Body[Floats]:
-    """The body of an actor in every frame."""
-    e = evidence
-    x, y, heading, vx, vy = (column(each, actor) for each in (e.x_m, e.y_m, e.heading_rad, e.vx_mps, e.vy_mps))
-    return Body(x, y, heading, vx, vy, recorded_size(e, actor))
-
-
-def recorded_size(evidence: Evidence, actor: int) -> Size:
-    """The size of an actor."""
-    return Size(float(evidence.length_m[actor]) / 2, float(evidence.width_m[actor]) / 2)
-
-
-def column(values: Floats, actor: int) -> Floats:
-    """One actor's values, in one piece as compiled code likes them."""
-    return np.ascontiguousarray(values[:, actor])
 
 
 def _way_to_corridor(path: Path, evidence: Evidence, striker: int) -> Floats:
@@ -199,11 +203,15 @@ def _cannot_stop(to_go_m: Floats, evidence: Evidence, striker: int, *, wary: boo
     return found
 
 
-def _type(evidence: Evidence, striker: int, frame: int, same_way: bool, across_m: Floats) -> ConflictType:
+def _type(
+    evidence: Evidence, striker: int, frame: int, same_way: bool, across_m: Floats, *, came_over: bool
+) -> ConflictType:
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         return ConflictType.PEDESTRIAN
     if not same_way:
         return ConflictType.CROSSING
     first = int(np.searchsorted(evidence.time_s, evidence.time_s[frame] - SETTLED_S - 1e-6))
     settled = (np.abs(across_m[first : frame + 1]) <= evidence.ground.lane_width_m / 2).all()
-    return ConflictType.LEADER if settled else ConflictType.CUT_IN
+    if settled:
+        return ConflictType.LEADER
+    return ConflictType.MERGE if came_over else ConflictType.CUT_IN

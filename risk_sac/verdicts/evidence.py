@@ -106,16 +106,13 @@ class Evidence:
         """The first frame of the last `before_s` seconds."""
         return int(np.searchsorted(self.time_s, self.time_s[-1] - before_s - 1e-6))
 
-    def unwrapped_offset_m(self, column: int) -> Floats:
-        """Offset from the centre of the lane that the actor is on in the first frame, `T`.
+    def moved_across_m(self, actor: int) -> Floats:
+        """How far an actor has moved across its lanes since the first frame, `T`, m, positive to the left.
 
-        SUMO's offset jumps by a lane's width when the vehicle's centre passes to the next lane.
+        It says nothing of the lane's centre, and so it is the same over a lane change and beside the road.
         """
-        offset = self.lane_offset_m[:, column]
-        width = self.ground.lane_width_m
-        steps = np.diff(offset, prepend=offset[:1])
-        unwrapped: Floats = offset[0] + np.cumsum(steps - width * np.round(steps / width))
-        return unwrapped
+        moved: Floats = np.cumsum(self.lateral_mps[:, actor]) * self.step_s
+        return moved
 
 
 def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.0) -> Bools:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from risk_sac.records import Collision, Judgement
+from risk_sac.records import Collision, ConflictType, Judgement
 from risk_sac.risk.measures import Measures
 from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
@@ -12,7 +12,8 @@ from risk_sac.types import STEP_S, Frame, Kind, Role
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.definitions import DEFINITIONS
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.labels import broken, ground, manoeuvre, response, signature
+from risk_sac.verdicts.labels import ground, manoeuvre, response, signature
+from risk_sac.verdicts.offences import ego_offences, striker_offences
 from risk_sac.verdicts.reference import grade, reference_outcomes
 from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, validity_verdicts
 
@@ -71,7 +72,9 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
     striker = evidence.column(striker_id)
     conflict = conflict or find_conflict(evidence, striker)
     ego_manoeuvre, ego_response = manoeuvre(evidence), response(evidence, conflict)
-    where, broke = ground(evidence, striker), broken(evidence, striker, conflict)
+    where, crossing = ground(evidence, striker), conflict.type is ConflictType.CROSSING
+    broke = striker_offences(evidence, striker, crossing=crossing)
+    ego_broke = ego_offences(evidence, striker, crossing=crossing)
     drivers = reference_outcomes(evidence, striker, conflict) if valid else {}
     return Judgement(
         definitions=DEFINITIONS,
@@ -86,10 +89,18 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
         ego_response=ego_response,
         ground=where,
         broke=broke,
+        ego_broke=ego_broke,
         unresponsive=unresponsive(evidence, conflict),
         grade=grade(drivers) if valid else None,
         drivers=drivers,
         signature=signature(
-            evidence, striker, conflict, manoeuvre=ego_manoeuvre, response=ego_response, ground=where, broke=broke
+            evidence,
+            striker,
+            conflict,
+            manoeuvre=ego_manoeuvre,
+            response=ego_response,
+            ground=where,
+            broke=broke,
+            ego_broke=ego_broke,
         ),
     )

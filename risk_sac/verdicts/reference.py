@@ -12,11 +12,11 @@ from risk_sac.records import ConflictType, Grade, ReferenceOutcome
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import HEADING, LENGTH, WIDTH, Floats, X, Y
 from risk_sac.verdicts.along import Along
-from risk_sac.verdicts.conflict import Conflict, ego_path, recorded_motion, recorded_size, seen_along
-from risk_sac.verdicts.course import Body
+from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path
+from risk_sac.verdicts.recorded import ego_path, lane_path, recorded_motion, recorded_size, seen_along
 from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, drive
 
 # Who perceives, and how long after the conflict began. Choice: fsm and rss look out from the beginning of the conflict
@@ -27,23 +27,41 @@ R157_BRAKES_MPS2, R157_DELAY_S = 6.0, 0.35
 # Choice: who was further along than the ego by the time of the contact, and so is missed, avoids it by being faster and
 # not by care. Such is a driver who brakes later than the ego did for a pedestrian that then runs into the ego's flank.
 LEAD_M = 0.1
+NEAR_M = 30.0  # further from the ego's place than that, an actor is not in the way of a reference driver
 AVOIDED = ReferenceOutcome(avoids=True, impact_speed_mps=0.0)
 
 
 def reference_outcomes(evidence: Evidence, striker: int, conflict: Conflict) -> Mapping[str, ReferenceOutcome]:
     """How each reference driver fares in the ego's place against the actor in column `striker`.
 
+    A reference driver brakes and does not steer: it keeps the lane that the ego was in when the conflict began, or when
+    the ego left it for the striker. Where the ego left its lane, others may be in the reference driver's way, so it has
+    to avoid them too.
     `r157_ttc` speaks of cut-ins only and is left out of everything else.
     """
-    path, motion = ego_path(evidence), recorded_motion(evidence, striker)
-    track = motion._replace(heading=np.unwrap(motion.heading))
-    outcomes = {
-        name: _outcome(evidence, path, track, driver, conflict.frame, perceives_s)
-        for name, (driver, perceives_s) in DRIVERS.items()
-    }
+    recorded, kept = ego_path(evidence), lane_path(evidence, conflict.in_lane)
+    outcomes = {}
+    for name, (driver, perceives_s) in DRIVERS.items():
+        if kept is None:
+            outcomes[name] = _outcome(evidence, recorded, striker, driver, conflict.frame, perceives_s)
+        else:
+            each = (
+                _outcome(evidence, kept, other, driver, conflict.frame, perceives_s, kept=True)
+                for other in (striker, *_met(evidence, kept, striker))
+            )
+            outcomes[name] = next((outcome for outcome in each if not outcome.avoids), AVOIDED)
     if conflict.type is ConflictType.CUT_IN:
-        outcomes["r157_ttc"] = _by_ttc(evidence, path, striker)
+        outcomes["r157_ttc"] = _by_ttc(evidence, recorded, striker)
     return outcomes
+
+
+def _met(evidence: Evidence, path: Path, striker: int) -> list[int]:
+    """The other actors that the ego knew of and that came near its place on a path that it did not take."""
+    e = evidence
+    apart_m = np.hypot(e.x_m - path.x[:, None], e.y_m - path.y[:, None])
+    near = np.where(e.known & np.isfinite(apart_m), apart_m, np.inf).min(axis=0) <= NEAR_M
+    near &= np.isfinite(e.x_m[-1])
+    return [int(i) for i in np.flatnonzero(near) if i not in (0, striker)]
 
 
 def grade(outcomes: Mapping[str, ReferenceOutcome]) -> Grade:
@@ -54,20 +72,24 @@ def grade(outcomes: Mapping[str, ReferenceOutcome]) -> Grade:
 
 
 def _outcome(
-    evidence: Evidence, path: Path, track: Body[Floats], driver: int, began: int, perceives_s: float
+    evidence: Evidence, path: Path, other: int, driver: int, began: int, perceives_s: float, *, kept: bool = False
 ) -> ReferenceOutcome:
-    e, size = evidence, recorded_size(evidence, 0)
+    """How a driver fares against one actor; `kept`: on a path that the ego did not take."""
+    e, size, motion = evidence, recorded_size(evidence, 0), recorded_motion(evidence, other)
+    track = motion._replace(heading=np.unwrap(motion.heading))
     first = began + round(perceives_s / e.step_s)
-    if first >= len(e.time_s) - 1:  # it is struck before it perceives
+    if first >= len(e.time_s) - 1:  # the ego is struck before the driver perceives
+        if kept:
+            return AVOIDED
         speed = float(e.speed_mps[-1, 0])
-        pose, other = ((each.x[-1], each.y[-1], each.heading[-1]) for each in (path, track))
-        ending = Ending(True, speed, pose, other, lead_m=0.0, passing_mps=speed)
+        pose, other_pose = ((each.x[-1], each.y[-1], each.heading[-1]) for each in (path, track))
+        ending = Ending(True, speed, pose, other_pose, lead_m=0.0, passing_mps=speed)
     else:
         speed = float(e.speed_mps[first, 0])
         grip = e.ground.friction * GRAVITY_MPS2
         ending = drive(driver, path, size, track, first, speed, grip, HORIZON_S - perceives_s, e.step_s)
     blameless = not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, size, track.size)
-    if blameless and ending.lead_m <= LEAD_M:
+    if blameless and (kept or ending.lead_m <= LEAD_M):
         return AVOIDED
     return ReferenceOutcome(avoids=False, impact_speed_mps=float(ending.passing_mps if blameless else ending.speed_mps))
 

@@ -33,6 +33,7 @@ VALUES: Mapping[str, Mapping[object, str]] = {
     },
     "conflict_type": {
         ConflictType.CUT_IN: "cut-in",
+        ConflictType.MERGE: "merge of the ego",
         ConflictType.LEADER: "leader",
         ConflictType.CROSSING: "crossing vehicle",
         ConflictType.PEDESTRIAN: "pedestrian",

@@ -170,6 +170,12 @@ def hangs_over(at_s: float, comes_at_s: float) -> Evidence:
     return stage(straight(-1.5 * 12.0, 0.0, 0.0, 12.0), sideways(beside, comes_at_s, -1.2, LANE_M - 0.5))
 
 
+def merge(rate: float = 1.2, at_s: float = 2.0, side: int = 1, other_x: float = -2.0, speed: float = 12.0) -> Evidence:
+    """The ego moves over to a neighbour that keeps its lane, and its speed, `other_x` metres ahead of the ego."""
+    ego = sideways(straight(0.0, 0.0, 0.0, speed), at_s, side * rate, LANE_M)
+    return stage(ego, straight(other_x, side * LANE_M, 0.0, speed))
+
+
 def leader_brakes(gap: float = 20.0, speed: float = 14.0, braking: float = 8.0, at_s: float = 2.0) -> Evidence:
     """`gap` metres ahead at the ego's speed, it brakes to a standstill."""
     return stage(straight(0.0, 0.0, 0.0, speed), straight(CAR_M[0] + gap, 0.0, 0.0, speed, (at_s, -braking)))

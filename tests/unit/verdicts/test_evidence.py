@@ -26,12 +26,10 @@ def test_what_is_stored_is_judged_alike(evidence: Evidence) -> None:
     assert again.model_copy(update={"conflict_s": first.conflict_s, "noticed_s": first.noticed_s}) == first
 
 
-def test_offsets_are_unwrapped_over_lane_changes() -> None:
+def test_what_moved_across_is_the_same_over_a_lane_change() -> None:
     evidence = cut_in(rate=1.2, at_s=2.0)
-    offset = evidence.unwrapped_offset_m(1)
-    assert offset[0] == pytest.approx(0.0, abs=1e-9)
-    assert np.abs(np.diff(offset)).max() <= 0.12 + 1e-9
-    assert offset[-1] == pytest.approx(evidence.y_m[-1, 1] - 3.3)
+    moved = evidence.moved_across_m(1)
+    assert moved - moved[0] == pytest.approx(evidence.y_m[:, 1] - evidence.y_m[0, 1])
 
 
 def test_the_last_seconds_are_counted_from_the_contact() -> None:

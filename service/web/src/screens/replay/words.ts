@@ -10,6 +10,7 @@ type Judgement = Body<"Judgement">;
 
 const CONFLICTS: Record<string, string> = {
   cut_in: "a cut-in",
+  merge: "the ego's move over to its neighbour",
   leader: "a leader that slows down",
   pedestrian: "a pedestrian in the way",
   crossing_vehicle: "a crossing vehicle",

@@ -3,11 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from risk_sac.records import ConflictType
 from risk_sac.scenario.ground import Area
-from risk_sac.types import Kind
+from risk_sac.types import Kind, Role
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.labels import broken
+from risk_sac.verdicts.offences import ego_offences, striker_offences
 from tests.unit.verdicts.staged import (
     STREET,
     crossing_car,
@@ -22,8 +23,18 @@ from tests.unit.verdicts.staged import (
 JUNCTION = (Area.box(45.0, 75.0, -15.0, 15.0),)
 
 
+def crosses(evidence: Evidence) -> bool:
+    return find_conflict(evidence, 1).type is ConflictType.CROSSING
+
+
 def labels(evidence: Evidence) -> tuple[str, ...]:
-    found, again = (broken(each, 1, find_conflict(each, 1)) for each in (evidence, mirrored(evidence)))
+    found, again = (striker_offences(each, 1, crossing=crosses(each)) for each in (evidence, mirrored(evidence)))
+    assert found == again
+    return found
+
+
+def of_ego(evidence: Evidence) -> tuple[str, ...]:
+    found, again = (ego_offences(each, 1, crossing=crosses(each)) for each in (evidence, mirrored(evidence)))
     assert found == again
     return found
 
@@ -120,3 +131,50 @@ def test_off_a_crossing_no_light_tells_a_pedestrian_anything() -> None:
     evidence = with_links(pedestrian_crosses(), [], [(0.0, "r")])
     assert evidence.kind[1] == Kind.PEDESTRIAN
     assert labels(replace(evidence, ground=replace(STREET, crossings=()))) == ()
+
+
+@pytest.mark.parametrize(
+    ("ego", "other", "expected"),
+    [
+        ([(0.0, "r"), (3.5, "")], GREEN, ("red_light",)),
+        ([(0.0, "y"), (3.5, "")], GREEN, ()),
+        ([(0.0, "r"), (3.0, "g"), (3.5, "")], GREEN, ("priority",)),  # it turned green before, but it has to yield
+        ([(0.0, "g"), (3.5, "")], [(0.0, "g"), (3.5, "")], ()),
+        ([(0.0, "g"), (3.5, "")], [(0.0, "r"), (3.5, "")], ()),
+        (GREEN, GREEN, ()),
+    ],
+)
+def test_what_the_ego_passed_its_stop_line_on(
+    ego: list[tuple[float, str]], other: list[tuple[float, str]], expected: tuple[str, ...]
+) -> None:
+    assert of_ego(crossing(ego, other)) == expected
+
+
+@pytest.mark.parametrize(("speed", "expected"), [(13.89 * 1.09, ()), (13.89 * 1.11, ("speeding",))])
+def test_an_ego_more_than_ten_percent_over_the_limit_speeds(speed: float, expected: tuple[str, ...]) -> None:
+    assert of_ego(crossing_car(ego=speed)) == expected
+
+
+@pytest.mark.parametrize(
+    ("link", "expected"),
+    [([], ("priority",)), ([(0.0, "G")], ("priority",)), ([(0.0, "r")], ())],
+    ids=["zebra", "on green", "on red"],
+)
+def test_a_pedestrian_on_a_crossing_has_priority_unless_it_stepped_out_on_red(
+    link: list[tuple[float, str]], expected: tuple[str, ...]
+) -> None:
+    assert of_ego(with_links(pedestrian_crosses(), [], link)) == expected
+    elsewhere = with_links(pedestrian_crosses(), [], link)
+    assert of_ego(replace(elsewhere, ground=replace(STREET, crossings=()))) == ()
+
+
+def test_a_pedestrian_that_walks_into_an_ego_on_the_crossing_has_lost_nothing() -> None:
+    ego, walker = straight(96.0, 0.0, 0.0, 2.0, start_s=0.0), straight(100.0, 8.0, -np.pi / 2, 2.6, start_s=0.0)
+    evidence = stage(ego, walker, kinds=(Kind.VEHICLE, Kind.PEDESTRIAN), from_s=0.0)
+    assert evidence.x_m[-1, 0] > 99.0
+    assert of_ego(evidence) == ()
+
+
+def test_background_traffic_is_taken_to_have_entered_on_green() -> None:
+    evidence = replace(crossing([(0.0, "g"), (3.5, "")], []), role=np.array([Role.EGO, Role.BACKGROUND], dtype=np.int8))
+    assert of_ego(evidence) == ("priority",)

@@ -1,0 +1,140 @@
+"""Rules of the road that the striker or the ego broke."""
+
+import math
+
+import numpy as np
+
+from risk_sac.types import Bools, Floats, Kind, Role
+from risk_sac.verdicts.evidence import Evidence, Letters, inside
+
+EGO = 0
+JUNCTION_S = 6.0  # the longest way through a junction
+RECENT_S = 3.0
+SPEEDING_FACTOR = 1.1
+STANDING_MPS = 0.5
+KERB_M = 0.5  # a pedestrian this near to a crossing is stepping onto it
+RED, MUST_YIELD, MAJOR = b"ru", b"g", b"G"
+IN_WORDS = {
+    "red_light": "on red",
+    "priority": "against priority",
+    "wrong_direction": "in the wrong direction",
+    "speeding": "speeding",
+    "off_road": "off the road",
+    "pedestrian_on_red": "on red",
+}
+
+
+def striker_offences(evidence: Evidence, striker: int, *, crossing: bool) -> tuple[str, ...]:
+    """Lists what the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red.
+
+    `crossing` says whether it is a vehicle that crossed the ego's way.
+    """
+    if evidence.kind[striker] == Kind.PEDESTRIAN:
+        return ("pedestrian_on_red",) if pedestrian_on_red(evidence, striker) else ()
+    rules = {
+        "red_light": entered_on(evidence, striker, RED),
+        "priority": crossing and took_priority(evidence, striker, EGO),
+        "wrong_direction": reverses(evidence, striker),
+        "speeding": speeds(evidence, striker),
+    }
+    return tuple(name for name, broke in rules.items() if broke)
+
+
+def ego_offences(evidence: Evidence, striker: int | None = None, *, crossing: bool = False) -> tuple[str, ...]:
+    """Lists what the ego broke: red_light, priority, wrong_direction, speeding, off_road.
+
+    Priority is asked towards a striker; an ego on red had none anyway.
+    """
+    red_light = entered_on(evidence, EGO, RED)
+    priority = False
+    if striker is not None and not red_light:
+        walks = evidence.kind[striker] == Kind.PEDESTRIAN
+        priority = took_crossing(evidence, striker) if walks else crossing and took_priority(evidence, EGO, striker)
+    rules = {
+        "red_light": red_light,
+        "priority": priority,
+        "speeding": speeds(evidence, EGO),
+    }
+    return tuple(name for name, broke in rules.items() if broke)
+
+
+def took_priority(evidence: Evidence, taker: int, other: int) -> bool:
+    """Whether a vehicle entered from a signal that told it to yield, and the other from one that did not.
+
+    Of background traffic no signals are recorded: SUMO's drivers enter on green.
+    """
+    if not entered_on(evidence, taker, MUST_YIELD):
+        return False
+    if evidence.role[other] == Role.BACKGROUND:
+        return True
+    ahead = evidence.link[evidence.since(JUNCTION_S) :, other]
+    shown = ahead[ahead != 0]
+    return bool(len(shown) and shown[-1] in MAJOR)
+
+
+def reverses(evidence: Evidence, striker: int) -> bool:
+    """Whether the vehicle goes backwards when it strikes; SUMO takes its heading from the lane."""
+    e = evidence
+    heading = e.heading_rad[-1, striker]
+    speed = e.vx_mps[-1, striker] * math.cos(heading) + e.vy_mps[-1, striker] * math.sin(heading)
+    return bool(speed < -STANDING_MPS)
+
+
+def speeds(evidence: Evidence, actor: int) -> bool:
+    """Whether the vehicle was more than 10 % over the limit in the last 3 s."""
+    fastest = evidence.speed_mps[evidence.since(RECENT_S) :, actor].max()
+    return bool(fastest > SPEEDING_FACTOR * evidence.ground.speed_limit_mps + 1e-6)
+
+
+def pedestrian_on_red(evidence: Evidence, striker: int) -> bool:
+    """Whether the pedestrian stepped on red onto the crossing on which, or beside which, it was struck.
+
+    One that steps on it on green and is caught by red half way has broken nothing.
+    """
+    stepped = _stepped_onto_crossing(evidence, striker)
+    return stepped is not None and int(evidence.link[stepped, striker]) in RED
+
+
+def took_crossing(evidence: Evidence, striker: int) -> bool:
+    """Whether the ego came onto a crossing after the pedestrian had stepped onto it, and not on red."""
+    stepped = _stepped_onto_crossing(evidence, striker)
+    if stepped is None or int(evidence.link[stepped, striker]) in RED:
+        return False
+    x_m, y_m = evidence.x_m[-1:, striker], evidence.y_m[-1:, striker]
+    here = [area for area in evidence.ground.crossings if inside((area,), x_m, y_m, KERB_M)[0]]
+    return not bool(inside(here, *_front(evidence, 0, EGO))[: stepped + 1].any())
+
+
+def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
+    """Whether a vehicle passed a stop line while its signal showed one of these letters, in the last 6 s.
+
+    Its signal then goes from them to none. To another letter it turned, unless the vehicle came into a junction in that
+    step and it is the next junction's.
+    """
+    e, first = evidence, evidence.since(JUNCTION_S)
+    link = e.link[first:, actor]
+    shown = _is_any(link[:-1], letters)
+    passed = shown & (link[1:] == 0)
+    in_junction = inside(e.ground.junctions, *_front(e, first, actor))
+    passed |= shown & ~_is_any(link[1:], letters) & in_junction[1:] & ~in_junction[:-1]
+    return bool((passed & (e.speed_mps[first + 1 :, actor] > STANDING_MPS)).any())
+
+
+def _stepped_onto_crossing(evidence: Evidence, striker: int) -> int | None:
+    """The frame in which the pedestrian stepped onto the crossing that it was struck on; None without one."""
+    e = evidence
+    on = inside(e.ground.crossings, e.x_m[:, striker], e.y_m[:, striker], KERB_M)
+    if not on[-1]:
+        return None
+    away = np.flatnonzero(~on)
+    return int(away[-1]) + 1 if len(away) else 0
+
+
+def _is_any(link: Letters, letters: bytes) -> Bools:
+    return np.isin(link, list(letters))
+
+
+def _front(evidence: Evidence, first: int, actor: int) -> tuple[Floats, Floats]:
+    e = evidence
+    heading, reach = e.heading_rad[first:, actor], e.length_m[actor] / 2
+    return e.x_m[first:, actor] + reach * np.cos(heading), e.y_m[first:, actor] + reach * np.sin(heading)

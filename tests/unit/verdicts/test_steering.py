@@ -1,0 +1,167 @@
+"""Verdicts on an ego that is not in its first lane, changes lanes or leaves the road; each in the mirror too."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from risk_sac.records import ConflictType, Grade, Judgement
+from risk_sac.types import Kind
+from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.judge import judge
+from risk_sac.verdicts.recorded import lane_path
+from tests.unit.verdicts.staged import (
+    CAR_M,
+    LANE_M,
+    STREET,
+    crossing_car,
+    cut_in,
+    leader_brakes,
+    merge,
+    mirrored,
+    pedestrian_crosses,
+    sideways,
+    stage,
+    straight,
+)
+
+
+def judged(evidence: Evidence) -> Judgement:
+    first, second = judge(evidence, "actor_1", valid=True), judge(mirrored(evidence), "actor_1", valid=True)
+    sides = {"conflict_y_m": first.conflict_y_m, "signature": first.signature}
+    assert second.model_copy(update=sides) == first
+    return first
+
+
+def shifted(evidence: Evidence, lanes: int) -> Evidence:
+    """The same encounter some lanes further left on a road that is wide enough."""
+    by_m = lanes * LANE_M
+    ground = evidence.ground
+    wide = replace(ground, roadway=tuple(area.grown(by_m) for area in ground.roadway))
+    return replace(evidence, y_m=evidence.y_m + by_m, ground=wide)
+
+
+@pytest.mark.parametrize("lanes", [-1, 1, 2])
+@pytest.mark.parametrize(
+    "evidence", [cut_in(), cut_in(gap=-3.0, ego=12.0, other=12.0), leader_brakes(), merge(), crossing_car()]
+)
+def test_the_same_encounter_in_another_lane_has_the_same_verdict(evidence: Evidence, lanes: int) -> None:
+    first, second = judged(evidence), judged(shifted(evidence, lanes))
+    assert second.conflict_y_m == pytest.approx(first.conflict_y_m + lanes * LANE_M)
+    assert second.model_copy(update={"conflict_y_m": first.conflict_y_m}) == first
+
+
+def comes_from_next_lane(encounter: Evidence, side: int) -> Evidence:
+    """The encounter, before which the ego changed lanes; nothing else is moved."""
+    over_s = encounter.time_s[-1] - 6.0
+    left_m = LANE_M * np.clip((over_s - encounter.time_s) / 2.0, 0.0, 1.0)
+    y, lateral = encounter.y_m.copy(), encounter.lateral_mps.copy()
+    y[:, 0] += side * left_m
+    lateral[:, 0] += np.diff(y[:, 0], prepend=y[:1, 0]) / encounter.step_s
+    return replace(encounter, y_m=y, lateral_mps=lateral)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize("evidence", [cut_in(at_s=9.0), leader_brakes(at_s=9.0), pedestrian_crosses(speed=9.0)])
+def test_a_lane_change_that_is_over_changes_nothing(evidence: Evidence, side: int) -> None:
+    found = comes_from_next_lane(evidence, side)
+    assert abs(found.y_m[0, 0]) == pytest.approx(LANE_M)
+    assert judged(found) == judged(evidence)
+
+
+def test_an_ego_that_comes_over_to_its_neighbour_merges_into_it() -> None:
+    # 0.375 m off its lane's centre 0.31 s after it began, at 2 s.
+    found = judged(merge())
+    assert found.signature == "neighbour, alongside, in a lane; ego changes lanes, does not brake"
+    assert (found.conflict_type, found.grade) == (ConflictType.MERGE, Grade.CAREFUL)
+    assert found.conflict_s == found.noticed_s == pytest.approx(2.4, abs=0.06)
+    assert "r157_ttc" not in found.drivers
+
+
+@pytest.mark.parametrize("rate", [0.4, 1.2, 2.0])
+def test_a_merge_right_after_the_release_is_the_egos_own(rate: float) -> None:
+    assert judged(merge(rate=rate, at_s=1.0)).conflict_s >= 1.0
+
+
+@pytest.mark.parametrize(
+    ("ego_mps", "other_mps", "expected"),
+    [(0.0, 1.2, ConflictType.CUT_IN), (0.3, 1.2, ConflictType.CUT_IN), (1.2, 0.0, ConflictType.MERGE)],
+)
+def test_who_comes_over_names_the_conflict(ego_mps: float, other_mps: float, expected: ConflictType) -> None:
+    ego = sideways(straight(0.0, 0.0, 0.0, 12.0), 2.0, max(ego_mps, 1e-9), LANE_M)
+    other = sideways(straight(-2.0, LANE_M, 0.0, 12.0), 2.0, -max(other_mps, 1e-9), LANE_M)
+    assert judged(stage(ego, other)).conflict_type is expected
+
+
+def test_an_ego_that_swerves_away_from_a_cut_in_was_cut_in_on() -> None:
+    beside = sideways(straight(3.0, LANE_M, 0.0, 12.0), 2.0, -1.8, 3 * LANE_M)
+    swerves = sideways(straight(0.0, 0.0, 0.0, 12.0), 2.8, -0.9, LANE_M)
+    assert judged(stage(swerves, beside)).conflict_type is ConflictType.CUT_IN
+
+
+def test_a_reference_driver_keeps_its_lane_and_looks_out_for_who_is_there() -> None:
+    # The leader brakes hard and the ego swerves into its neighbour: in the lane, a careful driver brakes too late.
+    ego = sideways(straight(0.0, 0.0, 0.0, 14.0), 2.0, 2.0, LANE_M)
+    neighbour = straight(-2.0, LANE_M, 0.0, 14.0)
+    leader = straight(CAR_M[0] + 9.0, 0.0, 0.0, 14.0, (1.5, -9.0))
+    kinds = (Kind.VEHICLE,) * 3
+    alone = judged(stage(ego, neighbour))
+    behind_leader = stage(ego, neighbour, leader, kinds=kinds)
+    assert behind_leader.time_s[-1] == pytest.approx(2.8)
+    assert alone.grade is Grade.CAREFUL
+    assert judged(behind_leader).grade is Grade.IDEAL
+
+
+def bend(t: float, radius_m: float = 60.0, speed: float = 10.0) -> tuple[float, float, float]:
+    """Place and heading of a lane's middle that turns left."""
+    angle = speed * max(t, 0.0) / radius_m
+    return radius_m * math.sin(angle) + speed * min(t, 0.0), radius_m * (1 - math.cos(angle)), angle
+
+
+def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend() -> None:
+    def leaves(t: float) -> tuple[float, float, float]:
+        x, y, heading = bend(t)
+        right_m = max(t - 2.0, 0.0)
+        return x + right_m * math.sin(heading), y - right_m * math.cos(heading), heading - 0.1 * (t > 2.0)
+
+    x, y, heading = bend(6.0)
+    post = straight(x + 3.5 * math.sin(heading), y - 3.5 * math.cos(heading), heading, 0.0)
+    ground = replace(STREET, roadway=())
+    evidence = stage(leaves, post, kinds=(Kind.VEHICLE, Kind.PEDESTRIAN), ground=ground)
+    lateral = evidence.lateral_mps.copy()
+    lateral[:, 0] = np.where(evidence.time_s > 2.0 + 1e-9, -1.0, 0.0)
+    evidence = replace(evidence, lateral_mps=lateral)
+    began = int(np.searchsorted(evidence.time_s, 2.0))
+    path = lane_path(evidence, began)
+    assert path is not None
+    wanted = np.array([bend(t) for t in evidence.time_s]).T
+    assert np.hypot(path.x - wanted[0], path.y - wanted[1]).max() < 0.05
+    assert np.abs(path.heading - wanted[2])[began + 1 :].max() < 0.02
+    assert lane_path(evidence, len(evidence.time_s) - 2) is None
+
+
+def leaves_the_road(walker_y: float = -9.0) -> Evidence:
+    """The ego leaves the road (y = ±6.6) to the right, where a pedestrian stands."""
+    ego = sideways(straight(0.0, 0.0, 0.0, 10.0), 2.0, -3.0, 9.0)
+    return stage(ego, straight(60.0, walker_y, math.pi / 2, 0.0), kinds=(Kind.VEHICLE, Kind.PEDESTRIAN))
+
+
+def test_a_pedestrian_beside_the_road_is_struck_by_an_ego_that_left_it() -> None:
+    found = judged(leaves_the_road())
+    assert found.conflict_s == pytest.approx(2.2, abs=0.11)
+    assert (found.hidden, found.grade) == (False, Grade.CAREFUL)
+
+
+def test_an_unseen_pedestrian_beside_the_road_would_not_have_been_struck_from_the_lane() -> None:
+    evidence = leaves_the_road()
+    unseen = replace(evidence, known=evidence.known & (np.arange(2) == 0))
+    assert judged(unseen).grade is Grade.CAREFUL
+
+
+@pytest.mark.parametrize("speed", [8.0, 12.0])
+def test_an_ego_that_drifts_into_oncoming_traffic_is_avoided_by_keeping_the_lane(speed: float) -> None:
+    ego = sideways(straight(0.0, 0.0, 0.0, speed), 3.0, 1.5, LANE_M)
+    found = judged(stage(ego, straight(120.0, LANE_M, math.pi, 10.0)))
+    assert found.conflict_s >= 3.0
+    assert (found.conflict_type, found.grade) == (ConflictType.CROSSING, Grade.CAREFUL)
