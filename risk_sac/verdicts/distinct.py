@@ -29,7 +29,8 @@ VISIBLE_S = (0.6, 2.0)
 CLOSING_MPS = (5.0, 10.0)
 BRAKED_MPS2 = 3.0  # more than a driver does for comfort
 MANOEUVRES, ROLES = 4, 2
-VEHICLE_TYPES, ZONES = 4, 3  # cut-in, merge, leader, crossing; front, left, right: a contact at the ego's rear is not valid
+# Cut-in, merge, leader, crossing; front, left, right: a contact at the ego's rear is not valid.
+VEHICLE_TYPES, ZONES = 4, 3
 CELLS = ROLES * MANOEUVRES * (VEHICLE_TYPES * ZONES + 1) * (len(VISIBLE_S) + 1) * 2 * (len(CLOSING_MPS) + 1)
 
 
