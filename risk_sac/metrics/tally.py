@@ -11,7 +11,7 @@ from risk_sac.metrics.features import Spread, outcome_features
 from risk_sac.metrics.requirements import RequirementTally
 from risk_sac.records import Collision, Counts, EpisodeRecord, Outcome, RequirementCounts
 from risk_sac.types import STEP_S
-from risk_sac.verdicts.distinct import FailureKind, kind_of
+from risk_sac.verdicts.distinct import FailureKind, distinct_failures, kind_of
 
 STEPS_PER_S = round(1 / STEP_S)
 WINDOW = 100  # episodes of the sliding ECR and PCR
@@ -72,14 +72,19 @@ class Tally(Counts):
         if record.steps and not math.isfinite(record.mean_cost):
             raise NotFinite(f"mean_cost of episode {record.index} is {record.mean_cost}; wanted a finite number")
         collision = record.collision
-        struck = collision if collision is not None and collision.valid else None
-        self._add_requirements(record)
-        if record.outcome is Outcome.FAILURE:
+        failed = record.outcome is Outcome.FAILURE
+        struck = collision if failed and collision is not None and collision.valid else None
+        for name, result in record.requirements.items():  # in their order
+            self._requirement(name, result.counts)
+        if failed:
             if not record.valid_violations:
                 raise ValueError(f"episode {record.index} is a failure without a valid violation")
+            distinct_failures(record.valid_violations)  # raises for a NaN before anything is counted
             if struck is not None:
                 self._add_collision(struck)
             self._add_violations(record)
+        for name, result in record.requirements.items():
+            self._requirements[name].violated += result.violated_s is not None
         self.episodes += 1
         self.rejected += record.outcome is Outcome.REJECTED
         self.raw_collisions += collision is not None
@@ -98,10 +103,6 @@ class Tally(Counts):
     def requirement_counts(self) -> dict[str, RequirementCounts]:
         """Requirement → its funnel, in the order in which the requirements were first met."""
         return {name: each.counts(self.driven) for name, each in self._requirements.items()}
-
-    def _add_requirements(self, record: EpisodeRecord) -> None:
-        for name, result in record.requirements.items():
-            self._requirement(name, result.counts).violated += result.violated_s is not None
 
     def _add_violations(self, record: EpisodeRecord) -> None:
         self.failures += 1

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from datetime import datetime
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import TypeAdapter, WithJsonSchema
+from pydantic import TypeAdapter, WithJsonSchema, model_validator
 
 from risk_sac.config import FamilyName, MethodName, RunMethod
 from risk_sac.records.base import Real, Record
@@ -41,6 +41,15 @@ class Counts(Record):
     invalid: int = 0
     """Episodes in which the ego failed to drive; the rates leave them out."""
     environment_steps: int = 0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_contacts_alone(cls, values: Any) -> Any:
+        """Reads counts from before other requirements made failures."""
+        if not isinstance(values, Mapping) or "collisions" in values:
+            return values
+        contacts = {"collisions": values.get("failures", 0), "preventable_collisions": values.get("preventable", 0)}
+        return {**values, **contacts}
 
     @property
     def driven(self) -> int:

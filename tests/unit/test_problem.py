@@ -88,6 +88,26 @@ def test_a_requirement_may_not_take_a_shipped_name() -> None:
     assert refused.value.field == "requirements[0].name"
 
 
+def test_a_user_says_which_shipped_requirements_count() -> None:
+    counts = {r.name: r.counts for r in problem(requirements=(Requirement(name="safe_ttc"),)).requirements}
+    assert counts == {r.name: r.counts for r in problem().requirements} | {"safe_ttc": "failure"}
+    reported = problem("dense", requirements=(Requirement(name="no_red_light_entry", counts="report"),)).requirements
+    assert [r.counts for r in reported if r.name == "no_red_light_entry"] == ["report"]
+
+
+@pytest.mark.parametrize(
+    ("requirement", "field"),
+    [
+        (Requirement(name="no_contact", counts="report"), "requirements[0].counts"),
+        (Requirement(name="wide_berth"), "requirements[0].formula"),
+    ],
+)
+def test_a_contact_counts_and_an_own_requirement_needs_a_formula(requirement: Requirement, field: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        problem(requirements=(requirement,))
+    assert refused.value.field == field
+
+
 def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs() -> None:
     spec = CampaignSpec(
         families=("low", "mixed"), requirements=(Requirement(name="soon", formula="eventually(ttc_s > 1)", scale=1),)

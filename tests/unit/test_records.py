@@ -8,14 +8,14 @@ import sys
 from risk_sac.records import Episode, EpisodeRecord, stored, wire
 from tests.builders import collision, episode_record, judgement
 
-# Loads `risk_sac.records.episode` with one field more, and passes a contact that has it through the service.
+# Loads `risk_sac.records.violation` with one field more, and passes a contact that has it through the service.
 NEW_FIELD = r"""
 import importlib.util, sys
 from importlib.machinery import PathFinder, SourceFileLoader
 
 class WithNewField(SourceFileLoader):
     def source_to_code(self, data, path, **options):
-        anchor = b"class Collision(Record):\n"
+        anchor = b"class Collision(Violated):\n"
         assert anchor in data
         field = b"    bonnet_temperature_c: Real = 20.0\n"
         head, tail = data.split(anchor)
@@ -29,7 +29,7 @@ class WithNewField(SourceFileLoader):
 class Finder:
     @staticmethod
     def find_spec(name, path=None, target=None):
-        if name != "risk_sac.records.episode":
+        if name != "risk_sac.records.violation":
             return None
         found = PathFinder.find_spec(name, path)
         return importlib.util.spec_from_loader(name, WithNewField(name, found.origin))

@@ -22,7 +22,9 @@ def contact(ttc=0.3, speed=10.0, offset=0.0, robustness=-1.0, **changes):
 def episode(outcome=Outcome.SAFE, steps=HORIZON, cost=0.0, hit=None, **changes):
     if outcome is Outcome.REJECTED:
         steps = 0
-    if hit is None and outcome in (Outcome.FAILURE, Outcome.DEGENERATE):
+    if outcome not in (Outcome.FAILURE, Outcome.DEGENERATE):
+        hit = None
+    elif hit is None:
         hit = contact()
     values = {"scene": {"gap_m": 10.0, "speed_mps": 12.5}, "objective": 0.2, "dual_variable": 0.7, "temperature": 0.1}
     return episode_record(outcome=outcome, steps=steps, mean_cost=cost, collision=hit, **(values | changes))
@@ -44,8 +46,10 @@ def counted(records):
     return Tally(
         horizon_steps=HORIZON,
         episodes=len(records),
+        collisions=len(hits),
         failures=len(hits),
         preventable=sum(hit.preventable for hit in hits),
+        preventable_collisions=sum(hit.preventable for hit in hits),
         distinct_failures=len(distinct_failures(hits)),
         environment_steps=sum(record.steps for record in records),
         steps_to_failure=sum(record.steps if record.outcome is Outcome.FAILURE else HORIZON for record in driven),

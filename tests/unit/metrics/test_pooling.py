@@ -21,7 +21,11 @@ def test_runs_are_pooled_by_sums_and_signatures_keep_their_order():
     assert (counts.episodes, counts.raw_collisions, counts.failures) == (13, 11, 7)
     assert (counts.distinct_failures, counts.preventable, counts.distinct_preventable) == (6, 4, 3)
     assert (counts.artefacts, counts.unresponsive, counts.environment_steps) == (2, 2, 518 + 380)
-    assert list(pooled_signatures(metrics).items()) == [("cut-in, straight", 3), ("pedestrian, straight", 2)]
+    assert list(pooled_signatures(metrics).items()) == [
+        ("cut-in, straight", 3),
+        ("pedestrian, straight", 2),
+        ("unjudged adversary vehicle", 2),
+    ]
 
 
 def test_histograms_of_runs_from_before_there_were_any_add_nothing():

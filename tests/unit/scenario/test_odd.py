@@ -140,6 +140,7 @@ def test_an_odd_that_empties_the_space_names_the_parameter() -> None:
 def test_requirements_follow_the_odd() -> None:
     everything = {r.name for r in requirements_from_odd(DEFAULT, 0.5)}
     assert everything == {
+        "no_contact",
         "safe_ttc",
         "rss_margin",
         "pedestrian_gap",
@@ -149,6 +150,8 @@ def test_requirements_follow_the_odd() -> None:
     motorway = Odd(scenery=Scenery(signal_types=("none",)), dynamic=DynamicElements(actor_kinds=("vehicle",)))
     left_out = everything - {r.name for r in requirements_from_odd(intersect(DEFAULT, motorway), 0.5)}
     assert left_out == {"pedestrian_gap", "no_red_light_entry"}
+    counting = {r.name for r in requirements_from_odd(DEFAULT, 0.5) if r.counts == "failure"}
+    assert counting == {"no_contact", "no_red_light_entry"}
 
 
 def test_thresholds_follow_the_odd_and_the_reaction_time() -> None:
@@ -164,13 +167,14 @@ def test_thresholds_follow_the_odd_and_the_reaction_time() -> None:
 
 
 def test_what_is_flat_until_it_breaks_is_monitored_and_no_part_of_the_potential() -> None:
-    assert {r.name for r in requirements_from_odd(DEFAULT, 0.5) if not r.shapes} == {"bounded_braking"}
+    assert {r.name for r in requirements_from_odd(DEFAULT, 0.5) if not r.shapes} == {"no_contact", "bounded_braking"}
 
 
 def test_an_ego_that_nobody_threatens_has_a_robustness_of_about_1_in_every_requirement() -> None:
     requirements = requirements_from_odd(DEFAULT, 0.5)
     monitor = Monitor(requirements, 0.1, 150)
     calm = {"encounter_s": 4.2, "rss_margin": 1.0, "pedestrian_gap_m": 12.0, "red_light_braking_mps2": 0.0}
+    calm |= {"vehicle_gap_m": 10.0}
     for speed_mps in (0.0, 5.0):
         monitor.reset()
         robustness = monitor.update(calm | {"ego_speed_mps": speed_mps, "ego_braking_mps2": 0.0})
