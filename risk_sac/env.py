@@ -30,12 +30,13 @@ from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import HardRule, broken_hard_rule, soft_cost
 from risk_sac.risk.reward import risk_reward, worth
 from risk_sac.run_folder.series import Trace
+from risk_sac.scenario.environment import conditions
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries, shares_of
-from risk_sac.sim.ego import Perception, sight
+from risk_sac.sim.ego import EVERYTHING, Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
 from risk_sac.verdicts.evidence import Evidence, Ground
@@ -69,7 +70,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._reward = reward
         self._controlled = controlled
         sensor, horizon_steps = problem.ego.sensor, problem.family.horizon_steps
-        self._perception = Perception(sensor.memory_s if sensor else 0.0, sight(sensor, problem.visibility_m))
+        self._perception = Perception(sensor.memory_s if sensor else 0.0, EVERYTHING)
         ego = load(problem.ego)
         self._pilot = None if ego is None else EgoPilot(ego)
         self._sim = SumoSimulation(problem.ego, self._perception, self._pilot)
@@ -193,6 +194,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._reflex = CarefulReflex(self._ground) if self.problem.ego.profile == "careful" else None
         self._gauge.reset()
         self.trace = Trace(self._gauge.names)
+        sensor = self.problem.ego.sensor
+        visible = conditions(self.problem.odd, scene.values, sensor=sensor is not None)
+        self._perception.sight = sight(sensor, visible.visibility_m, visible.unlit_m)
         self._steps = 0
         self._artefacts = {}
         self._contact_s = None

@@ -191,15 +191,20 @@ class Sight(NamedTuple):
     reach_m: float
     half_view_rad: float  # to either side of the ego's heading
     occlusion: bool  # whether vehicles hide what stands behind them
+    unlit_m: float = math.inf  # the reach to what carries no lights
 
 
 @compiled
-def in_sight(view: RelativeView, occludes: Bools, sight: Sight) -> Bools:
-    """Which of the `n` others are within reach, inside the field of view and not hidden; see `line_of_sight`."""
-    seen = line_of_sight(view, occludes) if sight.occlusion else np.ones(len(view.x), dtype=np.bool_)
+def in_sight(view: RelativeView, vehicle: Bools, sight: Sight) -> Bools:
+    """Which of the `n` others are within reach, inside the field of view and not hidden; see `line_of_sight`.
+
+    Vehicles hide what is behind them, and carry lights.
+    """
+    seen = line_of_sight(view, vehicle) if sight.occlusion else np.ones(len(view.x), dtype=np.bool_)
     for i in range(len(seen)):
         x, y = view.x[i], view.y[i]
-        if x * x + y * y > sight.reach_m * sight.reach_m or abs(math.atan2(y, x)) > sight.half_view_rad:
+        reach_m = sight.reach_m if vehicle[i] else min(sight.reach_m, sight.unlit_m)
+        if x * x + y * y > reach_m * reach_m or abs(math.atan2(y, x)) > sight.half_view_rad:
             seen[i] = False
     return seen
 

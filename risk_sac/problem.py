@@ -16,6 +16,7 @@ from risk_sac.observation_layout import observation_size
 from risk_sac.records import NO_CONTACT
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import check_requirements
+from risk_sac.scenario.environment import with_environment
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import GRAVITY_MPS2, limits_from_odd
@@ -33,7 +34,7 @@ class Problem:
 
     family: Family
     odd: Odd  # complete: the family's default narrowed by the user's
-    space: SceneSpace  # the family's, narrowed by the ODD
+    space: SceneSpace  # the family's, narrowed by the ODD, with the parameters of a user's environment
     ego: EgoConfig
     requirements: tuple[Requirement, ...]  # the ODD's, then the user's
     rss: RssParameters
@@ -63,7 +64,7 @@ class Problem:
         problem = cls(
             family=family,
             odd=odd,
-            space=narrow(family.space, odd),
+            space=narrow(with_environment(family.space, spec.odd, odd), odd),
             ego=ego,
             requirements=tuple((shipped | {each.name: each for each in own}).values()),
             rss=_rss_parameters(odd),
@@ -88,12 +89,6 @@ class Problem:
     def action_size(self) -> int:
         """Entries of a joint action: drive and steering of each adversary."""
         return 2 * len(self.family.adversaries)
-
-    @property
-    def visibility_m(self) -> float:
-        """The worst visibility the ODD admits, m; it bounds the ego's sensor."""
-        visibility = self.odd.environment.visibility_m
-        return float("inf") if visibility is None else visibility.low
 
     @property
     def speed_limit_mps(self) -> float:

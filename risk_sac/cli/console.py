@@ -18,8 +18,9 @@ from rich.progress import (
 )
 from rich.table import Table
 
+from risk_sac.records import Adjustment
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.terminal import Output, console, printable
+from risk_sac.terminal import Output, console, notes, printable
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs
@@ -93,6 +94,12 @@ def narrow_table(*columns: str, **style: Any) -> Table:
     for name in columns:
         table.add_column(name, no_wrap=name != columns[-1])
     return table
+
+
+def say_adjustments(found: Iterable[Adjustment]) -> None:
+    """Says what episodes use otherwise than it was asked for."""
+    for each in found:
+        notes.print(f"Note: {each}.", markup=False, soft_wrap=True)
 
 
 def or_dash(value: float | None, format_: str) -> str:

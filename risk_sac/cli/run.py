@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
+from risk_sac.adjustments import adjustments
 from risk_sac.cli.campaign_flags import (
     add_budget_flags,
     add_campaign_flags,
@@ -19,7 +20,18 @@ from risk_sac.cli.campaign_flags import (
     ego_flag,
     families_on_map,
 )
-from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, add_command, counted, or_dash, progress_bar
+from risk_sac.cli.console import (
+    FAILED,
+    INTERRUPTED,
+    OK,
+    Board,
+    Commands,
+    add_command,
+    counted,
+    or_dash,
+    progress_bar,
+    say_adjustments,
+)
 from risk_sac.config import METHODS, SHIPPED, RunSpec
 from risk_sac.config.spec_file import read_campaign, read_spec
 from risk_sac.machine import cores
@@ -68,6 +80,7 @@ def _run(options: argparse.Namespace) -> int:
         options.family = families[0]
     named = {name: getattr(options, name) for name in ("family", "method", "seed")}
     spec = read_spec(options.spec, named | budget_flags(options) | ego_flag(options))
+    say_adjustments(adjustments(spec))
     from risk_sac.execution.runs import run  # here, because loading torch takes seconds
 
     total = spec.budget.total_episodes
@@ -135,6 +148,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     defaults = {"families": list(SHIPPED), "methods": methods, "seeds": list(range(SEEDS))}
     options.families = families_on_map(options) or options.families
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | ego_flag(options), defaults)
+    say_adjustments(adjustments(spec))
     from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
 
     with progress_bar() as bar:

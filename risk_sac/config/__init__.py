@@ -15,7 +15,7 @@ from risk_sac.config.learner import (
     WarmStartConfig,
 )
 from risk_sac.config.methods import IID_METHODS, METHODS, IidName, Method, MethodName, RunMethod, method_of
-from risk_sac.config.odd import CrossingType, DynamicElements, Environment, Odd, Scenery, SignalType
+from risk_sac.config.odd import CrossingType, DynamicElements, Environment, Odd, Precipitation, Scenery, SignalType
 
 __all__ = [
     "FAMILY_NAME",
@@ -40,6 +40,7 @@ __all__ = [
     "Method",
     "MethodName",
     "Odd",
+    "Precipitation",
     "ReplayConfig",
     "Requirement",
     "RewardConfig",

@@ -6,20 +6,27 @@ Every field may be left out: a family's default ODD fills it. What an ODD does t
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator
+from pydantic import AfterValidator, Field
 
 from risk_sac.config.base import Interval, Settings
 
 SignalType = Literal["none", "fixed_time"]
 CrossingType = Literal["none", "zebra", "signalised"]
 ActorKind = Literal["vehicle", "pedestrian"]
+Precipitation = Literal["none", "rain", "heavy_rain"]
+TimeOfDay = Literal["day", "night"]
 
 
 def _as_sorted_set(values: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(sorted(set(values)))  # a frozenset has no stable JSON, and so no stable digest
 
 
+def _left_out(value: object) -> bool:
+    return value is None
+
+
 SetOf = AfterValidator(_as_sorted_set)
+Younger = Field(exclude_if=_left_out)  # left out of JSON where it is not set: specs from before keep their digests
 
 
 class Scenery(Settings):
@@ -36,12 +43,16 @@ class Scenery(Settings):
 
 
 class Environment(Settings):
-    """Weather, as far as the simulator knows it."""
+    """Weather and light, as far as they act on an episode; the rules are in `risk_sac.scenario.environment`."""
 
     friction: Interval | None = None
-    """Tyre-road friction coefficient, in (0, 1.2]."""
+    """Tyre-road friction coefficient, in (0, 1.2]; each scene has one value of it."""
     visibility_m: Interval | None = None
-    """Meteorological visibility, m; its low end bounds the ego's sensor range."""
+    """Meteorological visibility, m; where it is stated, each scene has one value, and the ego sees no farther."""
+    precipitation: Annotated[Annotated[tuple[Precipitation, ...], SetOf] | None, Younger] = None
+    """Rain wets the road: it bounds the friction. `rain` is up to 7.6 mm/h, `heavy_rain` up to 50 mm/h."""
+    time_of_day: Annotated[Annotated[tuple[TimeOfDay, ...], SetOf] | None, Younger] = None
+    """At night the ego sees a pedestrian within its low beam only; vehicles carry lights."""
 
 
 class DynamicElements(Settings):
@@ -52,15 +63,18 @@ class DynamicElements(Settings):
     ego_speed_mps: Interval | None = None
     """Initial speed of the ego, m/s."""
     vehicle_speed_mps: Interval | None = None
-    """Speed of other vehicles, m/s."""
+    """Speed of the adversary vehicles, m/s; the low end holds for their start, after which they may brake."""
     vehicle_accel_mps2: Interval | None = None
-    """Longitudinal acceleration of other vehicles, m/s²; low is the hardest braking."""
+    """Longitudinal acceleration of the adversary vehicles, m/s²; low is the hardest braking."""
     vehicle_lateral_speed_mps: Interval | None = None
-    """Speed of other vehicles across their lane, m/s, to either side. Usual is 1.2, UN R157's extreme 1.8."""
+    """Speed of the adversary vehicles across their lane, m/s, to either side, from 0. Usual is 1.2, UN R157's extreme
+    1.8."""
     vehicle_lateral_accel_mps2: Interval | None = None
-    """Acceleration of other vehicles across their lane, m/s², to either side, without the lane's own curve."""
+    """Acceleration of the adversary vehicles across their lane, m/s², to either side, from 0, without the lane's own
+    curve."""
     pedestrian_speed_mps: Interval | None = None
-    """Speed of pedestrians, m/s. Usual is walking, up to 2; a high of up to 3 lets them run."""
+    """Speed of pedestrians, m/s; the low end holds for their start. Usual is up to 2; a high of up to 3 lets them
+    run."""
     pedestrian_accel_mps2: Interval | None = None
     """Acceleration of pedestrians, m/s²."""
 

@@ -5,6 +5,7 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+from risk_sac.adjustments import adjustments
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
@@ -100,7 +101,7 @@ def _results_so_far(spec: RunSpec, folder: Path) -> Results:
 
 
 def _claim(spec: RunSpec, folder: Path) -> Results:
-    results = Results(spec=spec, spec_digest=spec.digest, finished=False)
+    results = Results(spec=spec, spec_digest=spec.digest, adjustments=adjustments(spec), finished=False)
     write_results(folder, results)
     return results
 

@@ -3,9 +3,10 @@
 A record is stored as JSON, answered by the service and read by the client; a field is declared once, here.
 """
 
-from risk_sac.records.base import FieldProblem, Least, Page, Real, Record, stored, wire
+from risk_sac.records.base import Adjustment, FieldProblem, Least, Page, Real, Record, stored, wire
 from risk_sac.records.campaign import (
     Campaign,
+    CampaignCheck,
     CampaignHead,
     CampaignPage,
     CampaignSummary,

@@ -65,6 +65,22 @@ class Page(Record, Generic[T]):
     """Pass as `cursor` to continue; null at the end."""
 
 
+class Adjustment(Record):
+    """A setting that episodes use otherwise than it was asked for."""
+
+    families: tuple[str, ...]
+    """Where that is so."""
+    field: str
+    """Dotted path, such as `odd.environment.visibility_m`."""
+    asked: str
+    used: str
+    why: str
+
+    def __str__(self) -> str:
+        where = f" in {', '.join(self.families)}"
+        return f"{self.field}: asked for {self.asked}, used {self.used}{where}; {self.why}"
+
+
 class FieldProblem(Record):
     """What is wrong with one field."""
 

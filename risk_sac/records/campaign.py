@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from datetime import datetime
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records.base import Page, Record
+from risk_sac.records.base import Adjustment, Page, Record
 from risk_sac.records.run import Family, Run, RunResult, SearchMethod, State
 from risk_sac.series import Real
 
@@ -87,6 +87,12 @@ class Campaign(CampaignSummary):
     spec: CampaignSpec
 
 
+class CampaignCheck(Record):
+    """What a campaign would run with, where that is not what was asked for."""
+
+    adjustments: tuple[Adjustment, ...]
+
+
 class StateChange(Record):
     """A change of state of a campaign, or of one of its runs."""
 
@@ -158,5 +164,7 @@ class Results(Record):
     state: State
     complete: bool
     """Whether these are the final results."""
+    adjustments: tuple[Adjustment, ...] = ()
+    """What its episodes use otherwise than it was asked for, such as an ODD beyond what a family supports."""
     runs: list[RunResult]
     totals: list[Total]

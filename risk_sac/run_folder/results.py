@@ -16,7 +16,7 @@ from pydantic import TypeAdapter
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.records import EpisodeRecord, RunMetrics
+from risk_sac.records import Adjustment, EpisodeRecord, RunMetrics
 from risk_sac.run_folder.durable import read_sealed, write_sealed
 
 RESULTS = "results.json"
@@ -49,6 +49,7 @@ class Results:
 
     spec: RunSpec
     spec_digest: str
+    adjustments: tuple[Adjustment, ...] = ()  # of the spec, in what the episodes use
     finished: bool
     metrics: RunMetrics | None = None  # of the search or the i.i.d. phase; None before its first episode
     evaluation: RunMetrics | None = None  # of the frozen policy

@@ -81,7 +81,12 @@ def road_odd(place: Place, signals: tuple[SignalType, ...], crossings: tuple[Cro
             signal_types=signals,
             crossing_types=crossings,
         ),
-        environment=Environment(friction=Interval(low=0.6, high=1.0), visibility_m=Interval(low=100, high=2000)),
+        environment=Environment(
+            friction=Interval(low=0.6, high=1.0),
+            visibility_m=Interval(low=100, high=2000),
+            precipitation=("none",),
+            time_of_day=("day",),
+        ),
         dynamic=DynamicElements(
             actor_kinds=("pedestrian", "vehicle") if pedestrians else ("vehicle",),
             ego_speed_mps=Interval(low=0, high=limit_mps),

@@ -5,11 +5,12 @@ Source: RISK-SAC, Sec. II-A; ISO 34503 for the ODD's branches.
 
 import math
 from collections.abc import Iterator
-from typing import Any, TypeVar
+from typing import Any
 
-from risk_sac.config import Interval, Odd, Requirement, Scenery, Settings
+from risk_sac.config import Environment, Interval, Odd, Precipitation, Requirement, Scenery
 from risk_sac.errors import OddError
 from risk_sac.records import NO_CONTACT
+from risk_sac.scenario.environment import WET_FRICTION
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.scenario.space import Parameter, SceneSpace
 
@@ -44,13 +45,18 @@ SENSIBLE: dict[str, Interval] = {
 }
 
 # A family's default says what is usual; up to here every family supports what is not, for a user who asks for it.
-EXTREME: dict[str, Interval] = {
+EXTREME: dict[str, Interval | tuple[str, ...]] = {
+    "environment.friction": Interval(low=0.4, high=1.0),  # from worn tyres in heavy rain
+    "environment.visibility_m": Interval(low=40, high=2000),
+    "environment.precipitation": ("heavy_rain", "none", "rain"),
+    "environment.time_of_day": ("day", "night"),
     "dynamic.vehicle_lateral_speed_mps": Interval(low=0, high=1.8),  # UN R157
     "dynamic.vehicle_lateral_accel_mps2": Interval(low=0, high=3),
     "dynamic.pedestrian_speed_mps": Interval(low=0, high=3),  # running
 }
 
-Branch = TypeVar("Branch", bound=Settings)
+SIGNAL_OF = {"zebra": "none", "signalised": "fixed_time"}
+"""Kind of crossing → the kind of signal that an ego meets there."""
 
 
 def intersect(default: Odd, user: Odd) -> Odd:
@@ -59,13 +65,14 @@ def intersect(default: Odd, user: Odd) -> Odd:
     The user's narrows the default, or widens a field of `EXTREME` up to that; a field left out keeps the default's.
 
     Raises:
-      OddError: a field of the user's is physically senseless or leaves nothing of the default's.
+      OddError: a field of the user's is physically senseless, or leaves nothing of what the family supports.
     """
     check(user)
+    limits = widest(default)
     return Odd(
-        scenery=_without_dark_signals(_intersect_branch("scenery", default.scenery, user.scenery)),
-        environment=_intersect_branch("environment", default.environment, user.environment),
-        dynamic=_intersect_branch("dynamic", default.dynamic, user.dynamic),
+        scenery=_with_their_signals(_intersect_branch("scenery", default, user, limits)),
+        environment=_rained_on(_intersect_branch("environment", default, user, limits), user.environment),
+        dynamic=_intersect_branch("dynamic", default, user, limits),
     )
 
 
@@ -73,6 +80,8 @@ def widest(default: Odd) -> Odd:
     """All that a user may ask of a family with this default: `intersect` keeps nothing beyond it."""
     for path, extreme in EXTREME.items():
         branch, name = path.split(".")
+        if name == "time_of_day" and "pedestrian" not in (default.dynamic.actor_kinds or ()):
+            continue  # vehicles carry lights: night would change nothing
         widened = getattr(default, branch).model_copy(update={name: extreme})
         default = default.model_copy(update={branch: widened})
     return default
@@ -83,7 +92,7 @@ def check(odd: Odd) -> None:
     for path, sensible in SENSIBLE.items():
         interval = field(odd, path)
         if interval is not None and not (interval.low in sensible and interval.high in sensible):
-            raise _error(path, interval, f"bounds within {_text(sensible)}")
+            raise _error(path, interval, f"bounds within {text_of(sensible)}")
         if interval is not None and any(0 < abs(bound) < TINY for bound in (interval.low, interval.high)):
             raise _error(path, interval, f"bounds that are 0 or at least {TINY:g} in size")
     for path in ("dynamic.vehicle_accel_mps2", "dynamic.pedestrian_accel_mps2"):
@@ -95,7 +104,11 @@ def check(odd: Odd) -> None:
     if lateral is not None and lateral.high < LEAST_ACCEL_MPS2:
         wanted = f"a high of at least {LEAST_ACCEL_MPS2:g}; a lateral speed of 0 forbids moving"
         raise _error("dynamic.vehicle_lateral_accel_mps2", lateral, wanted)
-    for path in ("scenery.signal_types", "scenery.crossing_types", "dynamic.actor_kinds"):
+    for path in ("dynamic.vehicle_lateral_speed_mps", "dynamic.vehicle_lateral_accel_mps2"):
+        interval = field(odd, path)
+        if interval is not None and interval.low > 0:
+            raise _error(path, interval, "a low of 0, since a vehicle may keep to its lane")
+    for path in paths(odd):
         if field(odd, path) == ():
             raise _error(path, (), "at least one kind, or the field left out")
 
@@ -113,7 +126,7 @@ def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
             raise _error(
                 str(parameter.odd),
                 allowed,
-                f"an overlap with {_text(supported)}, the values of scene parameter {parameter.name!r} "
+                f"an overlap with {text_of(supported)}, the values of scene parameter {parameter.name!r} "
                 f"in the {space.family!r} family",
             )
         bounds[parameter.name] = interval
@@ -200,31 +213,53 @@ def _share(parameter: Parameter, allowed: tuple[str, ...]) -> Interval | None:
     )
 
 
-def _intersect_branch(branch: str, default: Branch, user: Branch) -> Branch:
+def _intersect_branch(branch: str, default: Odd, user: Odd, limits: Odd) -> Any:
     values = {}
-    for name in type(default).model_fields:
-        usual, theirs = getattr(default, name), getattr(user, name)
-        ours = EXTREME.get(f"{branch}.{name}", usual)
-        if theirs is None or ours is None:
-            values[name] = usual if theirs is None else theirs
+    usual, asked, ours = (getattr(odd, branch) for odd in (default, user, limits))
+    for name in type(usual).model_fields:
+        theirs, supported = getattr(asked, name), getattr(ours, name)
+        if theirs is None or supported is None:
+            values[name] = getattr(usual, name) if theirs is None else theirs
             continue
-        values[name] = common = _common(ours, theirs)
+        values[name] = common = _common(supported, theirs)
         if not common:
-            raise _error(f"{branch}.{name}", theirs, f"an overlap with {_text(ours)}, which the family supports")
-    return type(default)(**values)
+            raise _error(f"{branch}.{name}", theirs, f"an overlap with {text_of(supported)}, which the family supports")
+    return type(usual)(**values)
 
 
-def _without_dark_signals(scenery: Scenery) -> Scenery:
-    """A signalised crossing needs a signal: without one, only the other crossings stay."""
-    crossings = scenery.crossing_types
-    if crossings is None or "fixed_time" in (scenery.signal_types or ("fixed_time",)):
+def _with_their_signals(scenery: Scenery) -> Scenery:
+    """Leaves the crossings whose signal the ODD allows: one for a signalised crossing, none for a zebra."""
+    signals, crossings = scenery.signal_types, scenery.crossing_types
+    if signals is None or crossings is None:
         return scenery
-    left = tuple(kind for kind in crossings if kind != "signalised")
+    left = tuple(kind for kind in crossings if SIGNAL_OF.get(kind, signals[0]) in signals)
     if not left:
-        raise _error(
-            "scenery.crossing_types", crossings, "a crossing without a signal, or signal_types with fixed_time"
-        )
+        expected = f"a crossing that goes with the signal_types {text_of(signals)}"
+        raise _error("scenery.crossing_types", crossings, expected, "zebra goes with none, signalised with fixed_time")
     return scenery.model_copy(update={"crossing_types": left})
+
+
+def _rained_on(environment: Environment, user: Environment) -> Environment:
+    """Bounds the friction by the kinds of precipitation that a user states."""
+    friction = environment.friction
+    if user.precipitation is None or friction is None:
+        return environment
+    bounds = [
+        _friction_in(kind, friction, stated=user.friction is not None) for kind in environment.precipitation or ()
+    ]
+    hull = Interval(low=min(each.low for each in bounds), high=max(each.high for each in bounds))
+    return environment.model_copy(update={"friction": hull})
+
+
+def _friction_in(precipitation: Precipitation, friction: Interval, *, stated: bool) -> Interval:
+    wet = WET_FRICTION.get(precipitation)
+    if wet is None:
+        return friction
+    common: Interval | None = _common(wet, friction) if stated else wet
+    if common is None:
+        expected = f"an overlap with {text_of(wet)}, the friction in {precipitation}"
+        raise _error("environment.friction", friction, expected, "leave friction or that precipitation out")
+    return common
 
 
 def _common(ours: Any, theirs: Any) -> Any:
@@ -235,9 +270,10 @@ def _common(ours: Any, theirs: Any) -> Any:
     return tuple(kind for kind in ours if kind in theirs)
 
 
-def _error(path: str, got: Any, wanted: str) -> OddError:
-    return OddError(f"odd.{path}", _text(got), wanted)
+def _error(path: str, got: Any, wanted: str, remedy: str = "") -> OddError:
+    return OddError(f"odd.{path}", text_of(got), wanted, remedy)
 
 
-def _text(value: Any) -> str:
+def text_of(value: Any) -> str:
+    """An interval or a set, as messages write it."""
     return f"[{value.low:g}, {value.high:g}]" if isinstance(value, Interval) else f"{{{', '.join(value)}}}"

@@ -15,11 +15,17 @@ EVERYTHING = Sight(reach_m=math.inf, half_view_rad=math.pi, occlusion=False)
 VEHICLE = int(Kind.VEHICLE)  # compiled code knows no enums of int8
 
 
-def sight(sensor: SensorConfig | None, visibility_m: float) -> Sight:
-    """The best the ego can see with a sensor in some weather; None sees everything."""
+def sight(sensor: SensorConfig | None, visibility_m: float, unlit_m: float = math.inf) -> Sight:
+    """Combines a sensor with the visibility; None sees everything that the visibility leaves.
+
+    Args:
+      sensor: of the ego.
+      visibility_m: in the episode's weather.
+      unlit_m: the same of pedestrians, which carry no light.
+    """
     if sensor is None:
-        return EVERYTHING
-    return Sight(min(sensor.range_m, visibility_m), sensor.field_of_view_rad / 2, sensor.occlusion)
+        return EVERYTHING._replace(reach_m=visibility_m, unlit_m=unlit_m)
+    return Sight(min(sensor.range_m, visibility_m), sensor.field_of_view_rad / 2, sensor.occlusion, unlit_m)
 
 
 TIME_TOLERANCE_S = 1e-6  # SUMO counts milliseconds, we add floats
@@ -55,12 +61,13 @@ class Perception:
     An actor out of sight is remembered for the sensor's memory, and expected to keep its velocity.
 
     Attributes:
+      sight: in the weather of the episode.
       seen: which of the others of the latest frame are in sight, `n - 1`.
     """
 
     def __init__(self, memory_s: float, sight: Sight) -> None:
         self._memory_s = memory_s
-        self._sight = sight
+        self.sight = sight
         self.reset()
 
     def reset(self) -> None:
@@ -75,7 +82,7 @@ class Perception:
             self._memory = np.array([self._of(id_) for id_ in frame.ids]).T.copy()
             self._ids = frame.ids
         self.seen, known, state = _look(
-            self._memory, frame.state, frame.kind, frame.time_s, self._memory_s, *self._sight
+            self._memory, frame.state, frame.kind, frame.time_s, self._memory_s, *self.sight
         )
         return Belief(known, state)
 
@@ -105,9 +112,10 @@ def _look(
     reach_m: float,
     half_view_rad: float,
     occlusion: bool,
+    unlit_m: float,
 ) -> tuple[Bools, Bools, Floats]:
     """Updates the memory; returns which of the others are in sight, and both parts of the belief."""
-    seen = in_sight(frame_view(state), kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion))
+    seen = in_sight(frame_view(state), kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion, unlit_m))
     n = state.shape[1]
     known, believed = np.ones(n, dtype=np.bool_), state.copy()
     for i in range(1, n):

@@ -6,6 +6,7 @@ intervals are those of the report.
 
 from collections.abc import Sequence
 
+from risk_sac.adjustments import adjustments
 from risk_sac.metrics import (
     METRICS,
     RATIOS,
@@ -15,7 +16,8 @@ from risk_sac.metrics import (
     pooled_counts,
     pooled_signatures,
 )
-from risk_sac.records import Results, RunMetrics, Total
+from risk_sac.records import Adjustment, Results, RunMetrics, Total
+from service.errors import OutdatedError
 from service.store.stored import StoredCampaign, StoredRun
 
 
@@ -25,9 +27,17 @@ def results(campaign: StoredCampaign) -> Results:
         campaign_id=campaign.id,
         state=campaign.state,
         complete=campaign.state.final,
+        adjustments=_adjustments(campaign),
         runs=campaign.runs,
         totals=totals(campaign.searches),
     )
+
+
+def _adjustments(campaign: StoredCampaign) -> tuple[Adjustment, ...]:
+    try:
+        return adjustments(campaign.spec)
+    except OutdatedError:
+        return ()
 
 
 def totals(runs: Sequence[StoredRun]) -> list[Total]:

@@ -50,7 +50,7 @@ ROUTES = {
     ("GET", "/v1/egos"): ("read", 200),
     ("GET", "/v1/campaigns"): ("read", 200),
     ("POST", "/v1/campaigns"): ("run", 202),
-    ("POST", CHECK): ("run", 204),
+    ("POST", CHECK): ("run", 200),
     ("GET", CAMPAIGN): ("read", 200),
     ("DELETE", CAMPAIGN): ("run", 409),  # it runs
     ("POST", f"{CAMPAIGN}/cancel"): ("run", 202),

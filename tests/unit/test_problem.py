@@ -43,8 +43,13 @@ def test_a_users_odd_narrows_the_scene_space_and_the_requirements() -> None:
     posed = problem(odd=odd)
     assert bounds(posed, "ego_speed_mps") == (8, 10)
     assert bounds(posed, "friction") == (0.6, 0.7)
-    assert posed.visibility_m == 100  # the family's default ODD already asks for as much
-    assert problem(odd=Odd(environment=Environment(visibility_m=Interval(low=150, high=500)))).visibility_m == 150
+    assert bounds(posed, "visibility_m") == (40, 500)
+
+
+def test_day_and_night_together_are_a_parameter_and_one_of_them_is_none() -> None:
+    both = problem(odd=Odd(environment=Environment(time_of_day=("day", "night"))))
+    assert bounds(both, "night") == (0, 1)
+    assert "night" not in problem(odd=Odd(environment=Environment(time_of_day=("night",)))).space.names
 
 
 def test_an_odd_without_signals_leaves_the_zebra() -> None:
@@ -66,7 +71,9 @@ def test_an_odd_without_signals_leaves_the_zebra() -> None:
         ("mixed", Odd(dynamic=DynamicElements(actor_kinds=("vehicle",))), "odd.dynamic.actor_kinds"),
         ("low", Odd(dynamic=DynamicElements(actor_kinds=("pedestrian",))), "odd.dynamic.actor_kinds"),
         ("low", Odd(scenery=Scenery(lanes=Interval(low=1, high=2))), "odd.scenery.lanes"),
+        ("low", Odd(scenery=Scenery(speed_limit_mps=Interval(low=20, high=30))), "odd.scenery.speed_limit_mps"),
         ("low", Odd(environment=Environment(friction=Interval(low=0.1, high=0.3))), "odd.environment.friction"),
+        ("low", Odd(environment=Environment(time_of_day=("night",))), "odd.environment.time_of_day"),
         ("low", Odd(dynamic=DynamicElements(ego_speed_mps=Interval(low=0, high=5))), "odd.dynamic.ego_speed_mps"),
     ],
 )

@@ -9,11 +9,12 @@ from pathlib import Path
 
 from rich.progress import BarColumn, Progress
 
+from risk_sac.adjustments import adjustments
 from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, add_place_flags, campaign_flags, ego_flag
 from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, verdict
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.cli.campaigns.output import add_campaign_command, figures, line, print_answer, results_table
-from risk_sac.cli.console import OK, Board, Commands, add_command, columns, number
+from risk_sac.cli.console import OK, Board, Commands, add_command, columns, number, say_adjustments
 from risk_sac.client import Campaign, Client, Episode, Results
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import read_posted
@@ -87,6 +88,7 @@ def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> 
     if options.junit is not None:
         _report(client, results, bounds, options.junit)
     print_answer(options, results, results_table(results, bounds))
+    say_adjustments(results.adjustments)
     for run in results.runs:
         if run.state == "failed":
             complain(f"{run.id}: {run.reason}")
@@ -180,6 +182,8 @@ def _submit(options: argparse.Namespace) -> int:
     flags = campaign_flags(options, SEEDS) | ego_flag(options)
     flags |= {name: getattr(options, name) for name in ("label", "network", "pattern", "place", "places")}
     spec = read_posted(options.spec, flags)
+    if isinstance(spec, CampaignSpec) and not options.watch:
+        say_adjustments(adjustments(spec))
     with Client.from_environment(options.url) as client:
         if not isinstance(spec, CampaignSpec):
             spec |= {"network": _network_id(client, spec["network"])}

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, Interval, Odd
 from risk_sac.records import Collision, ConflictType, EpisodeRecord, Outcome, Record
+from risk_sac.scenario.environment import with_environment
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.odd import TINY, field, intersect, narrow, paths
 from risk_sac.scenario.space import Parameter, SceneSpace
@@ -153,14 +154,15 @@ def axis_of(parameter: Parameter, whole: Parameter, bins: int) -> Axis:
 def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Coverage:
     """Count what these episodes looked at; those from before the family had all its parameters are left out."""
     whole = intersect(family.odd, odd)
-    space = narrow(family.space, whole)
+    every = with_environment(family.space, odd, whole)
+    space = narrow(every, whole)
     varied = {parameter.odd for parameter in space.parameters}
     known = [record for record in records if set(space.names) <= record.scene.keys()]
     columns = [np.array([record.scene[name] for record in known], dtype=np.float64) for name in space.names]
     played = np.array([record.outcome not in NOT_PLAYED for record in known], dtype=bool)
     failed = np.array([record.outcome is Outcome.FAILURE for record in known], dtype=bool)
     fine, coarse = (
-        [axis_of(*both, bins) for both in zip(space.parameters, family.space.parameters, strict=True)]
+        [axis_of(*both, bins) for both in zip(space.parameters, every.parameters, strict=True)]
         for bins in (BINS, PAIR_BINS)
     )
     placed = [(axis, axis.places(column)) for axis, column in zip(coarse, columns, strict=True)]

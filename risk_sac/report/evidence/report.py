@@ -23,8 +23,8 @@ LIMITS = (
     "named. Roads have other shares. Scenes that were refused as infeasible are in no bound.",
     "Each bound holds by itself with 95 % confidence, not all of them together.",
     "The ego is what the simulator drives under the settings above, and no vehicle. What it perceives is a model.",
-    "Of the environment, scenes know friction and visibility; night, rain on a sensor, and other road users than "
-    "vehicles and pedestrians are not in them.",
+    "Of the environment, scenes know friction, visibility, and where the ODD states it night; drops on a sensor, and "
+    "other road users than vehicles and pedestrians, are not in them.",
     "Coverage counts where scenes begin. What unfolds from one beginning differs with what the others do.",
     "Preventable is judged by a model of a careful driver in the ego's place; the striker's motion is kept as it was.",
     "Numbers are those of one kind of processor; on another one the same commands give other digits.",

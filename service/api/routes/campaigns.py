@@ -8,8 +8,9 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import PlainTextResponse
 
 from risk_sac import __version__, problem
+from risk_sac.adjustments import adjustments
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
-from risk_sac.records import Campaign, CampaignPage, Record, Results, State, wire
+from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Record, Results, State, wire
 from service.api.answer_cache import kept
 from service.api.answers.pages import TIERS, Cursor, Limit, Tier
 from service.api.answers.representations import cacheable, entity_tag, link
@@ -69,11 +70,10 @@ def post_campaign(
     return _accepted(request, campaign, service)
 
 
-@router.post("/check", status_code=204, responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
-def check_campaign(spec: PostedCampaign) -> Response:
-    """Say what is wrong with a campaign, as posting it would; nothing is kept, and no quota counts it."""
-    problem.checked_campaign(spec)
-    return Response(status_code=204)
+@router.post("/check", responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
+def check_campaign(spec: PostedCampaign) -> CampaignCheck:
+    """Check a campaign as posting it would, and say what its episodes would use otherwise; nothing is kept."""
+    return CampaignCheck(adjustments=adjustments(problem.checked_campaign(spec)))
 
 
 @router.get("", response_model=CampaignPage, responses=TAGGED)

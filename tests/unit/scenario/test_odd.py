@@ -20,7 +20,12 @@ DEFAULT = Odd(
         signal_types=("fixed_time", "none"),
         crossing_types=("none", "zebra"),
     ),
-    environment=Environment(friction=interval(0.5, 1.0), visibility_m=interval(100, 2000)),
+    environment=Environment(
+        friction=interval(0.5, 1.0),
+        visibility_m=interval(100, 2000),
+        precipitation=("none",),
+        time_of_day=("day",),
+    ),
     dynamic=DynamicElements(
         actor_kinds=("pedestrian", "vehicle"),
         ego_speed_mps=interval(0, 15),
@@ -91,6 +96,21 @@ def test_intersection_is_the_set_of_common_values(bounds: list[float]) -> None:
             r"bounds within \[0, 1.8\]",
         ),
         (
+            Odd(dynamic=DynamicElements(vehicle_lateral_speed_mps=interval(0.5, 1))),
+            "odd.dynamic.vehicle_lateral_speed_mps",
+            r"got \[0.5, 1\]; wanted a low of 0",
+        ),
+        (
+            Odd(environment=Environment(visibility_m=interval(10, 30))),
+            "odd.environment.visibility_m",
+            r"got \[10, 30\]; wanted an overlap with \[40, 2000\], which the family supports",
+        ),
+        (
+            Odd(environment=Environment(precipitation=("rain",), friction=interval(0.8, 1))),
+            "odd.environment.friction",
+            r"got \[0.8, 1\]; wanted an overlap with \[0.5, 0.65\], the friction in rain; leave friction or",
+        ),
+        (
             Odd(dynamic=DynamicElements(vehicle_lateral_accel_mps2=interval(0, 0))),
             "odd.dynamic.vehicle_lateral_accel_mps2",
             "a high of at least 0.1",
@@ -125,6 +145,37 @@ def test_a_set_in_the_odd_narrows_a_category(allowed: tuple[str, ...], low: floa
     odd = Odd(scenery=Scenery(crossing_types=allowed))
     [crossing] = narrow(SceneSpace("mixed", (CROSSING,)), odd).parameters
     assert (crossing.low, crossing.high) == (low, high)
+
+
+@pytest.mark.parametrize(
+    ("environment", "friction"),
+    [
+        (Environment(), (0.5, 1.0)),
+        (Environment(friction=interval(0.1, 0.7)), (0.4, 0.7)),
+        (Environment(precipitation=("none",)), (0.5, 1.0)),
+        (Environment(precipitation=("rain",)), (0.5, 0.65)),
+        (Environment(precipitation=("none", "heavy_rain")), (0.4, 1.0)),
+        (Environment(precipitation=("rain", "heavy_rain"), friction=interval(0.5, 0.6)), (0.5, 0.6)),
+    ],
+)
+def test_rain_bounds_the_friction(environment: Environment, friction: tuple[float, float]) -> None:
+    assert intersect(DEFAULT, Odd(environment=environment)).environment.friction == interval(*friction)
+
+
+@pytest.mark.parametrize(
+    ("signals", "crossings"),
+    [(("none",), ("zebra",)), (("fixed_time",), ("signalised",)), (None, ("signalised", "zebra"))],
+)
+def test_crossings_keep_to_the_signals(signals: tuple[str, ...] | None, crossings: tuple[str, ...]) -> None:
+    both = Scenery(signal_types=("fixed_time", "none"), crossing_types=("signalised", "zebra"))
+    default = DEFAULT.model_copy(update={"scenery": both})
+    assert intersect(default, Odd(scenery=Scenery(signal_types=signals))).scenery.crossing_types == crossings
+
+
+def test_night_is_refused_where_there_is_no_pedestrian_for_it_to_hide() -> None:
+    road = DEFAULT.model_copy(update={"dynamic": DynamicElements(actor_kinds=("vehicle",))})
+    with pytest.raises(OddError, match=r"got \{night\}; wanted an overlap with \{day\}, which the family supports"):
+        intersect(road, Odd(environment=Environment(time_of_day=("night",))))
 
 
 def test_an_odd_that_empties_the_space_names_the_parameter() -> None:
@@ -196,7 +247,8 @@ def test_the_widest_odd_is_what_intersect_keeps_of_any_other():
     assert limits.dynamic.pedestrian_speed_mps == interval(0, 3)  # running, where the default has its own
     assert limits.dynamic.vehicle_lateral_speed_mps == interval(0, 1.8)
     assert limits.scenery == DEFAULT.scenery
-    assert limits.environment == DEFAULT.environment
+    assert limits.environment.visibility_m == interval(40, 2000)
+    assert limits.environment.time_of_day == ("day", "night")
     assert intersect(DEFAULT, limits) == limits
     assert intersect(DEFAULT, Odd(dynamic=DynamicElements(pedestrian_speed_mps=interval(0, 9)))).dynamic == (
         DEFAULT.dynamic.model_copy(update={"pedestrian_speed_mps": interval(0, 3)})

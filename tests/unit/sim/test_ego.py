@@ -119,4 +119,11 @@ def test_a_look_takes_note_of_whom_the_sensor_sees() -> None:
     assert hidden(near.look(frame_at(0.0))) == {"parked"}
     assert near.ever_seen("walker")
     assert hidden(Perception(0.0, sight(SensorConfig(), visibility_m=15.0)).look(frame_at(0.0))) == {"walker", "parked"}
-    assert hidden(Perception(0.0, sight(None, visibility_m=15.0)).look(frame_at(0.0))) == set()
+    assert hidden(Perception(0.0, sight(None, visibility_m=math.inf)).look(frame_at(0.0))) == set()
+    assert hidden(Perception(0.0, sight(None, visibility_m=15.0)).look(frame_at(0.0))) == {"walker", "parked"}
+
+
+def test_at_night_a_pedestrian_is_seen_in_the_low_beam_only_and_a_vehicle_by_its_lights() -> None:
+    day, night = (Perception(0.0, sight(None, math.inf, unlit_m)) for unlit_m in (math.inf, 15.0))
+    assert hidden(day.look(frame_at(0.0))) == set()
+    assert hidden(night.look(frame_at(0.0))) == {"walker"}

@@ -99,11 +99,12 @@ function Narrowed({ families, path }: Pick<OfFamilies, "families" | "path">) {
 
 function SetField({ field, path, families }: OfFamilies) {
   const { id, value, change, wrong } = useField<string[] | null>(path, true);
-  const offered = [...new Set(each<string[]>(families, path, "odd").flatMap(([, kinds]) => kinds))].sort();
-  const chosen = value ?? offered;
+  const all = (which: Which) => [...new Set(each<string[]>(families, path, which).flatMap(([, kinds]) => kinds))].sort();
+  const [offered, usual] = [all("odd_limits"), all("odd")];
+  const chosen = value ?? usual;
   const toggle = (kind: string) => {
     const next = offered.filter((other) => (other === kind) !== chosen.includes(other));
-    change(next.length === offered.length ? null : next);
+    change(next.join() === usual.join() ? null : next);
   };
   if (offered.length < 2 && value === null) return null;
   return (

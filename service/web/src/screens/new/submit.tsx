@@ -43,6 +43,18 @@ export function Submit({ spec, places, verdict, wrong, refused, busy }: Ready) {
       <p class="small verdict" role="status">
         {wrong.length === 0 && SAID[verdict.state]}
       </p>
+      {verdict.state === "good" && wrong.length === 0 && verdict.adjustments.length > 0 && (
+        <ul class="small adjustments">
+          {verdict.adjustments.map(({ families, field, asked, used, why }) => (
+            <li key={field + families.join()}>
+              <button type="button" class="to-field" onClick={() => show(field)}>
+                {field}
+              </button>{" "}
+              {families.join(", ")}: asked for {asked}, used {used}; {why}
+            </li>
+          ))}
+        </ul>
+      )}
       {refused && (
         <p class="wrong" role="alert">
           {refused}

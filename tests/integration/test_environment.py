@@ -1,0 +1,92 @@
+"""Weather and light of an ODD act on the ego's sight, whoever drives it."""
+
+from collections.abc import Mapping
+from contextlib import closing
+from typing import Any
+
+import numpy as np
+import pytest
+
+from risk_sac.config import RunSpec
+from risk_sac.env import RiskSacEnv
+from risk_sac.scenario.environment import LOW_BEAM_M
+from risk_sac.types import Frame, Kind, Scene
+
+BRAKE, STEPS = -1.0, 60
+FOG_M, CLEAR_M = 40.0, 2000.0
+EGOS: list[dict[str, Any]] = [
+    {},
+    {"profile": "careful"},
+    {"profile": "perfect"},
+    {"driver": "idm-aeb"},
+    {"driver": "rss", "sensor": {"range_m": 200.0}},
+]
+each_ego = pytest.mark.parametrize("ego", EGOS, ids=lambda ego: ego.get("driver", ego.get("profile", "default")))
+
+
+def play(
+    family: str, environment: Mapping[str, Any], ego: Mapping[str, Any], **changes: float
+) -> list[tuple[Frame, np.ndarray]]:
+    """Frames, and who is seen in each, of an episode in which all adversaries brake."""
+    spec = RunSpec.model_validate(
+        {"family": family, "method": "random", "seed": 0, "ego": ego, "odd": {"environment": environment}}
+    )
+    with closing(RiskSacEnv.of(spec)) as env:
+        middle = env.problem.space.from_unit(np.full(env.problem.space.dimension, 0.5))
+        env.reset(seed=3, options={"scene": Scene(family, {**middle.values, **changes})})
+        for _ in range(STEPS):
+            *_, terminated, _, _ = env.step(np.tile(np.float32([BRAKE, 0.0]), env.action_size // 2))
+            if terminated:
+                break
+        seen = [each.assessment.seen.copy() for each in env.trace.measures]
+        return list(zip(env.trace.frames, seen, strict=True))
+
+
+def distances(frame: Frame) -> np.ndarray:
+    return np.hypot(frame.x_m[1:] - frame.x_m[0], frame.y_m[1:] - frame.y_m[0])
+
+
+@each_ego
+def test_nothing_is_seen_beyond_the_visibility_of_the_scene_and_the_ego_brakes_later(ego: dict[str, Any]) -> None:
+    stated = {"visibility_m": {"low": FOG_M, "high": CLEAR_M}}
+    fog, clear = (play("low", stated, ego, lead_gap_m=50, visibility_m=each_m) for each_m in (FOG_M, CLEAR_M))
+    far = [(frame, seen) for frame, seen in fog if (distances(frame) > FOG_M).any()]
+    assert far
+    assert not any(seen[distances(frame) > FOG_M].any() for frame, seen in far)
+    assert any(seen[distances(frame) > FOG_M].any() for frame, seen in clear)
+    behind = [[frame.x_m[0] for frame, _ in played] for played in (fog, clear)]
+    assert behind[0] != behind[1]
+
+
+@pytest.mark.parametrize("driver", [{}, {"driver": "rss"}])
+def test_at_night_pedestrians_beyond_the_low_beam_are_not_seen(driver: dict[str, Any]) -> None:
+    ego = driver | {"sensor": {"occlusion": False}}  # else the truck hides the pedestrian by day, too
+    changes = {"ego_distance_m": 80.0, "occluder_distance_m": 25.0, "pedestrian_speed_mps": 1.0}
+    stated = {"time_of_day": ["day", "night"]}
+    night, day = (play("mixed", stated, ego, night=night, **changes) for night in (1.0, 0.0))
+
+    def sees_a_far_pedestrian(played: list[tuple[Frame, np.ndarray]]) -> bool:
+        return any(
+            (seen & (frame.kind[1:] == Kind.PEDESTRIAN) & (distances(frame) > LOW_BEAM_M)).any()
+            for frame, seen in played
+        )
+
+    assert sees_a_far_pedestrian(day)
+    assert not sees_a_far_pedestrian(night)
+    assert any(seen[distances(frame) > LOW_BEAM_M].any() for frame, seen in night)  # vehicles carry lights
+
+
+def test_heavy_rain_makes_the_road_slippery() -> None:
+    spec = RunSpec.model_validate(
+        {
+            "family": "low",
+            "method": "random",
+            "seed": 0,
+            "odd": {"environment": {"precipitation": ["heavy_rain"]}},
+        }
+    )
+    with closing(RiskSacEnv.of(spec)) as env:
+        env.reset(seed=0)
+        assert 0.4 <= env.layout.friction <= 0.55
+        [braking] = [each.formula for each in env.problem.requirements if each.name == "bounded_braking"]
+        assert braking.endswith(">= 3.53)")  # 0.9 · 0.4 · 9.81
