@@ -30,6 +30,7 @@ from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import HardRule, broken_hard_rule, soft_cost
 from risk_sac.risk.reward import risk_reward, worth
 from risk_sac.run_folder.series import Trace
+from risk_sac.scenario.carriageway import carriageway_of
 from risk_sac.scenario.environment import conditions
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
@@ -192,7 +193,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._ground = Ground.of(layout, self.problem.speed_limit_mps)
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = CarefulReflex(self._ground) if self.problem.ego.profile == "careful" else None
-        self._gauge.reset()
+        self._gauge.reset(carriageway_of(layout.net))
         self.trace = Trace(self._gauge.names)
         sensor = self.problem.ego.sensor
         visible = conditions(self.problem.odd, scene.values, sensor=sensor is not None)

@@ -6,9 +6,11 @@ from typing import NamedTuple
 
 from risk_sac.config import Requirement
 from risk_sac.jit import compiled
+from risk_sac.risk.own_motion import OwnMotionGauge
 from risk_sac.risk.publish import Assessment, assess, publish
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import Monitor
+from risk_sac.scenario.carriageway import Carriageway
 from risk_sac.types import STEP_S, Bools, Floats, Frame
 
 
@@ -55,17 +57,19 @@ class Gauge:
     ) -> None:
         """Compiles the requirements; `softmin_sharpness` is β of (7)."""
         self._monitor = Monitor(requirements, STEP_S, horizon_steps)
+        self._own = OwnMotionGauge()
         self._rss = rss
         self._sharpness = softmin_sharpness
         self.names = self._monitor.names
 
-    def reset(self) -> None:
-        """Forgets the previous episode."""
+    def reset(self, carriageway: Carriageway) -> None:
+        """Forgets the previous episode; the next is on the net of this carriageway."""
         self._monitor.reset()
+        self._own.reset(carriageway)
 
     def measure(self, frame: Frame, before: Frame | None, seen: Bools, struck: int = 0) -> Measures:
         """Measures the next frame, given the one before, and which of the others the ego sees and has touched."""
         assessment = assess(frame, self._rss, seen, struck)
-        signals = publish(frame, before, assessment.least)
+        signals = publish(frame, before, assessment.least, self._own.measure(frame))
         robustness = self._monitor.update(signals)
         return Measures(assessment, signals, robustness, soft_min(robustness[self._monitor.shapes], self._sharpness))

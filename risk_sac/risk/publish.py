@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from risk_sac.geometry import RelativeView, frame_view, time_to_contact
 from risk_sac.jit import compiled
+from risk_sac.risk.own_motion import OwnMotion
 from risk_sac.risk.rss import LONGITUDINAL_CAP_M, SCALED_HIGH, margins
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.ttc import ENCOUNTER_CAP_S, TTC_CAP_S, time_to_encounter
@@ -124,8 +125,8 @@ def worst_rss_margin(assessment: Assessment) -> float:
     return float(margin.min(where=assessment.others[CHARGED] != 0.0, initial=LONGITUDINAL_CAP_M))
 
 
-def publish(frame: Frame, before: Frame | None, least: LeastMargins) -> dict[str, float]:
-    """The value of every signal in `SIGNALS`; `before` is the previous frame, `least` is of `frame`."""
+def publish(frame: Frame, before: Frame | None, least: LeastMargins, own: OwnMotion) -> dict[str, float]:
+    """The value of every signal in `SIGNALS`; `before` is the previous frame, `least` and `own` are of `frame`."""
     return {
         "ttc_s": least.ttc_s,
         "encounter_s": least.encounter_s,
@@ -136,6 +137,13 @@ def publish(frame: Frame, before: Frame | None, least: LeastMargins) -> dict[str
         "red_light_braking_mps2": red_light_braking(frame, before),
         "ego_speed_mps": frame.ego_speed_mps,
         "ego_braking_mps2": max(0.0, -float(frame.accel_mps2[0])),
+        "ego_jerk_mps3": own.ego_jerk_mps3,
+        "ego_lateral_accel_mps2": own.ego_lateral_accel_mps2,
+        "lane_offset_m": own.lane_offset_m,
+        "over_limit_mps": own.over_limit_mps,
+        "edge_m": own.edge_m,
+        "carriageway_m": own.carriageway_m,
+        "headway_s": own.headway_s,
     }
 
 

@@ -45,4 +45,31 @@ SIGNALS: dict[str, SignalInfo] = {
     ),
     "ego_speed_mps": SignalInfo("m/s", 0.0, 60.0, "speed of the ego"),
     "ego_braking_mps2": SignalInfo("m/s²", 0.0, 12.0, "deceleration of the ego; 0 while it accelerates"),
+    "ego_jerk_mps3": SignalInfo("m/s³", 0.0, 60.0, "size of the ego's jerk: its change of acceleration over 0.3 s"),
+    "ego_lateral_accel_mps2": SignalInfo(
+        "m/s²", 0.0, 20.0, "size of the ego's lateral acceleration: its speed times its change of heading over 0.3 s"
+    ),
+    "lane_offset_m": SignalInfo(
+        "m", 0.0, 10.0, "distance of the ego's centre from the middle of the nearest lane of its direction"
+    ),
+    "over_limit_mps": SignalInfo(
+        "m/s", -60.0, 60.0, "speed of the ego above the limit of the lane where it is; negative below the limit"
+    ),
+    "edge_m": SignalInfo(
+        "m",
+        -10.0,
+        5.0,
+        "smallest distance from the ego's body to the edge of the carriageway of its direction; negative by how far a "
+        "part of its body is beyond. Oncoming lanes count only while it overtakes",
+    ),
+    "carriageway_m": SignalInfo(
+        "m",
+        -10.0,
+        3.0,
+        "how deep the ego's body reaches into the carriageway of its direction: positive while a part of it is on it, "
+        "else the gap to it, negative. Oncoming lanes count only while it overtakes",
+    ),
+    "headway_s": SignalInfo(
+        "s", 0.0, 10.0, "time gap from the ego's front to the vehicle that it follows, along the arc that it drives"
+    ),
 }

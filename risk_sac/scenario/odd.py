@@ -25,6 +25,7 @@ STANDING_M = 10.0  # which is worth as much as this gap
 EMERGENCY_BRAKING_MPS2 = 9.0  # of SUMO's default passenger car, on dry asphalt
 RED_LIGHT_SCALE = 0.8  # of the grip, and so 1.25 for who need not brake and about 0.5 for who brakes at leisure
 RED_LIGHT_HOLD_S = 1.0
+CARRIAGEWAY_SCALE_M = 2.0  # a car reaches 1.65 m into a road of one lane, and 2.6 m or more into a wider one
 TINY = 1e-6  # in any unit; SUMO refuses a speed of 1e-320
 LEAST_ACCEL_MPS2 = 0.1  # of who can accelerate at all: what is stopped by less is stopped for good
 BRAKING_HOLD_S = 0.5  # braking shorter than that is a correction, not an emergency stop
@@ -150,6 +151,8 @@ def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...
     - Red light: the braking that it takes to stop at the line must be within what the car, or the worst friction of
       the ODD, friction · g, can give; the step that crosses the line on red is far beyond it. That is held for
       RED_LIGHT_HOLD_S, not for good, or it would stay the worst margin of the episode.
+    - Carriageway: a part of the ego's body is on the carriageway of its own direction. That falls from the moment when
+      the ego begins to leave it.
     - Braking: BRAKING_HOLD_S on end at nine tenths of what car and road can give means that the ego had no reserve
       left. It is flat until then, and so no part of φ.
 
@@ -167,6 +170,7 @@ def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...
     apart = "vehicle_gap_m > 0 and pedestrian_gap_m > 0"
     requirements = [
         Requirement(name=NO_CONTACT, formula=apart, scale=CONTACT_SCALE_M, shapes=False),
+        Requirement(name="on_carriageway", formula="carriageway_m >= 0", scale=CARRIAGEWAY_SCALE_M),
         Requirement(name="safe_ttc", formula=f"encounter_s >= {ttc_s:g}", scale=ttc_scale_s, counts="report"),
         Requirement(name="rss_margin", formula="rss_margin >= 0", scale=1.0, counts="report"),
     ]

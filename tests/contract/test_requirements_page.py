@@ -27,7 +27,7 @@ def requirement_rows() -> list[str]:
         for requirement in defaults(family):
             families.setdefault(requirement, []).append(family)
     return [
-        f"| `{r.name}` | {', '.join(names)} | `{r.formula}` | {r.scale:g} | {'yes' if r.shapes else 'no'} |"
+        f"| `{r.name}` | {', '.join(names)} | `{r.formula}` | {r.scale:g} | {r.counts} | {'yes' if r.shapes else 'no'} |"
         for r, names in families.items()
     ]
 

@@ -115,6 +115,7 @@ class Net:
     inside: dict[str, list[Lane]] = field(default_factory=lambda: defaultdict(list))  # drivable, by junction
     # Inside junctions, by a lane's id: the lanes that vehicles wait for before they drive onto it.
     waits_for: dict[str, tuple[Lane, ...]] = field(default_factory=dict)
+    walkways: dict[str, list[tuple[Point, ...]]] = field(default_factory=lambda: defaultdict(list))  # by junction
     keeps_left: bool = False
     known: dict[Hashable, object] = field(default_factory=dict)  # what was found out; see `once`
 

@@ -63,6 +63,8 @@ def _net(root: ET.Element) -> Net:
             net.inside[edge.attrib["id"].rpartition("_")[0][1:]] += [lane for lane in lanes if lane.drivable]
         elif function == "crossing" and lanes:
             crossings.append((edge, lanes[0]))
+        elif function == "walkingarea":
+            net.walkways[edge.attrib["id"].rpartition("_")[0][1:]] += [lane.line for lane in lanes]
         elif function == "normal":
             net.edges[edge.attrib["id"]] = _edge(edge, lanes)
     index_of: dict[str, int] = {}

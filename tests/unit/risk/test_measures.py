@@ -3,8 +3,10 @@ import pytest
 
 from risk_sac.config import Requirement
 from risk_sac.risk.measures import Gauge, Measures, soft_min
+from risk_sac.risk.own_motion import OwnMotionGauge
 from risk_sac.risk.publish import assess, publish
 from risk_sac.risk.rss_parameters import RssParameters
+from risk_sac.scenario.carriageway import Carriageway
 from risk_sac.types import Frame
 from tests.builders import frame_of
 
@@ -33,7 +35,8 @@ def test_a_frame_is_measured_by_the_functions_of_the_paper() -> None:
     (measures,) = measured(gauge(), 20.0)
     assessment = assess(behind(20.0), RSS, SEEN)
     assert np.array_equal(measures.assessment.others, assessment.others)
-    assert measures.signals == publish(behind(20.0), None, assessment.least)
+    own = OwnMotionGauge().measure(behind(20.0))
+    assert measures.signals == publish(behind(20.0), None, assessment.least, own)
     assert measures.robustness.tolist() == pytest.approx([1.0, 1.5])
     assert measures.soft_min == soft_min(measures.robustness, 20.0)
 
@@ -47,5 +50,5 @@ def test_an_actor_that_was_touched_in_the_step_and_is_past_has_no_gap_left() -> 
 def test_requirements_remember_the_frames_of_an_episode_and_nothing_before_it() -> None:
     subject = gauge()
     assert [m.robustness[1] for m in measured(subject, 20.0, 8.0, 20.0)] == pytest.approx([1.5, 0.3, 0.3])
-    subject.reset()
+    subject.reset(Carriageway())
     assert measured(subject, 20.0)[0].robustness[1] == pytest.approx(1.5)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from risk_sac.geometry import relative_view
+from risk_sac.risk.own_motion import OwnMotion
 from risk_sac.risk.publish import (
     CROSSED_ON_RED_M,
     ENCOUNTER,
@@ -28,6 +29,15 @@ from risk_sac.types import Frame, Kind, Signal
 from tests import builders
 
 VEHICLE, PEDESTRIAN = Kind.VEHICLE, Kind.PEDESTRIAN
+OWN = OwnMotion(
+    ego_jerk_mps3=1.0,
+    ego_lateral_accel_mps2=2.0,
+    lane_offset_m=3.0,
+    over_limit_mps=4.0,
+    edge_m=-5.0,
+    carriageway_m=-6.0,
+    headway_s=7.0,
+)
 
 
 def frame_of(
@@ -53,7 +63,7 @@ def signals_of(
 ) -> dict[str, float]:
     others = assess(frame, RssParameters(), np.ones(len(frame.ids) - 1, dtype=np.bool_)).others.copy()
     others[TTC], others[RSS_SCALED], others[ENCOUNTER] = ttc, rss, ttc if encounter is None else encounter
-    return publish(frame, None, LeastMargins(*least_margins(others, frame.kind)))
+    return publish(frame, None, LeastMargins(*least_margins(others, frame.kind)), OWN)
 
 
 @pytest.mark.parametrize(
@@ -79,6 +89,7 @@ def test_nothing_to_measure_takes_the_caps() -> None:
         "red_light_braking_mps2": 0.0,
         "ego_speed_mps": 10.0,
         "ego_braking_mps2": 0.0,
+        **OWN._asdict(),
     }
 
 

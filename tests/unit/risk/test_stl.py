@@ -153,6 +153,7 @@ FORMULAS: dict[str, Any] = {
 }
 SHIPPED_FORMULAS: dict[str, Any] = {
     "no_contact": ("and", (">=", "vehicle_gap_m", 0), (">=", "pedestrian_gap_m", 0)),
+    "on_carriageway": (">=", "carriageway_m", 0),
     "safe_ttc": (">=", "encounter_s", 1.5),
     "rss_margin": (">=", "rss_margin", 0),
     "pedestrian_gap": (

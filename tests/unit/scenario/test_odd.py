@@ -194,6 +194,7 @@ def test_requirements_follow_the_odd() -> None:
         "no_contact",
         "safe_ttc",
         "rss_margin",
+        "on_carriageway",
         "pedestrian_gap",
         "no_red_light_entry",
         "bounded_braking",
@@ -202,7 +203,7 @@ def test_requirements_follow_the_odd() -> None:
     left_out = everything - {r.name for r in requirements_from_odd(intersect(DEFAULT, motorway), 0.5)}
     assert left_out == {"pedestrian_gap", "no_red_light_entry"}
     counting = {r.name for r in requirements_from_odd(DEFAULT, 0.5) if r.counts == "failure"}
-    assert counting == {"no_contact", "no_red_light_entry"}
+    assert counting == {"no_contact", "on_carriageway", "no_red_light_entry"}
 
 
 def test_thresholds_follow_the_odd_and_the_reaction_time() -> None:
@@ -225,7 +226,7 @@ def test_an_ego_that_nobody_threatens_has_a_robustness_of_about_1_in_every_requi
     requirements = requirements_from_odd(DEFAULT, 0.5)
     monitor = Monitor(requirements, 0.1, 150)
     calm = {"encounter_s": 4.2, "rss_margin": 1.0, "pedestrian_gap_m": 12.0, "red_light_braking_mps2": 0.0}
-    calm |= {"vehicle_gap_m": 10.0}
+    calm |= {"vehicle_gap_m": 10.0, "carriageway_m": 1.65}  # on a road of one lane
     for speed_mps in (0.0, 5.0):
         monitor.reset()
         robustness = monitor.update(calm | {"ego_speed_mps": speed_mps, "ego_braking_mps2": 0.0})
