@@ -27,9 +27,13 @@ def requirement_rows() -> list[str]:
         for requirement in defaults(family):
             families.setdefault(requirement, []).append(family)
     return [
-        f"| `{r.name}` | {', '.join(names)} | `{r.formula}` | {r.scale:g} | {r.counts} | {'yes' if r.shapes else 'no'} |"
+        f"| `{r.name}` | {', '.join(names)} | `{r.formula}` | {r.scale:g} | {r.counts} | {_yes_or_no(r.shapes)} |"
         for r, names in families.items()
     ]
+
+
+def _yes_or_no(answer: bool) -> str:
+    return "yes" if answer else "no"
 
 
 def test_the_page_has_every_signal_and_default_requirement_as_the_code_has_them() -> None:
