@@ -18,6 +18,7 @@ from risk_sac.records import (
     Outcome,
     ReferenceOutcome,
     RunMetrics,
+    Violation,
 )
 from risk_sac.types import Floats, Frame, Kind, Role, Row, Signal
 
@@ -160,6 +161,28 @@ def collision(**changes: Any) -> Collision:
         "verdicts": {"inside_limits": True, "ego_moving": True},
     }
     return Collision(**(values | changes))
+
+
+def violation(**changes: Any) -> Violation:
+    """Of `never_fast`, 1.5 s after the release, by an ego that drives straight near no other; refused by no rule."""
+    values: dict[str, Any] = {
+        "requirement": "never_fast",
+        "time_s": 1.5,
+        "robustness": -0.4,
+        "other_id": None,
+        "other_kind": None,
+        "other_role": None,
+        "ego_speed_mps": 9.0,
+        "ego_manoeuvre": "straight",
+        "hidden": False,
+        "broke": (),
+        "verdicts": {"no_teleport": True, "inside_limits": True},
+        "grade": None,
+        "drivers": {},
+        "signature": "never_fast violated; straight",
+        "definitions": 1,
+    }
+    return Violation(**(values | changes))
 
 
 def episode_record(index: int = 0, outcome: Outcome = Outcome.SAFE, **changes: Any) -> EpisodeRecord:

@@ -1,15 +1,18 @@
 """What an episode adds to its row, its run's counts and its project's hours."""
 
 import time
+from collections.abc import Iterable
 
 from pydantic_core import from_json
 from sqlalchemy.orm import Session
 
 from risk_sac.execution.messages import EpisodeDone
-from risk_sac.records import EpisodeRecord, Funnel, Outcome, stored
-from service.store.tables import EpisodeRow, RunRow, UsageRow
+from risk_sac.metrics.requirements import STEPS
+from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Funnel, Outcome, stored
+from service.store.tables import EpisodeRow, RequirementRow, RunRow, UsageRow
 
 HOUR_S = 3600
+TOUCHED = f",{NO_CONTACT},"
 
 
 def add_usage(session: Session, project: str, busy_s: float) -> None:
@@ -22,12 +25,12 @@ def add_usage(session: Session, project: str, busy_s: float) -> None:
         row.busy_s += busy_s
 
 
-def count(run: RunRow, outcome: Outcome, sign: int) -> None:
-    """Adds an episode with this outcome to a run's counts (+1), or takes it out (-1)."""
+def count(run: RunRow, row: EpisodeRow, sign: int) -> None:
+    """Adds an episode to its run's counts (+1), or takes it out (-1)."""
     run.episodes_done += sign
-    run.rejected += sign * (outcome is Outcome.REJECTED)
-    run.raw_collisions += sign * (outcome in (Outcome.FAILURE, Outcome.DEGENERATE))
-    run.failures += sign * (outcome is Outcome.FAILURE)
+    run.rejected += sign * (row.outcome == Outcome.REJECTED)
+    run.raw_collisions += sign * (TOUCHED in (row.violated or ""))
+    run.failures += sign * (row.outcome == Outcome.FAILURE)
 
 
 def tally(run: RunRow) -> None:
@@ -35,6 +38,11 @@ def tally(run: RunRow) -> None:
     phases = [from_json(text) for text in (run.metrics, run.evaluation) if text is not None]
     for name in ("distinct_failures", "preventable", "distinct_preventable"):
         setattr(run, name, sum(phase.get(name, 0) for phase in phases))
+    funnels = [phase.get("requirements", {}) for phase in phases]
+    for name in dict.fromkeys(name for each in funnels for name in each):
+        row = run.requirements.setdefault(name, RequirementRow(name=name))
+        for step in STEPS:
+            setattr(row, step, sum(each[name][step] for each in funnels if name in each))
 
 
 def fill(row: EpisodeRow, event: EpisodeDone) -> None:
@@ -52,7 +60,18 @@ def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
     row.index = record.index
     row.outcome = record.outcome
     row.record = stored(record)
-    judgement = record.collision.judgement if record.collision is not None else None
-    row.grade = judgement.grade if judgement is not None and record.outcome is Outcome.FAILURE else None
-    row.signature = judgement.signature if judgement is not None else None
-    row.broke = f",{','.join(judgement.broke)}," if judgement is not None else None
+    contact, worst = record.collision, record.worst_violation
+    violated = [name for name, result in record.requirements.items() if result.violated_s is not None]
+    row.violated = listed(dict.fromkeys([*violated, *([] if contact is None else [NO_CONTACT])]))
+    row.failed = listed(record.failed)
+    judgement = contact.judgement if contact is not None else None
+    unjudged = worst is None or (isinstance(worst, Collision) and judgement is None)
+    row.grade = None if worst is None or record.outcome is not Outcome.FAILURE else worst.graded
+    row.signature = None if worst is None or unjudged else worst.signature
+    row.broke = None if judgement is None else listed(judgement.broke)
+
+
+def listed(names: Iterable[str]) -> str | None:
+    """Names as a column has them, each between commas; None without any."""
+    found = ",".join(names)
+    return f",{found}," if found else None

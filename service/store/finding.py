@@ -17,8 +17,11 @@ from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """Which contacts are asked for, by their judgement; None: any."""
+    """Which episodes are asked for, by what was judged of them; None: any."""
 
+    requirement: str | None = None
+    valid: bool = False
+    """Whether the requirement must be what makes the episode a failure, and not only violated in it."""
     grade: Grade | None = None
     broke: str | None = None
     signature: str | None = None
@@ -27,6 +30,9 @@ class Judged:
 
     def conditions(self) -> Iterator[ColumnElement[bool]]:
         """As the database takes them."""
+        if self.requirement is not None:
+            column = EpisodeRow.failed if self.valid else EpisodeRow.violated
+            yield column.contains(f",{self.requirement},", autoescape=True)
         if self.grade is not None:
             yield EpisodeRow.grade == self.grade
         if self.broke is not None:
@@ -73,7 +79,7 @@ def episode_page(
 
 
 def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> EpisodeRow:
-    """The campaign's episode with this id in which the ego touched something."""
+    """The campaign's episode with this id in which a requirement that counts was violated."""
     run_id, phase, index = _split(failure_id)
     query = (
         select(EpisodeRow)
@@ -84,15 +90,13 @@ def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> Ep
     )
     row = session.scalars(query).one_or_none()
     if row is None:
-        message = (
-            f"campaign {campaign.id} has no failure {failure_id!r}; GET its `failures?tier=raw` lists all contacts"
-        )
+        message = f"campaign {campaign.id} has no failure {failure_id!r}; GET its `failures?tier=raw` lists them all"
         raise NotFoundError(message, field="failure_id", got=failure_id)
     return row
 
 
 def find_triage(session: Session, episode: EpisodeRow) -> TriageRow | None:
-    """The triage of a contact; None without one."""
+    """The triage of a failure; None without one."""
     place = {"campaign_number": episode.campaign_number, "episode_number": episode.number}
     return session.scalars(select(TriageRow).filter_by(**place)).one_or_none()
 

@@ -1,4 +1,4 @@
-"""The database: campaigns, their runs, the runs' episodes, what changed when, triages, usage, the server's own.
+"""The database: campaigns, runs and their requirements, episodes, changes, triages, usage, the server's own.
 
 Records of the method are stored as the JSON that the worker sent; what is filtered or counted has a
 column of its own. Numbers are primary keys in order of arrival, so that a page continues where the
@@ -6,7 +6,9 @@ last one ended however much was inserted meanwhile. Its history is in `service.s
 """
 
 from sqlalchemy import ForeignKey, Index, Text, text
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
+from sqlalchemy.orm import DeclarativeBase, Mapped, attribute_keyed_dict, mapped_column, relationship
+
+from risk_sac.metrics.requirements import STEPS
 
 # What is summed up over runs, per family, method and state.
 TALLIED = (
@@ -20,7 +22,7 @@ TALLIED = (
 
 
 def _of_judged(name: str, *columns: str) -> Index:
-    """An index that the many episodes without a contact take no room in."""
+    """An index without the many episodes that violated nothing that counts."""
     judged = text(f"{columns[1]} IS NOT NULL")
     return Index(name, *columns, sqlite_where=judged, postgresql_where=judged)
 
@@ -97,6 +99,23 @@ class RunRow(Base):
     versions: Mapped[str] = mapped_column(Text, default="{}")
     repetitions: Mapped[str | None] = mapped_column(Text)  # of its distinct failures, by episode's index
     campaign: Mapped[CampaignRow] = relationship(back_populates="runs")
+    requirements: Mapped[dict[str, "RequirementRow"]] = relationship(
+        collection_class=attribute_keyed_dict("name"), cascade="all, delete-orphan"
+    )
+
+
+class RequirementRow(Base):
+    """The funnel of one requirement in one run, search and evaluation together."""
+
+    __tablename__ = "requirements"
+    __table_args__ = (Index("requirements_tallies", "name", *STEPS),)  # all that metrics sum up
+
+    run_number: Mapped[int] = mapped_column(ForeignKey("runs.number"), primary_key=True)
+    name: Mapped[str] = mapped_column(primary_key=True)
+    violated: Mapped[int] = mapped_column(default=0)
+    valid: Mapped[int] = mapped_column(default=0)
+    distinct: Mapped[int] = mapped_column(default=0)
+    preventable: Mapped[int] = mapped_column(default=0)
 
 
 class EpisodeRow(Base):
@@ -123,8 +142,10 @@ class EpisodeRow(Base):
     series: Mapped[str | None]
     series_sha256: Mapped[str | None]
     wall_s: Mapped[float]
+    violated: Mapped[str | None]  # requirements that were, between commas: ",safe_ttc,no_contact,"
+    failed: Mapped[str | None]  # of these, those that make it a failure
     grade: Mapped[str | None]  # of a valid failure
-    signature: Mapped[str | None]  # of a contact
+    signature: Mapped[str | None]  # of the violation that names the episode
     broke: Mapped[str | None]  # what its striker broke, between commas: ",red_light,"
     funnel: Mapped[str | None] = mapped_column(Text)  # of the run's phase, this episode included
     sequence: Mapped[int]  # among the campaign's events: 1, 2, …, with those of `changes`
@@ -150,7 +171,7 @@ class ChangeRow(Base):
 
 
 class TriageRow(Base):
-    """What people made of a contact."""
+    """What people made of a failure."""
 
     __tablename__ = "triages"
     __table_args__ = (

@@ -19,7 +19,7 @@ from service.store.reading import Store
 from service.store.sequence import hold_campaigns, next_sequence
 from service.store.states import RESUMED, advance, campaign_state
 from service.store.stored import StoredCampaign
-from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow, TriageRow
+from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RequirementRow, RunRow, TriageRow
 
 
 class Ledger:
@@ -95,9 +95,9 @@ class Ledger:
                     )
                     session.add(row)
                 else:
-                    count(run, Outcome(row.outcome), -1)
+                    count(run, row, -1)
                 fill(row, event)
-                count(run, event.record.outcome, +1)
+                count(run, row, +1)
                 if event.record.evaluating:
                     run.evaluation = stored(event.metrics)
                 else:
@@ -177,7 +177,7 @@ class Ledger:
     def triage(
         self, campaign_id: str, failure_id: str, state: TriageState, comment: str, project: str | None = None
     ) -> Triage:
-        """Stores the triage of a contact; storing the same again changes nothing."""
+        """Stores the triage of a failure; storing the same again changes nothing."""
         with self._writing("noting what people make of a failure") as session:
             campaign = find_campaign(session, campaign_id, project)
             session.refresh(campaign, with_for_update=True)  # held, as by `hold_campaigns`
@@ -197,6 +197,8 @@ class Ledger:
         with self._writing("deleting a campaign") as session:
             number = find_campaign(session, campaign_id).number
             session.expunge_all()
+            runs = select(RunRow.number).filter_by(campaign_number=number)
+            session.execute(delete(RequirementRow).where(RequirementRow.run_number.in_(runs)))
             for table in (TriageRow, EpisodeRow, ChangeRow, RunRow):
                 session.execute(delete(table).where(table.campaign_number == number))
             session.execute(delete(CampaignRow).where(CampaignRow.number == number))
@@ -228,9 +230,9 @@ def _refuse(session: Session, run: RunRow, flaky: Collection[int]) -> None:
     for row in session.scalars(failures):
         if row.index not in indices:
             continue
-        count(run, Outcome(row.outcome), -1)
+        count(run, row, -1)
         fill_record(row, EpisodeRecord.model_validate_json(row.record).refused(REPEATS))
-        count(run, Outcome(row.outcome), +1)
+        count(run, row, +1)
 
 
 Place = tuple[int, str, int]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.metrics import WINDOW
-from risk_sac.records import RECORDED, Grade, Outcome, Real, Record, State
+from risk_sac.records import RECORDED, Outcome, Real, Record, State
 from risk_sac.types import Floats
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
-from service.views.failure_table import Kinds, Plain
+from service.views.failure_table import Kinds, Plain, is_preventable, violations_of
 
 SEARCH = RECORDED["search"]
 Counts = NDArray[np.int64]
@@ -31,11 +31,11 @@ class RunCurves(Record):
     episodes: list[int]
     """How many episodes of the search there were; evenly spread, the newest included."""
     window_ecr: list[Real]
-    """ECR over the newest 100 episodes by then."""
+    """ECR over the newest 100 episodes by then: valid contacts alone."""
     window_pcr: list[Real]
-    """PCR over the newest 100 episodes by then."""
+    """PCR over the newest 100 episodes by then: valid contacts alone."""
     distinct: list[int]
-    """Distinct failures so far."""
+    """Distinct violations so far, of all requirements that count."""
     preventable: list[int]
     """Failures so far that the careful driver would have prevented, repetitions included."""
     distinct_preventable: list[int]
@@ -66,10 +66,11 @@ class _Search:
     """What each episode of a run's search adds to its curves."""
 
     driven: list[int] = field(default_factory=list)  # so far: episodes in which the ego did not fail to drive
-    failures: list[bool] = field(default_factory=list)  # of these alone
+    contacts: list[bool] = field(default_factory=list)  # valid ones, of these episodes alone
+    preventable_contacts: list[bool] = field(default_factory=list)
     preventable: list[bool] = field(default_factory=list)
-    distinct: list[bool] = field(default_factory=list)
-    distinct_preventable: list[bool] = field(default_factory=list)
+    distinct: list[int] = field(default_factory=list)
+    distinct_preventable: list[int] = field(default_factory=list)
     steps: list[int] = field(default_factory=list)
     cost: list[float] = field(default_factory=list)  # summed over the steps
     dual_variable: list[float] = field(default_factory=list)
@@ -77,16 +78,16 @@ class _Search:
     _preventable_kinds: Kinds = field(default_factory=Kinds)
 
     def add(self, outcome: str, record: Plain) -> None:
-        failed = outcome == Outcome.FAILURE
-        collision = record["collision"]
-        judged = collision.get("judgement") if failed else None
-        preventable = judged is not None and judged["grade"] == Grade.CAREFUL
+        valid, _ = violations_of(outcome, record)
+        preventable = [violation for violation in valid if is_preventable(violation)]
         if outcome != Outcome.INVALID:
-            self.failures.append(failed)
-            self.preventable.append(preventable)
-        self.driven.append(len(self.failures))
-        self.distinct.append(failed and self._kinds.add(collision))
-        self.distinct_preventable.append(preventable and self._preventable_kinds.add(collision))
+            contact = record["collision"]
+            self.contacts.append(contact is not None and contact in valid)
+            self.preventable_contacts.append(contact is not None and contact in preventable)
+        self.driven.append(len(self.contacts))
+        self.preventable.append(bool(preventable))
+        self.distinct.append(sum(map(self._kinds.add, valid)))
+        self.distinct_preventable.append(sum(map(self._preventable_kinds.add, preventable)))
         self.steps.append(record["steps"])
         self.cost.append(float(record["mean_cost"]) * record["steps"] if record["steps"] else 0.0)
         self.dual_variable.append(float(record["dual_variable"]))
@@ -98,8 +99,8 @@ def _curves(run: StoredRun, search: _Search, points: int) -> RunCurves:
     lines = {name: _summed(getattr(search, name))[at] for name in ("distinct", "preventable", "distinct_preventable")}
     driven = np.array([0, *search.driven])[at]
     lines |= {
-        "window_ecr": _window(search.failures, driven),
-        "window_pcr": _window(search.preventable, driven),
+        "window_ecr": _window(search.contacts, driven),
+        "window_pcr": _window(search.preventable_contacts, driven),
         "dual_variable": np.array([0.0, *search.dual_variable])[at],
         "mean_cost": np.divide(cost, steps, out=np.full(len(at), np.nan), where=steps > 0.0),
     }

@@ -10,30 +10,26 @@ from typing import Any, Literal
 import numpy as np
 
 from risk_sac.config import FamilyName, MethodName
-from risk_sac.records import ConflictType, Grade, Outcome, Real, Record, TriageState
-from risk_sac.verdicts.distinct import Cell, cell
+from risk_sac.records import NO_CONTACT, ConflictType, Grade, Outcome, Real, Record, TriageState
+from risk_sac.verdicts.distinct import Niche, cell
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
 
 Plain = Mapping[str, Any]
 """A JSON object as it is stored, see `risk_sac.records.stored`."""
 Repeats = Literal["verified", "flaky"]
 DECIMALS = 4
-OF_COLLISION = {"striker": "other_id", "striker_kind": "other_kind"} | {  # column -> field
-    name: name
-    for name in (
-        "time_s",
-        "visible_for_s",
-        "ego_speed_mps",
-        "other_speed_mps",
-        "relative_speed_mps",
-        "lateral_offset_m",
-        "min_rss_margin_m",
-        "ego_peak_braking_mps2",
-    )
-}
-OF_JUDGEMENT = ("grade", "conflict_type", "conflict_s", "hidden", "ego_response", "ground", "broke")
+OF_ANY = ("time_s", "ego_speed_mps")
+OF_CONTACT = (
+    "visible_for_s",
+    "other_speed_mps",
+    "relative_speed_mps",
+    "lateral_offset_m",
+    "min_rss_margin_m",
+    "ego_peak_braking_mps2",
+)
+OF_JUDGEMENT = ("grade", "conflict_type", "conflict_s", "hidden", "ego_response", "ground", "broke", "ego_broke")
 COUNTED = ("failures", "distinct", "preventable")
-UNJUDGED: Plain = dict.fromkeys((*OF_JUDGEMENT, "signature")) | {"broke": []}
+UNJUDGED: Plain = dict.fromkeys((*OF_JUDGEMENT, "signature")) | {"broke": [], "ego_broke": []}
 
 
 class FailureKind(Record):
@@ -41,6 +37,8 @@ class FailureKind(Record):
 
     signature: str | None
     """What `signature=` of the failures takes; null in what was stored before contacts were judged."""
+    requirement: str
+    """That is violated; `no_contact` by a contact."""
     name: str
     """In words."""
     failures: int
@@ -65,6 +63,7 @@ class FamilyScenes(Record):
 class FailureTable(Record):
     """Failures by columns: each list has an entry per failure, in the order of their arrival.
 
+    An episode that violates several requirements is one failure; a contact names it, or else the first violation.
     Numbers are rounded to four decimals; the failure itself has all of them. Times count from the adversaries' release.
     """
 
@@ -78,22 +77,27 @@ class FailureTable(Record):
     phases: list[str]
     """train | evaluate"""
     valid: list[bool]
-    """Whether no rule refused the contact; always, unless `tier=raw` was asked for."""
+    """Whether it has a violation that no rule refused; always, unless `tier=raw` was asked for."""
+    requirement: list[str]
+    """That the violation which names it violates; `no_contact` of a contact."""
+    failed: list[list[str]]
+    """All requirements that count and were validly violated."""
     grade: list[Grade | None]
-    """Null where the contact is not valid, or was never judged."""
+    """Null where it is not valid, or was never judged."""
     distinct: list[bool]
-    """Whether it is valid, and the first of its kind in its run and phase."""
+    """Whether one of its valid violations is the first of its kind in its run and phase."""
     kind: list[int]
     """Position in `kinds`."""
-    striker: list[str]
-    striker_kind: list[str]
+    striker: list[str | None]
+    """The road user that touched the ego; without contact the one that the ego would have met soonest, if any."""
+    striker_kind: list[str | None]
     """vehicle | pedestrian"""
     conflict_type: list[ConflictType | None]
-    """Null in what was stored before contacts were judged, as all that is judged of a contact."""
+    """Null without contact, as all that is said of contacts alone; and in what was stored before they were judged."""
     conflict_s: list[Real]
     """When the conflict began; negative before the release."""
     time_s: list[Real]
-    """When they touched."""
+    """When they touched, or when the requirement was first violated."""
     visible_for_s: list[Real]
     """How long the ego had known of the striker; 0 if unseen."""
     ego_speed_mps: list[Real]
@@ -105,18 +109,20 @@ class FailureTable(Record):
     """Until 1 s before the contact; null where there was none."""
     min_rss_margin_m: list[Real]
     min_robustness: list[Real]
-    """Soft minimum of the requirements, until 1 s before the contact."""
+    """Soft minimum of the requirements, until 1 s before the contact; without contact, of the one that was violated."""
     ego_peak_braking_mps2: list[Real]
     hidden: list[bool | None]
-    """Whether the ego knew nothing of the striker when the conflict began."""
+    """Whether the ego knew nothing of the striker when the conflict began, or at the violation."""
     ego_response: list[str | None]
     """none | late_braking | braking | standing | starting"""
     ground: list[str | None]
     """lane | junction | crossing | beside_crossing"""
     broke: list[list[str]]
     """What the striker broke."""
+    ego_broke: list[list[str]]
+    """What the ego broke."""
     refused_by: list[list[str]]
-    """Rules that the contact failed; none where it is valid."""
+    """Rules that the violation failed; none where it is valid."""
     repeats: list[Repeats | None]
     """Whether it was the same each time that it was played again; null where it was not."""
     triage: list[TriageState]
@@ -131,46 +137,78 @@ class Kinds:
     """Finds the first failure of each kind, as `risk_sac.verdicts.distinct.DistinctFailures` does."""
 
     def __init__(self) -> None:
-        self._found: set[tuple[str, Cell]] = set()
+        self._found: set[Niche] = set()
 
-    def add(self, collision: Plain) -> bool:
-        """Adds a collision; returns whether it is the first of its kind."""
-        niche = signature_of(collision), _cell(collision)
+    def add(self, violation: Plain) -> bool:
+        """Adds a violation; returns whether it is the first of its kind."""
+        niche = _niche(violation)
         new = niche not in self._found
         self._found.add(niche)
         return new
 
 
-def signature_of(collision: Plain) -> str:
-    """The judgement's signature; of a contact stored before contacts were judged, its striker."""
-    judged = collision.get("judgement")
-    if judged:
-        return str(judged["signature"])
-    return f"unjudged {collision['other_role']} {collision['other_kind']}"
+def violations_of(outcome: str, record: Plain) -> tuple[list[Plain], list[Plain]]:
+    """The violations of an episode, with and without contact: the valid ones, and all; a contact first."""
+    contact = record["collision"]
+    every = [*([] if contact is None else [contact]), *record.get("violations", [])]
+    if outcome != Outcome.FAILURE:
+        return [], every
+    return [each for each in every if all(each.get("verdicts", {}).values())], every
 
 
-def _cell(collision: Plain) -> Cell:
-    judged = collision.get("judgement")
-    from_conflict_s = float(collision["time_s"]) - float(judged["conflict_s"]) if judged else 0.0
-    return cell((float(collision["ego_speed_mps"]), float(collision["other_speed_mps"]), from_conflict_s))
+def is_preventable(violation: Plain) -> bool:
+    """Whether the careful driver would have prevented a valid violation."""
+    return bool(_judged(violation)["grade"] == Grade.CAREFUL)
+
+
+def _judged(violation: Plain) -> Plain:
+    """What was judged of a violation, which a contact keeps apart."""
+    if "requirement" in violation:
+        return violation
+    return violation.get("judgement") or UNJUDGED
+
+
+def _requirement(violation: Plain) -> str:
+    return str(violation.get("requirement", NO_CONTACT))
+
+
+def _name(violation: Plain) -> str:
+    """Its signature; of a contact stored before contacts were judged, its striker."""
+    return _judged(violation)["signature"] or f"unjudged {violation['other_role']} {violation['other_kind']}"
+
+
+def _niche(violation: Plain) -> Niche:
+    values = [violation["ego_speed_mps"]]
+    if "requirement" not in violation:
+        judged = violation.get("judgement")
+        from_conflict_s = float(violation["time_s"]) - float(judged["conflict_s"]) if judged else 0.0
+        values += [violation["other_speed_mps"], from_conflict_s]
+    return _requirement(violation), _name(violation), cell([float(value) for value in values])
 
 
 def failure_table(
-    campaign: StoredCampaign, contacts: Iterable[PlainEpisode], triages: Mapping[int, TriageState]
+    campaign: StoredCampaign, failures: Iterable[PlainEpisode], triages: Mapping[int, TriageState]
 ) -> FailureTable:
-    """The table of these contacts of the campaign, in their order; a contact without a triage is new."""
+    """The table of these failures of the campaign, in their order; one without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
     found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)
-    contacts = list(contacts)
-    rows = [_row(runs[each.run_number], each, found[each.run_number, each.phase]) for each in contacts]
-    names = [signature_of(each.record["collision"]) for each in contacts]
-    kinds = _kinds(contacts, names, rows)
-    places = {kind.name: place for place, kind in enumerate(kinds)}
+    failures, naming, rows = list(failures), [], []
+    for each in failures:
+        valid, every = violations_of(each.outcome, each.record)
+        naming.append(next(iter(valid or every)))
+        kinds = found[each.run_number, each.phase]
+        rows.append(
+            _row(runs[each.run_number], each, naming[-1])
+            | {"failed": [_requirement(violation) for violation in valid]}
+            | {"distinct": any([kinds.add(violation) for violation in valid])}  # each of them is to be added
+        )
+    kinds_found = _kinds(naming, rows)
+    places = {(kind.requirement, kind.name): place for place, kind in enumerate(kinds_found)}
     table: dict[str, Any] = {
-        "kind": [places[name] for name in names],
-        "kinds": kinds,
-        "triage": [triages.get(each.number, TriageState.NEW) for each in contacts],
-        "scenes": _scenes([row["families"] for row in rows], [each.record["scene"] for each in contacts]),
+        "kind": [places[_requirement(each), _name(each)] for each in naming],
+        "kinds": kinds_found,
+        "triage": [triages.get(each.number, TriageState.NEW) for each in failures],
+        "scenes": _scenes([row["families"] for row in rows], [each.record["scene"] for each in failures]),
     }
     for column in FailureTable.model_fields.keys() - table.keys():
         values = [row[column] for row in rows]
@@ -178,36 +216,40 @@ def failure_table(
     return FailureTable.model_validate(table)
 
 
-def _row(run: StoredRun, contact: PlainEpisode, found: Kinds) -> dict[str, Any]:
-    """A contact's entries of the columns."""
-    collision = contact.record["collision"]
-    judged = collision.get("judgement") or UNJUDGED
-    repetition = run.repetitions.get(contact.index)
-    valid = contact.outcome == Outcome.FAILURE
-    row = {column: collision[name] for column, name in OF_COLLISION.items()}
-    row |= {name: judged[name] for name in OF_JUDGEMENT}
-    row |= {name: collision.get(f"early_{name}", collision.get(name)) for name in ("min_ttc_s", "min_robustness")}
+def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, Any]:
+    """A failure's entries of most columns, by the violation that names it."""
+    judged = UNJUDGED | _judged(violation)
+    repetition = run.repetitions.get(failure.index)
+    row = {name: judged[name] for name in OF_JUDGEMENT}
+    if "requirement" in violation:  # whose offences are the ego's own
+        row |= {"broke": [], "ego_broke": violation["broke"]}
+        row |= {"min_ttc_s": None, "min_robustness": violation["robustness"]}
+    else:
+        row |= {name: violation.get(f"early_{name}", violation.get(name)) for name in ("min_ttc_s", "min_robustness")}
+    row |= {name: violation[name] for name in OF_ANY} | {name: violation.get(name) for name in OF_CONTACT}
     return row | {
-        "ids": f"{run.id}-{contact.phase}-{contact.index}",
+        "ids": f"{run.id}-{failure.phase}-{failure.index}",
         "run_ids": run.id,
         "families": run.family,
         "methods": run.method,
         "seeds": run.seed,
-        "indices": contact.index,
-        "phases": contact.phase,
-        "valid": valid,
-        "distinct": valid and found.add(collision),
-        "refused_by": [rule for rule, passed in collision.get("verdicts", {}).items() if not passed],
+        "indices": failure.index,
+        "phases": failure.phase,
+        "valid": failure.outcome == Outcome.FAILURE,
+        "requirement": _requirement(violation),
+        "striker": violation["other_id"],
+        "striker_kind": violation["other_kind"],
+        "refused_by": [rule for rule, passed in violation.get("verdicts", {}).items() if not passed],
         "repeats": None if repetition is None else "verified" if repetition.verified else "flaky",
     }
 
 
-def _kinds(contacts: Sequence[PlainEpisode], names: Sequence[str], rows: Sequence[Plain]) -> list[FailureKind]:
+def _kinds(naming: Sequence[Plain], rows: Sequence[Plain]) -> list[FailureKind]:
     """Of the signatures, the most preventable failures first."""
-    kinds: dict[str, dict[str, Any]] = {}
-    for contact, name, row in zip(contacts, names, rows, strict=True):
-        judged = contact.record["collision"].get("judgement") or UNJUDGED
-        kind = kinds.setdefault(name, {"signature": judged["signature"], "name": name} | dict.fromkeys(COUNTED, 0))
+    kinds: dict[tuple[str, str], dict[str, Any]] = {}
+    for violation, row in zip(naming, rows, strict=True):
+        said = {"signature": _judged(violation)["signature"], "requirement": row["requirement"], "name": _name(violation)}
+        kind = kinds.setdefault((row["requirement"], said["name"]), said | dict.fromkeys(COUNTED, 0))
         kind["failures"] += row["valid"]
         kind["distinct"] += row["distinct"]
         kind["preventable"] += row["valid"] and row["grade"] == Grade.CAREFUL

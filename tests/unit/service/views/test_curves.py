@@ -12,7 +12,7 @@ from risk_sac.metrics import MetricsAccumulator
 from risk_sac.records import Grade, Outcome, stored, wire
 from service.store.stored import PlainEpisode
 from service.views.curves import curves, spread
-from tests.builders import collision, episode_record, judgement
+from tests.builders import collision, episode_record, judgement, violation
 
 SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
 
@@ -22,7 +22,7 @@ def plain(run, record):
 
 
 def drawn(count):
-    """Records of a search: half of them contacts of several kinds."""
+    """Records of a search: half of them contacts of several kinds, some with or after a violation without contact."""
     dice = random.Random(5)
     for index in range(count):
         outcome = dice.choice([Outcome.SAFE, Outcome.REJECTED, Outcome.FAILURE, Outcome.FAILURE, Outcome.DEGENERATE])
@@ -31,7 +31,12 @@ def drawn(count):
             ego_speed_mps=dice.choice([5.0, 15.0]), judgement=judgement(grade, signature=dice.choice("abcdefgh"))
         )
         touched = outcome in (Outcome.FAILURE, Outcome.DEGENERATE)
+        if outcome is Outcome.DEGENERATE:
+            hit = hit.model_copy(update={"verdicts": {"ego_moving": False}})
         more = {"mean_cost": dice.random(), "dual_variable": dice.random()}
+        if outcome is Outcome.FAILURE and dice.random() < 0.4:
+            more["violations"] = (violation(grade=dice.choice(list(Grade)), signature=dice.choice("abcd")),)
+            touched = dice.random() < 0.5
         yield episode_record(index, outcome, collision=hit if touched else None, **more)
 
 

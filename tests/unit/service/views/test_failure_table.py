@@ -9,7 +9,7 @@ from risk_sac.records import Grade, Outcome, Repetition, TriageState, stored, wi
 from risk_sac.verdicts.distinct import DistinctFailures
 from service.store.stored import PlainEpisode
 from service.views.failure_table import failure_table
-from tests.builders import collision, episode_record, judgement
+from tests.builders import collision, episode_record, judgement, violation
 
 SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
 FAILURE, REFUSED = Outcome.FAILURE, Outcome.DEGENERATE
@@ -46,6 +46,8 @@ def test_a_column_has_what_the_record_has(ledger):
         "indices": 7,
         "phases": "train",
         "valid": False,
+        "requirement": "no_contact",
+        "failed": [],
         "grade": None,
         "distinct": False,
         "kind": 0,
@@ -67,11 +69,12 @@ def test_a_column_has_what_the_record_has(ledger):
         "ego_response": "late_braking",
         "ground": "lane",
         "broke": ["red_light", "speeding"],
+        "ego_broke": [],
         "refused_by": ["ego_moving"],
         "repeats": None,
         "triage": "new",
     }
-    named = {"signature": "cut-in, straight", "name": "cut-in, straight"}
+    named = {"signature": "cut-in, straight", "requirement": "no_contact", "name": "cut-in, straight"}
     assert kinds == [named | {"failures": 0, "distinct": 0, "preventable": 0}]
     assert scenes == {"low": {"names": ["lead_gap_m"], "rows": [[12.3457]], "of": [0]}}
 
@@ -105,6 +108,31 @@ def test_distinct_are_those_that_the_run_counted(ledger):
     assert [kind.signature for kind in table.kinds] == ["cut-in, straight", "leader", None]
     assert table.kind == [0, 0, 0, 1, 0, 2, 0, 0, 0]
     assert (table.grade[5], table.conflict_type[5], table.hidden[5], table.broke[5]) == (None, None, None, [])
+
+
+def test_a_violation_without_contact_has_what_is_known_of_it(ledger):
+    campaign = ledger.create(SPEC)
+    fast = violation(grade=Grade.CAREFUL, broke=("speeding",))
+    near = violation(other_id="lead", other_kind="vehicle", other_role="adversary", ego_speed_mps=3.0)
+    hit, touched = collision(verdicts={"ego_moving": False}), collision(judgement=judgement())
+    failures = [
+        plain(campaign.runs[0], index, contact, violations=violations, scene={})
+        for index, (contact, violations) in enumerate(
+            [(None, (fast,)), (hit, (near,)), (touched, (near, violation(requirement="gap", signature="gap"))), (None, (fast,))]
+        )
+    ]
+    table = failure_table(campaign, failures, {})
+    assert table.requirement == ["never_fast", "never_fast", "no_contact", "never_fast"]
+    assert table.failed == [["never_fast"], ["never_fast"], ["no_contact", "never_fast", "gap"], ["never_fast"]]
+    assert (table.striker, table.striker_kind) == ([None, "lead", "lead", None], [None, "vehicle", "vehicle", None])
+    assert (table.time_s[0], table.ego_speed_mps[0], table.min_robustness[0]) == (1.5, 9.0, -0.4)
+    assert (table.broke[0], table.ego_broke[0], table.conflict_type[0], table.refused_by[0]) == ([], ["speeding"], None, [])
+    assert all(math.isnan(column[0]) for column in (table.conflict_s, table.other_speed_mps, table.min_rss_margin_m))
+    assert table.distinct == [True, True, True, False]
+    assert [(kind.requirement, kind.name, kind.failures, kind.distinct, kind.preventable) for kind in table.kinds] == [
+        ("never_fast", "never_fast violated; straight", 3, 2, 2),
+        ("no_contact", "cut-in, straight", 1, 1, 1),
+    ]
 
 
 def test_a_failure_says_whether_it_repeats(ledger):
