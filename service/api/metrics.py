@@ -5,7 +5,7 @@ What is stored is counted when it is asked for, so that it survives restarts and
 
 import threading
 from collections import Counter as Counts
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from prometheus_client import CollectorRegistry, Histogram, ProcessCollector
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
@@ -14,6 +14,7 @@ from pydantic_core import from_json
 
 from risk_sac.execution.executor import Cluster, Node
 from risk_sac.records import State
+from service.api.requirements import SHIPPED
 from service.errors import StorageError
 from service.runs.manager import Manager
 from service.store.reading import Store
@@ -21,16 +22,29 @@ from service.store.statistics import Statistics, read_statistics
 
 BUCKETS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)
 SEARCH = ("family", "method")
+REQUIREMENT = ("requirement",)
+MOST_OWN = 50  # names of users' requirements that become labels
+OTHERS = "(others)"  # no requirement can be called so
 # The funnel, and what preventable failures are counted with repetitions; by the column that is summed up.
 COUNTERS = {
     "episodes_done": ("risk_sac_episodes", "Finished episodes, rejected scenes included."),
     "raw_collisions": ("risk_sac_contacts", "Episodes in which the ego touched something."),
-    "failures": ("risk_sac_failures", "Valid failures of the ego."),
-    "distinct_failures": ("risk_sac_distinct_failures", "Valid failures that resemble no earlier one of their run."),
-    "preventable": ("risk_sac_preventable_failures", "Valid failures that the careful driver would have prevented."),
+    "failures": ("risk_sac_failures", "Episodes with a valid violation of a requirement that counts."),
+    "distinct_failures": ("risk_sac_distinct_failures", "Valid violations that resemble no earlier one of their run."),
+    "preventable": ("risk_sac_preventable_failures", "Failures that the careful driver would have prevented."),
     "distinct_preventable": (
         "risk_sac_distinct_preventable_failures",
-        "The distinct ones of the preventable failures.",
+        "Distinct violations that the careful driver would have prevented.",
+    ),
+}
+# The funnel of each requirement; by the column that is summed up.
+OF_REQUIREMENTS = {
+    "violated": ("risk_sac_requirement_violated", "Episodes that violated the requirement."),
+    "valid": ("risk_sac_requirement_valid", "Of these, failures: it counts, and the violation is valid."),
+    "distinct": ("risk_sac_requirement_distinct", "Valid violations that resemble no earlier one of their run."),
+    "preventable": (
+        "risk_sac_requirement_preventable",
+        "Distinct violations that the careful driver would have prevented.",
     ),
 }
 NODE_GAUGES: tuple[tuple[str, str, Callable[[Node], float]], ...] = (
@@ -39,7 +53,7 @@ NODE_GAUGES: tuple[tuple[str, str, Callable[[Node], float]], ...] = (
     ("runs", "Runs at work on the node.", lambda node: node.runs),
     ("silent_seconds", "Since a run on the node was heard of, at least.", lambda node: node.silent_s),
 )
-RATES = {"ecr": "Valid failures", "pcr": "Preventable failures"}
+RATES = {"ecr": "Valid contacts", "pcr": "Preventable contacts"}
 
 
 def request_latencies() -> Histogram:
@@ -68,7 +82,9 @@ class CampaignMetrics(Collector):
     def __init__(self, store: Store, manager: Manager) -> None:
         self._store = store
         self._manager = manager
-        self._counters = {name: _Monotone() for name in COUNTERS}
+        self._counters = {name: _Monotone(SEARCH) for name in COUNTERS}
+        self._of_requirements = {step: _Monotone(REQUIREMENT) for step in OF_REQUIREMENTS}
+        self._labelled = set(SHIPPED)
 
     def collect(self) -> Iterator[Metric]:
         """All families; without those of the database while it cannot be read."""
@@ -88,10 +104,11 @@ class CampaignMetrics(Collector):
     def _stored(self, statistics: Statistics) -> Iterator[Metric]:
         yield from _states(statistics)
         for counted, (name, meaning) in COUNTERS.items():
-            sums = Counts[tuple[str, str]]()
+            sums = Counts[tuple[str, ...]]()
             for tally in statistics.tallies:
                 sums[tally.family, tally.method] += getattr(tally, counted)
             yield self._counters[counted].family(name, meaning, sums)
+        yield from self._requirements(statistics)
         for name, rate in RATES.items():
             labels = ["campaign", "run", *SEARCH]
             gauge = GaugeMetricFamily(f"risk_sac_run_{name}", f"{rate} per episode of a run at work.", labels=labels)
@@ -102,6 +119,17 @@ class CampaignMetrics(Collector):
                 ):  # not before the first episode; the PCR not in what is older than judgements
                     gauge.add_metric([run.campaign_id, run.id, run.family, run.method], metrics[name])
             yield gauge
+
+    def _requirements(self, statistics: Statistics) -> Iterator[Metric]:
+        """The funnel of each requirement; of users' requirements only so many names become labels, and stay labels."""
+        for row in statistics.requirements:
+            if len(self._labelled) < len(SHIPPED) + MOST_OWN:
+                self._labelled.add(row.name)
+        for step, (name, meaning) in OF_REQUIREMENTS.items():
+            sums = Counts[tuple[str, ...]]()
+            for row in statistics.requirements:
+                sums[(row.name if row.name in self._labelled else OTHERS,)] += getattr(row, step)
+            yield self._of_requirements[step].family(name, meaning, sums)
 
 
 def _of_cluster(cluster: Cluster | None) -> Iterator[Metric]:
@@ -119,13 +147,14 @@ def _of_cluster(cluster: Cluster | None) -> Iterator[Metric]:
 class _Monotone:
     """Sums over rows as counters: deleted rows must not look like a counter that began anew."""
 
-    def __init__(self) -> None:
+    def __init__(self, labels: Sequence[str]) -> None:
+        self._labels = labels
         self._lock = threading.Lock()
-        self._last = Counts[tuple[str, str]]()
-        self._deleted = Counts[tuple[str, str]]()
+        self._last = Counts[tuple[str, ...]]()
+        self._deleted = Counts[tuple[str, ...]]()
 
-    def family(self, name: str, meaning: str, sums: Counts[tuple[str, str]]) -> CounterMetricFamily:
-        family = CounterMetricFamily(name, meaning, labels=SEARCH)
+    def family(self, name: str, meaning: str, sums: Counts[tuple[str, ...]]) -> CounterMetricFamily:
+        family = CounterMetricFamily(name, meaning, labels=self._labels)
         with self._lock:
             for labels in sorted(sums.keys() | self._last.keys()):
                 self._deleted[labels] += max(0, self._last[labels] - sums[labels])

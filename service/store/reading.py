@@ -136,21 +136,27 @@ class Store:
                 yield PlainEpisode(*found[:-1], from_json(found.record))
 
     def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredContact:
-        """The episode with this id in which the ego touched something."""
+        """The episode with this id in which a requirement that counts was violated."""
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             row = find_failure(session, campaign, failure_id)
             return StoredContact(read_episode(row), row.series, row.series_sha256)
 
+    def own_requirements(self, campaign_id: str, project: str | None = None) -> list[str]:
+        """Names of the requirements that were posted with a campaign."""
+        with self._reading() as session:
+            spec = from_json(find_campaign(session, campaign_id, project).spec)
+            return [requirement["name"] for requirement in spec["requirements"]]
+
     def triage(self, campaign_id: str, failure_id: str, project: str | None = None) -> Triage | None:
-        """The triage of the contact with this id; None without one."""
+        """The triage of the failure with this id; None without one."""
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             row = find_triage(session, find_failure(session, campaign, failure_id))
             return None if row is None else Triage.model_validate(row, from_attributes=True)
 
     def triages(self, number: int) -> dict[int, TriageState]:
-        """Triage states of a campaign's contacts, by the numbers of the episodes."""
+        """Triage states of a campaign's failures, by the numbers of the episodes."""
         with self._reading() as session:
             rows = session.scalars(select(TriageRow).filter_by(campaign_number=number))
             return {row.episode_number: TriageState(row.state) for row in rows}

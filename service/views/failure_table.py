@@ -200,7 +200,7 @@ def failure_table(
         rows.append(
             _row(runs[each.run_number], each, naming[-1])
             | {"failed": [_requirement(violation) for violation in valid]}
-            | {"distinct": any([kinds.add(violation) for violation in valid])}  # each of them is to be added
+            | {"distinct": sum(map(kinds.add, valid)) > 0}
         )
     kinds_found = _kinds(naming, rows)
     places = {(kind.requirement, kind.name): place for place, kind in enumerate(kinds_found)}
@@ -248,8 +248,9 @@ def _kinds(naming: Sequence[Plain], rows: Sequence[Plain]) -> list[FailureKind]:
     """Of the signatures, the most preventable failures first."""
     kinds: dict[tuple[str, str], dict[str, Any]] = {}
     for violation, row in zip(naming, rows, strict=True):
-        said = {"signature": _judged(violation)["signature"], "requirement": row["requirement"], "name": _name(violation)}
-        kind = kinds.setdefault((row["requirement"], said["name"]), said | dict.fromkeys(COUNTED, 0))
+        key = requirement, name = row["requirement"], _name(violation)
+        said = {"signature": _judged(violation)["signature"], "requirement": requirement, "name": name}
+        kind = kinds.setdefault(key, said | dict.fromkeys(COUNTED, 0))
         kind["failures"] += row["valid"]
         kind["distinct"] += row["distinct"]
         kind["preventable"] += row["valid"] and row["grade"] == Grade.CAREFUL

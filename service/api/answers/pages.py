@@ -1,4 +1,4 @@
-"""Query parameters that lists share: how many items, from where, and which contacts.
+"""Query parameters that lists share: how many items, from where, and which failures.
 
 A cursor holds the number of a row, which would tell how many rows all projects have. So it is encrypted and
 authenticated, deterministically: the same page has the same body.
@@ -23,7 +23,7 @@ Cursor = Annotated[
     ),
 ]
 TIERS = {"valid": (Outcome.FAILURE,), "raw": (Outcome.FAILURE, Outcome.DEGENERATE)}
-Tier = Annotated[Literal["valid", "raw"], Query(description="`raw` adds contacts that a rule refused.")]
+Tier = Annotated[Literal["valid", "raw"], Query(description="`raw` adds episodes whose violations a rule refused.")]
 
 
 class Cursors:

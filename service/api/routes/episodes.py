@@ -12,6 +12,7 @@ from service.api.answers.representations import as_json
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN
 from service.api.context import CurrentCaller, Service
 from service.api.posted import documented, read_posted
+from service.api.requirements import AskedRequirement
 from service.store.finding import Judged
 from service.store.stored import StoredPage
 from service.views.series import failure_body
@@ -43,6 +44,7 @@ def list_episodes(
     caller: CurrentCaller,
     run: Annotated[str | None, Query(description="Only episodes of this run.")] = None,
     outcome: Annotated[Outcome | None, Query(description="Only episodes that ended so.")] = None,
+    requirement: AskedRequirement = None,
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> Response:
@@ -53,6 +55,7 @@ def list_episodes(
         after=service.cursors.decode(cursor, campaign_id, caller.sees),
         run_id=run,
         outcomes=() if outcome is None else (outcome,),
+        judged=Judged(requirement=requirement),
         project=caller.sees,
     )
     return _page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
@@ -67,6 +70,7 @@ def list_failures(
     run: Annotated[
         str | None, Query(description="Only failures of this run. Without it, none of an i.i.d. phase.")
     ] = None,
+    requirement: AskedRequirement = None,
     grade: Annotated[Grade | None, Query(description="Only failures of this grade; `careful`: preventable.")] = None,
     broke: Annotated[
         str | None, Query(max_length=40, pattern="^[a-z_]+$", description="Only those whose striker broke this.")
@@ -77,14 +81,21 @@ def list_failures(
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> Response:
-    """Collisions of the ego in the order of their arrival."""
+    """Violations of requirements that count, contacts among them, in the order of their arrival."""
     page = service.store.episodes(
         campaign_id,
         limit=limit,
         after=service.cursors.decode(cursor, campaign_id, caller.sees),
         run_id=run,
         outcomes=TIERS[tier],
-        judged=Judged(grade=grade, broke=broke, signature=signature, iid=run is not None),
+        judged=Judged(
+            requirement=requirement,
+            valid=tier == "valid",
+            grade=grade,
+            broke=broke,
+            signature=signature,
+            iid=run is not None,
+        ),
         project=caller.sees,
     )
     return _page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
@@ -92,7 +103,7 @@ def list_failures(
 
 @router.get("/failures/{failure_id}", response_model=Failure)
 def get_failure(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> Response:
-    """One collision, valid or not, with its full time series."""
+    """One failure, valid or not, with its full time series."""
     contact = service.store.failure(campaign_id, failure_id, caller.sees)
     triage = service.store.triage(campaign_id, failure_id, caller.sees)
     return as_json(failure_body(campaign_id, contact, triage, service.settings))
@@ -106,7 +117,7 @@ def put_triage(
     service: Service,
     caller: CurrentCaller,
 ) -> Triage:
-    """Note what you make of a collision, in place of what was noted before; it goes with the campaign."""
+    """Note what you make of a failure, in place of what was noted before; it goes with the campaign."""
     return service.manager.triage(campaign_id, failure_id, posted.state, posted.comment, caller.sees)
 
 

@@ -52,7 +52,7 @@ EpisodesFormat = Annotated[
     responses=made(*(FORMATS[name].media_type for name in names("failure"))) | PLAYED | LACKING,
 )
 async def get_export(contact: Asked, format: FailureFormat, headers: Headers, service: Service) -> Response:
-    """One collision in a format of other tools, see `GET /v1/formats`; some are several files, and come as a zip."""
+    """One failure in a format of other tools, see `GET /v1/formats`; some are several files, and come as a zip."""
     content = await service.studies.get(Study(contact, "export", format=format))
     row = FORMATS[format]
     name = f"{contact.episode.id}-{contact.edition[:8]}{f'-{format}' if row.media_type == ZIP else ''}{row.suffix}"

@@ -1,4 +1,4 @@
-"""/v1/campaigns/{id}/failures/{id}/…: what a page shows of a collision, made when it is asked for."""
+"""/v1/campaigns/{id}/failures/{id}/…: what a page shows of a failure, made when it is asked for."""
 
 from typing import Annotated
 
@@ -17,11 +17,11 @@ from service.views.studies import Study
 PNG, SVG, JSON, ZIP = "image/png", "image/svg+xml", "application/json", "application/zip"
 LOST = problem(404, "Nothing has this id, or its time series is lost")
 CROWDED = problem(503, "The database cannot be read, or too many wait for theirs", WAIT)
-PLAYED = problem(409, "The collision does not repeat here, or cannot be played")
+PLAYED = problem(409, "The failure does not repeat here, or cannot be played")
 
 
 def made(*media_types: str) -> Responses:
-    """Responses of what is made of a collision."""
+    """Responses of what is made of a failure."""
     return TAGGED | LOST | CROWDED | {200: TAGGED[200] | {"content": {each: {} for each in media_types}}}
 
 
@@ -46,7 +46,7 @@ Headers = Annotated[dict[str, str], Depends(_headers)]
 
 @router.get("/failures/{failure_id}/roads", response_model=Roads, responses=TAGGED)
 def get_roads(contact: Asked, headers: Headers) -> Response:
-    """The ground on which a collision came about, as polygons on the map that its time series is on."""
+    """The ground on which a failure came about, as polygons on the map that its time series is on."""
     return Response(roads_body(contact).model_dump_json(), headers=headers, media_type=JSON)
 
 
@@ -56,19 +56,19 @@ def get_roads(contact: Asked, headers: Headers) -> Response:
     responses=TAGGED | LOST | {200: made(SVG)[200]},
 )
 def get_thumbnail(contact: Asked, headers: Headers, service: Service) -> Response:
-    """One collision from above, small: the roads, both paths in the last 3 s, and both bodies as they touch."""
+    """One failure from above, small: the roads, the paths in the last 3 s, and the bodies at that moment."""
     return Response(thumbnail_of(contact, service.settings), headers=headers, media_type=SVG)
 
 
 @router.get("/failures/{failure_id}/picture.png", response_class=Response, responses=made(PNG))
 async def get_picture(contact: Asked, headers: Headers, service: Service) -> Response:
-    """One collision, valid or not: both paths from above, and what was measured along the way."""
+    """One failure, valid or not: the paths from above, and what was measured along the way."""
     return Response(await service.pictures.get(Picture(contact)), headers=headers, media_type=PNG)
 
 
 @router.get("/failures/{failure_id}/bundle.npz", response_class=Response, responses=made(ZIP) | PLAYED)
 async def get_bundle(contact: Asked, headers: Headers, service: Service) -> Response:
-    """One collision in a file that stands alone, once it was played again; `risk-sac replay` plays it anywhere."""
+    """One failure in a file that stands alone, once it was played again; `risk-sac replay` plays it anywhere."""
     return Response(await service.studies.get(Study(contact, "bundle")), headers=headers, media_type=ZIP)
 
 
@@ -86,7 +86,7 @@ async def get_region(contact: Asked, headers: Headers, service: Service) -> Resp
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=made(PNG) | PLAYED)
 async def get_twin(contact: Asked, twin: Twin, headers: Headers, service: Service) -> Response:
-    """One collision beside the same scene without an attack (`idle`), or with another ego, on one clock."""
+    """One failure beside the same scene without an attack (`idle`), or with another ego, on one clock."""
     played = await service.studies.get(Study(contact, "twin", twin))
     return Response(await service.pictures.get(Picture(contact, twin, played)), headers=headers, media_type=PNG)
 

@@ -4,8 +4,9 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.local import LocalExecutor
-from risk_sac.records import Outcome, State
-from service.api.metrics import registry, request_latencies
+from risk_sac.metrics.requirements import STEPS
+from risk_sac.records import Outcome, RequirementCounts, State
+from service.api.metrics import MOST_OWN, OTHERS, registry, request_latencies
 from service.runs.manager import Manager, worker_program
 from service.settings import ServiceSettings
 
@@ -101,3 +102,40 @@ def test_latencies_are_those_of_one_app(scrape):
 def test_every_state_has_a_figure(scrape):
     seen = scrape()
     assert all(seen["risk_sac_runs", state] == 0 for state in State)
+
+
+def test_each_requirement_has_its_funnel(ledger, episode, scrape):
+    first, second, *_ = ledger.create(SPEC).runs
+    for run in (first, second):
+        ledger.start_run(run.number)
+        funnels = {
+            "never_fast": RequirementCounts(counts="failure", violated=3, valid=2, distinct=1),
+            "safe_ttc": RequirementCounts(counts="report", violated=2),
+        }
+        ledger.add_episodes([(run.number, told(episode(0), funnels))])
+    seen = scrape()
+    steps = [seen[f"risk_sac_requirement_{step}_total", "never_fast"] for step in STEPS]
+    assert steps == [6, 4, 2, 0]
+    assert seen["risk_sac_requirement_violated_total", "safe_ttc"] == 4
+    ledger.add_episodes(
+        [(first.number, told(episode(1), {"never_fast": RequirementCounts(counts="failure", violated=4)}))]
+    )
+    assert scrape()["risk_sac_requirement_violated_total", "never_fast"] == 7
+
+
+def test_names_of_users_requirements_do_not_make_endless_labels(ledger, episode, scrape):
+    campaign = ledger.create(SPEC)
+    ledger.start_run(campaign.runs[0].number)
+    names = [f"mine_{i}" for i in range(MOST_OWN + 3)]
+    funnels = {name: RequirementCounts(counts="failure", violated=2) for name in names}
+    ledger.add_episodes([(campaign.runs[0].number, told(episode(0), funnels))])
+    counted = {key: value for key, value in scrape().items() if key[0] == "risk_sac_requirement_violated_total"}
+    assert len(counted) == MOST_OWN + 1
+    assert counted["risk_sac_requirement_violated_total", OTHERS] == 2 * 3
+    ledger.delete(campaign.id)
+    assert {key: value for key, value in scrape().items() if key in counted} == counted
+
+
+def told(event, funnels):
+    """A worker's message, as if its run had counted these funnels."""
+    return event.model_copy(update={"metrics": event.metrics.model_copy(update={"requirements": funnels})})

@@ -115,18 +115,19 @@ def test_a_violation_without_contact_has_what_is_known_of_it(ledger):
     fast = violation(grade=Grade.CAREFUL, broke=("speeding",))
     near = violation(other_id="lead", other_kind="vehicle", other_role="adversary", ego_speed_mps=3.0)
     hit, touched = collision(verdicts={"ego_moving": False}), collision(judgement=judgement())
+    other = violation(requirement="gap", signature="gap")
+    episodes = [(None, (fast,)), (hit, (near,)), (touched, (near, other)), (None, (fast,))]
     failures = [
         plain(campaign.runs[0], index, contact, violations=violations, scene={})
-        for index, (contact, violations) in enumerate(
-            [(None, (fast,)), (hit, (near,)), (touched, (near, violation(requirement="gap", signature="gap"))), (None, (fast,))]
-        )
+        for index, (contact, violations) in enumerate(episodes)
     ]
     table = failure_table(campaign, failures, {})
     assert table.requirement == ["never_fast", "never_fast", "no_contact", "never_fast"]
     assert table.failed == [["never_fast"], ["never_fast"], ["no_contact", "never_fast", "gap"], ["never_fast"]]
     assert (table.striker, table.striker_kind) == ([None, "lead", "lead", None], [None, "vehicle", "vehicle", None])
     assert (table.time_s[0], table.ego_speed_mps[0], table.min_robustness[0]) == (1.5, 9.0, -0.4)
-    assert (table.broke[0], table.ego_broke[0], table.conflict_type[0], table.refused_by[0]) == ([], ["speeding"], None, [])
+    assert (table.broke[0], table.ego_broke[0], table.refused_by[0]) == ([], ["speeding"], [])
+    assert table.conflict_type[0] is None
     assert all(math.isnan(column[0]) for column in (table.conflict_s, table.other_speed_mps, table.min_rss_margin_m))
     assert table.distinct == [True, True, True, False]
     assert [(kind.requirement, kind.name, kind.failures, kind.distinct, kind.preventable) for kind in table.kinds] == [

@@ -1,0 +1,44 @@
+"""The names of requirements that a filter takes and that metrics are labelled with."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+from fastapi import Depends, Query
+
+from risk_sac.config import EgoConfig
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.odd import requirements_from_odd
+from service.api.answers.problems import invalid_field
+from service.api.context import CurrentCaller, Service
+
+SHIPPED: Sequence[str] = tuple(
+    dict.fromkeys(
+        requirement.name
+        for family in FAMILIES.values()
+        for requirement in requirements_from_odd(family.odd, EgoConfig().response_s)
+    )
+)
+
+
+def _known(
+    campaign_id: str,
+    service: Service,
+    caller: CurrentCaller,
+    requirement: Annotated[
+        str | None,
+        Query(
+            max_length=40,
+            description="Only those that violate it. With `tier=valid` it must count, and the violation be valid.",
+        ),
+    ] = None,
+) -> str | None:
+    """The requirement asked for; a 422 that names the campaign's unless it has this one."""
+    if requirement is None:
+        return None
+    known = dict.fromkeys([*SHIPPED, *service.store.own_requirements(campaign_id, caller.sees)])
+    if requirement not in known:
+        raise invalid_field("requirement", requirement, f"one of the campaign's: {', '.join(known)}")
+    return requirement
+
+
+AskedRequirement = Annotated[str | None, Depends(_known)]
