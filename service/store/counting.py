@@ -63,10 +63,11 @@ def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
     contact, worst = record.collision, record.worst_violation
     violated = [name for name, result in record.requirements.items() if result.violated_s is not None]
     row.violated = listed(dict.fromkeys([*violated, *([] if contact is None else [NO_CONTACT])]))
-    row.failed = listed(record.failed)
+    failed = record.outcome is Outcome.FAILURE
+    row.failed = listed(each.requirement for each in record.valid_violations) if failed else None
     judgement = contact.judgement if contact is not None else None
     unjudged = worst is None or (isinstance(worst, Collision) and judgement is None)
-    row.grade = None if worst is None or record.outcome is not Outcome.FAILURE else worst.graded
+    row.grade = None if worst is None or not failed else worst.graded
     row.signature = None if worst is None or unjudged else worst.signature
     row.broke = None if judgement is None else listed(judgement.broke)
 

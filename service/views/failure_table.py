@@ -218,7 +218,7 @@ def failure_table(
 
 def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, Any]:
     """A failure's entries of most columns, by the violation that names it."""
-    judged = UNJUDGED | _judged(violation)
+    judged = {**UNJUDGED, **_judged(violation)}
     repetition = run.repetitions.get(failure.index)
     row = {name: judged[name] for name in OF_JUDGEMENT}
     if "requirement" in violation:  # whose offences are the ego's own

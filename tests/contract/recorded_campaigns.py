@@ -12,7 +12,7 @@ import pytest
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.metrics import results_digest
-from risk_sac.records import Collision, EpisodeRecord, Grade, Judgement, Outcome, State
+from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Grade, Judgement, Outcome, RequirementResult, State
 from risk_sac.report import FinishedRun
 from risk_sac.run_folder.results import (
     EPISODES,
@@ -28,12 +28,12 @@ from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign, StoredRun
 from service.store.writing import Ledger
-from tests.builders import LOW_SCENE, collision, episode_record, judgement
+from tests.builders import LOW_SCENE, collision, episode_record, judgement, violation
 
 BEGAN = 1_750_000_000.0
 ENDED_ID, LIVE_ID, CANCELLED_ID, POSTED_ID = (f"c{number:016x}" for number in range(1, 5))
 VERSIONS = {"numpy": "2.4", "sumo": "1.28"}
-FOUND, NOTHING = ".fF.dr", ".a.r.."  # a letter for each episode, see `OUTCOMES`
+FOUND, NOTHING = ".fF.drv", ".a.r.."  # a letter for each episode, see `OUTCOMES`
 
 
 def hit(judged: Judgement | None = None, broken: str = "", least_ttc_s: float = 0.3) -> Collision:
@@ -41,6 +41,8 @@ def hit(judged: Judgement | None = None, broken: str = "", least_ttc_s: float = 
     return collision(min_ttc_s=least_ttc_s, verdicts=verdicts, judgement=judged)
 
 
+OWN = {"name": "never_fast", "formula": "ego_speed_mps <= 5", "scale": 10.0}
+SLOW = violation(grade=Grade.CAREFUL, broke=("speeding",))
 OUTCOMES = {
     ".": (Outcome.SAFE, "", None),
     "r": (Outcome.REJECTED, "sim_crash", None),
@@ -48,7 +50,22 @@ OUTCOMES = {
     "F": (Outcome.FAILURE, "", hit(judgement(Grade.IDEAL, -0.5, unresponsive=True, signature="leader"))),
     "a": (Outcome.DEGENERATE, "inside_limits", hit(broken="inside_limits", least_ttc_s=math.inf)),
     "d": (Outcome.DEGENERATE, "ego_moving", hit(broken="ego_moving")),
+    "v": (Outcome.FAILURE, "", None),  # with `SLOW`
 }
+
+
+def kept(contact: Collision | None, violated: bool) -> dict[str, RequirementResult]:
+    """What an episode says of each requirement."""
+    touched_s = None if contact is None else contact.time_s
+    return {
+        NO_CONTACT: RequirementResult(counts="failure", robustness=0.2, violated_s=touched_s),
+        "safe_ttc": RequirementResult(counts="report", robustness=-0.5, violated_s=0.5),
+        "never_fast": RequirementResult(
+            counts="failure",
+            robustness=SLOW.robustness if violated else 0.1,
+            violated_s=SLOW.time_s if violated else None,
+        ),
+    }
 
 
 def record(index: int, letter: str, phase: str) -> EpisodeRecord:
@@ -68,6 +85,9 @@ def record(index: int, letter: str, phase: str) -> EpisodeRecord:
         objective=None if index == 0 else 0.75,
         dual_variable=0.5 * index,
         temperature=0.25,
+        requirements={} if letter == "r" else kept(contact, letter == "v"),
+        failed=(() if outcome is not Outcome.FAILURE else (NO_CONTACT if contact else "never_fast",)),
+        violations=(SLOW,) if letter == "v" else (),
         collision=contact,
     )
 
@@ -174,7 +194,14 @@ class Recorded:
         self._clock.now += 60
         budget = {"episodes": episodes, "evaluation_episodes": evaluation}
         spec = CampaignSpec.model_validate(
-            {"label": label, "families": ("low",), "methods": ("risk-sac", "random"), "seeds": (3,), "budget": budget}
+            {
+                "label": label,
+                "families": ("low",),
+                "methods": ("risk-sac", "random"),
+                "seeds": (3,),
+                "budget": budget,
+                "requirements": [OWN],
+            }
         )
         campaign = self._ledger.create(spec, key=f"key of {label}")
         self._clock.now += 1
@@ -187,7 +214,7 @@ class Recorded:
             file = folder / FAILURES / series_name(episode.index)
             kept = (
                 None
-                if episode.collision is None
+                if episode.worst_violation is None
                 else write_series(file, series_arrays() | {"released_s": np.array(0.0)})
             )
             metrics = finished(spec, done[:count]).metrics
@@ -216,7 +243,7 @@ class Recorded:
                 device="cpu",
                 wall_s=result.wall_s,
                 cpu_s=result.cpu_s,
-                contacts=tuple(Contact.of(spec.id, each) for each in done if each.collision is not None),
+                contacts=tuple(Contact.of(spec.id, each) for each in done if each.worst_violation is not None),
             ),
         )
         (folder / EPISODES).write_text("".join(records_to_json([each])[1:-1].strip() + "\n" for each in done))

@@ -75,6 +75,21 @@ def test_the_answer_is_the_recorded_one(client, name):
     assert answer == json.loads(file.read_text(encoding="utf-8"))
 
 
+def test_failures_and_episodes_are_filtered_by_requirement(client):
+    for listed in ("failures", "episodes"):
+        items = client.get(f"{ENDED}/{listed}", params={"requirement": "no_contact"}).json()["items"]
+        assert items
+        assert all(item["collision"] is not None for item in items)
+        (fast,) = client.get(f"{ENDED}/{listed}", params={"requirement": "never_fast"}).json()["items"]
+        assert (fast["failed"], fast["collision"], fast["violations"][0]["time_s"]) == (["never_fast"], None, 1.5)
+        problem = client.get(f"{ENDED}/{listed}", params={"requirement": "never_fats"})
+        assert problem.status_code == 422
+        (error,) = problem.json()["errors"]
+        assert (error["field"], error["got"]) == ("requirement", '"never_fats"')
+        assert error["wanted"].startswith("one of the campaign's: no_contact, safe_ttc")
+        assert error["wanted"].endswith("never_fast")
+
+
 def choices(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
     """Each parameter of a GET that takes one of several values: path, parameter and its schema."""
 
