@@ -135,7 +135,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
           action: two entries in [-1, 1] per adversary, see `risk_sac.sim.control`; what is beyond is clipped.
 
         Returns:
-          Observation, R_risk, whether the ego touched something, whether the horizon is reached, and
+          Observation, R_risk, whether the ego touched something, whether it reached the horizon or its route's end, and
           `info` with `cost` (C_soft), `robustness` (soft minimum) and, at a contact, `collision`.
 
         Raises:
@@ -169,7 +169,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             float(collision is not None and not collision.valid),
             self._reward,
         )
-        truncated = self._steps >= self.problem.family.horizon_steps
+        truncated = self._sim.ego_arrived or self._steps >= self.problem.family.horizon_steps
         info: dict[str, Any] = {"cost": cost, "robustness": self._measures.soft_min}
         if collision is not None:
             info["collision"] = collision

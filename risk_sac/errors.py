@@ -8,7 +8,7 @@ RiskSacError
 ├── SceneError             a scene is not a point of its family's space
 │   └── InfeasibleScene    C_hard: the scene's first frame is physically impossible
 ├── SimulationError        libsumo refused a command or died
-├── EgoFailed              a registered ego missed its deadline, answered nonsense, crashed or left the road
+├── EgoFailed              a registered ego missed its deadline, answered nonsense or crashed
 ├── CheckpointError        a checkpoint is missing or belongs to another run
 │   └── DamagedCheckpoint  its bytes are not those that were written
 ├── DamagedError           a file that carries its own checksum is not as it was written

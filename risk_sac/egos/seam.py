@@ -51,9 +51,9 @@ class Perceived(NamedTuple):
     ids: tuple[str, ...]  # as long as an actor is known, it keeps its id
     kind: NDArray[np.int8]  # of `risk_sac.types.Kind`
     state: Floats  # rows x n
-    path: Floats  # rows of `risk_sac.egos.road` x p: the middle of the lanes that its route goes on along
+    path: Floats  # rows of `risk_sac.egos.road` x p: the middle of the lane it is on, or was on last, along its route
     station_m: float  # of its front bumper on the path
-    offset_m: float  # of its middle from the path, positive to the left
+    offset_m: float  # of its front bumper's middle from the path, positive to the left
     signal: Signal  # ahead of it
     stop_line_m: float  # from its front bumper to that signal's stop line; inf without one
 

@@ -44,11 +44,11 @@ def play(env: RiskSacEnv, scene: Scene, seed: int, actions: Floats, policy: Poli
     heads, rewards, costs = [env.signal_heads()], [0.0], [0.0]
     for step in range(env.problem.family.horizon_steps if policy else len(actions)):
         action = actions[step] if policy is None or step < len(actions) else policy(observation)
-        observation, reward, touched, _, info = env.step(action)
+        observation, reward, touched, over, info = env.step(action)
         heads.append(env.signal_heads())
         rewards.append(reward)
         costs.append(info["cost"])
-        if touched:
+        if touched or over:
             break
     return Played(
         series=env.trace.series(),

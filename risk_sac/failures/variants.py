@@ -7,13 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from risk_sac.env import RiskSacEnv
-from risk_sac.errors import EgoFailed, InfeasibleScene, SimulationError
+from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.failures.bundle import Bundle, check_world
 from risk_sac.failures.recording import actions_of
 from risk_sac.failures.studied import Region, Share, valid_contact
 from risk_sac.records import Collision
 from risk_sac.scenario.space import SceneSpace
-from risk_sac.sim.sumo import OFF_ROAD
 from risk_sac.types import STEP_S, Floats, Scene
 
 SCENES, COPIES = (0.01, 0.02, 0.05), 40  # of a region: shares of the scene parameters' ranges, and copies at each
@@ -71,15 +70,14 @@ class Stage:
         try:
             self.env.reset(seed=variant.seed, options={"scene": self.scene(variant)})
             for action in variant.actions:
-                *_, touched, _, info = self.env.step(action)
+                *_, touched, over, info = self.env.step(action)
                 if touched:
                     collision: Collision = info["collision"]
                     return collision
+                if over:
+                    break
         except (InfeasibleScene, SimulationError):
             pass
-        except EgoFailed as failed:
-            if failed.reason != OFF_ROAD:  # a dead ego, which says nothing of the variant
-                raise
         return None
 
     def fails(self, variant: Variant) -> bool:

@@ -38,8 +38,8 @@ class EpisodeRecord(Record):
     scene: Mapping[str, Real]
     outcome: Outcome
     reason: str
-    """Rule that rejected the scene, validity rules that refused its violations, sim_crash, ego_deadline, ego_malformed,
-    ego_crash or ego_off_road; else empty."""
+    """Rule that rejected the scene, validity rules that refused its violations, sim_crash, ego_deadline, ego_malformed
+    or ego_crash; else empty."""
     failed: tuple[str, ...] = ()
     """Requirements that count and were validly violated: what makes it a failure. Empty in older records."""
     steps: int

@@ -12,6 +12,7 @@ from risk_sac.scenario.layout import Layout
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.lookout import project, targets
 from risk_sac.sim.paths import Along
+from risk_sac.sim.pilot import MovedEgo
 from risk_sac.sim.placing import emergency_decel_mps2
 from risk_sac.sim.reading import Reading
 from risk_sac.sim.roads import Roads
@@ -116,7 +117,7 @@ class Drivers:
         self._ego: Driver | None = Driver(layout.ego.id, reaction_time_s, emergency)
         self._walkers = bool(layout.pedestrians)
         self._ego_id, self._wary = layout.ego.id, layout.wary
-        self._roads = roads
+        self._roads, self._outside = roads, False
 
     def release_ego(self) -> None:
         """Drops the ego's driver: a pilot drives it."""
@@ -126,27 +127,33 @@ class Drivers:
         """Stops telling a vehicle; its driver is only asked what it intends."""
         self._released[vehicle] = self._others.pop(vehicle)
 
-    def tell(self, reading: Reading, belief: Belief, braking_mps2: float) -> None:
-        """Tells all drivers what to do in the next step; the ego brakes by at least `braking_mps2`."""
+    def tell(self, reading: Reading, belief: Belief, braking_mps2: float, moved: MovedEgo | None = None) -> None:
+        """Tells all drivers what to do in the next step.
+
+        Args:
+          reading: the latest.
+          belief: the ego's.
+          braking_mps2: least braking of an ego that SUMO drives.
+          moved: the ego, if a pilot drives it.
+        """
         if self._ego is not None:
             self._tell_ego(self._ego, reading, belief, braking_mps2)
-        askew = self._wary and self._is_askew(reading)
-        if not self._walkers and not self._wary:
+        before, self._outside = self._outside, moved is not None and not moved.inside
+        hidden = self._outside or (self._wary and self._is_askew(reading, moved))
+        if not (self._walkers or self._wary or hidden or before):
             return
-        candidates = reading.walks
-        if askew:
-            candidates = candidates.copy()
-            candidates[0] = True
+        candidates = _with_ego(reading.walks) if hidden else reading.walks
         for row, id_ in enumerate(reading.vehicles):
             driver = self._others.get(id_)
-            if driver is not None and (askew or reading.near[row] or driver.telling):
+            if driver is not None and (hidden or reading.near[row] or driver.telling):
                 driver.wanted_mps2 = self._decide(driver, row, reading, reading.frame.state, candidates)
                 driver.tell(*reading.speed_and_accel[row])
 
-    def _is_askew(self, reading: Reading) -> bool:
+    def _is_askew(self, reading: Reading, moved: MovedEgo | None) -> bool:
         """Whether the ego's body reaches elsewhere than the box along its lane that SUMO's models go by."""
         frame = reading.frame
-        _, _, way_rad = project(self._roads.along(self._ego_id).path, float(frame.x_m[0]), float(frame.y_m[0]))
+        along = self._roads.along(self._ego_id) if moved is None else moved.along
+        _, _, way_rad = project(along.path, float(frame.x_m[0]), float(frame.y_m[0]))
         return abs(math.sin(float(frame.heading_rad[0]) - way_rad)) * float(frame.length_m[0]) / 2 > ASKEW_M
 
     def _tell_ego(self, ego: Driver, reading: Reading, belief: Belief, braking_mps2: float) -> None:
@@ -163,7 +170,7 @@ class Drivers:
         They keep the speed they started with, or drive slower for SUMO's models or a pedestrian. SUMO's wish is that of
         the step before, the newest it tells.
         """
-        found = {}
+        found, candidates = {}, _with_ego(reading.walks) if self._outside else reading.walks
         for id_, driver in self._released.items():
             row = reading.row.get(id_)
             if row is None:  # left the net
@@ -172,11 +179,18 @@ class Drivers:
             models = (libsumo.vehicle.getSpeedWithoutTraCI(id_) - speed) / STEP_S + accel
             wanted = min(models, max(driver.cruise_mps - speed, 0.0) / STEP_S)
             told = None
-            if reading.near[row]:
-                told = self._decide(driver, row, reading, reading.frame.state, reading.walks)
+            if self._outside or reading.near[row]:
+                told = self._decide(driver, row, reading, reading.frame.state, candidates)
             found[id_] = wanted if told is None else min(wanted, told)
         return found
 
     def _decide(self, driver: Driver, row: int, reading: Reading, state: Floats, candidates: Bools) -> float | None:
         along = self._roads.along(reading.vehicles[row])
         return driver.decide(row, reading.speed_and_accel[row][0], along, state, reading.drives, candidates)
+
+
+def _with_ego(walks: Bools) -> Bools:
+    """Which actors drivers look out for where SUMO's models do not see the ego."""
+    candidates = walks.copy()
+    candidates[0] = True
+    return candidates

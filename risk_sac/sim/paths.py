@@ -1,4 +1,8 @@
-"""Paths of vehicles: the centre line of the lanes along a route, junctions included."""
+"""Paths of vehicles: the centre line of the lanes along a route, junctions included.
+
+A lane that does not lead to the route's next edge still has a path along the route: towards its end, the path leads
+over to the nearest lane that does. So a vehicle that has left the lanes of its route finds back.
+"""
 
 import math
 from collections.abc import Sequence
@@ -14,6 +18,9 @@ AHEAD_M = 120.0  # of road beyond a lane's own end: at 16 m/s more than any driv
 SAME_POINT_M = 1e-3
 SHIFT_M = 1.0  # by which a lane may begin beside or before the end of the one that leads to it
 TAPER_M = 5.0  # of the way to that lane on which the path makes up for it
+CHANGE_M = 50.0  # before the end of a lane that leads elsewhere, the path leads over to the next lane
+CHANGED = 0.6  # of that way until it has
+CAR = "passenger"  # the class of all vehicles of ours
 
 
 # A polyline from the start of a lane on; one column for each point, and these rows.
@@ -30,17 +37,94 @@ class Along(NamedTuple):
 
     path: Path
     station_m: float  # of its front bumper
-    offset_m: float  # of its middle from the line, positive to the left
+    offset_m: float  # of its front bumper's middle from the line, positive to the left
 
 
-def path_of(route: Sequence[str], lane: str) -> Path:
-    """The path from the start of `lane` along `route`; a lane that does not lead on ends it.
+class StopLine(NamedTuple):
+    """A signal's stop line on a path."""
+
+    station_m: float
+    signal: str
+    index: int  # of its letter
+
+
+class Way(NamedTuple):
+    """A path and the stop lines on it."""
+
+    path: Path
+    stop_lines: tuple[StopLine, ...]
+    complete: bool  # whether it ends where its route ends
+
+
+def way_of(route: Sequence[str], lane: str) -> Way:
+    """The way from the start of `lane` along `route`; it ends where no lane of an edge leads to the next edge.
 
     The simulation must have loaded the net.
     """
     lanes = _lanes_ahead(route, lane)
-    lines = [np.array(libsumo.lane.getShape(lane)) for lane in lanes]
-    return path_along(lines, [libsumo.lane.getMaxSpeed(lane) for lane in lanes])
+    lines = [_line(route, lane) for lane in lanes]
+    path = path_along(lines, [libsumo.lane.getMaxSpeed(lane) for lane in lanes])
+    controlled, stop_lines, station_m = _controlled(), [], 0.0
+    for line, (before, following) in zip(lines, pairwise(lanes), strict=False):
+        station_m += _length(line)
+        signal = controlled.get((leading_lane(route, before), following))
+        if signal is not None:
+            stop_lines.append(StopLine(station_m, *signal))
+    return Way(path, tuple(stop_lines), complete=_edge(lanes[-1]) == route[-1])
+
+
+def _controlled() -> dict[tuple[str, str], tuple[str, int]]:
+    """Signal and index of its letter for each pair of lanes that a signal connects, the second in the junction."""
+    return {
+        (before, via or after): (signal, index)
+        for signal in libsumo.trafficlight.getIDList()
+        for index, links in enumerate(libsumo.trafficlight.getControlledLinks(signal))
+        for before, after, via in links
+    }
+
+
+def leading_lane(route: Sequence[str], lane: str) -> str:
+    """The nearest lane of the lane's edge that leads on along the route, itself first; itself if none does."""
+    edge, _, index = lane.rpartition("_")
+    beside = sorted(range(libsumo.edge.getLaneNumber(edge)), key=lambda other: abs(other - int(index)))
+    return next((other for other in (f"{edge}_{i}" for i in beside) if leads_on(route, other)), lane)
+
+
+def leads_on(route: Sequence[str], lane: str) -> bool:
+    """Whether cars may use a lane, and it leads to the route's next edge, if there is one."""
+    allowed = libsumo.lane.getAllowed(lane)  # empty: all classes but the disallowed ones
+    if CAR not in allowed if allowed else CAR in libsumo.lane.getDisallowed(lane):
+        return False
+    edge = _edge(lane)
+    if edge not in route[:-1]:
+        return True
+    following = route[route.index(edge) + 1]
+    return any(_edge(link[0]) == following for link in libsumo.lane.getLinks(lane))
+
+
+def _line(route: Sequence[str], lane: str) -> Floats:
+    """The middle of a lane, `points x 2`, which leads over to its `leading_lane` at the end."""
+    line, leading = np.array(libsumo.lane.getShape(lane)), leading_lane(route, lane)
+    if leading == lane:
+        return line
+    lanes = abs(int(lane.rpartition("_")[2]) - int(leading.rpartition("_")[2]))
+    length_m, beside = _length(line), np.array(libsumo.lane.getShape(leading))
+    leaves_m = max(length_m - CHANGE_M * lanes, 0.0)
+    arrives_m = leaves_m + CHANGED * (length_m - leaves_m)
+    first, _ = _cut(line, leaves_m)
+    _, last = _cut(beside, arrives_m * _length(beside) / length_m)
+    return np.concatenate((first, last))
+
+
+def _cut(line: Floats, station_m: float) -> tuple[Floats, Floats]:
+    """The parts of a line, `points x 2`, before and behind a station."""
+    stations = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))))
+    at = [np.interp(station_m, stations, line[:, 0]), np.interp(station_m, stations, line[:, 1])]
+    return np.vstack((line[stations < station_m], at)), np.vstack((at, line[stations > station_m]))
+
+
+def _length(line: Floats) -> float:
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
 def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:
@@ -56,7 +140,7 @@ def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:
 
 
 def _next_lane(route: Sequence[str], lane: str) -> str | None:
-    edge = _edge(lane)
+    edge, lane = _edge(lane), leading_lane(route, lane)
     links = libsumo.lane.getLinks(lane)
     following: tuple[str, ...] = ()
     if edge in route:

@@ -1,6 +1,7 @@
 """Pilots, which drive the ego in place of SUMO's models, and how SUMO is told where it is.
 
-SUMO maps such an ego onto the nearest lane along its route, so that its drivers follow it and yield to it.
+SUMO maps such an ego onto the nearest lane along its route, so that its drivers follow it and yield to it. Where the
+whole body is beside these lanes, on an oncoming lane or off the road, SUMO keeps it where it is, on no lane.
 """
 
 import math
@@ -11,13 +12,18 @@ import libsumo
 from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.ego import Belief
-from risk_sac.sim.lookout import project
-from risk_sac.sim.paths import Along
+from risk_sac.sim.lookout import project, stretch
+from risk_sac.sim.paths import STATION, Along, StopLine, Way
 from risk_sac.sim.reading import EgoTold
+from risk_sac.sim.roads import Roads, Room
 from risk_sac.types import Floats, Frame
 
-KEEP_ROUTE = 1  # SUMO's word for the nearest place along the route
+ROUTE_OR_NOWHERE = 3  # SUMO's word for the nearest place along the route (1), or off the road (2)
 NO_LANE_CHANGE = 0
+NEAR_M = 20.0  # of its path, on which the ego is looked for: a path may come back beside itself
+HANGS_OVER_M = 0.3  # over the edge of its lanes, which no driver has to mind
+NO_ROOM = Room(-math.inf, -math.inf)
+PASSES_M = 10.0  # from its path; an ego that is farther off passes no stop line and no end of its route
 
 
 class Motion(NamedTuple):
@@ -47,35 +53,90 @@ class MovedEgo:
 
     Attributes:
       motion: after its latest step.
-      told: what SUMO tells of others: front bumper, compass degrees, speed, lateral speed, acceleration.
+      along: where it is on its path, that of the lane that it is on, or was on last, along its route.
+      inside: whether its body is on lanes that lead along its route. SUMO's drivers see what is on these lanes.
+      arrived: whether it reached its route's end. SUMO, which removes its own vehicles there, keeps one that is moved.
+      told: what SUMO would tell of it.
     """
 
-    def __init__(self, vehicle: str, motion: Motion, length_m: float, points: Floats) -> None:
-        self._vehicle, self._half_m = vehicle, length_m / 2
-        self.motion, self.told = motion, self._told(motion, points)
-        libsumo.vehicle.setLaneChangeMode(vehicle, NO_LANE_CHANGE)
+    along: Along
+    inside: bool
+    arrived: bool
+    told: EgoTold
+    _way: Way
+    _stop_line: StopLine | None
 
-    def move(self, motion: Motion, along: Along) -> None:
-        """Has SUMO put it there in its next step; `along` is the ego on its path before."""
-        self.motion, self.told = motion, self._told(motion, along.path)
-        x, y, angle, *_ = self.told
-        libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, angle, KEEP_ROUTE)
+    def __init__(self, vehicle: str, motion: Motion, size_m: tuple[float, float], roads: Roads) -> None:
+        """Takes over a vehicle; its size is length and width."""
+        self._vehicle, self._size_m, self._roads = vehicle, size_m, roads
+        self.motion, self._stop_line = motion, None
+        libsumo.vehicle.setLaneChangeMode(vehicle, NO_LANE_CHANGE)
+        self._find(libsumo.vehicle.getLaneID(vehicle))
+
+    def move(self, motion: Motion) -> None:
+        """Has SUMO put it there in its next step."""
+        self.motion = motion
+        half_m, heading = self._size_m[0] / 2, motion.heading_rad
+        x, y = motion.x_m + half_m * math.cos(heading), motion.y_m + half_m * math.sin(heading)
+        libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, 90.0 - math.degrees(heading), ROUTE_OR_NOWHERE)
 
     def settle(self) -> None:
         """After the step: SUMO derives a speed from the way along the lane, 0 where a lane begins. Followers see it."""
         libsumo.vehicle.setPreviousSpeed(self._vehicle, self.motion.speed_mps)
+        self._find(libsumo.vehicle.getLaneID(self._vehicle))
 
-    def _told(self, motion: Motion, points: Floats) -> EgoTold:
-        x, y, heading, speed, accel, _, slip = motion
-        return _told(points, x, y, heading, speed, accel, slip, self._half_m)
+    def _find(self, lane: str) -> None:
+        """Finds the ego on its path; `lane` is SUMO's, empty where the ego is off the road."""
+        if lane:
+            self._way = self._roads.way(self._vehicle, lane)
+            near_m = self._roads.station_m(self._vehicle, lane)
+        else:
+            near_m = self.along.station_m
+        path, (x, y, heading, speed, accel, _, slip) = self._way.path, self.motion
+        station_m, offset_m, front_x, front_y, lateral, left_m, right_m = _placed(
+            path, near_m, x, y, heading, speed, slip, *self._size_m
+        )
+        self.along = Along(path, station_m, offset_m)
+        room = self._roads.room(self._vehicle, lane) if lane else NO_ROOM
+        self.inside = left_m < room.left_m + HANGS_OVER_M and right_m < room.right_m + HANGS_OVER_M
+        passes = abs(offset_m) < PASSES_M
+        self.arrived = passes and self._way.complete and station_m >= path[STATION, -1]
+        if passes:
+            self._stop_line = next((line for line in self._way.stop_lines if line.station_m >= station_m), None)
+        angle = 90.0 - math.degrees(heading)
+        self.told = EgoTold(front_x, front_y, angle, speed, lateral, accel, offset_m, self._ahead(station_m))
+
+    def _ahead(self, station_m: float) -> tuple[str, float] | None:
+        if self._stop_line is None:
+            return None
+        line_m, signal, index = self._stop_line
+        letter = libsumo.trafficlight.getRedYellowGreenState(signal)[index]
+        return letter, max(line_m - station_m, 0.0)
 
 
 @compiled
-def _told(
-    points: Floats, x: float, y: float, heading: float, speed: float, accel: float, slip: float, half_m: float
-) -> EgoTold:
-    """What SUMO would tell of a motion on a path."""
-    _, _, lane_heading = project(points, x, y)
-    lateral = speed * math.sin(heading + slip - lane_heading)
-    front_x, front_y = x + half_m * math.cos(heading), y + half_m * math.sin(heading)
-    return front_x, front_y, 90.0 - math.degrees(heading), speed, lateral, accel
+def _placed(
+    points: Floats,
+    near_m: float,
+    x: float,
+    y: float,
+    heading: float,
+    speed: float,
+    slip: float,
+    length_m: float,
+    width_m: float,
+) -> tuple[float, float, float, float, float, float, float]:
+    """Where a body is on a path near a station.
+
+    Returns:
+      Station and offset of the front bumper, its place, the lateral speed, and how far the body reaches to the left and
+      to the right of the path.
+    """
+    near = stretch(points, near_m - NEAR_M, near_m + NEAR_M)
+    _, middle_m, lane_heading = project(near, x, y)
+    front_x, front_y = x + length_m / 2 * math.cos(heading), y + length_m / 2 * math.sin(heading)
+    station_m, offset_m, _ = project(near, front_x, front_y)
+    turned = heading - lane_heading
+    half_m = abs(math.sin(turned)) * length_m / 2 + abs(math.cos(turned)) * width_m / 2
+    lateral = speed * math.sin(turned + slip)
+    return station_m, offset_m, front_x, front_y, lateral, half_m + middle_m, half_m - middle_m

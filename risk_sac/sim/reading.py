@@ -38,8 +38,20 @@ from risk_sac.types import (
 PEDESTRIAN_SIZE_M = 0.5
 SIDEWALK_M = 1.0  # a pedestrian so near a crossing looks at its signal
 CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
-EgoTold = tuple[float, float, float, float, float, float]  # as SUMO does: see `MovedEgo.told`
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
+
+
+class EgoTold(NamedTuple):
+    """What SUMO would tell of an ego that a pilot drives."""
+
+    front_x_m: float
+    front_y_m: float
+    angle_deg: float  # 0 = north, clockwise
+    speed_mps: float
+    lateral_mps: float
+    accel_mps2: float
+    offset_m: float  # of its middle from its path
+    ahead: tuple[str, float] | None  # letter of the signal ahead, and distance to its stop line, m
 
 
 class Reading(NamedTuple):
@@ -99,32 +111,41 @@ class Reader:
         told: list[float] = []  # flat: numpy converts nested sequences at half the speed
         speed_and_accel, offsets = [], []
         for id_ in self._vehicles:
-            offset = get_offset(id_)
             if ego is not None and not told:
-                x, y, angle, speed, lateral, accel = ego
+                x, y, angle, speed, lateral, accel, offset, _ = ego
             else:
                 (x, y), angle = get_position(id_), get_angle(id_)
                 speed, lateral, accel = get_speed(id_), get_lateral(id_), get_accel(id_)
+                offset = get_offset(id_)
             told += (x, y, angle, speed, lateral, accel, offset)
             speed_and_accel.append((speed, accel))
             offsets.append(offset)
         for w in walkers.values():
             told += (w.x_m, w.y_m, w.heading_rad, w.speed_mps, 0.0, w.accel_mps2, 0.0)
         before, self._told = self._told, np.array(told).reshape(-1, 7)
-        ahead = () if self._signal is None else libsumo.vehicle.getNextTLS(self._vehicles[0])
+        letter, stop_line_m = self._ahead(ego)
         frame = Frame(
             time_s=libsumo.simulation.getTime(),
             ids=self._ids,
             kind=self._kind,
             role=self._role,
             state=_state(self._told, before, self._bodies, len(self._vehicles)),
-            signal=COLOURS.get(ahead[0][3].lower(), Signal.NONE) if ahead else Signal.NONE,
-            stop_line_m=ahead[0][2] if ahead else math.inf,
-            link=self._links(ahead[0][3] if ahead else "", walkers),
+            signal=COLOURS.get(letter.lower(), Signal.NONE),
+            stop_line_m=stop_line_m,
+            link=self._links(letter, walkers),
             teleported=libsumo.simulation.getStartingTeleportIDList(),
         )
         near = near_pedestrians(frame.state, self._drives).tolist() if walkers else [False] * len(self._ids)
         return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, self._drives, self._walks, near)
+
+    def _ahead(self, ego: EgoTold | None) -> tuple[str, float]:
+        """Letter of the signal ahead of the ego, and the distance to its stop line; without one "" and inf."""
+        if self._signal is None:
+            return "", math.inf
+        if ego is not None:
+            return ego.ahead or ("", math.inf)
+        ahead = libsumo.vehicle.getNextTLS(self._vehicles[0])
+        return (ahead[0][3], ahead[0][2]) if ahead else ("", math.inf)
 
     def _links(self, ego: str, walkers: Mapping[str, Walker]) -> NDArray[np.uint8]:
         """The letter of the signal ahead of the ego and of each adversary; a pedestrian's is that of its crossing."""

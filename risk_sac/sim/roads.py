@@ -8,16 +8,15 @@ import libsumo
 import numpy as np
 
 from risk_sac.scenario.layout import Layout
-from risk_sac.sim.paths import HEADING, STATION, Along, X, Y, path_of
+from risk_sac.sim.paths import HEADING, STATION, Along, Way, X, Y, leads_on, way_of
 from risk_sac.types import Floats
 
-CAR = "passenger"  # the class of all vehicles of ours
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 ROUNDED_M = 0.05  # by which a lane's length may differ from that of its line without a word
 
 
 class Room(NamedTuple):
-    """Lateral room of a vehicle on its road, from its sides to the edges of the drivable lanes."""
+    """Lateral room on a road up to the edges of the drivable lanes: from a vehicle's sides, or a lane's middle."""
 
     left_m: float
     right_m: float
@@ -35,12 +34,16 @@ class Roads:
         self._routes = {start.id: start.route for start in (layout.ego, *layout.vehicles)}
         if layout.net != self._net:  # another one may use the same names
             self._net = layout.net
-            self._path, self._widths, self._stretch = cache(path_of), cache(_widths), cache(_stretch)
+            self._way, self._room, self._stretch = cache(way_of), cache(_room), cache(_stretch)
 
     def along(self, vehicle: str) -> Along:
         """Where a vehicle is on its path."""
         lane = libsumo.vehicle.getLaneID(vehicle)
         return self._along(vehicle, lane, libsumo.vehicle.getLateralLanePosition(vehicle))
+
+    def way(self, vehicle: str, lane: str) -> Way:
+        """The way from the start of a lane along a vehicle's route."""
+        return self._way(self._routes[vehicle], lane)
 
     def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
         """Points x and y of the way ahead of a vehicle, its centre first."""
@@ -58,18 +61,24 @@ class Roads:
         of its centre from its lane's, positive to the left.
         """
         lane = libsumo.vehicle.getLaneID(vehicle)
-        right_lanes, left_lanes, lane_width = self._widths(self._routes[vehicle], lane)
-        spare = (lane_width - width_m) / 2 - EDGE_M
-        room = Room(left_lanes + spare - offset_m, right_lanes + spare + offset_m)
-        return room, self._along(vehicle, lane, offset_m)
+        left_m, right_m = self.room(vehicle, lane)
+        spare = -width_m / 2 - EDGE_M
+        return Room(left_m + spare - offset_m, right_m + spare + offset_m), self._along(vehicle, lane, offset_m)
+
+    def room(self, vehicle: str, lane: str) -> Room:
+        """Room from a lane's middle to the edges of the lanes that lead on along a vehicle's route."""
+        return self._room(self._routes[vehicle], lane)
 
     def _along(self, vehicle: str, lane: str, offset_m: float) -> Along:
-        """Where a vehicle is on its path, whose lane is known.
+        """Where a vehicle is on its path, whose lane is known."""
+        return Along(self.way(vehicle, lane).path, self.station_m(vehicle, lane), offset_m)
+
+    def station_m(self, vehicle: str, lane: str) -> float:
+        """How far a vehicle is along its lane.
 
         SUMO counts in lengths of the lane, which are those of its edge; on a bend the outer lanes are drawn longer.
         """
-        station_m = libsumo.vehicle.getLanePosition(vehicle) * self._stretch(lane)
-        return Along(self._path(self._routes[vehicle], lane), station_m, offset_m)
+        return float(libsumo.vehicle.getLanePosition(vehicle) * self._stretch(lane))
 
 
 def _stretch(lane: str) -> float:
@@ -79,28 +88,15 @@ def _stretch(lane: str) -> float:
     return drawn_m / length_m if abs(drawn_m - length_m) > ROUNDED_M else 1.0
 
 
-def _widths(route: tuple[str, ...], lane: str) -> tuple[float, float, float]:
-    """Width of the lanes right and left of `lane` that lead on along `route`, and its own."""
+def _room(route: tuple[str, ...], lane: str) -> Room:
+    """Room from a lane's middle to the edges of the lanes beside it that lead on along `route`."""
     edge, _, index = lane.rpartition("_")
     widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
-    own = int(index)
+    own, half_m = int(index), libsumo.lane.getWidth(lane) / 2
     right, left = takewhile(bool, reversed(widths[:own])), takewhile(bool, widths[own + 1 :])
-    return sum(right), sum(left), libsumo.lane.getWidth(lane)
+    return Room(sum(left) + half_m, sum(right) + half_m)
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
     """Width of a lane, m; 0 if cars may not use it or it does not lead to the route's next edge."""
-    if not _admits_cars(lane):
-        return 0.0
-    edge = lane.rpartition("_")[0]
-    if edge in route[:-1]:
-        following = route[route.index(edge) + 1]
-        if not any(link[0].rpartition("_")[0] == following for link in libsumo.lane.getLinks(lane)):
-            return 0.0
-    width: float = libsumo.lane.getWidth(lane)
-    return width
-
-
-def _admits_cars(lane: str) -> bool:
-    allowed = libsumo.lane.getAllowed(lane)  # empty: all classes but the disallowed ones
-    return CAR in allowed if allowed else CAR not in libsumo.lane.getDisallowed(lane)
+    return float(libsumo.lane.getWidth(lane)) if leads_on(route, lane) else 0.0

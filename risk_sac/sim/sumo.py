@@ -12,13 +12,12 @@ from importlib.resources import files
 import libsumo
 
 from risk_sac.config import EgoConfig
-from risk_sac.errors import EgoFailed, SimulationError
+from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.drivers import Drivers
 from risk_sac.sim.ego import EVERYTHING, Belief, Perception, Senses
 from risk_sac.sim.holder import LIBSUMO
-from risk_sac.sim.lookout import project
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import MovedEgo, Pilot
 from risk_sac.sim.placing import hand_over, place
@@ -29,8 +28,6 @@ from risk_sac.types import STEP_S, Floats, Frame, Role
 
 NETS = files("sumo_nets")
 LISTED_WITHIN_S = 0.3
-OFF_ROAD = "ego_off_road"
-BESIDE_M = 1.0  # from the middle of its lane; an ego that is nearer is on the road
 OPTIONS = (
     f"--step-length {STEP_S} --lateral-resolution 0.8 --default.speeddev 0 --insertion-checks none "
     "--collision.action warn --collision.mingap-factor 0 --collision.check-junctions "
@@ -102,8 +99,8 @@ class SumoSimulation:
         frame = self._reading.frame
         motion = self._pilot.begin(self._layout, self._seed, frame)
         self._drivers.release_ego()
-        points = self._roads.along(self._layout.ego.id).path
-        self._moved = MovedEgo(self._layout.ego.id, motion, float(frame.length_m[0]), points)
+        size_m = float(frame.length_m[0]), float(frame.width_m[0])
+        self._moved = MovedEgo(self._layout.ego.id, motion, size_m, self._roads)
 
     def release(self) -> None:
         """Hands the adversary vehicles over to commands; only they lose SUMO's safety checks."""
@@ -125,6 +122,11 @@ class SumoSimulation:
         self._reflex_mps2 = braking_mps2
 
     @property
+    def ego_arrived(self) -> bool:
+        """Whether the ego's pilot drove it to its route's end, where the episode ends."""
+        return self._moved is not None and self._moved.arrived
+
+    @property
     def running(self) -> bool:
         """Whether libsumo runs this simulation: it was reset, and neither closed nor replaced since."""
         return LIBSUMO.is_held_by(self)
@@ -133,21 +135,20 @@ class SumoSimulation:
         """Advances 0.1 s.
 
         Raises:
-          SimulationError: libsumo failed, or the ego left the net.
-          EgoFailed: its pilot cannot drive on, or drove it off its road.
+          SimulationError: libsumo failed, or SUMO removed the ego at its route's end.
+          EgoFailed: its pilot cannot drive on.
         """
         try:
-            if self._moved is not None:
-                self._drive(self._moved)
-            self._drivers.tell(self._reading, self._belief, self._reflex_mps2)
+            if self._moved is not None and self._pilot is not None:
+                motion = self._pilot.drive(self._reading.frame, self._belief, self._moved.along)
+                self._moved.move(motion)
+            self._drivers.tell(self._reading, self._belief, self._reflex_mps2, self._moved)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise SimulationError(f"SUMO failed during a step: {error}") from error
         if libsumo.simulation.getArrivedNumber():
             gone = set(libsumo.simulation.getArrivedIDList())
             if self._layout.ego.id in gone:
-                if self._moved is not None:
-                    raise EgoFailed("the ego reached the end of its route before the horizon", reason=OFF_ROAD)
                 raise SimulationError("the ego left the net before the horizon; lengthen its route")
             self._reader.forget(gone)
         if self._moved is not None:
@@ -158,22 +159,6 @@ class SumoSimulation:
         if before.known.tobytes() != self._belief.known.tobytes():
             self._hide()
         return self._reading.frame
-
-    def _drive(self, ego: MovedEgo) -> None:
-        """Lets the pilot drive a step."""
-        assert self._pilot is not None
-        frame, along = self._reading.frame, self._roads.along(self._layout.ego.id)
-        if abs(along.offset_m) > BESIDE_M:
-            self._refuse_off_road(frame, along)
-        ego.move(self._pilot.drive(frame, self._belief, along), along)
-
-    def _refuse_off_road(self, frame: Frame, along: Along) -> None:
-        """Raises if the ego is off its road; SUMO itself would keep it at the edge."""
-        width_m = float(frame.width_m[0])
-        _, offset_m, _ = project(along.path, float(frame.x_m[0]), float(frame.y_m[0]))
-        room, _ = self._roads.place(self._layout.ego.id, offset_m, width_m)
-        if min(room.left_m, room.right_m) < -width_m:
-            raise EgoFailed(f"the ego is {offset_m:.1f} m beside its lane, off its road", reason=OFF_ROAD)
 
     def signal_heads(self) -> bytes:
         """The letters of all signals, one after the other."""
@@ -209,6 +194,8 @@ class SumoSimulation:
 
     def along(self, vehicle: str) -> Along:
         """Where a vehicle is on its path."""
+        if self._moved is not None and vehicle == self._layout.ego.id:
+            return self._moved.along
         return self._roads.along(vehicle)
 
     def ego_path(self) -> tuple[Floats, Floats]:

@@ -191,7 +191,6 @@ def test_invalid_episodes_are_counted_by_no_rate(install, tmp_path, fails):
     [
         ("raise ValueError('by me')", "ego_crash"),
         ("return None", "ego_malformed"),
-        ("return Control(2.0, 0.5)", "ego_off_road"),
     ],
 )
 def test_five_in_a_row_fail_the_run(install, tmp_path, body, reason):

@@ -1,0 +1,160 @@
+"""Where SUMO, its drivers and the ego itself have an ego that is not on the lane that it began on, from either side."""
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import replace
+
+import libsumo
+import numpy as np
+import pytest
+
+from risk_sac.config import EgoConfig
+from risk_sac.geometry import relative_view
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.layout import Layout, VehicleStart
+from risk_sac.sim.ego import Belief
+from risk_sac.sim.paths import HEADING, STATION, Along, X, Y, way_of
+from risk_sac.sim.pilot import Motion
+from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.types import STEP_S, Frame, Role, Signal
+
+
+class Told:
+    """Drives as a function of time says, whatever is in the way."""
+
+    def __init__(self) -> None:
+        self.motion: Callable[[float], Motion] = lambda time_s: Motion(0.0, 0.0, 0.0, 0.0)
+        self.paths: list[Along] = []
+
+    def begin(self, layout: Layout, seed: int, frame: Frame) -> Motion:
+        self.paths = []
+        return self.motion(0.0)
+
+    def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
+        self.paths.append(along)
+        return self.motion(len(self.paths) * STEP_S)
+
+
+@pytest.fixture(scope="module")
+def pilot() -> Told:
+    return Told()
+
+
+@pytest.fixture(scope="module")
+def sim(pilot: Told) -> Iterator[SumoSimulation]:
+    with closing(SumoSimulation(EgoConfig(), pilot=pilot)) as simulation:
+        yield simulation
+
+
+def middle(family: str) -> Layout:
+    space = FAMILIES[family].space
+    layout = FAMILIES[family].layout(space.from_unit(np.full(space.dimension, 0.5)).values)
+    return replace(layout, vehicles=(), pedestrians=(), wary=False)
+
+
+LOW, MIXED, DENSE = middle("low"), middle("mixed"), middle("dense")
+
+
+def car(id_: str, route: tuple[str, ...], lane: int, position_m: float, speed_mps: float) -> VehicleStart:
+    role = Role.EGO if id_ == "ego" else Role.BACKGROUND
+    return VehicleStart(id=id_, role=role, route=route, lane=lane, position_m=position_m, speed_mps=speed_mps)
+
+
+def play(sim: SumoSimulation, layout: Layout, steps: int) -> list[Frame]:
+    sim.reset(layout, 1)
+    sim.hand_over_ego()
+    frames = []
+    while len(frames) < steps and not sim.ego_arrived:
+        frames.append(sim.step())
+    return frames
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_who_drives_past_an_ego_in_the_ditch_does_not_mind_it(sim: SumoSimulation, pilot: Told, side: int) -> None:
+    pilot.motion = lambda time_s: Motion(300.0, side * 8.0, 0.3, 0.0)
+    lane = 1 + side
+    layout = replace(
+        LOW, ego=car("ego", ("road",), lane, 300.0, 0.0), vehicles=(car("o", ("road",), lane, 240.0, 12.0),)
+    )
+    frames = play(sim, layout, 80)
+    assert frames[-1].x_m[1] > 310.0
+    assert min(frame.speed_mps[1] for frame in frames) > 11.9
+
+
+@pytest.mark.parametrize("y_m", [1.65, 0.0], ids=["on the oncoming lane", "half over the line"])
+def test_who_comes_towards_an_ego_on_its_lane_stops(sim: SumoSimulation, pilot: Told, y_m: float) -> None:
+    pilot.motion = lambda time_s: Motion(150.0, y_m, 0.0, 0.0)
+    layout = replace(
+        MIXED,
+        ego=car("ego", ("e1", "e2"), 2, 152.0, 0.0),
+        vehicles=tuple(car(f"o{lane}", ("w1",), lane, 70.0, 12.0) for lane in (1, 2)),  # none may pass on the other
+    )
+    frames = play(sim, layout, 100)
+    assert not any(relative_view(frame).overlap.any() for frame in frames)
+    assert frames[-1].speed_mps[frames[-1].ids.index("o2")] < 0.1 or frames[-1].x_m[2] < 145.0
+
+
+@pytest.mark.parametrize("beside_m", [2.0, 6.0, 20.0])
+@pytest.mark.parametrize("side", [1, -1])
+def test_an_ego_that_drives_round_a_red_light_has_passed_it(
+    sim: SumoSimulation, pilot: Told, side: int, beside_m: float
+) -> None:
+    """But not one that is off in the fields."""
+    aside_m = side * beside_m
+    pilot.motion = lambda time_s: Motion(3.15 + aside_m * min(time_s, 1.0), -60.0 + 10.0 * time_s, math.pi / 2, 10.0)
+    ego = car("ego", ("from_south", "to_north"), 2, 190.0, 10.0)
+    frames = play(sim, replace(DENSE, ego=ego, signal_offset_s=30.0), 60)
+    assert frames[0].signal is Signal.RED
+    lines_m = np.minimum([frame.stop_line_m for frame in frames], 1000.0)
+    passed = np.flatnonzero(np.diff(lines_m) > 1.0)
+    if beside_m > 10.0:
+        assert not len(passed)
+        return
+    (step,) = passed
+    assert frames[step].signal is Signal.RED
+    assert frames[step].y_m[0] + 2.3 == pytest.approx(-19.6, abs=1.0)
+
+
+@pytest.mark.parametrize(("lane", "to"), [(1, "to_west"), (2, "to_east")], ids=["turns left", "turns right"])
+def test_the_path_of_a_lane_that_leads_elsewhere_leads_back_to_the_route(
+    sim: SumoSimulation, lane: int, to: str
+) -> None:
+    route = ("from_south", to)
+    sim.reset(replace(DENSE, ego=car("ego", route, lane, 100.0, 10.0)), 1)
+    path, (line,), complete = way_of(route, f"from_south_{lane}")
+    assert complete
+    own_m, other_m = (6.45, 3.15) if lane == 1 else (3.15, 6.45)
+    straight = path[:, path[Y] < -19.0]
+    assert straight[X, 0] == own_m
+    assert straight[X, -1] == other_m
+    left_from = straight[Y, np.flatnonzero(straight[X] == own_m)[-1]]
+    assert left_from == pytest.approx(-69.6)  # 50 m before the end
+    assert line.station_m == pytest.approx(230.4, abs=0.3)
+    assert path[STATION, -1] > 350.0
+    turn = 1 if to == "to_west" else -1
+    assert path[HEADING, -1] - path[HEADING, 0] == pytest.approx(turn * math.pi / 2, abs=0.02)
+    assert np.abs(np.diff(path[HEADING])).max() < 0.3
+
+
+def test_an_ego_that_reaches_the_end_of_its_route_has_arrived(sim: SumoSimulation, pilot: Told) -> None:
+    pilot.motion = lambda time_s: Motion(1180.0 + 10.0 * time_s, 0.0, 0.0, 10.0)
+    frames = play(sim, replace(LOW, ego=car("ego", ("road",), 1, 1150.0, 10.0)), 60)
+    assert sim.ego_arrived
+    assert len(frames) < 25
+    assert 1200.0 <= frames[-1].x_m[0] + 2.3 < 1201.1
+
+
+@pytest.mark.parametrize("beside_m", [0.0, 4.0])
+def test_beside_its_road_an_ego_s_path_is_that_of_its_last_lane(
+    sim: SumoSimulation, pilot: Told, beside_m: float
+) -> None:
+    away_m = beside_m + 3.3
+    pilot.motion = lambda time_s: Motion(300.0 + 10.0 * time_s, -min(2.0 * time_s, away_m), 0.0, 10.0)
+    play(sim, replace(LOW, ego=car("ego", ("road",), 1, 300.0, 10.0)), 50)
+    path, station_m, offset_m = pilot.paths[-1]
+    assert path[Y, 0] == -3.3
+    assert offset_m == pytest.approx(-beside_m)
+    assert station_m == pytest.approx(300.0 + 49.0 + 2.3)
+    assert bool(libsumo.vehicle.getLaneID("ego")) == (beside_m == 0.0)
+    assert libsumo.vehicle.getPosition("ego") == pytest.approx((352.3, -away_m))
