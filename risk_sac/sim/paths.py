@@ -45,7 +45,7 @@ class StopLine(NamedTuple):
 
     station_m: float
     signal: str
-    index: int  # of its letter
+    link: int  # index of its letter
 
 
 class Way(NamedTuple):
