@@ -7,11 +7,13 @@ keep the measures from costing several times the simulation.
 import hashlib
 import re
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import event
 
 from risk_sac.machine import user_cache
 
@@ -60,6 +62,36 @@ def _cache_folder() -> str:
 
 
 SETTINGS["CACHE_DIR"] = _cache_folder()
+
+
+class _Compilation(event.Listener):
+    """Processor time that numba has spent on compiling; one function's compilation compiles those that it calls."""
+
+    def __init__(self) -> None:
+        self.spent_s = 0.0
+        self._depth = 0
+        self._began_s = 0.0
+
+    def on_start(self, event: event.Event) -> None:
+        """Begins to count, unless that is done already."""
+        if self._depth == 0:
+            self._began_s = time.process_time()
+        self._depth += 1
+
+    def on_end(self, event: event.Event) -> None:
+        """Counts."""
+        self._depth -= 1
+        if self._depth == 0:
+            self.spent_s += time.process_time() - self._began_s
+
+
+_COMPILATION = _Compilation()
+event.register("numba:compile", _COMPILATION)  # type: ignore[no-untyped-call]
+
+
+def cpu_s() -> float:
+    """Returns the processor time of this process, s, without what went into compilation."""
+    return time.process_time() - _COMPILATION.spent_s
 
 
 def compiled(function: Function) -> Function:

@@ -1,7 +1,6 @@
 """Run state between two episodes, and its checkpoint."""
 
 import logging
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -11,6 +10,7 @@ from risk_sac.config import RunSpec, method_of
 from risk_sac.egos.guard import DEAD_AFTER
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError
+from risk_sac.jit import cpu_s
 from risk_sac.metrics import MetricsAccumulator, results_digest
 from risk_sac.records import EpisodeRecord, Outcome, Phase, RunMetrics, SeriesFile
 from risk_sac.risk.reward import TrainingReward
@@ -39,7 +39,7 @@ class RunSummary:
     device: str
     wall_s: float  # of this process; excludes what was done before a resume
     cpu_s: float  # the same in processor time, which a busy machine does not lengthen
-    episode_cpu_s: tuple[float, ...]  # processor time of the run, resumes included, at the end of each episode
+    episode_cpu_s: tuple[float, ...]  # from the run's start to each episode's end, resumes included, compilation not
 
 
 class RunState:
@@ -57,7 +57,6 @@ class RunState:
 
     def __init__(self, spec: RunSpec, folder: Path) -> None:
         """Begins a run; `resume` continues the one in the folder."""
-        self._cpu_began_s = time.process_time()
         self.spec = spec
         self.env = RiskSacEnv.of(spec)
         self.problem = self.env.problem
@@ -70,6 +69,7 @@ class RunState:
         self._saved = 0  # records in the newest checkpoint
         self._search = MetricsAccumulator(self.problem.family.horizon_steps)
         self._evaluation = MetricsAccumulator(self.problem.family.horizon_steps)
+        self._cpu_began_s = cpu_s()
 
     @property
     def finished(self) -> bool:
@@ -108,7 +108,7 @@ class RunState:
             self.series[record.index] = write_series(file, self.env.trace.series())
         self.records.append(record)
         self.searchers.add(record)
-        self._episode_cpu_s.append(time.process_time() - self._cpu_began_s)
+        self._episode_cpu_s.append(cpu_s() - self._cpu_began_s)
         return self._count(record)
 
     def refuse_dead_ego(self) -> None:
@@ -157,7 +157,7 @@ class RunState:
         self.series = _series(self._folder, self.records, state.get("series", {}))  # older checkpoints have none
         self.searchers.load(state, self.records)
         self._episode_cpu_s = list(state["episode_cpu_s"])
-        self._cpu_began_s = time.process_time() - self._episode_cpu_s[-1]
+        self._cpu_began_s = cpu_s() - self._episode_cpu_s[-1]
         self._saved = len(self.records)
         logger.info("resumed after %d episodes", len(self.records))
         return [(record, self._count(record)) for record in self.records]

@@ -67,7 +67,8 @@ class Budget(Settings):
     evaluation_episodes: Annotated[int, Field(ge=0, le=10_000)] = 0
     """Episodes of the frozen policy after the search."""
     cpu_s: Annotated[float, Field(ge=0.1, le=1e7)] | None = None
-    """Processor time after which a search ends, s; how many episodes it has played then depends on the processor."""
+    """Processor time after which a search ends, s, without compilation; how many episodes it has played then depends
+    on the processor."""
     least_episodes: Annotated[int, Field(ge=1, le=100_000)] = 1
     """Search episodes that are played whatever the processor time, so that one run serves two budgets."""
 

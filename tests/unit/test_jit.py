@@ -54,3 +54,25 @@ def test_a_change_in_a_called_function_or_a_constant_is_not_hidden_by_the_cache(
         answers.append(float(found.stdout))
     assert answers == [2.0, 2.0, 3.0, 7.0]
     assert list((tmp_path / "c" if read_only else package / "__pycache__").rglob("*.nbi"))
+
+
+FIRST_CALL = """
+import time
+import numpy as np
+from risk_sac.geometry import overlapping_pairs
+from risk_sac.jit import cpu_s
+
+began_s, counted_s = time.process_time(), cpu_s()
+overlapping_pairs(np.ones((20, 3)))
+print(time.process_time() - began_s, cpu_s() - counted_s)
+"""
+
+
+def test_a_budget_of_processor_time_is_not_spent_on_compilation(tmp_path: Path) -> None:
+    """With an empty cache, as in a fresh clone, compilation takes most of the first call."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    answer = subprocess.run(
+        [sys.executable, "-c", FIRST_CALL], env=environment, capture_output=True, text=True, check=True
+    )
+    spent_s, counted_s = map(float, answer.stdout.split())
+    assert counted_s < spent_s / 2
