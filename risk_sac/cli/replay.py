@@ -17,7 +17,7 @@ def add(commands: Commands) -> None:
     bundle = add_command(commands, "bundle", _bundle, "write failures into files that stand alone")
     bundle.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
     bundle.add_argument(
-        "failure", nargs="?", metavar="FAILURE", help="id of a contact, or its number; default: every distinct failure"
+        "failure", nargs="?", metavar="FAILURE", help="id of a failure, or its number; default: every distinct one"
     )
     out = "the bundle; of every distinct failure: the folder for them"
     bundle.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
@@ -34,7 +34,7 @@ def add(commands: Commands) -> None:
 def _bundle(options: argparse.Namespace) -> int:
     results = read_results(options.results)
     folder = options.results if options.results.is_dir() else options.results.parent
-    one = None if options.failure is None else results.contact(options.failure).episode
+    one = None if options.failure is None else results.failure(options.failure).episode
     from risk_sac.failures.bundle import write_bundle  # here, because loading the simulator takes a second
     from risk_sac.failures.collect import bundles
 
@@ -64,10 +64,9 @@ def _replay(options: argparse.Namespace) -> int:
         played = replay(env, manifest.episode, bundle.series)
     same = trajectory_digest(played.series) == manifest.digest
     same &= played.signal_heads.tobytes() == bundle.signal_heads.tobytes()
-    found = played.collision
-    struck = f"strikes {found.other_id} at {found.ego_speed_mps:.1f} m/s" if found else "touches nobody"
+    events = ", ".join(each.event for each in played.found) or "keeps every requirement that counts"
     outcome = "every array is as recorded" if same else "not as recorded"
-    console.print(printable(f"{manifest.id}: the ego {struck}; {outcome}"), markup=False, soft_wrap=True)
+    console.print(printable(f"{manifest.id}: the ego {events}; {outcome}"), markup=False, soft_wrap=True)
     return OK if same else FAILED
 
 

@@ -1,6 +1,7 @@
-"""`risk-sac show`: the contacts of a run, and pictures of them."""
+"""`risk-sac show`: the failures of a run, refused ones included, and pictures of them."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.table import Table
@@ -9,7 +10,7 @@ from risk_sac.cli.console import EGO, OK, Commands, add_command, in_words, narro
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
-from risk_sac.records import Judgement
+from risk_sac.records import Collision, Judgement, Violation
 from risk_sac.run_folder.results import Results, read_results
 from risk_sac.run_folder.series import read_series
 from risk_sac.terminal import console
@@ -17,10 +18,10 @@ from risk_sac.terminal import console
 
 def add(commands: Commands) -> None:
     """Add the command."""
-    show = add_command(commands, "show", _show, "list a run's contacts, or draw one")
+    show = add_command(commands, "show", _show, "list a run's failures, or draw one")
     show.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
     show.add_argument(
-        "failure", nargs="?", metavar="FAILURE", help="id of a contact, or its number; default: list them"
+        "failure", nargs="?", metavar="FAILURE", help="id of a failure, or its number; default: list them"
     )
     twin = f"draw beside it the same scene without an attack (idle), or with this ego: {EGO}"
     show.add_argument("--twin", metavar="TWIN", help=twin)
@@ -30,28 +31,28 @@ def add(commands: Commands) -> None:
 def _show(options: argparse.Namespace) -> int:
     results = read_results(options.results)
     if options.failure is None:
-        console.print(_contacts(results))
+        console.print(_failures(results))
         return OK
-    contact = results.contact(options.failure)
+    failure = results.failure(options.failure)
     folder = options.results if options.results.is_dir() else options.results.parent
     from risk_sac.failures.show import draw  # here, because loading matplotlib takes a second
 
-    recording = Recording(contact, read_series(folder / contact.series))
+    recording = Recording(failure, read_series(folder / failure.series))
     twin = None
     if options.twin is not None:
         from risk_sac.failures.play import twin_recording
 
         ego = None if options.twin == IDLE else read_ego(options.twin)
         twin = twin_recording(results.spec, recording, ego, options.twin)
-    stem = Path(contact.series).stem + ("" if options.twin is None else f"-{Path(options.twin).stem}")
-    picture = options.out or (folder / contact.series).with_name(f"{stem}.png")
+    stem = Path(failure.series).stem + ("" if options.twin is None else f"-{Path(options.twin).stem}")
+    picture = options.out or (folder / failure.series).with_name(f"{stem}.png")
     draw(results.spec.family, recording, picture, twin)
     console.print(f"Drawn: {picture}", soft_wrap=True)
     return OK
 
 
-def _contacts(results: Results) -> Table:
-    """Two lines per contact, under the id of the run, with which their own ids begin.
+def _failures(results: Results) -> Table:
+    """Two lines per failure, under the id of the run, with which their own ids begin.
 
     Fits 80 columns; only the last one wraps.
     """
@@ -62,26 +63,45 @@ def _contacts(results: Results) -> Table:
         "other",
         "ego's\nother's\nm/s",
         "ego's\nother's\nzone",
-        "conflict\nbegan at s,\nx y m",
-        "failed rules,\nor what the\nother broke",
+        "requirement, or\nconflict; began\nat s, x y m",
+        "failed rules,\nor offences",
         title=run,
         caption=f"in full, as the service says it: {run}-ID",
     )
-    for contact in results.contacts:
-        collision = contact.episode.collision
-        if collision is None:
+    for failure in results.failures:
+        violation = failure.episode.worst_violation
+        if violation is None:
             continue
-        judgement = collision.judgement
+        cells = _of_contact(violation) if isinstance(violation, Collision) else _without_contact(violation)
+        told = [failure.episode.reason] if failure.episode.reason else _broke(violation)
         table.add_row(
-            contact.id.removeprefix(f"{run}-"),
-            f"{contact.episode.outcome}\n{(judgement and judgement.grade) or ''}",
-            collision.other_id,
-            f"{collision.ego_speed_mps:.1f}\n{collision.other_speed_mps:.1f}",
-            f"{collision.ego_zone}\n{collision.other_zone}",
-            "" if judgement is None else _conflict(judgement),
-            in_words([contact.episode.reason] if contact.episode.reason or judgement is None else judgement.broke),
+            failure.id.removeprefix(f"{run}-"),
+            f"{failure.episode.outcome}\n{violation.graded or ''}",
+            violation.other_id or "",
+            *cells,
+            in_words(told),
         )
     return table
+
+
+def _of_contact(collision: Collision) -> tuple[str, ...]:
+    """Speeds, zones, and how the conflict began."""
+    return (
+        f"{collision.ego_speed_mps:.1f}\n{collision.other_speed_mps:.1f}",
+        f"{collision.ego_zone}\n{collision.other_zone}",
+        "" if collision.judgement is None else _conflict(collision.judgement),
+    )
+
+
+def _without_contact(violation: Violation) -> tuple[str, ...]:
+    """The same of a violation without contact, which has no zones."""
+    return f"{violation.ego_speed_mps:.1f}", "", f"{violation.requirement}\n{violation.time_s:.1f}"
+
+
+def _broke(violation: Collision | Violation) -> Sequence[str]:
+    if isinstance(violation, Collision):
+        return () if violation.judgement is None else violation.judgement.broke
+    return violation.broke
 
 
 def _conflict(judgement: Judgement) -> str:

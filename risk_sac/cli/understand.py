@@ -9,7 +9,7 @@ from rich.text import Text
 
 from risk_sac.cli.console import OK, Commands, add_command, counted, narrow_table
 from risk_sac.errors import ConfigError
-from risk_sac.failures.studied import Studied, note, valid_contact
+from risk_sac.failures.studied import Studied, note, valid_failure
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import read_results
@@ -32,7 +32,7 @@ def add(commands: Commands) -> None:
     )
     for parser in (minimise, region):
         parser.add_argument("path", type=Path, metavar="PATH", help=what)
-        parser.add_argument("failure", nargs="?", metavar="FAILURE", help="of a run: id of a contact, or its number")
+        parser.add_argument("failure", nargs="?", metavar="FAILURE", help="of a run: id of a failure, or its number")
     clusters = add_command(commands, "clusters", _clusters, "which different failures runs have found, and one of each")
     clusters.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a run, or its results.json")
     clusters.add_argument("--out", type=Path, metavar="FILE.json", help="write them there too")
@@ -57,9 +57,9 @@ def _asked(path: Path, failure: str | None) -> _Asked:
     results, folder = read_results(path), path if path.is_dir() else path.parent
     if results.digest is None:
         raise ConfigError("PATH", f"the run in {folder} is not finished")
-    contact = results.contact(failure)
-    valid_contact(contact.id, contact.episode)  # before it is played
-    (bundle,) = bundles(folder, results, [contact.episode])
+    named = results.failure(failure)
+    valid_failure(named.id, named.episode)  # before it is played
+    (bundle,) = bundles(folder, results, [named.episode])
     return _Asked(bundle, folder, results.digest)
 
 
@@ -119,10 +119,10 @@ def _region(options: argparse.Namespace) -> int:
 
 
 def _failures(path: Path) -> Iterator[tuple[str, EpisodeRecord]]:
-    """The contacts of a run with their ids; flaky ones and their like are refused."""
+    """The failures of a run with their ids; flaky ones and their like are refused."""
     results = read_results(path)
     verified = read_verified(path if path.is_dir() else path.parent, results.digest or "")
-    episodes = [contact.episode for contact in results.contacts]
+    episodes = [failure.episode for failure in results.failures]
     for episode in verified.judged(episodes) if verified else episodes:
         yield episode.id_in(results.spec.id), episode
 

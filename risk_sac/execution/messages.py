@@ -62,8 +62,9 @@ class Finished(Message):
     wall_s: float
     repetitions: Mapping[int, Repetition] = {}
     """Of the distinct failures, by index of the episode; none where nothing was replayed."""
-    flaky: tuple[int, ...] = ()
-    """Episodes whose failures are of a kind that does not repeat; the metrics count them as refused."""
+    flaky: Mapping[int, tuple[str, ...]] = {}
+    """Requirements whose violations are of a kind that does not repeat, by index of the episode; the metrics count
+    these violations as refused."""
 
 
 class Failed(Message):

@@ -12,7 +12,7 @@ from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import set_aside
-from risk_sac.run_folder.results import EPISODES, RESULTS, Contact, Results, read_results, write_results
+from risk_sac.run_folder.results import EPISODES, RESULTS, RecordedFailure, Results, read_results, write_results
 from risk_sac.train import Observer
 
 logger = logging.getLogger(__name__)
@@ -39,7 +39,7 @@ class Recorder:
         self._observer = observer
         self.should_stop = observer.should_stop
         self.results = _results_so_far(spec, folder)
-        self._contacts: list[Contact] = []
+        self._failures: list[RecordedFailure] = []
         self._episodes = (folder / EPISODES).open("wb")
 
     def close(self) -> None:
@@ -50,12 +50,12 @@ class Recorder:
         """Writes an episode down."""
         self._episodes.write(record.model_dump_json().encode() + b"\n")
         self._episodes.flush()
-        if record.collision is not None:
-            self._contacts.append(Contact.of(self.results.spec.id, record))
+        if record.worst_violation is not None:
+            self._failures.append(RecordedFailure.of(self.results.spec.id, record))
         told = self.results.metrics.episodes if self.results.metrics else 0
         due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes > told
         if due and not record.evaluating:
-            self._write(replace(self.results, metrics=metrics, contacts=tuple(self._contacts)))
+            self._write(replace(self.results, metrics=metrics, failures=tuple(self._failures)))
         self._observer.episode(record, metrics, series)
 
     def finish(self, summary: RunSummary) -> Results:
@@ -73,7 +73,7 @@ class Recorder:
                 wall_s=self.results.wall_s + summary.wall_s,
                 cpu_s=self.results.cpu_s + summary.cpu_s,
                 episode_cpu_s=summary.episode_cpu_s,
-                contacts=tuple(self._contacts),
+                failures=tuple(self._failures),
             )
         )
         return self.results

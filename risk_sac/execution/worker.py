@@ -190,7 +190,7 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
     if folder not in found or not found[folder].flaky:
         return last
     judged = read_run(folder)
-    flaky = tuple(each.index for each in judged.records if each.collision and REPEATS in each.collision.broken)
+    flaky = {each.index: each.refused_by(REPEATS) for each in judged.records if each.refused_by(REPEATS)}
     return last.model_copy(
         update={
             "metrics": judged.metrics["iid" if spec.iid else "search"],

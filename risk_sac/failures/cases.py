@@ -16,7 +16,7 @@ class Verdict(StrEnum):
 
     FIXED = "fixed"
     STILL_FAILING = "still_failing"
-    NEW_KIND = "new_kind"  # another striker, or another type of conflict
+    NEW_KIND = "new_kind"  # another striker, type of conflict or requirement
     FLAKY = "flaky"  # not the same twice
     NOT_COMPARABLE = "not_comparable"
 

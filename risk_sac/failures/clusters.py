@@ -3,14 +3,25 @@
 import math
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from risk_sac.metrics.features import outcome_features
-from risk_sac.records import Collision, EpisodeRecord, Grade, Record
+from risk_sac.records import Collision, EpisodeRecord, Grade, Record, Violation
+from risk_sac.types import Floats
 from risk_sac.verdicts.distinct import CELLS, distinct_failures, kind_of
 
+SPEED_MPS, LEAST = 20.0, -3.0  # the same ranges for a violation without contact: of the ego's speed, and of robustness
 WIDTH = 0.25  # of the outcome features' ranges: failures farther apart than that are not much alike
+
+
+class _Member(NamedTuple):
+    """A violation of an episode."""
+
+    name: str
+    episode: EpisodeRecord
+    violation: Collision | Violation
 
 
 class Cluster(Record):
@@ -35,53 +46,62 @@ class Overview(Record):
     vendi: float
     """Vendi score of the distinct failures: as many that have nothing in common would be as various; 0 without any."""
     covered: int
-    """Cells of the taxonomy with a failure in them."""
+    """Cells of the taxonomy of contacts with a failure in them."""
     cells: int
     """Of the taxonomy; most of them hold what no ego and no road allows."""
 
 
 def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:
-    """Sorts failures into clusters; episodes without a valid, judged contact are left out."""
-    found: defaultdict[str, list[tuple[str, EpisodeRecord, Collision]]] = defaultdict(list)
+    """Sorts valid violations into clusters; contacts that were not judged are left out."""
+    found: defaultdict[str, list[_Member]] = defaultdict(list)
     kinds = set()
     for name, episode in episodes:
-        collision = episode.collision
-        if collision is None or not collision.valid or collision.judgement is None:
-            continue
-        found[collision.signature].append((name, episode, collision))
-        kinds.add(kind_of(collision, collision.judgement))
+        for violation in episode.valid_violations:
+            if isinstance(violation, Collision):
+                if violation.judgement is None:
+                    continue
+                kinds.add(kind_of(violation, violation.judgement))
+            found[violation.signature].append(_Member(name, episode, violation))
     distinct = {}
     for name, members in found.items():
-        collisions = [collision for *_, collision in members]
-        distinct[name] = [collisions[position] for position in distinct_failures(collisions)]
+        violations = [member.violation for member in members]
+        distinct[name] = [violations[position] for position in distinct_failures(violations)]
     clusters = [_cluster(name, members, len(distinct[name])) for name, members in found.items()]
     clusters.sort(key=lambda cluster: (-cluster.preventable, -cluster.failures, cluster.name))
     score = vendi(list(distinct.values()))
     return Overview(clusters=tuple(clusters), vendi=score, covered=len(kinds), cells=CELLS)
 
 
-def _cluster(name: str, members: Sequence[tuple[str, EpisodeRecord, Collision]], distinct: int) -> Cluster:
-    first, _, collision = min(members, key=lambda member: _rank(member[1], member[2]))
+def _cluster(name: str, members: Sequence[_Member], distinct: int) -> Cluster:
+    first = min(members, key=_rank)
     return Cluster(
         name=name,
         failures=len(members),
         distinct=distinct,
-        preventable=sum(collision.preventable for *_, collision in members),
-        representative=first,
-        grade=collision.judgement.grade if collision.judgement else None,
+        preventable=sum(member.violation.preventable for member in members),
+        representative=first.name,
+        grade=first.violation.graded,
     )
 
 
-def _rank(episode: EpisodeRecord, collision: Collision) -> tuple[int, float, int]:
+def _rank(member: _Member) -> tuple[int, float, int]:
     """Returns what orders failures: grade, impact speed of the careful driver, length."""
-    assert collision.judgement is not None
-    judged = collision.judgement
-    grade = list(Grade).index(judged.grade) if judged.grade else len(Grade)
-    careful = judged.drivers.get("careful")
-    return grade, careful.impact_speed_mps if careful else math.inf, episode.steps
+    violation = member.violation
+    grade = list(Grade).index(violation.graded) if violation.graded else len(Grade)
+    judged = violation.judgement if isinstance(violation, Collision) else None
+    careful = judged and judged.drivers.get("careful")
+    return grade, careful.impact_speed_mps if careful else math.inf, member.episode.steps
 
 
-def vendi(clusters: Sequence[Sequence[Collision]]) -> float:
+def _features(violation: Collision | Violation) -> Floats:
+    """Outcome features, scaled to [0, 1]; a violation without contact has the ego's speed and the robustness alone."""
+    if isinstance(violation, Collision):
+        return outcome_features(violation)
+    scaled: Floats = np.clip([violation.ego_speed_mps / SPEED_MPS, violation.robustness / LEAST], 0.0, 1.0)
+    return scaled
+
+
+def vendi(clusters: Sequence[Sequence[Collision | Violation]]) -> float:
     """Returns the Vendi score of failures; those in different clusters have nothing in common.
 
     Within a cluster, similarity falls with the distance of their outcome features.
@@ -90,8 +110,8 @@ def vendi(clusters: Sequence[Sequence[Collision]]) -> float:
     """
     count = sum(map(len, clusters))
     entropy = 0.0
-    for collisions in clusters:  # K has a block for each
-        features = np.array([outcome_features(collision) for collision in collisions])
+    for violations in clusters:  # K has a block for each
+        features = np.array([_features(violation) for violation in violations])
         apart = ((features[:, None] - features) ** 2).sum(axis=2)
         shares = np.linalg.eigvalsh(np.exp(-apart / (2 * WIDTH**2))) / count
         shares = shares[shares > 0.0]

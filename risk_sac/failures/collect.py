@@ -25,10 +25,10 @@ logger = logging.getLogger(__name__)
 
 
 def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -> Iterator[Bundle]:
-    """Yields bundles of contacts of a run, each after it was played again.
+    """Yields bundles of failures of a run, each after it was played again.
 
     Raises:
-      SimulationError: a contact does not repeat.
+      SimulationError: a failure does not repeat.
       DamagedError, OSError: its series cannot be read.
     """
     spec, policy = results.spec, policy_of(folder, results)
@@ -39,7 +39,7 @@ def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -
 
 
 def recorded_bundle(folder: Path, results: Results, episode: EpisodeRecord, policy: FrozenPolicy | None) -> Bundle:
-    """Returns a bundle of a contact as it was recorded, whether or not it repeats; without signal heads.
+    """Returns a bundle of a failure as it was recorded, whether or not it repeats; without signal heads.
 
     By which code it was recorded is known of runs that were verified.
 

@@ -1,4 +1,4 @@
-"""Draws the view from above: the roads, both paths, and the bodies at the contact and before it."""
+"""Draws the view from above: the roads, both paths, and the bodies at the violation and before it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,6 +10,7 @@ from matplotlib.patches import Polygon
 from risk_sac.config import FamilyName
 from risk_sac.failures.net import SurfaceUse, roads_of
 from risk_sac.failures.recording import BOX, Recording, on_body
+from risk_sac.records import Collision
 from risk_sac.types import Kind, Role
 
 EGO_COLOUR, OTHER_COLOUR, BYSTANDER_COLOUR = "tab:blue", "tab:red", "tab:gray"
@@ -22,33 +23,34 @@ def legend(axis: Axes, title: str | None = None) -> None:
 
 
 SURFACE_COLOURS: Mapping[SurfaceUse, str] = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
-GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the contact, where the two bodies are drawn as well
+GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the violation, where the two bodies are drawn as well
 OUTLINE: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.3", "linewidth": 0.8}
 CONFLICT: dict[str, Any] = {"facecolor": "none", "edgecolor": CONFLICT_COLOUR, "linewidth": 1.4, "linestyle": "--"}
 
 
 def draw_from_above(axis: Axes, family: FamilyName, recording: Recording, apart_m: float) -> None:
     """Draws everything on the ground; earlier places of a body that are nearer than `apart_m` are drawn as one."""
-    for surface in roads_of(family, recording.contact.episode.scene):
+    for surface in roads_of(family, recording.failure.episode.scene):
         colour = SURFACE_COLOURS[surface.use]
         axis.add_patch(Polygon(surface.outline, facecolor=colour, edgecolor="0.7", linewidth=0.5))
-    for actor in range(1, len(recording.series["ids"])):
-        if actor != recording.other:
-            _draw_actor(axis, recording, actor, BYSTANDER_COLOUR)
-    for actor, colour in ((recording.other, OTHER_COLOUR), (0, EGO_COLOUR)):
+    bystanders = [actor for actor in range(len(recording.series["ids"])) if actor not in recording.involved]
+    for actor in bystanders:
+        _draw_actor(axis, recording, actor, BYSTANDER_COLOUR)
+    for actor, colour in [*zip(recording.involved, (EGO_COLOUR, OTHER_COLOUR), strict=False)][::-1]:
         _draw_actor(axis, recording, actor, colour, involved=True)
         for times_s in _ghosts(recording, actor, apart_m):
             _draw_body(axis, recording, actor, -times_s[0], **OUTLINE | {"edgecolor": colour})
             _label_body(axis, recording, actor, times_s, colour)
-    if not recording.twin:
-        _draw_contact_point(axis, recording)
+    if recording.collision is not None and not recording.twin:
+        _draw_contact_point(axis, recording, recording.collision)
     _draw_conflict(axis, recording)
     axis.set(xlabel="x, m", ylabel="y, m")
     axis.add_patch(Polygon(np.empty((0, 2)), label="earlier", **OUTLINE))  # for the legend alone
-    if len(recording.series["ids"]) > 2:
+    if bystanders:
         grey: dict[str, Any] = {"facecolor": BYSTANDER_COLOUR, "edgecolor": BYSTANDER_COLOUR, "alpha": 0.2}
         axis.add_patch(Polygon(np.empty((0, 2)), label="others", **grey))
-    legend(axis, title="filled: at the contact" + (" of the failure" if recording.twin else ""))
+    when = "at the contact" if recording.collision else f"as {recording.violation.requirement} was violated"
+    legend(axis, title=f"filled: {when}{' in the failure' if recording.twin else ''}")
 
 
 def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float]]:
@@ -66,18 +68,19 @@ def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float
 
 
 def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, *, involved: bool = False) -> None:
-    """Draws the path, and the body at the contact."""
+    """Draws the path, and the body at the violation."""
     name = str(recording.series["ids"][actor])
     driver = Role(int(recording.series["role"][actor])).name.lower()
     x, y = recording["x_m"][:, actor], recording["y_m"][:, actor]
     axis.plot(x, y, color=colour, linewidth=1.2 if involved else 0.6, alpha=1.0 if involved else 0.5)
-    if not np.isfinite(x[-1]):
+    here = recording.pose(actor, 0.0)[:2]
+    if not np.isfinite(here).all():
         return
     label = ("ego" if actor == 0 else f"{name} ({driver})") if involved else None
     alpha = 0.6 if involved else 0.2
     _draw_body(axis, recording, actor, 0.0, facecolor=colour, edgecolor=colour, alpha=alpha, label=label)
     if not involved:
-        axis.annotate(name, (x[-1], y[-1]), fontsize=6, color=colour, ha="center", va="center", clip_on=True)
+        axis.annotate(name, here, fontsize=6, color=colour, ha="center", va="center", clip_on=True)
 
 
 def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **style: object) -> None:
@@ -91,7 +94,7 @@ def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **st
 def _label_body(axis: Axes, recording: Recording, actor: int, times_s: list[float], colour: str) -> None:
     """Writes the times beside a body, on the side that faces away from the other one."""
     x, y, heading = recording.pose(actor, -times_s[0])
-    partner_x, partner_y, _ = recording.pose(recording.other if actor == 0 else 0, -times_s[0])
+    partner_x, partner_y, _ = recording.pose((recording.other or 0) if actor == 0 else 0, -times_s[0])
     left = np.array((-np.sin(heading), np.cos(heading)))
     away = -left if left @ (partner_x - x, partner_y - y) > 0 else left
     side = "left" if away[0] > 0.5 else "right" if away[0] < -0.5 else "center"
@@ -108,9 +111,9 @@ def _label_body(axis: Axes, recording: Recording, actor: int, times_s: list[floa
     )
 
 
-def _draw_contact_point(axis: Axes, recording: Recording) -> None:
+def _draw_contact_point(axis: Axes, recording: Recording, collision: Collision) -> None:
     x, y, heading = recording.pose(0, 0.0)
-    along, across = recording.collision.contact_x_m, recording.collision.contact_y_m
+    along, across = collision.contact_x_m, collision.contact_y_m
     cos, sin = np.cos(heading), np.sin(heading)
     place = x + along * cos - across * sin, y + along * sin + across * cos
     axis.plot(*place, marker="x", color="black", markersize=7, linestyle="none", zorder=5, label="touched here")
@@ -118,10 +121,10 @@ def _draw_contact_point(axis: Axes, recording: Recording) -> None:
 
 def _draw_conflict(axis: Axes, recording: Recording) -> None:
     """Draws both bodies when the conflict began, and where the striker was then."""
-    judgement, begin_s = recording.collision.judgement, recording.conflict_s
+    judgement, begin_s = recording.collision and recording.collision.judgement, recording.conflict_s
     if judgement is None or begin_s is None:
         return
-    for actor in (0, recording.other):
+    for actor in recording.involved:
         if np.isfinite(recording.pose(actor, begin_s)).all():
             label = "as the conflict began" if actor == 0 else None
             _draw_body(axis, recording, actor, begin_s, label=label, **CONFLICT)

@@ -13,10 +13,9 @@ import numpy as np
 
 from risk_sac.failures.bundle import Bundle, make_bundle
 from risk_sac.failures.play import play
-from risk_sac.failures.sentence import sentence
+from risk_sac.failures.sentence import story
 from risk_sac.failures.studied import Core, Extent
 from risk_sac.failures.variants import Stage, Variant, alike
-from risk_sac.records import Collision, Grade
 from risk_sac.types import STEP_S, Bools, Floats
 
 MOST = 150  # episodes that are played for one failure
@@ -68,8 +67,8 @@ class _Search:
         """Goes on with a variant if it fails in the same way, and so do most of its copies."""
         if self.stage.played + 1 + COPIES > self._most - COPIES - 1:  # as many are counted afresh in the end
             return False
-        found, wanted = self.stage.play(variant), self.stage.collision
-        if found is None or not alike(found, wanted) or _grade(found) != _grade(wanted) or not self._holds(variant):
+        found = self.stage.play(variant)
+        if found is None or found.graded != self.stage.grade or not self._holds(variant):
             return False
         self.left = variant
         return True
@@ -89,22 +88,11 @@ class _Search:
         # Other copies than those that it was chosen by.
         held = sum(stage.fails(copy) for copy in stage.copies(left, SHARE, COPIES, self._random))
         played = play(stage.env, stage.scene(left), left.seed, left.actions)
-        assert played.collision is not None  # of its own, or it would not have been taken
-        episode = origin.manifest.episode.model_copy(
-            update={
-                "scene": dict(stage.scene(left).values),
-                "reason": "",
-                "steps": len(played.signal_heads) - 1,
-                "risk_return": played.risk_return,
-                "shaped_return": played.risk_return,  # nobody was trained on it
-                "mean_cost": played.mean_cost,
-                "min_ttc_s": stage.env.trace.min_ttc_s,
-                "min_robustness": stage.env.trace.min_robustness,
-                "objective": None,
-                "script": None,  # which would do all that was taken away
-                "collision": played.collision,
-            }
-        )
+        found = alike(played.found, stage.failure)
+        assert found is not None  # or it would not have been taken
+        # A script would do all that was taken away.
+        changes = {"scene": dict(stage.scene(left).values), "script": None}
+        episode = played.record(origin.manifest.episode).model_copy(update=changes)
         core = Core(
             before=_extent(stage.original),
             after=_extent(replace(left, actions=left.actions[: episode.steps])),
@@ -113,20 +101,16 @@ class _Search:
             episodes=stage.played + 1,
             held=held,
             copies=COPIES,
-            sentence=sentence(played.series, played.collision),
+            sentence=story(played.series, found),
         )
         return make_bundle(origin.manifest.spec, episode, played.series, played.signal_heads, origin.policy, core)
-
-
-def _grade(collision: Collision) -> Grade | None:
-    return collision.judgement.grade if collision.judgement else None
 
 
 def _active_adversaries(search: _Search) -> list[int]:
     """Returns the adversaries that act, the striker last."""
     names = search.stage.env.problem.family.adversaries
     active = [k for k in range(len(names)) if search.left.actions[:, _columns(k)].any()]
-    return sorted(active, key=lambda k: names[k] == search.stage.collision.other_id)
+    return sorted(active, key=lambda k: names[k] == search.stage.failure.other_id)
 
 
 def _units(search: _Search) -> Iterator[list[Cell]]:

@@ -1,6 +1,6 @@
 """Plays an episode with given actions: as it was recorded, or as its twin."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 
@@ -13,10 +13,10 @@ from risk_sac.errors import SimulationError
 from risk_sac.failures.question import TwinPlay
 from risk_sac.failures.recording import Recording, Series, actions_of, trajectory_digest
 from risk_sac.problem import Problem
-from risk_sac.records import Collision, EpisodeRecord
+from risk_sac.records import Collision, Ending, EpisodeRecord, RequirementResult, Violation
 from risk_sac.types import STEP_S, Floats, Scene, Vector
 
-AFTER_S = 3.0  # how long a twin goes on after the contact that it is compared with
+AFTER_S = 3.0  # how long a twin goes on after the end of the failure that it is compared with
 Policy = Callable[[Vector], Vector]
 """From an observation to an action."""
 
@@ -27,9 +27,34 @@ class Played:
 
     series: Series
     signal_heads: NDArray[np.uint8]  # T since the release x heads, SUMO's letters
+    requirements: Mapping[str, RequirementResult]  # how far each was kept
     collision: Collision | None
+    violations: tuple[Violation, ...]  # without contact
     risk_return: float
     mean_cost: float
+
+    @property
+    def found(self) -> tuple[Collision | Violation, ...]:
+        """All violations of requirements that count, a contact first."""
+        return (*(() if self.collision is None else (self.collision,)), *self.violations)
+
+    def record(self, episode: EpisodeRecord) -> EpisodeRecord:
+        """The record of an episode that went like this and was not trained on, otherwise as another one's."""
+        since_release = slice(-len(self.signal_heads), None)
+        changes = {
+            **Ending.of(self.collision, self.violations)._asdict(),
+            "steps": len(self.signal_heads) - 1,
+            "risk_return": self.risk_return,
+            "shaped_return": self.risk_return,
+            "mean_cost": self.mean_cost,
+            "min_ttc_s": float(self.series["least_ttc_s"][since_release].min()),
+            "min_robustness": float(self.series["soft_min"][since_release].min()),
+            "objective": None,
+            "requirements": self.requirements,
+            "violations": self.violations,
+            "collision": self.collision,
+        }
+        return episode.model_copy(update=changes)
 
 
 def play(env: RiskSacEnv, scene: Scene, seed: int, actions: Floats, policy: Policy | None = None) -> Played:
@@ -50,10 +75,13 @@ def play(env: RiskSacEnv, scene: Scene, seed: int, actions: Floats, policy: Poli
         costs.append(info["cost"])
         if touched or over:
             break
+    requirements = env.requirement_results()
     return Played(
         series=env.trace.series(),
         signal_heads=np.frombuffer(b"".join(heads), dtype=np.uint8).reshape(len(heads), -1),
+        requirements=requirements,
         collision=info.get("collision"),
+        violations=env.violations(requirements),
         risk_return=sum(rewards),
         mean_cost=sum(costs) / max(len(costs) - 1, 1),
     )
@@ -65,7 +93,7 @@ def replay(env: RiskSacEnv, episode: EpisodeRecord, recorded: Series) -> Played:
 
 
 def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: Series) -> Played:
-    """Plays a contact again; a SimulationError if it is not the same to the bit."""
+    """Plays a failure again; a SimulationError if it is not the same to the bit."""
     played = replay(env, episode, recorded)
     if trajectory_digest(played.series) != trajectory_digest(recorded):
         raise SimulationError(f"{episode.id_in(spec.id)} does not repeat here")
@@ -74,8 +102,9 @@ def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: S
 
 def twin_recording(spec: RunSpec, recording: Recording, changed: EgoConfig | None, name: str = "") -> Recording:
     """Returns the twin of a recorded failure, to be drawn beside it under the name of the other ego."""
-    played = twin(spec, recording.contact.episode, actions_of(recording.series), changed)
-    return replace(recording, series=played.series, twin=TwinPlay.of(changed, played.collision, name).title)
+    played = twin(spec, recording.failure.episode, actions_of(recording.series), changed)
+    told = TwinPlay.of(changed, recording.violation, played.found, name)
+    return replace(recording, series=played.series, twin=told.title)
 
 
 def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoConfig | None) -> Played:

@@ -1,7 +1,7 @@
 """Questions of a failure that take the simulator, for processes that must not load it; see `failures.study`."""
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.records import Collision, EpisodeRecord, Record
+from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Record, Violation
 
 IDLE = "idle"
 Twin = Literal["idle", "default", "perfect", "careful"]
@@ -42,16 +42,30 @@ class TwinPlay(Record):
     outcome: str
     """Such as "touches nobody"."""
     collision: Collision | None
-    """The ego's first contact, if it touched somebody."""
+    """The ego's first contact, if it touched something."""
 
     @classmethod
-    def of(cls, ego: EgoConfig | None, collision: Collision | None, name: str = "") -> Self:
-        """Describes a twin with another ego, or with None: without an attack."""
+    def of(
+        cls,
+        ego: EgoConfig | None,
+        failure: Collision | Violation,
+        found: Sequence[Collision | Violation],
+        name: str = "",
+    ) -> Self:
+        """Describes a twin with another ego, or with None: without an attack.
+
+        Args:
+          ego: the other one.
+          failure: what it is the twin of.
+          found: what was violated in the twin.
+          name: of the other ego.
+        """
         changed = "nobody attacks" if ego is None else f"ego: {name or ego.driver or ego.profile}"
-        touches = (
-            f"touches {collision.other_id} at {collision.ego_speed_mps:.1f} m/s" if collision else "touches nobody"
-        )
-        return cls(changed=changed, outcome=touches, collision=collision)
+        kept = "touches nobody" if failure.requirement == NO_CONTACT else f"keeps {failure.requirement}"
+        violated = {each.requirement: each.event for each in found}
+        told = dict.fromkeys([failure.requirement, *violated], kept) | violated
+        collision = next((each for each in found if isinstance(each, Collision)), None)
+        return cls(changed=changed, outcome=", ".join(told.values()), collision=collision)
 
     @property
     def title(self) -> str:

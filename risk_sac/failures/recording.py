@@ -1,4 +1,4 @@
-"""A contact and its time series, with time counted from the contact."""
+"""A failure and its time series, with time counted from the violation that names it."""
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.records import Collision
-from risk_sac.run_folder.results import Contact
+from risk_sac.records import Collision, Violation
+from risk_sac.run_folder.results import RecordedFailure
 from risk_sac.types import Floats
 
 Series = Mapping[str, NDArray[Any]]
@@ -44,53 +44,71 @@ def trajectory_digest(series: Series) -> str:
 
 @dataclass(frozen=True)
 class Recording:
-    """A contact's time series, or its twin's, with time counted from the contact."""
+    """A failure's time series, or its twin's, with time counted from the violation; a contact ends the series."""
 
-    contact: Contact
+    failure: RecordedFailure
     series: Mapping[str, NDArray[np.generic]]
-    twin: str = ""  # what is different, where the series is not the contact's own but that of its episode's twin
+    twin: str = ""  # what is different, where the series is not the failure's own but that of its episode's twin
 
     @property
-    def collision(self) -> Collision:
-        """What was recorded at the contact."""
-        assert self.contact.episode.collision is not None  # that is what makes an episode a contact
-        return self.contact.episode.collision
+    def violation(self) -> Collision | Violation:
+        """The violation that names the failure."""
+        assert self.failure.episode.worst_violation is not None  # that is what makes an episode a failure
+        return self.failure.episode.worst_violation
+
+    @property
+    def collision(self) -> Collision | None:
+        """The contact, if that names the failure."""
+        return self.violation if isinstance(self.violation, Collision) else None
 
     @cached_property
     def time_s(self) -> Floats:
-        """`T`, negative before the contact."""
-        time: Floats = self["time_s"] - float(self["released_s"]) - self.collision.time_s
+        """`T`, negative before the violation."""
+        time: Floats = self["time_s"] - float(self["released_s"]) - self.violation.time_s
         return time
 
     @property
     def released_s(self) -> float:
         """When the adversaries were released."""
-        return -self.collision.time_s
+        return -self.violation.time_s
 
     @property
     def conflict_s(self) -> float | None:
-        """When the conflict began; None in a twin, if nobody judged the contact, or if it was before the recording."""
-        if self.twin or self.collision.judgement is None:
+        """When the conflict began; None in a twin, without a judged contact, or if it was before the recording."""
+        if self.twin or self.collision is None or self.collision.judgement is None:
             return None
         began_s = self.collision.judgement.conflict_s - self.collision.time_s
         return began_s if began_s >= self.time_s[0] else None
 
     @cached_property
-    def other(self) -> int:
-        """Column of the actor that the ego touched; the ego's is 0."""
-        return [str(id_) for id_ in self.series["ids"]].index(self.collision.other_id)
+    def other(self) -> int | None:
+        """Column of the actor that mattered most, which in a contact was touched; None without one. The ego's is 0."""
+        other = self.violation.other_id
+        return None if other is None else [str(id_) for id_ in self.series["ids"]].index(other)
+
+    @property
+    def moment(self) -> str:
+        """What happens at time 0, in words."""
+        return "contact" if self.collision else f"{self.violation.requirement} violated"
+
+    @property
+    def involved(self) -> tuple[int, ...]:
+        """Columns of the ego and of that actor."""
+        return (0,) if self.other is None else (0, self.other)
 
     def __getitem__(self, name: str) -> Floats:
         return np.asarray(self.series[name], dtype=np.float64)
 
     def pose(self, actor: int, time_s: float) -> tuple[float, float, float]:
-        """Centre and heading at any time within the recording, between two frames as the contact's search does."""
+        """Centre and heading at any time within the recording, between two frames as the search for contacts does."""
         x, y, heading = (self[name][:, actor] for name in ("x_m", "y_m", "heading_rad"))
         at = (float(np.interp(time_s, self.time_s, values)) for values in (x, y, np.unwrap(heading)))
         return next(at), next(at), next(at)
 
     def hidden(self) -> Iterator[tuple[float, float]]:
-        """The spans in which the ego could not see the other."""
+        """The spans in which the ego could not see the other; none without one."""
+        if self.other is None:
+            return
         unseen = np.concatenate(([False], self["visible"][:, self.other] == 0, [False]))
         edges = np.flatnonzero(unseen[1:] != unseen[:-1])
         for start, end in edges.reshape(-1, 2):

@@ -3,9 +3,12 @@
 Each is first played with its own ego, so that nothing counts as fixed that would not fail here anyway. Then the other
 ego meets the recorded actions, and after them the policy that found the failure, if there is one: a contact that is
 only delayed is not avoided. Scripts that found it are followed as well, since they react to where the ego is.
+
+Every requirement that the failure violated has to be kept. A contact still fails with the same striker in the same type
+of conflict; a violation without contact, whatever is near.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -24,7 +27,7 @@ from risk_sac.failures.collect import policy_of, recorded_bundle
 from risk_sac.failures.play import Played, Policy, play
 from risk_sac.failures.recording import actions_of, trajectory_digest
 from risk_sac.failures.variants import alike
-from risk_sac.records import Collision, Outcome
+from risk_sac.records import Collision, Violation
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import distinct_failures
 from risk_sac.types import Floats, Scene
@@ -39,26 +42,26 @@ class _Ending(NamedTuple):
     verdict: Verdict
     reason: str
     found: str = ""  # signature of what happened instead
-    played: Played | None = None  # how it went, where the ego touched somebody
+    played: Played | None = None  # how it went, where a requirement that counts was violated
 
 
 class Regressed(NamedTuple):
     """Outcome of an old failure."""
 
     case: Case
-    bundle: Bundle  # of the contact that the other ego has now; where it has none that can be compared, the old failure
+    bundle: Bundle  # of what the other ego violates now; where that cannot be compared or is nothing, the old failure
 
 
 def regress(bundle: Bundle, ego: EgoConfig) -> Regressed:
     """Plays one failure against another ego."""
     manifest = bundle.manifest
-    collision = manifest.episode.collision
-    ending = _judge(bundle, collision, ego)
+    named = manifest.episode.worst_violation
+    ending = _judge(bundle, ego)
     case = Case(
         id=manifest.id,
         digest=manifest.digest,
-        name=collision.signature if collision else "no contact",
-        grade=collision.judgement.grade if collision and collision.judgement else None,
+        name=named.signature if named else "no violation",
+        grade=named.graded if named else None,
         verdict=ending.verdict,
         reason=ending.reason,
         found=ending.found,
@@ -67,18 +70,9 @@ def regress(bundle: Bundle, ego: EgoConfig) -> Regressed:
 
 
 def _as_played(bundle: Bundle, ego: EgoConfig, played: Played) -> Bundle:
-    """Returns a bundle of the contact that another ego has in the scene of a failure."""
-    assert played.collision is not None  # else there is nothing to show
-    changes = {
-        "collision": played.collision,
-        "outcome": Outcome.FAILURE if played.collision.valid else Outcome.DEGENERATE,
-        "reason": ", ".join(played.collision.broken),
-        "steps": len(actions_of(played.series)),
-        "risk_return": played.risk_return,
-        "mean_cost": played.mean_cost,
-    }
+    """Returns a bundle of how another ego fares in the scene of a failure."""
     spec = bundle.manifest.spec.model_copy(update={"ego": ego})
-    episode = bundle.manifest.episode.model_copy(update=changes)
+    episode = played.record(bundle.manifest.episode)
     return make_bundle(spec, episode, played.series, played.signal_heads, bundle.policy)
 
 
@@ -98,9 +92,10 @@ def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Regressed]:
         yield regress(recorded_bundle(folder, results, episode, policy), ego)
 
 
-def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig) -> _Ending:
+def _judge(bundle: Bundle, ego: EgoConfig) -> _Ending:
     manifest = bundle.manifest
-    if wanted is None or not wanted.valid:
+    wanted = manifest.episode.valid_violations
+    if not wanted:
         return _Ending(Verdict.NOT_COMPARABLE, "it is no valid failure")
     try:
         check_world(manifest)
@@ -108,7 +103,8 @@ def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig) -> _Ending:
         if trajectory_digest(own.series) != manifest.digest:
             if (manifest.code, manifest.versions) == (code_digest(), versions()):
                 return _Ending(Verdict.FLAKY, "with its own ego it goes another way than recorded")
-            if not alike(own.collision, wanted):
+            wanted = tuple(each for each in wanted if alike(own.found, each))
+            if not wanted:
                 why = "with its own ego it does not happen under this code and these packages"
                 return _Ending(Verdict.NOT_COMPARABLE, why)
         other = manifest.spec.model_copy(update={"ego": ego})
@@ -123,7 +119,7 @@ def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig) -> _Ending:
             first, second = attack(), attack()
             if trajectory_digest(first.series) != trajectory_digest(second.series):
                 return _Ending(Verdict.FLAKY, f"with {name} this ego went another way the second time")
-            endings[name] = _compared(first.collision, wanted)._replace(played=first if first.collision else None)
+            endings[name] = _compared(first.found, wanted)._replace(played=first if first.found else None)
     except InfeasibleScene as error:
         return _Ending(Verdict.NOT_COMPARABLE, f"its scene is refused with this ego: {error.reason}")
     except RiskSacError as error:
@@ -133,21 +129,32 @@ def _judge(bundle: Bundle, wanted: Collision | None, ego: EgoConfig) -> _Ending:
     return worst._replace(reason="; ".join(reasons))
 
 
-def _compared(found: Collision | None, wanted: Collision) -> _Ending:
-    if found is None:
-        return _Ending(Verdict.FIXED, "nobody is touched")
-    touched = f"touches {found.other_id} at {found.ego_speed_mps:.1f} m/s"
-    kind = found.signature
-    if alike(found, wanted):
-        return _Ending(Verdict.STILL_FAILING, touched, kind)
-    if found.valid:
-        return _Ending(Verdict.NEW_KIND, f"{touched}: {kind}", kind)
-    said = f"{touched}, which is not its failure: {', '.join(found.broken)}"
-    if found.artefact:  # and it may have ended the episode before the failure
+def _compared(found: Sequence[Collision | Violation], wanted: Sequence[Collision | Violation]) -> _Ending:
+    """What became of the violations of a failure, by what the other ego violates."""
+    if still := [each for each in found if any(_persists(old, each) for old in wanted)]:
+        return _Ending(Verdict.STILL_FAILING, _events(still), still[0].signature)
+    if valid := [each for each in found if each.valid]:
+        return _Ending(Verdict.NEW_KIND, f"{_events(valid)}: {valid[0].signature}", valid[0].signature)
+    if not found:
+        kept = (f"{old.requirement} is kept" if isinstance(old, Violation) else "nobody is touched" for old in wanted)
+        return _Ending(Verdict.FIXED, " and ".join(kept))
+    events, broken = _events(found), {rule for each in found for rule in each.broken}
+    said = f"{events}, which is not its failure: {', '.join(sorted(broken))}"
+    if any(each.artefact for each in found):  # and it may have ended the episode before the failure
         return _Ending(Verdict.NOT_COMPARABLE, said)
-    if BLIND in found.broken:
-        return _Ending(Verdict.NEW_KIND, f"{touched}, which it never saw", kind)
+    if BLIND in broken:
+        return _Ending(Verdict.NEW_KIND, f"{events}, which it never saw", found[0].signature)
     return _Ending(Verdict.FIXED, said)
+
+
+def _persists(old: Collision | Violation, new: Collision | Violation) -> bool:
+    if isinstance(old, Collision):
+        return alike([new], old) is not None
+    return new.valid and new.requirement == old.requirement
+
+
+def _events(violations: Sequence[Collision | Violation]) -> str:
+    return " and ".join(each.event for each in violations)
 
 
 def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:

@@ -6,7 +6,7 @@ from itertools import groupby
 import numpy as np
 
 from risk_sac.failures.recording import Series
-from risk_sac.records import Collision
+from risk_sac.records import Collision, Violation
 from risk_sac.types import STEP_S, Floats, Kind
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
@@ -30,6 +30,13 @@ def sentence(series: Series, collision: Collision) -> str:
     who = _who(series, striker, first)
     what = does[1] if does else f"goes on at {series['speed_mps'][first, striker]:.0f} m/s"
     return f"{who}, {what}; ego at {series['speed_mps'][began, 0]:.0f} m/s {_response(series, began)}"
+
+
+def story(series: Series, violation: Collision | Violation) -> str:
+    """Returns a sentence about any violation; see `sentence` for a contact that was judged."""
+    if isinstance(violation, Violation):
+        return f"{violation.signature}; ego at {violation.ego_speed_mps:.0f} m/s after {violation.time_s:.1f} s"
+    return sentence(series, violation) if violation.judgement else f"contact with {violation.other_id}"
 
 
 def _who(series: Series, striker: int, at: int) -> str:

@@ -1,4 +1,4 @@
-"""Draws one contact as the paper's Fig. 2 does: both paths from above, and what was measured along the way."""
+"""Draws one failure as the paper's Fig. 2 does: both paths from above, and what was measured along the way."""
 
 import textwrap
 from collections.abc import Callable, Iterator
@@ -15,13 +15,14 @@ from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
 from risk_sac.failures.from_above import CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, draw_from_above, legend
 from risk_sac.failures.recording import Recording
-from risk_sac.records import Grade
+from risk_sac.records import Collision, Grade, Violation
 from risk_sac.risk.ttc import TTC_CAP_S
-from risk_sac.types import Floats
+from risk_sac.types import STEP_S, Floats
 
 CAPTION_WIDTH = 120  # characters
-SEEN_COLOUR, RELEASE_COLOUR, HIDDEN_COLOUR = "tab:green", "tab:purple", "0.9"
-VIEW_S, PANELS_S = 3.0, 8.0  # before the contact: what the view from above holds, and the panels
+SEEN_COLOUR, RELEASE_COLOUR, HIDDEN_COLOUR, ALSO_COLOUR = "tab:green", "tab:purple", "0.9", "tab:brown"
+VIEW_S, PANELS_S = 3.0, 8.0  # before the violation: what the view from above holds, and the panels
+AFTER_S = 3.0  # after a violation without contact, in the panels
 MARGIN_M = 5.0
 WIDTH_IN, PANEL_IN, DPI = 11.0, 1.5, 110
 PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
@@ -35,25 +36,45 @@ PREVENTED = {
 
 
 def caption(family: FamilyName, recording: Recording) -> str:
-    """Returns which contact it is, what touched what, and what its judgement says."""
-    episode, collision, judgement = recording.contact.episode, recording.collision, recording.collision.judgement
-    failed = f" · failed rules: {_words(episode.reason)}" if episode.reason else ""
-    seen_s = collision.visible_for_s
-    seen = f"which it had seen for {seen_s:.1f} s" if seen_s > 0 else "which it had not seen"
+    """Returns which failure it is, what happened, and how it was judged."""
+    episode, violation = recording.failure.episode, recording.violation
+    refused = f" · failed rules: {_words(episode.reason)}" if episode.reason else ""
+    also = [name for name in episode.failed if name != violation.requirement]
     lines = [
-        f"{family} · episode {recording.contact.id} · {episode.outcome}{failed}",
-        f"the ego's {collision.ego_zone}, at {collision.ego_speed_mps:.1f} m/s, touched the {collision.other_zone} of "
-        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {seen}",
+        f"{family} · episode {recording.failure.id} · {episode.outcome}{refused}",
+        *(_contact(violation) if isinstance(violation, Collision) else _violation(violation)),
+        *([f"also violated: {', '.join(also)}"] if also else []),
     ]
+    return "\n".join(textwrap.fill(line, CAPTION_WIDTH) for line in lines)
+
+
+def _contact(collision: Collision) -> Iterator[str]:
+    seen_s, judgement = collision.visible_for_s, collision.judgement
+    seen = f"which it had seen for {seen_s:.1f} s" if seen_s > 0 else "which it had not seen"
+    yield (
+        f"the ego's {collision.ego_zone}, at {collision.ego_speed_mps:.1f} m/s, touched the {collision.other_zone} of "
+        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {seen}"
+    )
     if judgement is not None:
         before_s = collision.time_s - judgement.conflict_s
-        grade = "" if judgement.grade is None else f" · grade {judgement.grade}: {PREVENTED[judgement.grade]}"
-        lines += [
-            judgement.signature,
-            f"the conflict began {before_s:.1f} s before the contact{grade}",
-            f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'}",
-        ]
-    return "\n".join(textwrap.fill(line, CAPTION_WIDTH) for line in lines)
+        yield judgement.signature
+        yield f"the conflict began {before_s:.1f} s before the contact{_grade(judgement.grade)}"
+        yield f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'}"
+
+
+def _violation(violation: Violation) -> Iterator[str]:
+    met = "nothing was in its way"
+    if violation.other_id is not None:
+        unseen = ", which it did not see" if violation.hidden else ""
+        met = f"it would have met {violation.other_role} {violation.other_id!r} first{unseen}"
+    yield f"the ego, at {violation.ego_speed_mps:.1f} m/s, violated {violation.requirement}; {met}"
+    yield violation.signature
+    yield f"least robustness: {violation.robustness:.2f}{_grade(violation.grade)}"
+    yield f"the ego's offences: {_words(', '.join(violation.broke)) or 'none'}"
+
+
+def _grade(grade: Grade | None) -> str:
+    return "" if grade is None else f" · grade {grade}: {PREVENTED[grade]}"
 
 
 def _words(names: str) -> str:
@@ -74,30 +95,38 @@ def _accelerations(axis: Axes, recording: Recording) -> None:
 
 
 def _both(axis: Axes, recording: Recording, name: str) -> None:
-    for actor, colour in ((0, EGO_COLOUR), (recording.other, OTHER_COLOUR)):
+    for actor, colour in zip(recording.involved, (EGO_COLOUR, OTHER_COLOUR), strict=False):
         label = str(recording.series["ids"][actor])
         axis.plot(recording.time_s, recording[name][:, actor], color=colour, linewidth=1.2, label=label)
 
 
 def _distance(axis: Axes, recording: Recording) -> None:
-    axis.plot(recording.time_s, recording["distance_m"][:, recording.other], color="black", linewidth=1.2)
+    _to_the_other(axis, recording, "distance_m")
     axis.set_ylabel("distance\nm")
     axis.set_ylim(bottom=0)
 
 
 def _ttc(axis: Axes, recording: Recording) -> None:
-    axis.plot(recording.time_s, recording["ttc_s"][:, recording.other], color="black", linewidth=1.2)
+    _to_the_other(axis, recording, "ttc_s")
     axis.set(ylabel=f"time to\ncollision, s\n({TTC_CAP_S:g}: none)", ylim=(0, TTC_CAP_S * 1.05))
+
+
+def _to_the_other(axis: Axes, recording: Recording, name: str) -> None:
+    """Draws what was measured to the other; without one, the least to any actor."""
+    values = recording[name]
+    least = np.fmin.reduce(values, axis=1) if recording.other is None else values[:, recording.other]
+    axis.plot(recording.time_s, least, color="black", linewidth=1.2)
 
 
 def _robustness(axis: Axes, recording: Recording) -> None:
     for name, values in zip(recording.series["requirements"], recording["robustness"].T, strict=True):
-        axis.plot(recording.time_s, values, linewidth=0.9, label=str(name))
+        width = 2.2 if str(name) == recording.violation.requirement else 0.9
+        axis.plot(recording.time_s, values, linewidth=width, label=str(name))
     axis.plot(
         recording.time_s, recording["soft_min"], color="black", linestyle="--", linewidth=1.4, label="soft minimum"
     )
     axis.axhline(0, color="0.6", linewidth=0.6)
-    axis.set_ylabel("requirements\nbroken below 0")
+    axis.set_ylabel("requirements\nviolated below 0")
     legend(axis)
 
 
@@ -132,16 +161,19 @@ def _name_instants(axis: Axes, recording: Recording) -> None:
 
 def _instants(recording: Recording) -> Iterator[tuple[float, str, str]]:
     """Yields time, name and colour of what is marked."""
-    yield 0.0, "contact of the failure" if recording.twin else "contact", "black"
-    if recording.collision.visible_for_s > 0 and not recording.twin:
+    yield 0.0, recording.moment + (" in the failure" if recording.twin else ""), "black"
+    if recording.collision is not None and recording.collision.visible_for_s > 0 and not recording.twin:
         yield recording.time_s[-1] - recording.collision.visible_for_s, "in the ego's view from here", SEEN_COLOUR
+    for other in () if recording.twin else recording.failure.episode.valid_violations:
+        if other is not recording.violation:
+            yield other.time_s - recording.violation.time_s, f"{other.requirement} violated", ALSO_COLOUR
     yield recording.released_s, "adversaries released", RELEASE_COLOUR
     if recording.conflict_s is not None:
         yield recording.conflict_s, "conflict begins", CONFLICT_COLOUR
 
 
 def draw(family: FamilyName, recording: Recording, file: Path, twin: Recording | None = None) -> None:
-    """Draws a contact, and its twin beside it, into a png, pdf or svg file."""
+    """Draws a failure, and its twin beside it, into a png, pdf or svg file."""
     if file.suffix not in (".png", ".pdf", ".svg"):
         raise ConfigError("out", f"{str(file)!r}", "a name that ends in .png, .pdf or .svg")
     content = recording_bytes(family, recording, file.suffix.removeprefix("."), twin)
@@ -150,7 +182,7 @@ def draw(family: FamilyName, recording: Recording, file: Path, twin: Recording |
 
 
 def recording_bytes(family: FamilyName, recording: Recording, format_: str, twin: Recording | None = None) -> bytes:
-    """Returns the picture of a contact as a png, pdf or svg."""
+    """Returns the picture of a failure as a png, pdf or svg."""
     return picture(partial(draw_recording, family, recording, twin), [format_], DPI, {})[0]
 
 
@@ -179,8 +211,8 @@ def draw_recording(family: FamilyName, recording: Recording, twin: Recording | N
             _mark_instants(axis, each)
             axis.label_outer()
         _name_instants(axes[0], each)
-        axes[-1].set_xlabel("time before the contact, s")
-    after_s = 0.15 if twin is None else max(0.15, twin.time_s[-1])
+        axes[-1].set_xlabel(f"time from the {'contact' if each.collision else 'violation'}, s")
+    after_s = max(0.15, *(min(each.time_s[-1], AFTER_S) for each in columns))
     grid[1, 0].set_xlim(max(recording.time_s[0], -PANELS_S), after_s)
     return figure
 
@@ -189,8 +221,9 @@ def _extent(recording: Recording) -> tuple[Floats, Floats]:
     """Corners of the ground that both took in the last seconds, grown to a shape that fits the page."""
     begin_s = recording.conflict_s
     shown = recording.time_s >= min(-VIEW_S, max(begin_s, -PANELS_S) if begin_s is not None else 0.0)
-    pair = [0, recording.other]
-    points = np.concatenate([recording[name][shown][:, pair].reshape(1, -1) for name in ("x_m", "y_m")])
+    shown &= recording.time_s < STEP_S
+    bodies = list(recording.involved)
+    points = np.concatenate([recording[name][shown][:, bodies].reshape(1, -1) for name in ("x_m", "y_m")])
     low, high = np.nanmin(points, axis=1) - MARGIN_M, np.nanmax(points, axis=1) + MARGIN_M
     width, height = high - low
     height = max(height, width * VIEW_IN[0] / PANEL_WIDTH_IN)

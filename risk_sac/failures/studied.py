@@ -8,7 +8,7 @@ from pydantic import ValidationError, computed_field
 
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
-from risk_sac.records import Collision, EpisodeRecord, Record
+from risk_sac.records import Collision, EpisodeRecord, Record, Violation
 from risk_sac.run_folder.durable import replace_file
 
 
@@ -43,13 +43,14 @@ class Core(Record):
     """What happens, in words."""
 
 
-def valid_contact(id_: str, episode: EpisodeRecord) -> Collision:
-    """Returns the contact of a valid failure; a ConfigError for others, which have no core or region."""
-    collision = episode.collision
-    if collision is None or not collision.valid or collision.judgement is None:
+def valid_failure(id_: str, episode: EpisodeRecord) -> Collision | Violation:
+    """Returns the violation that names a valid failure; a ConfigError for others, which have no core or region."""
+    violation = episode.worst_violation
+    unjudged = isinstance(violation, Collision) and violation.judgement is None
+    if violation is None or not violation.valid or unjudged:
         why = f": it breaks {episode.reason.replace('_', ' ')}" if episode.reason else ""
         raise ConfigError("FAILURE", f"{id_} is no valid failure{why}", remedy="choose one that is")
-    return collision
+    return violation
 
 
 NEEDLE = 0.5

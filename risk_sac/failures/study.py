@@ -31,7 +31,9 @@ def answer(question: Question) -> bytes:
         played = repeated(env, spec, episode, recorded)
     if question.subject == "twin":
         changed = twin(spec, episode, actions_of(recorded), question.twin)
-        return twin_bytes(TwinPlay.of(question.twin, changed.collision), changed.series)
+        assert episode.worst_violation is not None  # else it would have no time series
+        told = TwinPlay.of(question.twin, episode.worst_violation, changed.found)
+        return twin_bytes(told, changed.series)
     bundle = make_bundle(spec, episode, recorded, played.signal_heads, _policy(question))
     if question.subject == "region":
         return region(bundle).model_dump_json().encode()

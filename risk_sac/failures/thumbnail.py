@@ -1,4 +1,4 @@
-"""Draws a contact as a small SVG from above: roads, both paths, and both bodies as they touch.
+"""Draws a failure as a small SVG from above: roads, the paths up to the violation, and the bodies at that time.
 
 It is written by hand, because a screen shows dozens of them and matplotlib takes a second for each.
 """
@@ -9,10 +9,10 @@ import numpy as np
 
 from risk_sac.failures.net import Surface
 from risk_sac.failures.recording import BOX, Recording, on_body
-from risk_sac.types import Floats, Kind
+from risk_sac.types import STEP_S, Floats, Kind
 
 WIDTH, HEIGHT = 240, 150  # px
-VIEW_S = 3.0  # before the contact
+VIEW_S = 3.0  # before the violation
 MARGIN_M = 5.0
 WIDTHS_M = (30.0, 56.0)  # least and greatest of the view
 LEAST_RADIUS = 3.5  # px, of a pedestrian
@@ -28,10 +28,10 @@ GROUND = {
 
 def thumbnail(recording: Recording, roads: Sequence[Surface]) -> str:
     """Returns an SVG with a transparent ground."""
-    view, ends = _View(recording), [(recording.other, STRIKER), (0, EGO)]
-    if recording.series["kind"][recording.other] == Kind.PEDESTRIAN:
+    view, ends = _View(recording), [*zip(recording.involved, (EGO, STRIKER), strict=False)]
+    if recording.series["kind"][ends[-1][0]] != Kind.PEDESTRIAN:
         ends.reverse()  # a small body lies over a large one
-    others = (actor for actor in range(1, len(recording.series["ids"])) if actor != recording.other)
+    others = (actor for actor in range(len(recording.series["ids"])) if actor not in recording.involved)
     shapes = [
         *(shape for surface in roads if view.shows(surface) for shape in _ground(view, surface)),
         *(shape for actor in others for shape in _body(view, recording, actor, f'fill="{GREY}" fill-opacity=".6"')),
@@ -45,8 +45,8 @@ class _View:
     """Visible piece of ground: the end of both paths, in the middle if all of it fits."""
 
     def __init__(self, recording: Recording) -> None:
-        paths = np.concatenate([_path(recording, actor) for actor in (0, recording.other)])
-        bodies = np.array([recording.pose(actor, 0.0)[:2] for actor in (0, recording.other)])
+        paths = np.concatenate([_path(recording, actor) for actor in recording.involved])
+        bodies = np.array([recording.pose(actor, 0.0)[:2] for actor in recording.involved])
         low, high = paths.min(axis=0) - MARGIN_M, paths.max(axis=0) + MARGIN_M
         width_m = np.clip(max(high[0] - low[0], (high[1] - low[1]) * WIDTH / HEIGHT), *WIDTHS_M)
         self.scale = WIDTH / float(width_m)  # px per m
@@ -67,7 +67,8 @@ class _View:
 def _path(recording: Recording, actor: int) -> Floats:
     """Returns an actor's last places, `k x 2`, m, without frames in which it was absent."""
     places = np.column_stack((recording["x_m"][:, actor], recording["y_m"][:, actor]))
-    return places[(recording.time_s >= -VIEW_S) & np.isfinite(places).all(axis=1)]
+    shown = (recording.time_s >= -VIEW_S) & (recording.time_s < STEP_S)
+    return places[shown & np.isfinite(places).all(axis=1)]
 
 
 def _ground(view: _View, surface: Surface) -> Iterator[str]:
@@ -87,7 +88,7 @@ def _actor(view: _View, recording: Recording, actor: int, colour: str) -> Iterat
 
 
 def _body(view: _View, recording: Recording, actor: int, style: str) -> Iterator[str]:
-    """Draws a body at the contact, that of a vehicle with an arrow head to the front."""
+    """Draws a body at the violation, that of a vehicle with an arrow head to the front."""
     pose, size = recording.pose(actor, 0.0), (recording["length_m"][actor], recording["width_m"][actor])
     if not np.isfinite(pose).all():
         return

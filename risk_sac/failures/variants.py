@@ -1,6 +1,6 @@
 """Plays variants of a failure: in another scene, with other actions, in other traffic; and counts which still fail."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 
@@ -9,9 +9,10 @@ import numpy as np
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.failures.bundle import Bundle, check_world
+from risk_sac.failures.play import play
 from risk_sac.failures.recording import actions_of
-from risk_sac.failures.studied import Region, Share, valid_contact
-from risk_sac.records import Collision
+from risk_sac.failures.studied import Region, Share, valid_failure
+from risk_sac.records import Collision, Violation
 from risk_sac.scenario.space import SceneSpace
 from risk_sac.types import STEP_S, Floats, Scene
 
@@ -41,48 +42,48 @@ class Variant:
 
 
 class Stage:
-    """Plays variants of one failure; `original` is the failure as it was, and a tail of no action."""
+    """Plays variants of one failure; `original` is the failure up to the violation, and a tail of no action.
+
+    Attributes:
+      failure: the violation that names it.
+      grade: of the failure, as it was played here.
+    """
 
     def __init__(self, bundle: Bundle) -> None:
         """Plays the failure once more; a SimulationError if it does not happen here."""
         episode = bundle.manifest.episode
-        self.collision = valid_contact(bundle.manifest.id, episode)
+        self.failure = valid_failure(bundle.manifest.id, episode)
         check_world(bundle.manifest)
         self.env = RiskSacEnv.of(bundle.manifest.spec)
         self.space = self.env.problem.space
         self.original = Variant(
             scene=np.array([episode.scene[name] for name in self.space.names]),
-            actions=_with_tail(actions_of(bundle.series), self.env.problem.family.horizon_steps),
+            actions=_up_to(self.failure, actions_of(bundle.series), self.env.problem.family.horizon_steps),
             seed=episode.seed,
         )
         self.played = 0  # episodes so far
-        if not self.fails(self.original):
+        found = self.play(self.original)
+        if found is None:
             self.env.close()
             raise SimulationError(f"{bundle.manifest.id} does not happen here")
+        self.grade = found.graded
 
     def scene(self, variant: Variant) -> Scene:
         """Returns the scene of a variant."""
         return Scene(self.space.family, dict(zip(self.space.names, variant.scene.tolist(), strict=True)))
 
-    def play(self, variant: Variant) -> Collision | None:
-        """Returns the contact of a variant; None without one, or if its scene is infeasible."""
+    def play(self, variant: Variant) -> Collision | Violation | None:
+        """Returns how the ego fails as it did, see `alike`; None if it does not, or if the scene is infeasible."""
         self.played += 1
         try:
-            self.env.reset(seed=variant.seed, options={"scene": self.scene(variant)})
-            for action in variant.actions:
-                *_, touched, over, info = self.env.step(action)
-                if touched:
-                    collision: Collision = info["collision"]
-                    return collision
-                if over:
-                    break
+            found = play(self.env, self.scene(variant), variant.seed, variant.actions).found
         except (InfeasibleScene, SimulationError):
-            pass
-        return None
+            return None
+        return alike(found, self.failure)
 
     def fails(self, variant: Variant) -> bool:
-        """Whether the ego fails as it did: a valid contact with the same striker, in the same type of conflict."""
-        return alike(self.play(variant), self.collision)
+        """Whether the ego fails as it did."""
+        return self.play(variant) is not None
 
     def copies(self, variant: Variant, share: float, count: int, random: np.random.Generator) -> Iterator[Variant]:
         """Yields copies whose scene and actions are perturbed by up to a share."""
@@ -90,23 +91,38 @@ class Stage:
             yield variant.perturbed(self.space, share, share, random)
 
 
-def alike(found: Collision | None, wanted: Collision) -> bool:
-    """Whether a contact is valid, with the same striker, and came about in the same type of conflict."""
-    if found is None or not found.valid or found.judgement is None or wanted.judgement is None:
+def alike(found: Sequence[Collision | Violation], wanted: Collision | Violation) -> Collision | Violation | None:
+    """Returns the violation that is valid, of the same requirement and with the same actor, if there was one.
+
+    Contacts that are alike came about in the same type of conflict too. None if no violation is alike.
+    """
+    return next((each for each in found if each.valid and _alike(each, wanted)), None)
+
+
+def _alike(found: Collision | Violation, wanted: Collision | Violation) -> bool:
+    if found.requirement != wanted.requirement or wanted.other_id not in (None, found.other_id):
         return False
-    same_type = found.judgement.conflict_type is wanted.judgement.conflict_type
-    return same_type and found.other_id == wanted.other_id
+    if not isinstance(found, Collision) or not isinstance(wanted, Collision):
+        return True
+    if found.judgement is None or wanted.judgement is None:
+        return False
+    return found.judgement.conflict_type is wanted.judgement.conflict_type
 
 
-def _with_tail(actions: Floats, horizon_steps: int) -> Floats:
-    steps = min(round(TAIL_S / STEP_S), horizon_steps - len(actions))
+def _up_to(failure: Collision | Violation, actions: Floats, horizon_steps: int) -> Floats:
+    """The actions up to a failure; then none, for a while after a contact, or else to the horizon."""
+    if isinstance(failure, Collision):
+        steps = min(round(TAIL_S / STEP_S), horizon_steps - len(actions))
+    else:
+        actions = actions[: round(failure.time_s / STEP_S)]
+        steps = horizon_steps - len(actions)
     return np.pad(actions, ((0, steps), (0, 0)))
 
 
 def region(bundle: Bundle) -> Region:
     """Plays a failure in scenes near its own, in other traffic, and with other actions: 170 episodes.
 
-    An episode fails as it did if it ends in a valid contact with the same striker, in the same type of conflict.
+    Which of them fail as it did is told by `alike`.
 
     Raises:
       ConfigError: the bundle holds no valid failure that can be played here.

@@ -1,6 +1,6 @@
 """One episode: how it ended, which requirements it violated, and how people triaged it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
@@ -80,6 +80,11 @@ class EpisodeRecord(Record):
         """The violation that names the episode: a valid contact, the first valid violation, a refused contact."""
         return next(iter(self.valid_violations), None) or self.collision or next(iter(self.violations), None)
 
+    def refused_by(self, rule: str) -> tuple[str, ...]:
+        """Requirements whose violations fail a rule."""
+        found: tuple[Collision | Violation | None, ...] = (self.collision, *self.violations)
+        return tuple(each.requirement for each in found if each is not None and rule in each.broken)
+
     def id_in(self, run_id: str) -> str:
         """How the episode is called wherever it is spoken of, unique within a campaign."""
         return f"{run_id}-{self.phase}-{self.index}"
@@ -94,16 +99,19 @@ class EpisodeRecord(Record):
         """Whether it belongs to the evaluation of the frozen policy, the second phase of a run that has one."""
         return self.phase == RECORDED["evaluation"]
 
-    def refused(self, rule: str) -> "EpisodeRecord":
-        """The same episode, whose violations fail one more rule; without any, the episode itself."""
-        if self.worst_violation is None:
+    def refused(self, rule: str, requirements: Collection[str]) -> "EpisodeRecord":
+        """The same episode, whose valid violations of these requirements fail one more rule."""
+        if not any(each.requirement in requirements for each in self.valid_violations):
             return self
         ungraded: dict[str, Any] = {"grade": None, "drivers": {}}  # drivers are asked of what is valid alone
         violations = tuple(
-            each.model_copy(update={"verdicts": {**each.verdicts, rule: False}, **ungraded}) for each in self.violations
+            each.model_copy(update={"verdicts": {**each.verdicts, rule: False}, **ungraded})
+            if each.requirement in requirements
+            else each
+            for each in self.violations
         )
         collision = self.collision
-        if collision is not None:
+        if collision is not None and collision.requirement in requirements:
             judgement = collision.judgement and collision.judgement.model_copy(update=ungraded)
             verdicts = {**collision.verdicts, rule: False}
             collision = collision.model_copy(update={"verdicts": verdicts, "judgement": judgement})

@@ -8,7 +8,7 @@ from pydantic import AliasChoices, Field
 
 from risk_sac.records.base import Least, Real, Record
 
-REPEATS = "repeats"  # rule that a contact fails if its replay goes another way; asked of nothing else
+REPEATS = "repeats"  # rule that a violation fails if its replay goes another way; asked of nothing else
 # Rules among a collision's verdicts that are about the simulator or the control, not about fault.
 ARTEFACT_RULES = frozenset(
     {
@@ -171,6 +171,11 @@ class Violation(Violated):
         """See `Violated.graded`."""
         return self.grade
 
+    @property
+    def event(self) -> str:
+        """What the ego does, such as "violates never_fast after 3.4 s, at 13.2 m/s"."""
+        return f"violates {self.requirement} after {self.time_s:.1f} s, at {self.ego_speed_mps:.1f} m/s"
+
 
 class RequirementResult(Record):
     """How far an episode kept one requirement after the adversaries' release."""
@@ -229,6 +234,11 @@ class Collision(Violated):
     def graded(self) -> Grade | None:
         """See `Violated.graded`."""
         return None if self.judgement is None else self.judgement.grade
+
+    @property
+    def event(self) -> str:
+        """What the ego does, such as "touches lead at 9.0 m/s"."""
+        return f"touches {self.other_id} at {self.ego_speed_mps:.1f} m/s"
 
     @property
     def signature(self) -> str:

@@ -86,7 +86,7 @@ def read_run(folder: Path) -> FinishedRun:
     if results_digest(records) != results.digest:
         raise ConfigError(
             "",
-            f"{folder / EPISODES} does not hold the {len(results.contacts)} contacts and the other episodes that "
+            f"{folder / EPISODES} does not hold the {len(results.failures)} failures and the other episodes that "
             f"digest {results.digest[:12]} was formed over",
             remedy="delete the folder and run it again",
         )

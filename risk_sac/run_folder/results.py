@@ -1,8 +1,8 @@
 """Files of a run's folder, under `risk-sac run` and in the service alike.
 
-results.json    the spec, the metrics and every contact, sealed; rewritten at each checkpoint and at the end
+results.json    the spec, the metrics and every failure, sealed; rewritten at each checkpoint and at the end
 episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
-failures/       the time series of every contact, see `risk_sac.run_folder.series`
+failures/       the time series of every failure, see `risk_sac.run_folder.series`
 verified.json   which failures repeated, see `risk_sac.run_folder.verified`; sealed
 studies/        cores and regions that were asked for, see `risk_sac.failures.studied`
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
@@ -11,8 +11,9 @@ checkpoint      from which the run goes on; beside it the one before, `checkpoin
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import TypeAdapter
+from pydantic import AliasChoices, Field, TypeAdapter
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
@@ -30,16 +31,16 @@ def series_name(index: int) -> str:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Contact:
-    """An episode in which the ego touched something."""
+class RecordedFailure:
+    """An episode in which a requirement that counts was violated, with or without contact, refused ones included."""
 
     id: str  # the episode's, as the service says it too; in older folders its index in six digits
     series: str  # file of its time series, relative to results.json
     episode: EpisodeRecord
 
     @classmethod
-    def of(cls, run_id: str, episode: EpisodeRecord) -> "Contact":
-        """The contact of an episode, its file named as the run names it."""
+    def of(cls, run_id: str, episode: EpisodeRecord) -> "RecordedFailure":
+        """The failure of an episode, its file named as the run names it."""
         return cls(id=episode.id_in(run_id), series=f"{FAILURES}/{series_name(episode.index)}", episode=episode)
 
 
@@ -59,17 +60,18 @@ class Results:
     wall_s: float = 0.0  # over all resumes
     cpu_s: float = 0.0  # the same in processor time
     episode_cpu_s: tuple[float, ...] = ()  # to the end of each; none while it goes on, or in an older folder
-    contacts: tuple[Contact, ...] = ()  # in the order of the episodes
+    # In the order of the episodes; `contacts` in older folders, which have no others.
+    failures: Annotated[tuple[RecordedFailure, ...], Field(validation_alias=AliasChoices("failures", "contacts"))] = ()
 
-    def contact(self, id_: str) -> Contact:
-        """The contact with this id, with or without the run's before it, or with this number of an episode."""
-        for contact in self.contacts:
-            episode = contact.episode
-            known = (contact.id, episode.id_in(self.spec.id), f"{episode.phase}-{episode.index}")
+    def failure(self, id_: str) -> RecordedFailure:
+        """The failure with this id, with or without the run's before it, or with this number of an episode."""
+        for failure in self.failures:
+            episode = failure.episode
+            known = (failure.id, episode.id_in(self.spec.id), f"{episode.phase}-{episode.index}")
             if id_ in known or (id_.isdecimal() and int(id_) == episode.index):
-                return contact
-        every = ", ".join(contact.id for contact in self.contacts) or "none: the ego touched nothing"
-        raise ConfigError("FAILURE", f"{id_!r}", f"one of the contacts ({every})")
+                return failure
+        every = ", ".join(failure.id for failure in self.failures) or "none: every requirement that counts was kept"
+        raise ConfigError("FAILURE", f"{id_!r}", f"one of the failures ({every})")
 
 
 _RECORDS = TypeAdapter(list[EpisodeRecord])

@@ -7,10 +7,10 @@ from pathlib import Path
 from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
-from risk_sac.records import REPEATS, EpisodeRecord, Outcome, Repetition
+from risk_sac.records import REPEATS, EpisodeRecord, Repetition
 from risk_sac.run_folder.durable import read_sealed, write_sealed
 from risk_sac.run_folder.results import Results
-from risk_sac.verdicts.distinct import DistinctFailures, niche_of
+from risk_sac.verdicts.distinct import DistinctFailures, Niche, niche_of
 
 VERIFIED = "verified.json"
 TIMES = 3  # that a failure is replayed, if nobody says otherwise
@@ -31,34 +31,36 @@ class Verified:
         return frozenset(index for index, repetition in self.episodes.items() if not repetition.verified)
 
     def judged(self, records: Sequence[EpisodeRecord]) -> tuple[EpisodeRecord, ...]:
-        """A run's episodes; failures that do not repeat are refused by that rule, and those like them in their phase.
+        """A run's episodes; violations that do not repeat are refused by that rule, and those like them in their phase.
 
-        One that was replayed itself and does repeat stays.
+        Those of an episode that was replayed itself and does repeat stay.
         """
         if not self.flaky:
             return tuple(records)
-        kinds = {each.index: (each.phase, niche_of(each.collision)) for each in records if each.collision}
-        flaky = {kinds[index] for index in self.flaky if index in kinds}
+        flaky = {kind for each in records if each.index in self.flaky for kind in _kinds(each)}
         repeating = self.episodes.keys() - self.flaky
         return tuple(
-            each.refused(REPEATS)
-            if each.outcome is Outcome.FAILURE and kinds[each.index] in flaky and each.index not in repeating
-            else each
+            each
+            if each.index in repeating
+            else each.refused(REPEATS, {name for kind, name in _kinds(each).items() if kind in flaky})
             for each in records
         )
 
 
+def _kinds(episode: EpisodeRecord) -> Mapping[tuple[str, Niche], str]:
+    """Phase and niche of each valid violation of an episode → its requirement."""
+    return {(episode.phase, niche_of(each)): each.requirement for each in episode.valid_violations}
+
+
 def distinct_failures(results: Results) -> list[EpisodeRecord]:
-    """The first failure of each kind in each phase, and the first preventable one, in the order of the episodes."""
+    """Episodes with the first violation of a kind in their phase, or the first preventable one, in their order."""
     found: defaultdict[tuple[str, bool], DistinctFailures] = defaultdict(DistinctFailures)
     episodes = []
-    for episode in (contact.episode for contact in results.contacts):
-        collision = episode.collision
-        if collision is None or not collision.valid:
-            continue
-        new = found[episode.phase, False].add(collision)
-        new_preventable = collision.preventable and found[episode.phase, True].add(collision)
-        if new or new_preventable:
+    for episode in (failure.episode for failure in results.failures):
+        valid = episode.valid_violations
+        new = [found[episode.phase, False].add(each) for each in valid]
+        new += [found[episode.phase, True].add(each) for each in valid if each.preventable]
+        if any(new):
             episodes.append(episode)
     return episodes
 

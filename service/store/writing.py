@@ -2,7 +2,7 @@
 
 import secrets
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from sqlalchemy import delete, select, tuple_
@@ -221,17 +221,16 @@ class Ledger:
                     self._store.revisions.note(row.id, row.project, row.revision)
 
 
-def _refuse(session: Session, run: RunRow, flaky: Collection[int]) -> None:
-    """Takes failures that do not repeat out of the run's failures."""
+def _refuse(session: Session, run: RunRow, flaky: Mapping[int, Collection[str]]) -> None:
+    """Takes violations that do not repeat, of these requirements by episode, out of the run's failures."""
     if not flaky:
         return
-    indices = set(flaky)  # filtered here: a statement has a limit on parameters
     failures = select(EpisodeRow).filter_by(run_number=run.number, outcome=Outcome.FAILURE)
     for row in session.scalars(failures):
-        if row.index not in indices:
+        if row.index not in flaky:  # asked here: a statement has a limit on parameters
             continue
         count(run, row, -1)
-        fill_record(row, EpisodeRecord.model_validate_json(row.record).refused(REPEATS))
+        fill_record(row, EpisodeRecord.model_validate_json(row.record).refused(REPEATS, flaky[row.index]))
         count(run, row, +1)
 
 

@@ -9,7 +9,7 @@ from risk_sac.failures.question import Twin, read_twin
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.records import Collision, Episode, Record
-from risk_sac.run_folder.results import Contact
+from risk_sac.run_folder.results import RecordedFailure
 from risk_sac.series import Series
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign, StoredContact, StoredRun
@@ -50,7 +50,7 @@ def recording_of(contact: ContactOfARun, settings: ServiceSettings) -> Recording
     episode = contact.episode
     path, sha256 = series_file(contact.campaign.id, contact.stored, settings)
     arrays = load_arrays(path, sha256)
-    return Recording(Contact(id=episode.id, series=path.name, episode=episode), arrays)
+    return Recording(RecordedFailure(id=episode.id, series=path.name, episode=episode), arrays)
 
 
 @dataclass(frozen=True, slots=True)

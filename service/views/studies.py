@@ -15,7 +15,7 @@ from risk_sac.execution.helper import ANSWER, QUESTION
 from risk_sac.execution.postmortem import without_folders
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
-from risk_sac.failures.studied import valid_contact
+from risk_sac.failures.studied import valid_failure
 from risk_sac.run_folder.results import RESULTS
 from service.errors import NotPlayable, OutdatedError, StorageError
 from service.settings import ServiceSettings
@@ -53,7 +53,7 @@ class Studies(OnDemandCache[Study]):
         if subject.subject in ("core", "region"):
             episode = subject.contact.episode
             try:
-                valid_contact(episode.id, episode)
+                valid_failure(episode.id, episode)
             except ConfigError as error:
                 raise NotPlayable(error.got) from error
         return await super().get(subject)

@@ -37,7 +37,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of the first contact of a run, whose folder is somewhere else now."""
     folder = tmp_path_factory.mktemp("bundle")
     assert main(["run", *RUN, "--out", str(folder / "run")]) == 0
-    contact = read_results(folder / "run").contacts[0]
+    contact = read_results(folder / "run").failures[0]
     assert main(["bundle", str(folder / "run"), contact.id, "--out", str(folder / "failure.npz")]) == 0
     (folder / "run").rename(folder / "elsewhere")
     return folder / "failure.npz"
@@ -50,7 +50,7 @@ def test_a_fresh_process_elsewhere_plays_it_again_to_the_bit(bundle: Path, tmp_p
     assert told.returncode == 0, told.stderr
     collision = read_bundle(bundle).manifest.episode.collision
     assert collision is not None
-    said = f"the ego strikes {collision.other_id} at {collision.ego_speed_mps:.1f} m/s; every array is as recorded"
+    said = f"the ego touches {collision.other_id} at {collision.ego_speed_mps:.1f} m/s; every array is as recorded"
     assert said in told.stdout.replace("\n", " ")
 
 
@@ -214,7 +214,7 @@ def test_a_failure_that_does_not_repeat_gets_no_bundle(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tell: Tell
 ) -> None:
     run = bundle.parent / "elsewhere"
-    contact = read_results(run).contacts[0]
+    contact = read_results(run).failures[0]
     monkeypatch.setattr("risk_sac.failures.play.actions_of", lambda series: series["actions"][-3:])
     status, _, err = tell("bundle", run, contact.id, "--out", tmp_path / "a.npz")
     assert status == 1
@@ -230,7 +230,7 @@ def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(library.VARIABLE, str(folder / "places"))
         assert main(["run", *net, *RUN[2:], "--out", str(folder / "run")]) == 0
-        contact = read_results(folder / "run").contacts[0]
+        contact = read_results(folder / "run").failures[0]
         assert main(["bundle", str(folder / "run"), contact.id, "--out", str(folder / "failure.npz")]) == 0
     shutil.rmtree(folder / "places")
     return folder / "failure.npz"

@@ -256,7 +256,7 @@ def test_what_is_asked_of_a_failure_names_one(run: Path, failure: Path, tell: Te
     for asked, complaint in (
         (("minimise", run, "--out", "x"), "which is a folder; wanted a bundle, or a failure of its run too"),
         (("minimise", failure), "--out: got nothing; wanted a file for the core of a bundle"),
-        (("region", run, "nobody"), "got 'nobody'; wanted one of the contacts"),
+        (("region", run, "nobody"), "got 'nobody'; wanted one of the failures"),
     ):
         status, out, err = tell(*asked)
         assert (status, out) == (2, "")

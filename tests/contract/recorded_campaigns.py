@@ -17,7 +17,7 @@ from risk_sac.report import FinishedRun
 from risk_sac.run_folder.results import (
     EPISODES,
     FAILURES,
-    Contact,
+    RecordedFailure,
     Results,
     records_to_json,
     series_name,
@@ -243,7 +243,7 @@ class Recorded:
                 device="cpu",
                 wall_s=result.wall_s,
                 cpu_s=result.cpu_s,
-                contacts=tuple(Contact.of(spec.id, each) for each in done if each.worst_violation is not None),
+                failures=tuple(RecordedFailure.of(spec.id, each) for each in done if each.worst_violation is not None),
             ),
         )
         (folder / EPISODES).write_text("".join(records_to_json([each])[1:-1].strip() + "\n" for each in done))

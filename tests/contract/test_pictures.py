@@ -60,7 +60,7 @@ def drawn(monkeypatch):
     draw, begun, gate = show.recording_bytes, [], threading.Event()
 
     def drawing(family, recording, format_, twin):
-        begun.append(recording.contact.id)
+        begun.append(recording.failure.id)
         assert gate.wait(600)
         return draw(family, recording, format_, twin)
 

@@ -67,7 +67,7 @@ def test_a_net_that_is_gone_or_another_one_is_named(
     assert not (tmp_path / "x").exists()
 
 
-def test_a_bundle_that_lacks_an_array_or_a_contact_is_refused(
+def test_a_bundle_that_lacks_an_array_or_a_violation_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from risk_sac.failures.recording import trajectory_digest
@@ -82,7 +82,7 @@ def test_a_bundle_that_lacks_an_array_or_a_contact_is_refused(
     assert "has no sound array visible" in refused(capsys, *asked)
     untouched = told | {"episode": told["episode"] | {"collision": None}}
     np.savez(tmp_path / "a.npz", **arrays | {MANIFEST: np.array(json.dumps(untouched))})
-    assert "ends without a contact" in refused(capsys, *asked)
+    assert "keeps every requirement" in refused(capsys, *asked)
     assert not (tmp_path / "x.mcap").exists()
 
 

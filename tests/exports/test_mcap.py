@@ -64,6 +64,6 @@ def test_bodies_and_measures_come_back(
     robustness = [[message["robustness"][name] for name in names] for message in measured]
     np.testing.assert_allclose(robustness, recorded.series["robustness"])
     assert len(topics["/roads"][0][1].entities) == len(recorded.net.lanes)
-    assert [message.message.split()[0] for _, message in topics["/moments"]][-1] == "contact"
+    assert topics["/moments"][-1][1].message.startswith(f"the ego {recorded.violation.event}: ")
     assert json.loads(attached["beside.json"])["failure"] == recorded.name
     assert bool(topics["/signals"]) == bool(recorded.heads)

@@ -44,7 +44,7 @@ def test_a_campaign_finds_the_same_with_and_without_a_crash_of_the_server(serve)
     at_once, resumed = (read_results(run_folder(service, id_, run["id"])) for id_ in (calm["id"], shaken))
     assert (resumed.finished, resumed.digest) == (True, run["digest"])
     assert (resumed.metrics, resumed.evaluation) == (at_once.metrics, at_once.evaluation)
-    assert resumed.contacts == at_once.contacts
+    assert resumed.failures == at_once.failures
     lines = (run_folder(service, shaken, run["id"]) / "episodes.jsonl").read_text().splitlines()
     assert [json.loads(line)["index"] for line in lines] == list(range(6))
 
@@ -69,7 +69,7 @@ def test_every_contact_can_be_read_with_its_full_time_series_and_drawn(serve, tm
         assert [len(row) for row in series["robustness"]] == [len(series["requirements"])] * steps
 
     folder = run_folder(service, campaign_id, campaign["runs"][0]["id"])
-    assert [contact.episode.index for contact in read_results(folder).contacts] == [each["index"] for each in contacts]
+    assert [failure.episode.index for failure in read_results(folder).failures] == [each["index"] for each in contacts]
     picture = tmp_path / "contact.png"
     assert cli.main(["show", str(folder), str(contacts[0]["index"]), "--out", str(picture)]) == 0
     assert picture.read_bytes().startswith(b"\x89PNG")

@@ -1,6 +1,7 @@
 """Draws a GIF of the last seconds, seen from above.
 
-The ego is blue and its striker orange; a body that the ego does not know of is only outlined.
+The ego is blue; its striker, or else the actor that mattered most, is orange. A body that the ego does not know of is
+only outlined.
 """
 
 import io
@@ -13,12 +14,13 @@ from risk_sac.failures.export.formats import Files
 from risk_sac.failures.export.recorded import Actor, Recorded, colour
 from risk_sac.failures.net import Surface, surfaces
 from risk_sac.failures.recording import BOX, on_body
-from risk_sac.failures.sentence import sentence
+from risk_sac.failures.sentence import story
+from risk_sac.records import Collision
 from risk_sac.types import STEP_S, Floats
 
 WIDTH, HEIGHT, FINE = 560, 340, 2  # px; drawn larger by `FINE`, and then made smooth
 VIEW_M = 56.0  # that the width shows
-LAST_S, HOLD_MS = 7.0, 2000  # before the contact, and how long the contact stays
+LAST_S, AFTER_S, HOLD_MS = 7.0, 2.0, 2000  # before the violation and after it, and how long it stays
 EASE = 0.06  # how fast the view follows the ego, so that it does not tremble
 GROUND = {"junction": "#dcdcdc", "lane": "#dcdcdc", "sidewalk": "#efefef", "crossing": "#c8c8c8"}
 PAPER, EDGE, INK = "#f8f8f6", "#bdbdbd", "#202020"
@@ -30,24 +32,26 @@ LIGHTS = {"red": "#d00000", "red_yellow": "#e07000", "yellow": "#e0b000", "green
 
 def files(failure: Recorded) -> Files:
     """One file."""
-    first = max(failure.frames - round(LAST_S / STEP_S), 0)
+    first = max(failure.moment + 1 - round(LAST_S / STEP_S), 0)
+    last = min(failure.moment + round(AFTER_S / STEP_S), failure.frames - 1)
     ground = surfaces(failure.net)
-    middles = _middles(failure, first)
+    middles = _middles(failure, first, last)
     pictures = [_picture(failure, ground, frame, middle) for frame, middle in enumerate(middles, start=first)]
     palette = _palette()
     flat = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     step_ms = round(STEP_S * 1000)
-    collision = failure.collision
-    story = sentence(failure.series, collision) if collision.judgement else f"contact with {collision.other_id}"
+    lasts_ms = [step_ms] * len(flat)
+    lasts_ms[failure.moment - first] = HOLD_MS
+    comment = f"{failure.name}: {story(failure.series, failure.violation)}"
     content = io.BytesIO()
     flat[0].save(
         content,
         "GIF",
         save_all=True,
         append_images=flat[1:],
-        duration=[step_ms] * (len(flat) - 1) + [HOLD_MS],
+        duration=lasts_ms,
         loop=0,
-        comment=f"{failure.name}: {story}".replace("²", "2").encode("ascii", "replace"),
+        comment=comment.replace("²", "2").encode("ascii", "replace"),
     )
     return {f"{failure.name}.gif": content.getvalue()}
 
@@ -66,9 +70,9 @@ def _palette() -> Image.Image:
     return palette
 
 
-def _middles(failure: Recorded, first: int) -> list[Floats]:
-    """Returns the middle of each picture: at last the contact, before it the ego's surroundings."""
-    path = np.column_stack((failure.ego.x_m, failure.ego.y_m))
+def _middles(failure: Recorded, first: int, last: int) -> list[Floats]:
+    """Returns the middle of each picture: at last the ego's place, before it its surroundings."""
+    path = np.column_stack((failure.ego.x_m, failure.ego.y_m))[: last + 1]
     middle = path[-1]
     found: list[Floats] = []
     reach = np.array((WIDTH, HEIGHT)) / WIDTH * VIEW_M / 4  # the ego stays within the middle half
@@ -98,7 +102,7 @@ def _picture(failure: Recorded, ground: Sequence[Surface], frame: int, middle: F
             pen.ellipse((x - r, y - r, x + r, y + r), fill=LIGHTS[shown])
     for column, actor in sorted(enumerate(failure.actors), key=lambda each: -each[0]):
         if frame < len(actor.time_s):
-            tone = EGO if column == 0 else STRIKER if actor.id == failure.collision.other_id else OTHER
+            tone = EGO if column == 0 else STRIKER if column == failure.striker else OTHER
             known = column == 0 or failure.series["visible"][frame, column] == 1
             _body(pen, placed, actor, frame, tone, known=known)
     picture = picture.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
@@ -121,9 +125,14 @@ def _body(pen: ImageDraw.ImageDraw, placed: Placed, actor: Actor, frame: int, to
 
 
 def _caption(pen: ImageDraw.ImageDraw, failure: Recorded, frame: int) -> None:
-    left_s = (failure.frames - 1 - frame) * STEP_S
-    when = "contact" if left_s < STEP_S / 2 else f"{left_s:.1f} s before the contact"
+    left_s = (failure.moment - frame) * STEP_S
+    what = when = "contact" if isinstance(failure.violation, Collision) else "violation"
+    if frame != failure.moment:
+        when = f"{abs(left_s):.1f} s {'before' if left_s > 0 else 'after'} the {what}"
     line = f"{when}   ego {failure.ego.speed_mps[frame]:.1f} m/s"
+    if not isinstance(failure.violation, Collision):
+        pen.rectangle((0, 0, WIDTH, 20), fill=PAPER)
+        pen.text((8, 3), f"violates {failure.violation.requirement}", fill=INK, font=ImageFont.load_default(13))
     pen.rectangle((0, HEIGHT - 22, WIDTH, HEIGHT), fill=PAPER)
     pen.text((8, HEIGHT - 19), line, fill=INK, font=ImageFont.load_default(13))
     pen.text((WIDTH - 8, HEIGHT - 17), failure.name, fill=OTHER, font=ImageFont.load_default(10), anchor="ra")

@@ -3,6 +3,7 @@
 import io
 import json
 import math
+from collections import defaultdict
 from collections.abc import Iterator
 from typing import Any
 
@@ -16,7 +17,8 @@ from risk_sac.failures.export.formats import Files
 from risk_sac.failures.export.recorded import Actor, Recorded, colour
 from risk_sac.failures.export.written import BESIDE, beside
 from risk_sac.failures.net import Lane, boundaries
-from risk_sac.failures.sentence import sentence
+from risk_sac.failures.sentence import story
+from risk_sac.records import Collision
 from risk_sac.types import Floats
 
 MAP, EGO = "map", "ego"  # frames of reference
@@ -40,7 +42,9 @@ def files(failure: Recorded) -> Files:
         signals = SceneUpdateChannel("/signals", context=context)
         frames, measures = FrameTransformsChannel("/tf", context=context), _measures_channel(failure, context)
         moments = LogChannel("/moments", context=context)
-        said = dict(_moments(failure))
+        said = defaultdict[int, list[str]](list)
+        for frame, what in _moments(failure):
+            said[frame].append(what)
         for frame, time_s in enumerate(failure.time_s):
             at = round(float(time_s) * 1e9)
             actors.log(_actors(failure, frame), log_time=at)
@@ -48,9 +52,9 @@ def files(failure: Recorded) -> Files:
             measures.log(_measured(failure, frame), log_time=at)
             if failure.heads:
                 signals.log(_signals(failure, frame), log_time=at)
-            if frame in said:
+            for what in said[frame]:
                 stamp = _stamp(failure, frame)
-                moment = fox.Log(timestamp=stamp, level=fox.LogLevel.Info, message=said[frame], name="risk-sac")
+                moment = fox.Log(timestamp=stamp, level=fox.LogLevel.Info, message=what, name="risk-sac")
                 moments.log(moment, log_time=at)
         told = {"id": failure.name, "digest": failure.manifest.digest, "code": failure.manifest.code, "beside": BESIDE}
         writer.write_metadata("failure", told)
@@ -103,7 +107,7 @@ def _actors(failure: Recorded, frame: int) -> fox.SceneUpdate:
 def _body(failure: Recorded, actor: Actor, frame: int) -> fox.SceneEntity:
     column = failure.actors.index(actor)
     seen = column == 0 or bool(failure.series["visible"][frame, column])
-    tone = BLUE if column == 0 else ORANGE if actor.id == failure.collision.other_id else GREY
+    tone = BLUE if column == 0 else ORANGE if column == failure.striker else GREY
     paint = _paint(tone, 1.0 if seen else UNSEEN_ALPHA)
     height = HEIGHTS_M[actor.pedestrian]
     x, y, z, heading = (float(values[frame]) for values in (actor.x_m, actor.y_m, actor.z_m, actor.heading_rad))
@@ -164,17 +168,16 @@ def _measures_channel(failure: Recorded, context: Context) -> Channel:
 
 
 def _measured(failure: Recorded, frame: int) -> dict[str, object]:
-    series = failure.series
-    striker = [actor.id for actor in failure.actors].index(failure.collision.other_id)
+    series, striker = failure.series, failure.striker
     names = [str(name) for name in series["requirements"]]
     return {
         "ego_speed_mps": _number(failure.ego.speed_mps[frame]),
         "ego_accel_mps2": _number(failure.ego.accel_mps2[frame]),
-        "striker_distance_m": _number(series["distance_m"][frame, striker]),
-        "striker_ttc_s": _number(series["ttc_s"][frame, striker]),
+        "striker_distance_m": None if striker is None else _number(series["distance_m"][frame, striker]),
+        "striker_ttc_s": None if striker is None else _number(series["ttc_s"][frame, striker]),
         "least_ttc_s": _number(series["least_ttc_s"][frame]),
         "soft_min": _number(series["soft_min"][frame]),
-        "striker_seen": bool(series["visible"][frame, striker] == 1),
+        "striker_seen": striker is not None and bool(series["visible"][frame, striker] == 1),
         "robustness": {name: _number(series["robustness"][frame, i]) for i, name in enumerate(names)},
     }
 
@@ -186,11 +189,10 @@ def _number(value: float) -> float | None:
 
 def _moments(failure: Recorded) -> Iterator[tuple[int, str]]:
     """Frames and what happens in them."""
-    collision = failure.collision
     released = round(failure.released_s * 10)
     yield released, "the adversaries are released"
-    if collision.judgement is not None:
-        began = released + round(collision.judgement.conflict_s * 10)
-        if 0 <= began < failure.frames - 1:
-            yield began, f"the conflict begins: {collision.judgement.signature}"
-        yield failure.frames - 1, f"contact with {collision.other_id}: {sentence(failure.series, collision)}"
+    if isinstance(failure.violation, Collision) and failure.violation.judgement is not None:
+        began = released + round(failure.violation.judgement.conflict_s * 10)
+        if 0 <= began < failure.moment:
+            yield began, f"the conflict begins: {failure.violation.signature}"
+    yield failure.moment, f"the ego {failure.violation.event}: {story(failure.series, failure.violation)}"

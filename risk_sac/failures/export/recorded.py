@@ -1,5 +1,6 @@
 """A failure as the formats need it: actors, their motion in each frame, and what the signals showed."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +17,7 @@ from risk_sac.failures.bundle import WORLD, Bundle, Manifest, check_world
 from risk_sac.failures.net import Lane, Net, read_net
 from risk_sac.failures.recording import Series
 from risk_sac.problem import Problem
-from risk_sac.records import Collision
+from risk_sac.records import Collision, Violation
 from risk_sac.scenario.layout import Layout
 from risk_sac.types import STEP_S, Floats, Kind, Role
 
@@ -53,12 +54,12 @@ class Actor:
 
 @dataclass(frozen=True, kw_only=True)
 class Recorded:
-    """A failure from its first frame, 1.5 s before the adversaries' release, to the contact."""
+    """A failure from its first frame, 1.5 s before the adversaries' release, to a contact or the horizon."""
 
     manifest: Manifest
     series: Series
     signal_heads: NDArray[np.uint8]  # of the bundle
-    collision: Collision
+    violation: Collision | Violation  # that names it
     problem: Problem
     layout: Layout
     net_file: Path
@@ -70,14 +71,16 @@ class Recorded:
         """Reads a bundle.
 
         Raises:
-          ConfigError: its net is gone or another one, or it lacks an array or a contact.
+          ConfigError: its net is gone or another one, or it lacks an array or a violation.
         """
         manifest, series = bundle.manifest, bundle.series
         check_world(manifest)
         _check(manifest, series)
-        collision = manifest.episode.collision
-        if collision is None:
-            raise ConfigError("BUNDLE", f"{manifest.id} ends without a contact, so that there is no failure in it")
+        violation = manifest.episode.worst_violation
+        if violation is None:
+            raise ConfigError("BUNDLE", f"{manifest.id} keeps every requirement, so that there is no failure in it")
+        if violation.other_id not in (None, *map(str, series["ids"])):
+            raise ConfigError("BUNDLE", f"{manifest.id} has no actor {violation.other_id!r}, which its failure names")
         problem = Problem.from_spec(manifest.spec)
         layout = problem.family.layout(manifest.episode.scene)
         net_file = Path(str(files(WORLD))) / layout.net
@@ -86,7 +89,7 @@ class Recorded:
             manifest=manifest,
             series=series,
             signal_heads=bundle.signal_heads,
-            collision=collision,
+            violation=violation,
             problem=problem,
             layout=layout,
             net_file=net_file,
@@ -108,6 +111,18 @@ class Recorded:
     def frames(self) -> int:
         """Number of frames, one every 0.1 s."""
         return len(self.series["time_s"])
+
+    @property
+    def striker(self) -> int | None:
+        """Column of the actor that the ego touched, or else of the one that mattered most; None without one."""
+        ids = [actor.id for actor in self.actors]
+        return None if self.violation.other_id is None else ids.index(self.violation.other_id)
+
+    @property
+    def moment(self) -> int:
+        """The first frame in which the violation is seen; of a contact, the last."""
+        after_s = self.released_s + self.violation.time_s
+        return min(math.ceil(after_s / STEP_S - 1e-6), self.frames - 1)
 
     @property
     def time_s(self) -> Floats:

@@ -142,7 +142,7 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str]]:
 
 def _commands(failure: Recorded, heard: Heard) -> bytes:
     """Returns the commands before each step, a line each."""
-    head = {"failure": failure.name, "ego": failure.ego.id, "striker": failure.collision.other_id, "zoom": ZOOM}
+    head = {"failure": failure.name, "ego": failure.ego.id, "striker": failure.violation.other_id, "zoom": ZOOM}
     told = ",\n".join(json.dumps(calls) for calls in heard.calls)
     return f'{json.dumps(head)[:-1]}, "commands": [\n{told}\n]}}\n'.encode()
 

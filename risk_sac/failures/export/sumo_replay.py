@@ -4,7 +4,8 @@
 
 It needs Python and a SUMO with its TraCI library: `pip install eclipse-sumo`, or an installation named by SUMO_HOME.
 The exit status is 0 if every vehicle is where it was, to the last bit, in every step, and 1 if not, as with another
-version of SUMO. With --gui the ego is blue and who strikes it orange. SUMO knows no pedestrians; they are drawn.
+version of SUMO. With --gui the ego is blue, and orange what strikes it or else matters most. SUMO knows no pedestrians;
+they are drawn.
 """
 
 import argparse

@@ -18,7 +18,7 @@ from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.document import Drawing
 from risk_sac.report.markdown import run_command
 from risk_sac.report.runs import FinishedRun
-from risk_sac.run_folder.results import FAILURES, Contact, series_name
+from risk_sac.run_folder.results import FAILURES, RecordedFailure, series_name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,7 +51,7 @@ def draw(run: FinishedRun, folder: Path | None, index: int) -> Drawing:
     try:
         with (folder / FAILURES / series_name(index)).open("rb") as file, np.load(file, allow_pickle=False) as archive:
             series = {name: archive[name] for name in archive.files}
-        recording = Recording(Contact.of(run.spec.id, record), series)
+        recording = Recording(RecordedFailure.of(run.spec.id, record), series)
         return Drawing(thumbnail(recording, roads_of(run.spec.family, record.scene)).encode())
     except RiskSacError as error:  # of a place on a map
         return Drawing(None, str(error))

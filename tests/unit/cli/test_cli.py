@@ -11,12 +11,12 @@ import pytest
 from rich.console import Console
 
 from risk_sac import __version__, cli
-from risk_sac.cli.show import _contacts
+from risk_sac.cli.show import _failures
 from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.execution.runs import run
 from risk_sac.records import ConflictType, Grade, Outcome, RunMetrics
-from risk_sac.run_folder.results import Contact, Results, read_results, write_results
+from risk_sac.run_folder.results import RecordedFailure, Results, read_results, write_results
 from tests.builders import judgement
 from tests.unit.failures.staged import synthetic_contact
 
@@ -38,12 +38,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for seed in range(11, 31):
         folder = tmp_path_factory.mktemp("run")
         spec = SPEC.model_copy(update={"seed": seed, "budget": Budget(episodes=8)})
-        if run(spec, folder, ignore).contacts:
+        if run(spec, folder, ignore).failures:
             return folder
     raise AssertionError("no contact in 160 random episodes; wanted one to list and draw")
 
 
-def test_results_hold_spec_metrics_versions_and_contacts(folder: Path) -> None:
+def test_results_hold_spec_metrics_versions_and_failures(folder: Path) -> None:
     stored = json.loads((folder / "results.json").read_text())
     assert stored["finished"] is True
     assert stored["spec"]["method"] == "random"
@@ -51,7 +51,7 @@ def test_results_hold_spec_metrics_versions_and_contacts(folder: Path) -> None:
     assert len(stored["digest"]) == 64
     assert stored["wall_s"] > 0
     assert "libsumo" in stored["versions"]
-    contact = stored["contacts"][0]
+    contact = stored["failures"][0]
     assert contact["id"] == f"{SPEC.family}-{SPEC.method}-{stored['spec']['seed']}-train-{contact['episode']['index']}"
     assert contact["episode"]["collision"]["verdicts"]
     assert (folder / contact["series"]).exists()
@@ -59,12 +59,12 @@ def test_results_hold_spec_metrics_versions_and_contacts(folder: Path) -> None:
     assert [json.loads(line)["index"] for line in lines] == list(range(8))
 
 
-def test_show_lists_the_contacts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_lists_the_failures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["show", str(folder)]) == 0
     printed = capsys.readouterr().out
     results = read_results(folder)
     assert results.spec.id in printed
-    assert all(f"train-{contact.episode.index} " in printed for contact in results.contacts)
+    assert all(f"train-{contact.episode.index} " in printed for contact in results.failures)
 
 
 @pytest.mark.parametrize("grade", [*Grade, None])
@@ -80,8 +80,8 @@ def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(
         conflict_y_m=-1202.5,
     )
     episode = synthetic_contact(judged).episode
-    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(Contact.of(SPEC.id, episode),))
-    Console(width=80).print(_contacts(results))
+    results = Results(spec=SPEC, spec_digest="", finished=True, failures=(RecordedFailure.of(SPEC.id, episode),))
+    Console(width=80).print(_failures(results))
     printed = capsys.readouterr().out
     assert "…" not in printed
     for word in (grade or "failure", "crossing vehicle", "-11.2, -1301 -1202", "wrong"):
@@ -93,8 +93,8 @@ def test_the_list_names_failed_rules_in_full_within_80_columns(capsys: pytest.Ca
     rules = "conflict_after_release, ego_model_saw, no_spawn_overlap"
     contact = synthetic_contact(judgement(None, conflict_type=ConflictType.CROSSING))
     failed = contact.episode.model_copy(update={"outcome": Outcome.DEGENERATE, "reason": rules})
-    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(Contact.of(SPEC.id, failed),))
-    Console(width=80).print(_contacts(results))
+    results = Results(spec=SPEC, spec_digest="", finished=True, failures=(RecordedFailure.of(SPEC.id, failed),))
+    Console(width=80).print(_failures(results))
     printed = capsys.readouterr().out
     assert "…" not in printed
     for word in rules.replace(",", "").replace("_", " ").split():
@@ -102,8 +102,8 @@ def test_the_list_names_failed_rules_in_full_within_80_columns(capsys: pytest.Ca
 
 
 def test_the_list_shows_what_nobody_judged(capsys: pytest.CaptureFixture[str]) -> None:
-    results = Results(spec=SPEC, spec_digest="", finished=True, contacts=(synthetic_contact(None),))
-    Console(width=80).print(_contacts(results))
+    results = Results(spec=SPEC, spec_digest="", finished=True, failures=(synthetic_contact(None),))
+    Console(width=80).print(_failures(results))
     printed = capsys.readouterr().out
     assert "failure" in printed
     assert "None" not in printed
@@ -112,13 +112,13 @@ def test_the_list_shows_what_nobody_judged(capsys: pytest.CaptureFixture[str]) -
 @pytest.mark.parametrize("form", ["{run}-train-{index}", "train-{index}", "{index:06d}", "{index}"])
 def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder: Path, tmp_path: Path, form: str) -> None:
     results = read_results(folder)
-    index = results.contacts[0].episode.index
+    index = results.failures[0].episode.index
     picture = tmp_path / "contact.png"
     wanted = form.format(run=results.spec.id, index=index)
     assert cli.main(["show", str(folder / "results.json"), wanted, "--out", str(picture)]) == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert cli.main(["show", str(folder), wanted]) == 0
-    assert (folder / results.contacts[0].series).with_suffix(".png").exists()
+    assert (folder / results.failures[0].series).with_suffix(".png").exists()
 
 
 @pytest.mark.parametrize("unknown", ["999", "x", "-1", "²"])
@@ -126,7 +126,7 @@ def test_show_names_the_known_contacts(folder: Path, unknown: str, capsys: pytes
     assert cli.main(["show", str(folder), "--", unknown]) == 2
     complaint = capsys.readouterr().err
     assert complaint.startswith("FAILURE: ")
-    assert read_results(folder).contacts[0].id in complaint
+    assert read_results(folder).failures[0].id in complaint
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path: Path) -> None:
     whole = run(SPEC, tmp_path, ignore)
     (tmp_path / "checkpoint").unlink()  # as if killed before the first one
     write_results(
-        tmp_path, replace(whole, metrics=None, digest=None, finished=False, contacts=(), wall_s=0.0, cpu_s=0.0)
+        tmp_path, replace(whole, metrics=None, digest=None, finished=False, failures=(), wall_s=0.0, cpu_s=0.0)
     )
     (tmp_path / "episodes.jsonl").write_text("stale\n" * 5)
     again = run(SPEC, tmp_path, ignore)

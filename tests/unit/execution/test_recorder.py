@@ -27,7 +27,7 @@ def finished(tmp_path_factory):
     """Every file of a finished run, and its results."""
     folder = tmp_path_factory.mktemp("finished")
     results = execute(folder)
-    assert results.contacts
+    assert results.failures
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}, results
 
 
@@ -45,7 +45,7 @@ def test_damaged_results_are_written_anew_from_the_checkpoint(folder, finished, 
     (folder / RESULTS).write_bytes(content)
     results = execute(folder)
     assert results.digest == finished[1].digest
-    assert results.contacts == finished[1].contacts
+    assert results.failures == finished[1].failures
     assert read_results(folder).metrics == finished[1].metrics
     assert (folder / "results.json.damaged").read_bytes() == content
     assert f"{folder / RESULTS} is damaged" in caplog.text
@@ -75,7 +75,7 @@ def test_a_folder_with_damaged_results_and_the_checkpoint_of_another_run_is_left
 
 def test_a_contact_whose_series_is_lost_stays_a_contact(folder, finished):
     assert not (folder / "failures").exists()
-    assert execute(folder).contacts == finished[1].contacts
+    assert execute(folder).failures == finished[1].failures
 
 
 def test_a_run_stays_in_its_folder_though_foreign_code_changes_the_working_directory(tmp_path, monkeypatch):

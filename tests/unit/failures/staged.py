@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.records import ConflictType, Judgement, Outcome
-from risk_sac.run_folder.results import Contact
+from risk_sac.run_folder.results import RecordedFailure
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.space import SceneSpace
 from tests.builders import collision, episode_record, judgement
@@ -18,7 +18,7 @@ JUDGED = judgement(
 )
 
 
-def synthetic_contact(judged: Judgement | None = JUDGED) -> Contact:
+def synthetic_contact(judged: Judgement | None = JUDGED) -> RecordedFailure:
     """The ego drives east at 10 m/s into a pedestrian who walks north; the contact is 1.95 s after the release."""
     space: SceneSpace = FAMILIES["mixed"].space
     hit = collision(
@@ -47,7 +47,7 @@ def synthetic_contact(judged: Judgement | None = JUDGED) -> Contact:
         min_ttc_s=0.1,
         collision=hit,
     )
-    return Contact.of("low-random-0", episode)
+    return RecordedFailure.of("low-random-0", episode)
 
 
 def synthetic_series() -> dict[str, NDArray[np.generic]]:

@@ -73,7 +73,7 @@ def test_both_bodies_and_both_paths_are_drawn() -> None:
 def test_a_twin_is_drawn_beside_the_failure_on_the_same_ground_clock_and_scales() -> None:
     failure = Recording(synthetic_contact(), with_release())
     later = {name: values + 2.0 if name == "time_s" else values for name, values in with_release().items()}
-    twin = Recording(failure.contact, later, "nobody attacks")
+    twin = Recording(failure.failure, later, "nobody attacks")
     axes = draw_recording("mixed", failure, twin).axes
     rows = list(zip(axes[::2], axes[1::2], strict=True))
     assert [view.get_title() for view in rows[0]] == ["the failure", "nobody attacks"]
@@ -82,7 +82,7 @@ def test_a_twin_is_drawn_beside_the_failure_on_the_same_ground_clock_and_scales(
         assert left.get_ylim() == right.get_ylim()
     assert rows[1][0].get_xlim()[1] >= twin.time_s[-1] > 0.0
     of_the_twin = [text.get_text() for text in rows[1][1].texts]
-    assert of_the_twin == ["contact of the failure", "adversaries released"]
+    assert of_the_twin == ["contact in the failure", "adversaries released"]
     assert "touched here" not in [text.get_text() for text in rows[0][1].get_legend().get_texts()]
 
 

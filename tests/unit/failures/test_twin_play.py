@@ -11,13 +11,14 @@ from tests.unit.failures.staged import synthetic_series
 def test_a_twin_is_named_by_what_was_changed_and_what_came_of_it() -> None:
     hit = collision(other_id="lead", ego_speed_mps=5.44)
     careful = EgoConfig(profile="careful")
-    assert TwinPlay.of(None, None).title == "nobody attacks: touches nobody"
-    assert TwinPlay.of(careful, hit).title == "ego: careful: touches lead at 5.4 m/s"
-    assert TwinPlay.of(careful, hit, "slow.yaml").changed == "ego: slow.yaml"
+    assert TwinPlay.of(None, hit, []).title == "nobody attacks: touches nobody"
+    assert TwinPlay.of(careful, hit, [hit]).title == "ego: careful: touches lead at 5.4 m/s"
+    assert TwinPlay.of(careful, hit, [hit], "slow.yaml").changed == "ego: slow.yaml"
 
 
 def test_a_twin_reads_back_with_its_series_and_what_is_not_finite() -> None:
-    play = TwinPlay.of(None, collision(min_ttc_s=math.inf))
+    hit = collision(min_ttc_s=math.inf)
+    play = TwinPlay.of(None, hit, [hit])
     read, series = read_twin(twin_bytes(play, synthetic_series()))
     assert read == play
     assert series.keys() == synthetic_series().keys()

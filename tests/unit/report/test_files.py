@@ -25,7 +25,7 @@ from risk_sac.report.drawing import LOOKS
 from risk_sac.report.figures import window_ecr, window_pcr
 from risk_sac.run_folder.results import (
     EPISODES,
-    Contact,
+    RecordedFailure,
     Results,
     read_results,
     write_results,
@@ -230,11 +230,13 @@ def test_a_run_in_which_nothing_was_ever_close_can_be_read(runs, tmp_path):
         spec_digest=runs[0].spec.digest,
         finished=True,
         digest=results_digest(records),
-        contacts=tuple(Contact.of(runs[0].spec.id, record) for record in records if record.collision is not None),
+        failures=tuple(
+            RecordedFailure.of(runs[0].spec.id, record) for record in records if record.worst_violation is not None
+        ),
     )
     write_results(tmp_path, results)
     (tmp_path / EPISODES).write_text("".join(record.model_dump_json() + "\n" for record in records))
-    assert read_results(tmp_path).contacts == results.contacts
+    assert read_results(tmp_path).failures == results.failures
     assert read_run(tmp_path).records == tuple(records)
 
 

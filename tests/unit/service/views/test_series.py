@@ -81,7 +81,7 @@ def test_a_series_that_is_not_the_one_that_was_written_is_never_shown(tmp_path):
 
 def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_is_not_finite():
     hit = collision(other_id="lead", ego_speed_mps=5.44, min_ttc_s=math.inf, judgement=judgement())
-    body = json.loads(wire(twin_body("idle", twin_bytes(TwinPlay.of(None, hit), series_arrays()))))
+    body = json.loads(wire(twin_body("idle", twin_bytes(TwinPlay.of(None, hit, [hit]), series_arrays()))))
     assert (body["twin"], body["outcome"]) == ("idle", "touches lead at 5.4 m/s")
     assert body["collision"]["early_min_ttc_s"] is None
     assert body["collision"]["judgement"]["signature"] == hit.judgement.signature
@@ -91,6 +91,6 @@ def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_
 
 def test_what_is_not_told_of_a_series_is_left_out():
     series = series_arrays() | {"least_ttc_s": series_arrays()["soft_min"]}
-    body = twin_body("careful", twin_bytes(TwinPlay.of(None, None), series))
+    body = twin_body("careful", twin_bytes(TwinPlay.of(None, collision(), []), series))
     assert (body.outcome, body.collision) == ("touches nobody", None)
     assert "least_ttc_s" not in body.series.model_dump()
