@@ -121,7 +121,8 @@ def _draw_contact_point(axis: Axes, recording: Recording, collision: Collision) 
 
 def _draw_conflict(axis: Axes, recording: Recording) -> None:
     """Draws both bodies when the conflict began, and where the striker was then."""
-    judgement, begin_s = recording.collision and recording.collision.judgement, recording.conflict_s
+    judgement = recording.collision.judgement if recording.collision is not None else None
+    begin_s = recording.conflict_s
     if judgement is None or begin_s is None:
         return
     for actor in recording.involved:
