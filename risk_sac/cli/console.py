@@ -18,7 +18,8 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from risk_sac.records import Adjustment
+from risk_sac.metrics import requirement_cells
+from risk_sac.records import Adjustment, RequirementCounts
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.terminal import Output, console, notes, printable
 
@@ -100,6 +101,34 @@ def say_adjustments(found: Iterable[Adjustment]) -> None:
     """Says what episodes use otherwise than it was asked for."""
     for each in found:
         notes.print(f"Note: {each}.", markup=False, soft_wrap=True)
+
+
+REQUIREMENT_HEADS = ("requirement", "counts", "vio-\nlated", "valid", "dis-\ntinct", "preven-\ntable", "rate\n95 %")
+
+
+def requirements_table(
+    groups: Mapping[str, Mapping[str, RequirementCounts]], said: Mapping[tuple[str, str], str] | None = None
+) -> Table | None:
+    """A row for each requirement below the name of its group, in 80 columns; None without any.
+
+    Args:
+      groups: by name, their requirements.
+      said: by group and requirement, what is said below its rate, in red.
+    """
+    if not any(groups.values()):
+        return None
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    for place, head in enumerate(REQUIREMENT_HEADS):
+        words = place < 2
+        table.add_column(head, no_wrap=place > 0, overflow="fold", justify="left" if words else "right")
+    for group, requirements in groups.items():
+        if requirements:
+            table.add_row(group)
+        for name, found in requirements.items():
+            above = (said or {}).get((group, name))
+            cells = requirement_cells(f"  {name}", found)
+            table.add_row(*cells[:-1], f"{cells[-1]}\n{above}" if above else cells[-1], style="red" if above else None)
+    return table
 
 
 def or_dash(value: float | None, format_: str) -> str:

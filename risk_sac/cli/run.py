@@ -2,7 +2,7 @@
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,6 +30,7 @@ from risk_sac.cli.console import (
     counted,
     or_dash,
     progress_bar,
+    requirements_table,
     say_adjustments,
 )
 from risk_sac.config import METHODS, SHIPPED, RunSpec
@@ -96,7 +97,12 @@ def _run(options: argparse.Namespace) -> int:
         again = "The same command again goes on from there."
         console.print(f"Stopped after {done} of {counted(total, 'episode')}. {again}")
         return INTERRUPTED
-    console.print(_summary(spec, results))
+    phases = {"i.i.d." if spec.iid else "search": results.metrics, "evaluation": results.evaluation}
+    found = {name: metrics for name, metrics in phases.items() if metrics is not None}
+    console.print(_summary(spec, results, found))
+    requirements = requirements_table({name: metrics.requirements for name, metrics in found.items()})
+    if requirements is not None:
+        console.print(requirements)
     console.print(f"Results: {options.out}/results.json")
     return OK
 
@@ -105,16 +111,15 @@ def _found(metrics: RunMetrics | None) -> str:
     if metrics is None:
         return ""
     return (
-        f"contacts {metrics.raw_collisions} → valid {metrics.failures} → distinct {metrics.distinct_failures} → "
-        f"preventable {metrics.distinct_preventable}  "
+        f"contacts {metrics.raw_collisions} → valid {metrics.collisions}  failures {metrics.failures} → "
+        f"distinct {metrics.distinct_failures} → preventable {metrics.distinct_preventable}  "
         f"window ECR {metrics.window_ecr:.2f} PCR {metrics.window_pcr:.2f}  λ {metrics.dual_variable:.3f}"
     )
 
 
-def _summary(spec: RunSpec, results: Results) -> Table:
+def _summary(spec: RunSpec, results: Results, phases: Mapping[str, RunMetrics]) -> Table:
     """One column per phase."""
-    phases = {"i.i.d." if spec.iid else "search": results.metrics, "evaluation": results.evaluation}
-    columns = {name: _figures(metrics) for name, metrics in phases.items() if metrics is not None}
+    columns = {name: _figures(metrics) for name, metrics in phases.items()}
     title = f"{spec.family} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}"
     table = Table("", *columns, title=title)
     for figure in next(iter(columns.values()), {}):
@@ -127,8 +132,9 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
     return {
         "episodes": f"{metrics.episodes} ({metrics.rejected} rejected)",
         "contacts": f"{metrics.raw_collisions} ({counted(metrics.artefacts, 'artefact')})",
-        "valid failures": f"{metrics.failures} ({metrics.unresponsive} unresponsive)",
-        "distinct failures": f"{metrics.distinct_failures}",
+        "valid contacts": f"{metrics.collisions} ({metrics.unresponsive} unresponsive)",
+        "failures of any requirement": f"{metrics.failures}",
+        "distinct": f"{metrics.distinct_failures}",
         "distinct and preventable": f"{metrics.distinct_preventable}",
         **dict(_figure(metric, metrics) for metric in shown),
         "steps per distinct failure": or_dash(metrics.steps_per_distinct_failure, ".0f"),

@@ -165,25 +165,27 @@ class Client:
         *,
         run: str | None = None,
         tier: Literal["valid", "raw"] = "valid",
+        requirement: str | None = None,
         grade: Grade | None = None,
         broke: str | None = None,
         signature: str | None = None,
         page: int = PAGE,
     ) -> Iterator[Episode]:
-        """Collisions of the ego in the order of their arrival; read page by page as far as they are asked for."""
-        query: Query = {"run": run, "tier": tier, "grade": grade, "broke": broke, "signature": signature, "limit": page}
+        """Failures in the order of their arrival; read page by page as far as they are asked for."""
+        query: Query = {"run": run, "tier": tier, "requirement": requirement, "grade": grade, "broke": broke}
+        query |= {"signature": signature, "limit": page}
         return self._items(EpisodePage, f"{_path(campaign_id)}/failures", query)
 
     def failure(self, campaign_id: str, failure_id: str) -> Failure:
-        """One collision with its full time series."""
+        """One failure with its full time series."""
         return self._get(Failure, f"{_path(campaign_id)}/failures/{_part(failure_id)}")
 
     def picture(self, campaign_id: str, failure_id: str, twin: str | None = None) -> bytes:
-        """One collision as a PNG; `twin` draws beside it the undisturbed scene (idle), or the one with that ego."""
+        """One failure as a PNG; `twin` draws beside it the undisturbed scene (idle), or the one with that ego."""
         return self._made(campaign_id, failure_id, "picture.png" if twin is None else f"twins/{_part(twin)}.png", PNG)
 
     def bundle(self, campaign_id: str, failure_id: str, *, core: bool = False) -> bytes:
-        """One collision in a file that stands alone, or its core, which takes some ten seconds."""
+        """One failure in a file that stands alone, or its core, which takes some ten seconds."""
         return self._made(campaign_id, failure_id, "core.npz" if core else "bundle.npz", BUNDLE)
 
     def regress(self, campaign_id: str, ego: EgoConfig) -> CampaignRegression:

@@ -18,5 +18,6 @@ from risk_sac.metrics.metric import (
     pooled_counts,
     pooled_signatures,
 )
+from risk_sac.metrics.requirements import COLUMNS, pooled_requirements, requirement_cells
 from risk_sac.metrics.rows import METRICS, RATIOS, MetricName
 from risk_sac.metrics.tally import WINDOW, Tally, preventable

@@ -7,6 +7,7 @@ from risk_sac.records import Collision, RequirementCounts, RunMetrics, Violation
 from risk_sac.verdicts.distinct import DistinctFailures
 
 STEPS = ("violated", "valid", "distinct", "preventable")
+COLUMNS = ("requirement", "counts", *STEPS, "rate (95 %)")
 
 
 class RequirementTally:
@@ -38,6 +39,14 @@ def pooled_requirements(metrics: Sequence[RunMetrics]) -> dict[str, RequirementC
         steps = [sum(getattr(each, step) for each in own) for step in STEPS]
         pooled[name] = _funnel(own[-1].counts, steps, sum(each.driven for each in having))
     return pooled
+
+
+def requirement_cells(name: str, found: RequirementCounts) -> list[str]:
+    """The cells of a requirement's row, under `COLUMNS`; a dash where nothing is judged."""
+    judged = (found.valid, found.distinct, found.preventable)
+    steps = map(str, judged) if found.counts == "failure" else "–––"
+    rate = f"{found.rate:.3f} [{found.rate_low:.3f}, {found.rate_high:.3f}]"
+    return [name, found.counts, str(found.violated), *steps, rate]
 
 
 def _funnel(counts: str, steps: Sequence[int], driven: int) -> RequirementCounts:

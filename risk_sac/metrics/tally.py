@@ -55,6 +55,7 @@ class Tally(Counts):
     _newest: deque[tuple[bool, bool]] = PrivateAttr(default_factory=lambda: deque(maxlen=WINDOW))
     _spread: Spread = PrivateAttr(default_factory=Spread)
     _requirements: dict[str, RequirementTally] = PrivateAttr(default_factory=dict)
+    _measured: bool = PrivateAttr(default=False)  # whether a record tells of requirements; older ones do not
 
     def model_post_init(self, context: object, /) -> None:
         """Make a bin for every second that is begun."""
@@ -76,6 +77,7 @@ class Tally(Counts):
         struck = collision if failed and collision is not None and collision.valid else None
         for name, result in record.requirements.items():  # in their order
             self._requirement(name, result.counts)
+            self._measured = True
         if failed:
             if not record.valid_violations:
                 raise ValueError(f"episode {record.index} is a failure without a valid violation")
@@ -101,8 +103,8 @@ class Tally(Counts):
         self.newest_failures, self.newest_preventable = map(sum, zip(*self._newest, strict=True))
 
     def requirement_counts(self) -> dict[str, RequirementCounts]:
-        """Requirement → its funnel, in the order in which the requirements were first met."""
-        return {name: each.counts(self.driven) for name, each in self._requirements.items()}
+        """Requirement → its funnel, in the order in which they were first met; none without records of them."""
+        return {name: each.counts(self.driven) for name, each in self._requirements.items()} if self._measured else {}
 
     def _add_violations(self, record: EpisodeRecord) -> None:
         self.failures += 1

@@ -5,7 +5,7 @@ from datetime import datetime
 
 from risk_sac.config import CampaignSpec
 from risk_sac.records.base import Adjustment, Page, Record
-from risk_sac.records.run import Family, Run, RunResult, SearchMethod, State
+from risk_sac.records.run import Counts, Family, RequirementCounts, Run, RunResult, SearchMethod, State
 from risk_sac.series import Real
 
 
@@ -16,14 +16,14 @@ class Progress(Record):
     """Of the i.i.d. phase too, if there is one; what follows the totals is of the searches alone."""
     episodes_total: int
     failures: int
-    """Valid collisions."""
+    """Episodes with a valid violation of a requirement that counts."""
     raw_collisions: int
     """All contacts of the ego."""
     rejected: int
     distinct_failures: int
     """Sum over the runs; what two runs found alike counts twice."""
     preventable: int
-    """Valid collisions that the careful driver would have prevented, repetitions included."""
+    """Failures that the careful driver would have prevented, repetitions included."""
     distinct_preventable: int
     """The distinct ones among them; sum over the runs."""
     window_ecr: Real
@@ -109,50 +109,37 @@ class StateChange(Record):
         return self.run_id is None and self.state.final
 
 
-class Total(Record):
-    """All runs of one family and method that have begun."""
+class Total(Counts):
+    """All runs of one family and method that have begun. Counts are sums over the runs; other figures are means.
+
+    What two runs found alike counts twice.
+    """
 
     family: Family
     method: SearchMethod
     runs: int
-    episodes: int
-    rejected: int
-    invalid: int
-    """Episodes in which the ego failed to drive; the rates leave them out."""
-    raw_collisions: int
-    failures: int
-    environment_steps: int
     ecr: Real
-    """Mean over the runs."""
     ecr_low: Real
     """95 % interval: Wilson for one run, bootstrap over the seeds for more."""
     ecr_high: Real
     pcr: Real
-    """Mean over the runs."""
     pcr_low: Real
     """95 % interval, as that of the ECR."""
     pcr_high: Real
     efficiency: Real
-    """Mean over the runs."""
     cost_rate: Real
-    """Mean over the runs."""
     dispersion: Real
-    """Mean over the runs that have one."""
-    distinct_failures: int
-    """Sum over the runs; what two runs found alike counts twice."""
+    """Over the runs that have one."""
     steps_per_distinct_failure: Real
-    preventable: int
-    """Sum over the runs, repetitions included."""
-    distinct_preventable: int
-    """Sum over the runs: the last step of the funnel contacts → valid → distinct → preventable."""
-    artefacts: int
-    unresponsive: int
+    """Of the sums."""
     unresponsive_share: Real
-    """Of the valid failures; null without one."""
+    """Of the valid contacts; null without one."""
+    requirements: Mapping[str, RequirementCounts] = {}
+    """Requirement → its funnel, summed over the runs; empty for older runs."""
     signatures: Mapping[str, int]
-    """Signature → valid failures, summed over the runs."""
+    """Signature → valid violations."""
     conflicts_by_second: list[int]
-    """Valid failures by the second after the adversaries' release in which the conflict began."""
+    """Valid contacts by the second after the adversaries' release in which the conflict began."""
     contacts_by_second: list[int]
     """The same by the second of the contact."""
 

@@ -17,17 +17,17 @@ class Counts(Record):
     episodes: int = 0
     """Finished, rejected scenes included."""
     rejected: int = 0
-    """Scenes that were physically infeasible and not simulated."""
+    """Infeasible scenes, which are not simulated."""
     raw_collisions: int = 0
     """Episodes in which the ego touched something."""
     collisions: int = 0
     """Valid contacts."""
     failures: int = 0
-    """Episodes in which a requirement that counts was violated, and the violation is valid."""
+    """Episodes with a valid violation of a requirement that counts."""
     distinct_failures: int = 0
-    """Valid violations that resemble no earlier one of their run: another requirement, signature or features."""
+    """Valid violations that resemble no earlier one of their run."""
     preventable: int = 0
-    """Failures with a violation that the careful driver would have prevented, repetitions included."""
+    """Failures that the careful driver would have prevented, repetitions included."""
     preventable_collisions: int = 0
     """Valid contacts that the careful driver would have prevented."""
     avoidable: int = 0
@@ -37,9 +37,9 @@ class Counts(Record):
     artefacts: int = 0
     """Contacts that the simulator or the control made."""
     unresponsive: int = 0
-    """Valid contacts with a visible collision course of 1.5 s or more during which the ego never braked."""
+    """Valid contacts after 1.5 s or more of a visible collision course without braking."""
     invalid: int = 0
-    """Episodes in which the ego failed to drive; the rates leave them out."""
+    """Episodes in which the ego failed to drive; no rate counts them."""
     environment_steps: int = 0
 
     @model_validator(mode="before")
@@ -74,6 +74,11 @@ class RequirementCounts(Record):
     rate_low: Real = 0.0
     """95 % interval of Wilson."""
     rate_high: Real = 1.0
+
+    @property
+    def in_rate(self) -> int:
+        """The episodes that `rate` counts."""
+        return self.valid if self.counts == "failure" else self.violated
 
 
 class RunMetrics(Counts):

@@ -14,6 +14,7 @@ from risk_sac.metrics import (
     mean_over_runs,
     pooled_bins,
     pooled_counts,
+    pooled_requirements,
     pooled_signatures,
 )
 from risk_sac.records import Adjustment, Results, RunMetrics, Total
@@ -59,6 +60,7 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
             "family": family,
             "method": method,
             "runs": len(group),
+            "requirements": pooled_requirements(group),
             "signatures": pooled_signatures(group),
             "conflicts_by_second": pooled_bins([metrics.conflicts_by_second for metrics in group]),
             "contacts_by_second": pooled_bins([metrics.contacts_by_second for metrics in group]),

@@ -7,10 +7,10 @@ from risk_sac.cli.console import COULD_NOT_RUN, Commands
 
 EPILOG = """exit status:
   0    fine
-  1    the ECR of a family and method is not shown to be within --max-ecr, or its PCR within --max-pcr: the upper end of
-       its 95 % interval lies above the bound; --judge-by rate compares the rate itself. Or it has found more distinct
-       preventable failures than --max-preventable, or a kind that --no-new-failures does not know. Controls such as
-       no-adversary count like any other method
+  1    the ECR of a family and method is not shown to be within --max-ecr, its PCR within --max-pcr, or the rate of a
+       requirement within --max-rate: the upper end of its 95 % interval lies above the bound; --judge-by rate compares
+       the rate itself. Or it has found more distinct preventable failures than --max-preventable, or a kind that
+       --no-new-failures does not know. Controls such as no-adversary count like any other method
   2    it could not run: the campaign failed, was cancelled or (with a bound) has not ended; the service refuses or
        does not answer; the time is up; an argument is wrong
   130  interrupted; the campaign goes on

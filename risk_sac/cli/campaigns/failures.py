@@ -15,11 +15,12 @@ from risk_sac.cli.console import OK, Commands, in_words, or_dash, write_out
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
-from risk_sac.records import Grade
+from risk_sac.records import Collision, Grade, Violation
 from risk_sac.terminal import notes, printable
 
 FILTERS = {
     "run": "of this run",
+    "requirement": "that violate this requirement, such as no_contact",
     "broke": "whose striker broke this, such as red_light",
     "signature": "of this class, in the words of the list",
 }
@@ -33,7 +34,7 @@ def add(commands: Commands) -> None:
     )
     for name, which in FILTERS.items():
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only those {which}")
-    parser.add_argument("--raw", action="store_true", help="contacts too that a rule refused")
+    parser.add_argument("--raw", action="store_true", help="contacts and violations too that a rule refused")
     add_limit(parser)
 
     parser = add_campaign_command(commands, "show", _show, "one failure in words and as a picture")
@@ -95,35 +96,60 @@ def failures_table(failures: Sequence[Episode]) -> Table:
     table = Table(box=SIMPLE_HEAD, padding=0)
     table.add_column("id,\nwhat kind of failure it is")
     table.add_column("outcome\ngrade", no_wrap=True)
+    table.add_column("violates", overflow="fold")
     table.add_column("ego's, other's\nm/s", no_wrap=True, justify="right")
-    table.add_column("failed rules,\nor what the other broke")
+    table.add_column("failed rules,\nor offences")
     for failure in failures:
-        collision = failure.collision
-        judgement = collision and collision.judgement
-        speeds = (collision.ego_speed_mps, collision.other_speed_mps) if collision else ()
+        worst = failure.worst_violation
+        if worst is None:
+            continue
+        speeds = [worst.ego_speed_mps, *([worst.other_speed_mps] if isinstance(worst, Collision) else [])]
         table.add_row(
-            Text(printable(f"{failure.id}\n{judgement.signature if judgement else ''}")),
-            f"{failure.outcome}\n{(judgement and judgement.grade) or ''}",
+            Text(printable(f"{failure.id}\n{worst.signature}")),
+            f"{failure.outcome}\n{worst.graded or ''}",
+            "\n".join(failure.failed or (worst.requirement,)),
             ", ".join(or_dash(speed, ".1f") for speed in speeds),
-            Text(printable(_wrong(failure))),
+            Text(printable("\n".join([in_words([failure.reason])] if failure.reason else _offences(worst)))),
         )
     return table
 
 
-def _wrong(failure: Episode) -> str:
-    """Rules that the contact failed, or else what its striker broke."""
-    collision = failure.collision
-    if failure.reason or collision is None or collision.judgement is None:
-        return in_words([failure.reason])
-    return in_words(collision.judgement.broke)
+def _offences(violation: Collision | Violation) -> Iterator[str]:
+    """What the ego and the other broke, on a line each."""
+    if isinstance(violation, Violation):
+        offences = {"ego": violation.broke}
+    else:
+        judged = violation.judgement
+        offences = {"ego": judged.ego_broke, "other": judged.broke} if judged else {}
+    yield from (f"{actor}: {in_words(broke)}" for actor, broke in offences.items() if broke)
 
 
 def _lines(failure: Episode) -> Iterator[str]:
     """A failure in words."""
     yield f"{failure.id}: {failure.outcome}{f' ({in_words([failure.reason])})' if failure.reason else ''}"
-    collision = failure.collision
-    if collision is None:
-        return
+    if failure.collision is not None:
+        yield from _contact(failure.collision)
+    for violation in failure.violations:
+        yield from _violation(violation)
+
+
+def _violation(violation: Violation) -> Iterator[str]:
+    actor = f"; the {violation.other_role} {printable(violation.other_id)!r} is next" if violation.other_id else ""
+    yield (
+        f"  violation  of {violation.requirement} from {or_dash(violation.time_s, '.1f')} s after the adversaries' "
+        f"release, at {or_dash(violation.ego_speed_mps, '.1f')} m/s; least robustness "
+        f"{or_dash(violation.robustness, '.2f')} scales{actor}"
+    )
+    yield f"  kind       {printable(violation.signature)}"
+    yield f"  grade      {_grade(violation)}"
+    yield f"  the ego    broke {in_words(violation.broke) or 'nothing'}"
+
+
+def _grade(violation: Collision | Violation) -> str:
+    return violation.graded or ("none: not judged" if violation.valid else "none: it is not valid")
+
+
+def _contact(collision: Collision) -> Iterator[str]:
     yield (
         f"  contact    {or_dash(collision.time_s, '.1f')} s after the adversaries' release: the ego's "
         f"{collision.ego_zone} at {or_dash(collision.ego_speed_mps, '.1f')} m/s, the {collision.other_zone} of "
@@ -131,5 +157,6 @@ def _lines(failure: Episode) -> Iterator[str]:
     )
     if (judgement := collision.judgement) is not None:
         yield f"  kind       {printable(judgement.signature)}"
-        yield f"  grade      {judgement.grade or 'none: it is not valid'}"
+        yield f"  grade      {_grade(collision)}"
+        yield f"  the ego    broke {in_words(judgement.ego_broke) or 'nothing'}"
         yield f"  the other  broke {in_words(judgement.broke) or 'nothing'}"

@@ -1,22 +1,37 @@
 """Whether a campaign found more than it may have: what the exit status of a CI job says. Pure."""
 
 import argparse
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from pydantic import ValidationError
 
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, OK, counted
 from risk_sac.client import Results, Total
+from risk_sac.config import IID_METHODS
 from risk_sac.config.text import read_text
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
+from risk_sac.records import RequirementCounts
 
 JudgedBy = Literal["interval", "rate"]
 JUDGED_BY: tuple[JudgedBy, ...] = get_args(JudgedBy)
-COUNTED = {"ECR": "valid failure", "PCR": "preventable failure"}
+
+
+def named_rate(text: str) -> tuple[str, float]:
+    """Type of an argument NAME=VALUE: a requirement, and what its rate may be."""
+    name, _, value = text.partition("=")
+    try:
+        bound = float(value)
+    except ValueError:
+        bound = -1.0
+    if not name or not 0.0 <= bound <= 1.0:
+        raise argparse.ArgumentTypeError(
+            f"got {text!r}; wanted a requirement's name and a rate from 0 to 1, such as no_contact=0.05"
+        )
+    return name, bound
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,6 +40,7 @@ class Bounds:
 
     ecr: float | None = None
     pcr: float | None = None
+    requirements: Mapping[str, float] = field(default_factory=dict)  # by name; of runs of the i.i.d. phase as well
     preventable: int | None = None  # distinct ones
     known: Mapping[str, frozenset[str]] | None = None  # family → signatures of failures that are no news
     judged_by: JudgedBy = "interval"
@@ -39,35 +55,51 @@ class Bounds:
         bounds = cls(
             ecr=options.max_ecr,
             pcr=options.max_pcr,
+            requirements=dict(options.max_rate or ()),
             preventable=options.max_preventable,
             known=None if options.no_new_failures is None else _read_known(options.no_new_failures),
             judged_by=options.judge_by,
         )
-        for name, bound in bounds.rates():
+        named = [(f"--max-{name.lower()}", bound) for name, bound in bounds.rates()]
+        named += [("--max-rate", bound) for bound in bounds.requirements.values()]
+        for flag, bound in named:
             if bound == 0 and bounds.judged_by == "interval":
                 got, expected = "0, where the interval of no rate ends", "more, or --judge-by rate as well"
-                raise ConfigError(f"--max-{name.lower()}", got, expected)
+                raise ConfigError(flag, got, expected)
         return bounds
 
     def __bool__(self) -> bool:
+        return self.overall or bool(self.requirements)
+
+    @property
+    def overall(self) -> bool:
+        """Whether a bound is of no single requirement."""
         return any(bound is not None for bound in (self.ecr, self.pcr, self.preventable, self.known))
 
     def rates(self) -> tuple[tuple[str, float], ...]:
-        """Rate -> its bound, for those that have one."""
+        """ECR and PCR with their bounds, if they have one."""
         both = (("ECR", self.ecr), ("PCR", self.pcr))
         return tuple((name, bound) for name, bound in both if bound is not None)
+
+    def check_names(self, requirements: Collection[str]) -> None:
+        """Raises a ConfigError if a bound is of no requirement among these."""
+        for name in self.requirements:
+            if name not in requirements:
+                known = ", ".join(requirements) or "those of a campaign whose requirements were counted"
+                raise ConfigError("--max-rate", f"the requirement {name!r}", f"one of {known}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
     """A rate of one family and method beside its bound."""
 
-    name: str  # ECR | PCR
+    name: str  # ECR | PCR | a requirement
     bound: float
     judged_by: JudgedBy
     rate: float
     upper: float  # end of its 95 % interval
-    failures: int  # that the rate counts
+    hits: int  # episodes that the rate counts
+    what: str  # happened in them
     episodes: int
 
     @property
@@ -79,32 +111,65 @@ class Comparison:
 
     def __str__(self) -> str:
         interval = f", 95 % interval up to {self.upper:.3f}" if self.judged_by == "interval" else ""
-        counts = f"{counted(self.failures, COUNTED[self.name])} in {counted(self.episodes, 'episode')}"
+        counts = f"{counted(self.hits, self.what)} in {counted(self.episodes, 'episode')}"
         return f"{self.rate:.3f}{interval} ({counts})"
 
 
 def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
-    """The rates of a family and method that have a bound, and have been measured."""
-    measured = {
-        "ECR": (total.ecr, total.ecr_high, total.failures),
-        "PCR": (total.pcr, total.pcr_high, total.preventable),
+    """ECR and PCR of a family and method, where they have a bound and have been measured."""
+    rates = {
+        "ECR": (total.ecr, total.ecr_high, total.collisions, "valid contact"),
+        "PCR": (total.pcr, total.pcr_high, total.preventable_collisions, "preventable contact"),
     }
     for name, bound in bounds.rates():
-        found, high, failures = measured[name]
+        found, high, hits, what = rates[name]
         if found is None:
             continue
         # A bootstrap over few seeds ends at the worst of them: at 0 where none has failed, however short they were.
-        driven = total.episodes - total.invalid
-        upper = max(high or 0.0, wilson_interval(failures, driven)[1])
+        upper = max(high or 0.0, wilson_interval(hits, total.driven)[1])
         yield Comparison(
             name=name,
             bound=bound,
             judged_by=bounds.judged_by,
             rate=found,
             upper=upper,
-            failures=failures,
-            episodes=driven,
+            hits=hits,
+            what=what,
+            episodes=total.driven,
         )
+
+
+class Measured(NamedTuple):
+    """The requirements of a family and method: of its searches together, or of its run of the i.i.d. phase."""
+
+    family: str
+    method: str
+    driven: int  # episodes
+    requirements: Mapping[str, RequirementCounts]
+
+    def comparisons(self, bounds: Bounds) -> Iterator[Comparison]:
+        """The rates that have a bound."""
+        for name, found in self.requirements.items():
+            if name in bounds.requirements:
+                yield Comparison(
+                    name=name,
+                    bound=bounds.requirements[name],
+                    judged_by=bounds.judged_by,
+                    rate=found.rate,
+                    upper=found.rate_high,
+                    hits=found.in_rate,
+                    what="valid violation" if found.counts == "failure" else "violation",
+                    episodes=self.driven,
+                )
+
+
+def measured(results: Results) -> list[Measured]:
+    """The requirements of a campaign by family and method, those of the i.i.d. phase last."""
+    drawn = [(run, run.metrics) for run in results.runs if run.method in IID_METHODS and run.metrics is not None]
+    return [
+        *(Measured(each.family, each.method, each.driven, each.requirements) for each in results.totals),
+        *(Measured(run.family, run.method, metrics.driven, metrics.requirements) for run, metrics in drawn),
+    ]
 
 
 def excesses(total: Total, bounds: Bounds) -> Iterator[str]:
@@ -118,7 +183,11 @@ def excesses(total: Total, bounds: Bounds) -> Iterator[str]:
 
 
 def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
-    """Judge a campaign, which counts as measured once it has succeeded: the exit status, and why."""
+    """Judge a campaign, which counts as measured once it has succeeded: the exit status, and why.
+
+    Raises:
+      ConfigError: a bound is of a requirement that the campaign does not have.
+    """
     if results.complete and results.state != "succeeded":
         ended = "was cancelled" if results.state == "cancelled" else results.state
         return COULD_NOT_RUN, f"the campaign {ended}: not all of it was measured"
@@ -126,15 +195,17 @@ def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
         return OK, ""
     if not results.complete:
         return COULD_NOT_RUN, f"the campaign is {results.state}, and what it finds can still change; wait with `watch`"
+    groups = measured(results)
+    bounds.check_names(list(dict.fromkeys(name for group in groups for name in group.requirements)))
+    found = [(total.family, total.method, each) for total in results.totals for each in comparisons(total, bounds)]
+    found += [(group.family, group.method, each) for group in groups for each in group.comparisons(bounds)]
     reasons: dict[str, list[str]] = {}
-    verdicts = set()
-    exceeded: list[str] = []
-    for total in results.totals:
-        name = f"{total.family} {total.method}"
-        for each in comparisons(total, bounds):
-            verdicts.add(each.verdict)
-            reasons.setdefault(f"{each.name} {each.verdict} {each.bound:g}", []).append(f"{name} {each}")
-        exceeded += (f"{name}: {said}" for said in excesses(total, bounds))
+    for family, method, each in found:
+        reasons.setdefault(f"{each.name} {each.verdict} {each.bound:g}", []).append(f"{family} {method} {each}")
+    verdicts = {each.verdict for *_, each in found}
+    exceeded = [
+        f"{total.family} {total.method}: {said}" for total in results.totals for said in excesses(total, bounds)
+    ]
     lines = [*(f"{said}: {', '.join(whose)}" for said, whose in reasons.items()), *exceeded]
     if "may be above" in verdicts:
         lines.append("More episodes narrow an interval; --judge-by rate ignores it.")

@@ -1,17 +1,21 @@
 """What a campaign found as JUnit XML, which CI systems show: a suite per family, a case per run. Pure.
 
-Where there are bounds, each family and method has one more case, which fails as the exit status does.
+Each family and method has a case for each requirement that counts or has a bound. Where there are other bounds, it has
+one more. These cases fail as the exit status does.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from junitparser import Error, Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
 from risk_sac.cli.campaigns.failures import look_command
-from risk_sac.cli.campaigns.gate import Bounds, comparisons, excesses
+from risk_sac.cli.campaigns.gate import Bounds, Comparison, Measured, comparisons, excesses, measured
 from risk_sac.cli.console import counted
 from risk_sac.client import Episode, Results, RunResult, Total
+from risk_sac.metrics import COLUMNS, requirement_cells
+from risk_sac.records import State
 from risk_sac.terminal import printable
 
 
@@ -22,9 +26,7 @@ def junit(
 
     A run is an error where it failed or was cancelled, and names its failures whatever the bounds are.
     """
-    named = {
-        run.id: _named(run, service_url, url, results.campaign_id, failures.get(run.id, ())) for run in results.runs
-    }
+    names = Names(results, service_url, url, failures)
     report = JUnitXml("risk-sac")
     for family in dict.fromkeys(run.family for run in results.runs):
         suite = TestSuite(family)
@@ -32,10 +34,13 @@ def junit(
         properties = {"campaign": results.campaign_id, "url": url, **_versions(runs)}
         for name, value in properties.items():
             suite.add_property(printable(name), printable(value))
-        suite.add_testcases([_case(run, named[run.id]) for run in runs])
-        if bounds:
+        suite.add_testcases([_case(run, names.of_run(run)) for run in runs])
+        for group in measured(results):
+            if group.family == family:
+                suite.add_testcases(list(_requirements(group, bounds, names)))
+        if bounds.overall:
             totals = [total for total in results.totals if total.family == family]
-            suite.add_testcases([_gate(total, results, bounds, named) for total in totals])
+            suite.add_testcases([_gate(total, bounds, names) for total in totals])
         report.add_testsuite(suite)
     report.update_statistics()
     return report
@@ -48,7 +53,8 @@ def _case(run: RunResult, named: str) -> TestCase:
             case.add_property(name, printable(value))
     if (found := run.metrics) is not None:
         funnel = (
-            f"{counted(found.raw_collisions, 'contact')}, {found.failures} valid, {found.distinct_failures} distinct, "
+            f"{counted(found.raw_collisions, 'contact')}, {found.collisions} valid; "
+            f"{counted(found.failures, 'failure')}, {found.distinct_failures} distinct, "
             f"{found.distinct_preventable} preventable"
         )
         case.add_property("funnel", funnel)
@@ -61,39 +67,91 @@ def _case(run: RunResult, named: str) -> TestCase:
     return case
 
 
-def _gate(total: Total, results: Results, bounds: Bounds, named: Mapping[str, str]) -> TestCase:
-    """Whether a family and method keeps the bounds, over all its runs."""
+def _requirements(group: Measured, bounds: Bounds, names: "Names") -> Iterator[TestCase]:
+    """A case for each requirement of a family and method that counts or has a bound."""
+    compared = {each.name: each for each in group.comparisons(bounds)}
+    for name, found in group.requirements.items():
+        if found.counts != "failure" and name not in compared:
+            continue
+        case = TestCase(name, printable(f"{group.family}.{group.method}"))
+        steps = zip(COLUMNS[2:], requirement_cells(name, found)[2:], strict=True)
+        case.add_property("funnel", ", ".join(f"{step} {count}" for step, count in steps))
+        own = [compared[name]] if name in compared else []
+        _judge(case, own, [], names.state, names.of_requirement(group, name))
+        yield case
+
+
+def _gate(total: Total, bounds: Bounds, names: "Names") -> TestCase:
+    """Whether a family and method keeps the bounds that are of no single requirement, over all its runs."""
     case = TestCase("all seeds", printable(f"{total.family}.{total.method}"))
-    found = list(comparisons(total, bounds))
-    broken = [each for each in found if each.verdict != "within"]
-    exceeded = list(excesses(total, bounds))
-    said = "; ".join([*(f"{each.name} {each.verdict} {each.bound:g}: {each}" for each in broken or found), *exceeded])
-    if results.state != "succeeded":
-        case.append(Skipped(f"the campaign is {results.state}: not all of it was measured"))
-    elif broken or exceeded:
-        kinds = [each.name.lower() for each in broken] + (["failures"] if exceeded else [])
-        failure = Failure(said, " ".join(kinds))
-        runs = (run for run in results.runs if (run.family, run.method) == (total.family, total.method))
-        failure.text = "\n\n".join(named[run.id] for run in runs if named[run.id])
-        case.append(failure)
-    else:
-        case.system_out = said
+    named = names.of_method(total.family, total.method)
+    _judge(case, list(comparisons(total, bounds)), list(excesses(total, bounds)), names.state, named)
     return case
 
 
-def _named(run: RunResult, service_url: str, url: str, campaign_id: str, failures: Sequence[Episode]) -> str:
-    """The first failures of a run, each with how to look at it, and how to have them all again."""
-    if not failures or run.metrics is None:
-        return ""
-    lines = [f"{run.id}: {counted(run.metrics.failures, 'valid failure')}, of which the first {len(failures)}:"]
-    for failure in failures:
-        judgement = failure.collision and failure.collision.judgement
-        kind = f"{judgement.signature}; grade {judgement.grade}" if judgement else "not judged"
-        lines += [f"{failure.id}: {kind}", f"  {look_command(service_url, campaign_id, failure.id)}"]
-    pick = f"--family {run.family} --method {run.method} --seed {run.seed} --out {run.id}"
-    lines.append(f"To have them again without the service: save {url}/spec?format=yaml as spec.yaml, then")
-    lines.append(f"  risk-sac run --spec spec.yaml {pick}")
-    return printable("\n".join(lines))
+def _judge(case: TestCase, found: Sequence[Comparison], exceeded: Sequence[str], state: State, named: str) -> None:
+    """Lets a case fail where a rate is not within its bound or something was exceeded; `named` says of which."""
+    broken = [each for each in found if each.verdict != "within"]
+    said = "; ".join([*(f"{each.name} {each.verdict} {each.bound:g}: {each}" for each in broken or found), *exceeded])
+    if state != "succeeded":
+        case.append(Skipped(f"the campaign is {state}: not all of it was measured"))
+    elif broken or exceeded:
+        failure = Failure(said, " ".join([each.name.lower() for each in broken] + (["failures"] if exceeded else [])))
+        failure.text = named
+        case.append(failure)
+    elif said:
+        case.system_out = said
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """Failures of a campaign in words, each with how to look at it, and how to have them all again."""
+
+    results: Results
+    service_url: str
+    url: str  # of the campaign
+    failures: Mapping[str, Sequence[Episode]]  # the first ones, by run
+
+    @property
+    def state(self) -> State:
+        """The campaign's."""
+        return self.results.state
+
+    def of_run(self, run: RunResult) -> str:
+        """The first failures of a run; nothing without any."""
+        failures = self.failures.get(run.id, ())
+        if not failures or run.metrics is None:
+            return ""
+        lines = [f"{run.id}: {counted(run.metrics.failures, 'valid failure')}, of which the first {len(failures)}:"]
+        for failure in failures:
+            lines += self._of_failure(failure)
+        pick = f"--family {run.family} --method {run.method} --seed {run.seed} --out {run.id}"
+        lines.append(f"To have them again without the service: save {self.url}/spec?format=yaml as spec.yaml, then")
+        lines.append(f"  risk-sac run --spec spec.yaml {pick}")
+        return printable("\n".join(lines))
+
+    def of_method(self, family: str, method: str) -> str:
+        """The first failures of each run of a family and method."""
+        runs = (run for run in self.results.runs if (run.family, run.method) == (family, method))
+        return "\n\n".join(named for run in runs if (named := self.of_run(run)))
+
+    def of_requirement(self, group: Measured, requirement: str) -> str:
+        """Those of the first failures that violate a requirement, and the command that lists all."""
+        lines = [
+            line
+            for run in self.results.runs
+            if (run.family, run.method) == (group.family, group.method)
+            for failure in self.failures.get(run.id, ())
+            if requirement in {each.requirement for each in failure.valid_violations}
+            for line in self._of_failure(failure)
+        ]
+        listed = f"risk-sac campaigns failures list {self.results.campaign_id} --requirement {requirement}"
+        return printable("\n".join([*lines, f"All: {listed} --url {self.service_url}"]))
+
+    def _of_failure(self, failure: Episode) -> list[str]:
+        worst = failure.worst_violation
+        kind = "not judged" if worst is None or worst.graded is None else f"{worst.signature}; grade {worst.graded}"
+        return [f"{failure.id}: {kind}", f"  {look_command(self.service_url, self.results.campaign_id, failure.id)}"]
 
 
 def _versions(runs: Sequence[RunResult]) -> dict[str, str]:

@@ -7,16 +7,28 @@ from typing import Any
 
 from pydantic import BaseModel
 from rich.box import SIMPLE_HEAD
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons
-from risk_sac.cli.console import Commands, add_command, counted, number, on_one_line, or_dash
-from risk_sac.client import CampaignSummary, Results
+from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons, measured
+from risk_sac.cli.console import (
+    Commands,
+    add_command,
+    counted,
+    number,
+    on_one_line,
+    or_dash,
+    requirements_table,
+)
+from risk_sac.client import Campaign, CampaignSummary, Results
+from risk_sac.config import IID_METHODS
+from risk_sac.metrics import pooled_requirements
 from risk_sac.records import wire
 from risk_sac.terminal import console
 
-COUNTS_AND_RATES = ("epi-\nsodes", "con-\ntacts", "valid", "dis-\ntinct", "preven-\ntable", "ECR\n95 %", "PCR\n95 %")
+COUNTS = ("epi-\nsodes", "con-\ntacts", "fail-\nures", "dis-\ntinct", "preven-\ntable")
+RATES = ("ECR\n95 %", "PCR\n95 %")
 
 Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]
 
@@ -35,7 +47,7 @@ def add_limit(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--limit", type=number(int, 1), default=20, metavar="N", help="at most (default: %(default)s)")
 
 
-def print_answer(options: argparse.Namespace, answer: Answer, text: Table | str) -> None:
+def print_answer(options: argparse.Namespace, answer: Answer, text: RenderableType) -> None:
     """Prints the answer as JSON where that is wanted, and the text otherwise."""
     if options.json:
         console.out(json.dumps(_plain(answer), allow_nan=False), highlight=False)
@@ -50,13 +62,23 @@ def line(campaign: CampaignSummary) -> str:
 
 
 def figures(campaign: CampaignSummary) -> str:
-    """What a campaign has found lately, and what holds it up."""
+    """What a campaign has found lately, by requirement where it is known, and what holds it up."""
     progress = campaign.progress
     eta = "?" if progress.eta_s is None else f"{progress.eta_s:.0f} s"
     reason = f"; {campaign.state}, {on_one_line(campaign.reason)}" if campaign.reason else ""
-    found = f"{counted(progress.failures, 'failure')}, {progress.distinct_preventable} distinct and preventable"
+    failures = f"{counted(progress.failures, 'failure')}{_by_requirement(campaign)}"
+    found = f"{failures}, {progress.distinct_preventable} distinct and preventable"
     rates = f"ECR {or_dash(progress.window_ecr, '.2f')}, PCR {or_dash(progress.window_pcr, '.2f')}"
     return f"{found}, {rates}, ETA {eta}{reason}"
+
+
+def _by_requirement(campaign: CampaignSummary) -> str:
+    """In brackets, how many failures of the searches violate each requirement; empty without any."""
+    runs = campaign.runs if isinstance(campaign, Campaign) else []
+    searches = [run.metrics for run in runs if run.metrics is not None and run.method not in IID_METHODS]
+    found = pooled_requirements(searches)
+    counts = ", ".join(f"{name} {each.valid}" for name, each in found.items() if each.valid)
+    return f" ({counts})" if counts else ""
 
 
 def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
@@ -78,16 +100,29 @@ def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
     return table
 
 
-def results_table(results: Results, bounds: Bounds) -> Table:
-    """Per family and method the funnel, and its rates above their intervals; what breaks a bound is red and says so.
+def results_tables(results: Results, bounds: Bounds) -> Group:
+    """Per family and method the funnel with ECR and PCR, and the requirements; what breaks a bound says so in red."""
+    groups = {f"{group.family} {group.method}": group for group in measured(results)}
+    said = {
+        (name, each.name): f"above {each.bound:g}" if each.verdict == "above" else f"may be above {each.bound:g}"
+        for name, group in groups.items()
+        for each in group.comparisons(bounds)
+        if each.verdict != "within"
+    }
+    requirements = requirements_table({name: group.requirements for name, group in groups.items()}, said)
+    return Group(results_table(results, bounds), *([requirements] if requirements else []))
 
-    80 columns hold it.
+
+def results_table(results: Results, bounds: Bounds) -> Table:
+    """Per family and method the funnel, and ECR and PCR over their intervals; 80 columns hold it.
+
+    Contacts are all of the ego's; failures, distinct and preventable ones are of every requirement that counts.
     """
     partial = "" if results.complete else ", so far"
     table = Table(title=f"{results.campaign_id} {results.state}{partial}", box=SIMPLE_HEAD, padding=0)
     table.add_column("family", overflow="fold")  # of a place on a map it is long
     table.add_column("method", no_wrap=True)
-    for name in COUNTS_AND_RATES:
+    for name in (*COUNTS, *RATES):
         table.add_column(name, no_wrap=True, justify="right")
     for total in results.totals:
         broken = {each.name: each for each in comparisons(total, bounds) if each.verdict != "within"}

@@ -11,9 +11,9 @@ from rich.progress import BarColumn, Progress
 
 from risk_sac.adjustments import adjustments
 from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, add_place_flags, campaign_flags, ego_flag
-from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, verdict
+from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, named_rate, verdict
 from risk_sac.cli.campaigns.junit import junit
-from risk_sac.cli.campaigns.output import add_campaign_command, figures, line, print_answer, results_table
+from risk_sac.cli.campaigns.output import add_campaign_command, figures, line, print_answer, results_tables
 from risk_sac.cli.console import OK, Board, Commands, add_command, columns, number, say_adjustments
 from risk_sac.client import Campaign, Client, Episode, Results
 from risk_sac.config import CampaignSpec
@@ -53,11 +53,20 @@ def _add_watch_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--timeout", type=number(float, 0.001), metavar="S", help="give up after so many seconds")
 
 
-def _prepare(options: argparse.Namespace) -> None:
-    """Check the bounds and make the report's folder, so that nothing is waited for in vain."""
-    Bounds.of(options)
+def _prepare(options: argparse.Namespace) -> Bounds:
+    """Checks the bounds and makes the report's folder, so that nothing is waited for in vain."""
+    bounds = Bounds.of(options)
     if options.junit is not None:
         options.junit.parent.mkdir(parents=True, exist_ok=True)
+    return bounds
+
+
+def _check_names(bounds: Bounds, spec: CampaignSpec) -> None:
+    """Refuses a bound of a requirement that no campaign ships and this one does not add."""
+    if bounds.requirements:
+        from risk_sac.scenario.families import shipped_requirements  # here, because loading families takes a while
+
+        bounds.check_names([*shipped_requirements(), *(each.name for each in spec.requirements)])
 
 
 def _follow(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
@@ -72,8 +81,9 @@ def _follow(client: Client, campaign_id: str, options: argparse.Namespace) -> in
 
 
 def _watch(options: argparse.Namespace) -> int:
-    _prepare(options)
+    bounds = _prepare(options)
     with Client.from_environment(options.url) as client:
+        _check_names(bounds, client.campaign(options.id).spec)
         return _follow(client, options.id, options)
 
 
@@ -87,7 +97,7 @@ def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> 
     results, bounds = client.results(campaign_id), Bounds.of(options)
     if options.junit is not None:
         _report(client, results, bounds, options.junit)
-    print_answer(options, results, results_table(results, bounds))
+    print_answer(options, results, results_tables(results, bounds))
     say_adjustments(results.adjustments)
     for run in results.runs:
         if run.state == "failed":
@@ -122,13 +132,15 @@ def _first_failures(client: Client, campaign_id: str, run_id: str) -> list[Episo
 def _add_gate_flags(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--max-ecr", type=RATE, metavar="X", help="exit with 1 unless every ECR is within it")
     parser.add_argument("--max-pcr", type=RATE, metavar="X", help="exit with 1 unless every PCR is within it")
-    preventable = "exit with 1 if a family and method has found more distinct preventable failures"
+    rate = "exit with 1 unless every rate of this requirement is within it, of the i.i.d. phase too; may be repeated"
+    parser.add_argument("--max-rate", type=named_rate, action="append", metavar="NAME=X", help=rate)
+    preventable = "exit with 1 if a family and method has found more distinct preventable failures, of any requirement"
     parser.add_argument("--max-preventable", type=number(int, 0), metavar="N", help=preventable)
-    known = "exit with 1 if a kind of failure is not in what `results --json` printed of an earlier campaign"
+    known = "exit with 1 if a kind of failure, of any requirement, is not in an earlier campaign's `results --json`"
     parser.add_argument("--no-new-failures", type=Path, metavar="KNOWN.json", help=known)
     judged = "what has to lie within: the upper end of the rate's 95 %% interval, or the rate (default: interval)"
     parser.add_argument("--judge-by", choices=JUDGED_BY, default=JUDGED_BY[0], help=judged)
-    cases = "report for CI: a suite per family, a case per run and per method, failures named"
+    cases = "report for CI: a suite per family, a case per run and per requirement of a method, failures named"
     parser.add_argument("--junit", type=Path, metavar="FILE.xml", help=cases)
 
 
@@ -175,13 +187,15 @@ def _network_id(client: Client, called: object) -> object:
 
 
 def _submit(options: argparse.Namespace) -> int:
-    for name in ("max_ecr", "max_pcr", "max_preventable", "no_new_failures", "junit", "timeout"):
+    for name in ("max_ecr", "max_pcr", "max_rate", "max_preventable", "no_new_failures", "junit", "timeout"):
         if getattr(options, name) is not None and not options.watch:
             raise ConfigError(f"--{name.replace('_', '-')}", "it without --watch", "both")
-    _prepare(options)
+    bounds = _prepare(options)
     flags = campaign_flags(options, SEEDS) | ego_flag(options)
     flags |= {name: getattr(options, name) for name in ("label", "network", "pattern", "place", "places")}
     spec = read_posted(options.spec, flags)
+    if isinstance(spec, CampaignSpec):
+        _check_names(bounds, spec)
     if isinstance(spec, CampaignSpec) and not options.watch:
         say_adjustments(adjustments(spec))
     with Client.from_environment(options.url) as client:

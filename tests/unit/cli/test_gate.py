@@ -4,9 +4,10 @@ from typing import Any
 
 import pytest
 
-from risk_sac.cli.campaigns.gate import Bounds, verdict
-from risk_sac.client import Results
+from risk_sac.cli.campaigns.gate import Bounds, named_rate, verdict
+from risk_sac.client import Results, RunResult
 from risk_sac.errors import ConfigError
+from tests.builders import run_metrics
 
 TOTAL = {
     "family": "low",
@@ -50,9 +51,23 @@ def results(state: str, *totals: dict[str, Any]) -> Results:
     )
 
 
+NEVER_FAST = {"counts": "failure", "violated": 12, "valid": 12, "distinct": 2, "preventable": 0}
+FAST = "never_fast violated; ego goes straight, vehicle near"
+
+
+def requirements(**rates: tuple[float, float]) -> dict[str, Any]:
+    """With these rates and upper ends; `safe_ttc` is reported only."""
+    return {
+        name: NEVER_FAST
+        | {"counts": "report" if name == "safe_ttc" else "failure", "rate": rate, "rate_low": 0.0, "rate_high": high}
+        for name, (rate, high) in rates.items()
+    }
+
+
 UNBOUND: dict[str, Any] = {
     "max_ecr": None,
     "max_pcr": None,
+    "max_rate": None,
     "max_preventable": None,
     "no_new_failures": None,
     "judge_by": "interval",
@@ -60,7 +75,7 @@ UNBOUND: dict[str, Any] = {
 LEADER, CUT_IN = "leader, ahead; ego brakes late", "cut-in, alongside; ego does not brake"
 
 
-def by_rate(**bounds: float) -> Bounds:
+def by_rate(**bounds: Any) -> Bounds:
     return Bounds(judged_by="rate", **bounds)
 
 
@@ -72,7 +87,7 @@ def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() ->
     status, reason = verdict(results("succeeded", FEW), Bounds(ecr=0.1))
     assert status == 1
     assert reason == (
-        "ECR may be above 0.1: low sac 0.050, 95 % interval up to 0.137 (3 valid failures in 60 episodes)" + HINT
+        "ECR may be above 0.1: low sac 0.050, 95 % interval up to 0.137 (3 valid contacts in 60 episodes)" + HINT
     )
     assert verdict(results("succeeded", FEW), Bounds(ecr=0.14))[0] == 0
 
@@ -80,7 +95,7 @@ def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() ->
 def test_the_rate_alone_is_judged_where_that_is_asked_for() -> None:
     assert verdict(results("succeeded", FEW), by_rate(ecr=0.1)) == (
         0,
-        "ECR within 0.1: low sac 0.050 (3 valid failures in 60 episodes)",
+        "ECR within 0.1: low sac 0.050 (3 valid contacts in 60 episodes)",
     )
     assert verdict(results("succeeded", {"ecr": 0.1, "ecr_high": 0.9}), by_rate(ecr=0.1))[0] == 0
     assert verdict(results("succeeded", {"ecr": 0.11, "ecr_low": 0.0}), by_rate(ecr=0.1))[0] == 1
@@ -91,8 +106,61 @@ def test_a_pcr_above_its_bound_is_named_whatever_the_ecr() -> None:
     found = results("succeeded", {}, worse)
     status, reason = verdict(found, by_rate(ecr=0.5, pcr=0.1))
     assert status == 1
-    assert "PCR above 0.1: low random 0.200 (1 preventable failure in 5 episodes)" in reason
+    assert "PCR above 0.1: low random 0.200 (1 preventable contact in 5 episodes)" in reason
     assert verdict(found, by_rate(ecr=0.5, pcr=0.2))[0] == 0
+
+
+def test_the_rate_of_a_requirement_is_judged_by_its_interval_or_by_itself() -> None:
+    found = results("succeeded", {"episodes": 60, "requirements": requirements(never_fast=(0.2, 0.32))})
+    assert verdict(found, Bounds(requirements={"never_fast": 0.25})) == (
+        1,
+        "never_fast may be above 0.25: low sac 0.200, 95 % interval up to 0.320 (12 valid violations in 60 episodes)"
+        + HINT,
+    )
+    assert verdict(found, Bounds(requirements={"never_fast": 0.32}))[0] == 0
+    assert verdict(found, by_rate(requirements={"never_fast": 0.2}))[0] == 0
+    status, reason = verdict(found, by_rate(requirements={"never_fast": 0.1}))
+    assert (status, reason) == (1, "never_fast above 0.1: low sac 0.200 (12 valid violations in 60 episodes)")
+
+
+def test_a_requirement_that_is_only_reported_can_be_bound_and_one_that_a_family_lacks_is_not_asked_of_it() -> None:
+    found = results(
+        "succeeded",
+        {"episodes": 60, "requirements": requirements(never_fast=(0.0, 0.06), safe_ttc=(0.2, 0.32))},
+        {"family": "dense", "requirements": requirements(never_fast=(0.0, 0.06))},
+    )
+    status, reason = verdict(found, by_rate(requirements={"safe_ttc": 0.1}))
+    assert (status, reason) == (1, "safe_ttc above 0.1: low sac 0.200 (12 violations in 60 episodes)")
+
+
+def test_the_rate_of_a_requirement_is_judged_in_the_i_i_d_phase_too() -> None:
+    metrics = run_metrics(40, requirements=requirements(never_fast=(0.3, 0.45)))
+    drawn = RunResult(
+        **{"id": "low-iid-random-0", "family": "low", "method": "iid-random", "seed": 0, "state": "succeeded"},
+        **{"reason": None, "metrics": metrics, "evaluation": None, "spec_digest": "", "digest": None},
+        **{"versions": {}, "busy_s": 1.0},
+    )
+    found = results("succeeded", {"requirements": requirements(never_fast=(0.0, 0.06))})
+    found = found.model_copy(update={"runs": [drawn]})
+    status, reason = verdict(found, by_rate(requirements={"never_fast": 0.1}))
+    assert status == 1
+    assert "never_fast above 0.1: low iid-random 0.300 (12 valid violations in 40 episodes)" in reason
+
+
+def test_a_bound_of_no_requirement_names_those_there_are() -> None:
+    found = results("succeeded", {"requirements": requirements(no_contact=(0.1, 0.2), never_fast=(0.0, 0.1))})
+    with pytest.raises(ConfigError) as error:
+        verdict(found, Bounds(requirements={"never_slow": 0.5}))
+    assert str(error.value) == "--max-rate: got the requirement 'never_slow'; wanted one of no_contact, never_fast"
+    with pytest.raises(ConfigError, match="wanted one of those of a campaign whose requirements were counted"):
+        verdict(results("succeeded", {}), Bounds(requirements={"no_contact": 0.5}))
+
+
+@pytest.mark.parametrize("text", ["0.1", "no_contact", "no_contact=", "no_contact=x", "no_contact=2", "=0.1", "a=nan"])
+def test_a_rate_is_a_name_and_a_number_from_0_to_1(text: str) -> None:
+    assert named_rate("no_contact=0.1") == ("no_contact", 0.1)
+    with pytest.raises(argparse.ArgumentTypeError, match="wanted a requirement's name and a rate from 0 to 1"):
+        named_rate(text)
 
 
 def test_few_short_runs_without_a_failure_prove_nothing() -> None:
@@ -101,18 +169,21 @@ def test_few_short_runs_without_a_failure_prove_nothing() -> None:
     status, reason = verdict(results("succeeded", none), Bounds(ecr=0.1))
     assert status == 1
     assert (
-        "low sac 0.000, 95 % interval up to 0.278 (0 valid failures in 10 episodes)" in reason
+        "low sac 0.000, 95 % interval up to 0.278 (0 valid contacts in 10 episodes)" in reason
     )  # 1.96² / (10 + 1.96²)
 
 
-@pytest.mark.parametrize(("field", "bounds"), [("--max-ecr", {"max_ecr": 0.0}), ("--max-pcr", {"max_pcr": 0.0})])
-def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field: str, bounds: dict[str, float]) -> None:
+@pytest.mark.parametrize(
+    ("field", "bounds"),
+    [("--max-ecr", {"max_ecr": 0.0}), ("--max-pcr", {"max_pcr": 0.0}), ("--max-rate", {"max_rate": [("a", 0.0)]})],
+)
+def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field: str, bounds: dict[str, Any]) -> None:
     options = argparse.Namespace(**UNBOUND | bounds)
     with pytest.raises(ConfigError, match="wanted more, or --judge-by rate") as error:
         Bounds.of(options)
     assert error.value.field == field
     options.judge_by = "rate"
-    assert Bounds.of(options).rates() == ((field.removeprefix("--max-").upper(), 0.0),)
+    assert Bounds.of(options)
 
 
 @pytest.mark.parametrize(("bound", "status"), [(0, 1), (1, 0), (2, 0)])
@@ -136,6 +207,10 @@ def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_fou
     status, reason = verdict(results("succeeded", {"family": "dense", "signatures": {LEADER: 1}}), bounds)
     assert (status, reason) == (1, f"dense sac: a new kind of failure: {LEADER}")
     assert verdict(results("running", {"signatures": {}}), bounds)[0] == 2
+    violation = results("succeeded", {"signatures": {LEADER: 1, FAST: 3}})  # without a contact
+    assert verdict(violation, bounds) == (1, f"low sac: a new kind of failure: {FAST}")
+    file.write_text(violation.model_dump_json())
+    assert verdict(violation, Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file})))[0] == 0
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ from typing import Any
 from risk_sac.cli.campaigns.gate import Bounds
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.client import Episode, Results
-from risk_sac.records import Outcome
-from tests.builders import collision, episode_record, judgement, run_metrics
-from tests.unit.cli.test_gate import TOTAL
+from risk_sac.records import Grade, Outcome
+from tests.builders import collision, episode_record, judgement, run_metrics, violation
+from tests.unit.cli.test_gate import TOTAL, requirements
 
 METRICS = run_metrics(
     40, failures=10, ecr=0.25, ecr_low=0.1, ecr_high=0.4, distinct_failures=4, raw_collisions=12, preventable=6
@@ -108,7 +108,7 @@ def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_
     assert cases == [("low.sac", "seed 0"), ("low.sac", "seed 1"), ("low.sac", "all seeds")]
     (failure,) = root.iter("failure")
     assert failure.attrib["message"] == (
-        "ECR above 0.1: 0.250, 95 % interval up to 0.278 (250 valid failures in 1000 episodes)"
+        "ECR above 0.1: 0.250, 95 % interval up to 0.278 (250 valid contacts in 1000 episodes)"
     )
 
 
@@ -136,6 +136,33 @@ def test_a_method_above_the_bound_on_preventable_failures_says_so() -> None:
     assert both.attrib["type"] == "ecr pcr"
 
 
+def test_every_requirement_that_counts_is_a_case_of_its_family_and_method() -> None:
+    both = requirements(no_contact=(0.0, 0.06), safe_ttc=(0.3, 0.4), never_fast=(0.2, 0.32))
+    root = report({}, bounds=Bounds(), totals=[{"requirements": both}])
+    cases = [(case.attrib["classname"], case.attrib["name"]) for case in root.iter("testcase")]
+    assert cases == [("low.sac", "seed 0"), ("low.sac", "no_contact"), ("low.sac", "never_fast")]
+    assert not list(root.iter("failure"))
+    funnel = "violated 12, valid 12, distinct 2, preventable 0, rate (95 %) 0.200 [0.000, 0.320]"
+    assert properties(root[0][-1]) == {"funnel": funnel}
+
+
+def test_a_requirement_over_its_bound_fails_and_names_the_failures_that_violate_it() -> None:
+    both = requirements(no_contact=(0.0, 0.06), never_fast=(0.2, 0.32))
+    bounds = Bounds(requirements={"never_fast": 0.1, "no_contact": 0.1})
+    broken = FAILURES["low-sac-0"][0].model_copy(update={"id": "low-sac-0-train-5", "collision": None})
+    broken = broken.model_copy(update={"violations": (violation(requirement="never_fast", grade=Grade.CAREFUL),)})
+    found = {"low-sac-0": [*FAILURES["low-sac-0"], broken]}
+    root = report({}, bounds=bounds, totals=[{"episodes": 60, "requirements": both}], failures=found)
+    (failure,) = root.iter("failure")
+    assert failure.attrib["message"].startswith("never_fast above 0.1: 0.200, 95 % interval up to 0.320")
+    assert (failure.text or "").splitlines() == [
+        "low-sac-0-train-5: never_fast violated; straight; grade careful",
+        "  risk-sac campaigns failures show c1 low-sac-0-train-5 --url http://host",
+        "All: risk-sac campaigns failures list c1 --requirement never_fast --url http://host",
+    ]
+    assert [case.attrib["name"] for case in root.iter("testcase")] == ["seed 0", "no_contact", "never_fast"]
+
+
 def test_a_run_that_failed_or_was_cancelled_is_an_error_and_one_that_goes_on_is_skipped() -> None:
     root = report(
         {"state": "failed", "reason": "the policy is NaN"},
@@ -153,7 +180,7 @@ def test_a_run_that_failed_or_was_cancelled_is_an_error_and_one_that_goes_on_is_
 def test_digests_versions_and_where_to_look_are_properties() -> None:
     root = report({}, {"seed": 1, "versions": {"libsumo": "1.29.0"}})
     assert properties(root[0]) == {"campaign": "c1", "url": URL, "version.libsumo": "1.28.0, 1.29.0"}
-    funnel = "12 contacts, 10 valid, 4 distinct, 2 preventable"
+    funnel = "12 contacts, 10 valid; 10 failures, 4 distinct, 2 preventable"
     assert properties(root[0][1]) == {"run": "low-sac-0", "spec_digest": "aa", "digest": "bb", "funnel": funnel}
 
 

@@ -1,7 +1,7 @@
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import State
+from risk_sac.records import RequirementCounts, State
 from service.views.totals import results
 
 
@@ -29,23 +29,28 @@ def test_totals_have_the_funnel_and_its_histograms(ledger, metrics):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0, 1)))
     found = {
         "raw_collisions": 5,
+        "collisions": 2,
         "failures": 3,
         "distinct_failures": 2,
         "preventable": 2,
         "distinct_preventable": 1,
         "pcr": 0.5,
         "unresponsive": 1,
+        "requirements": {"never_fast": RequirementCounts(counts="failure", violated=2, valid=1)},
         "signatures": {"pedestrian": 2, "cut-in, straight": 1},
         "conflicts_by_second": (1, 1, 1, 0),
         "contacts_by_second": (0, 0, 1, 2),
     }
     second = metrics.model_copy(update=found)
-    runs = tuple(changed(run, metrics=(metrics, second)[run.seed]) for run in campaign.runs)
+    first = metrics.model_copy(update={"requirements": second.requirements})
+    runs = tuple(changed(run, metrics=(first, second)[run.seed]) for run in campaign.runs)
     (total,) = results(changed(campaign, runs=runs)).totals
     assert (total.raw_collisions, total.failures, total.distinct_failures) == (7, 4, 3)
     assert (total.preventable, total.distinct_preventable, total.artefacts) == (3, 2, 2)
     assert (total.pcr, total.pcr_low, total.pcr_high) == (0.375, 0.25, 0.5)
-    assert (total.unresponsive, total.unresponsive_share) == (1, 0.25)
+    assert (total.collisions, total.unresponsive, total.unresponsive_share) == (3, 1, 1 / 3)
+    pooled = total.requirements["never_fast"]
+    assert (pooled.violated, pooled.valid, pooled.rate) == (4, 2, 2 / 8)
     assert total.signatures == {"cut-in, straight": 2, "pedestrian": 2}
     assert (total.conflicts_by_second, total.contacts_by_second) == ([1, 1, 2, 0], [0, 0, 1, 3])
 
