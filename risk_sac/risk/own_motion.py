@@ -129,10 +129,11 @@ def depth(edges: Floats, x: float, y: float) -> float:
     """Distance of a point from the edge of the carriageway, negative outside (even-odd rule)."""
     inside, least2 = False, math.inf
     for i in range(len(edges)):
-        dx, dy, wx, wy = x - edges[i, 0], y - edges[i, 1], edges[i, 2], edges[i, 3]
-        if (dy < 0.0) != (dy < wy) and dx < wx * dy / wy:
+        dx, dy = x - edges[i, 0], y - edges[i, 1]
+        wx, wy = edges[i, 2] - edges[i, 0], edges[i, 3] - edges[i, 1]
+        if (y < edges[i, 1]) != (y < edges[i, 3]) and dx < wx * dy / wy:
             inside = not inside
-        if edges[i, 4] != 0.0:
+        if edges[i, 4] != 0.0 and (wx != 0.0 or wy != 0.0):
             share = min(max((dx * wx + dy * wy) / (wx * wx + wy * wy), 0.0), 1.0)
             dx, dy = dx - share * wx, dy - share * wy
             least2 = min(least2, dx * dx + dy * dy)

@@ -92,3 +92,9 @@ def test_a_bend_is_as_wide_as_its_lane(radius_m: float) -> None:
 def test_far_from_all_roads_and_without_a_net_there_is_no_ground() -> None:
     assert depth_at(shipped("low"), 600.0, 80.0, EAST) < -REACH_M
     assert depth_at(Carriageway(), 0.0, 0.0, EAST) < -REACH_M
+
+
+@pytest.mark.parametrize("sector", [*range(SECTORS), ANY_WAY])
+def test_outlines_are_closed_to_the_last_digit(sector: int) -> None:
+    edges = shipped("dense").around(5.0, 5.0, sector).edges
+    assert sorted(map(tuple, edges[:, :2])) == sorted(map(tuple, edges[:, 2:4]))
