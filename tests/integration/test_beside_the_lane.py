@@ -13,6 +13,9 @@ from risk_sac.config import EgoConfig
 from risk_sac.geometry import relative_view
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
+from risk_sac.scenario.limits import limits_from_odd
+from risk_sac.scripts.motions import Genes, Seen, act, cue
+from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.paths import HEADING, STATION, Along, X, Y, way_of
 from risk_sac.sim.pilot import Motion
@@ -158,3 +161,46 @@ def test_beside_its_road_an_ego_s_path_is_that_of_its_last_lane(
     assert station_m == pytest.approx(300.0 + 49.0 + 2.3)
     assert bool(libsumo.vehicle.getLaneID("ego")) == (beside_m == 0.0)
     assert libsumo.vehicle.getPosition("ego") == pytest.approx((352.3, -away_m))
+
+
+CUT_IN = Genes(active=1.0, place=0.7, aside=0.3, cue=0.4, drive=0.5, steer=1.0, lasts=1.0, after=0.5)  # at 2.9 s
+
+
+def cut_in(sim: SumoSimulation, pilot: Told, begins: int, ends: int, beside: int) -> tuple[np.ndarray, np.ndarray]:
+    """Lateral places of an ego that drives from one lane to another, and of a neighbour that cuts in by a script."""
+    low = FAMILIES["low"]
+    id_ = "right" if beside < begins else "left"
+    lanes = {"lead": (begins, 400.0), id_: (beside, 300.0), "left" if id_ == "right" else "right": (beside, 200.0)}
+    others = [replace(car(name, ("road",), *where, 12.0), role=Role.ADVERSARY) for name, where in lanes.items()]
+    y_m = 3.3 * (np.array([begins, ends]) - 1)
+    pilot.motion = lambda time_s: Motion(300.0 + 12.0 * time_s, np.interp(time_s, [0.0, 2.5], y_m), 0.0, 12.0)
+    sim.reset(replace(LOW, ego=car("ego", ("road",), begins, 302.3, 12.0), vehicles=tuple(others)), 1)
+    sim.hand_over_ego()
+    sim.release()
+    frame = sim.step()
+    adversaries = Adversaries(low, limits_from_odd(low.odd, 1.0), frame)
+    row, slot, found, cued = frame.ids.index(id_), 2 * low.adversaries.index(id_), [], None
+    for step in range(80):
+        x, y = float(frame.x_m[row] - frame.x_m[0]), float(frame.y_m[row] - frame.y_m[0])
+        seen = Seen(step * STEP_S, x, y, 1.0, 0.0, float(frame.speed_mps[row]), 12.0)
+        cued = step if cued is None and cue(CUT_IN, seen, False) else cued
+        action = np.zeros(2 * len(low.adversaries))
+        action[slot : slot + 2] = act(CUT_IN, seen, -STEP_S if cued is None else (step - cued) * STEP_S, False)
+        adversaries.command(action.tolist(), sim)
+        frame = sim.step()
+        found.append((float(frame.y_m[0]), float(frame.y_m[row])))
+    ego_m, other_m = np.array(found).T
+    return ego_m, other_m
+
+
+@pytest.mark.parametrize(("begins", "ends", "beside"), [(2, 2, 1), (1, 1, 0), (1, 2, 0)])
+def test_a_neighbour_cuts_in_to_the_lane_where_the_ego_is(
+    sim: SumoSimulation, pilot: Told, begins: int, ends: int, beside: int
+) -> None:
+    """Whichever lane that is, and the same from the left and from the right."""
+    ego_m, other_m = cut_in(sim, pilot, begins, ends, beside)
+    assert abs(other_m[-1] - ego_m[-1]) < 1.0
+    assert abs(other_m[27] - ego_m[27]) > 1.8  # before its cue it is beside the ego
+    mirrored_ego_m, mirrored_m = cut_in(sim, pilot, 2 - begins, 2 - ends, 2 - beside)
+    np.testing.assert_allclose(mirrored_ego_m, -ego_m)
+    np.testing.assert_allclose(mirrored_m, -other_m, atol=0.02)
