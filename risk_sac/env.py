@@ -28,7 +28,7 @@ from risk_sac.records import Collision, RequirementResult, Violation
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import worst_rss_margin
 from risk_sac.risk.realism import HardRule, broken_hard_rule, soft_cost
-from risk_sac.risk.reward import risk_reward, worth
+from risk_sac.risk.reward import Violated, risk_reward, worth
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.carriageway import carriageway_of
 from risk_sac.scenario.environment import conditions
@@ -76,6 +76,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._pilot = None if ego is None else EgoPilot(ego)
         self._sim = SumoSimulation(problem.ego, self._perception, self._pilot)
         self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, reward.softmin_sharpness)
+        self._violated = Violated(problem.requirements)
         self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
         self.observation_size = self._encoder.size
         self.action_size = problem.action_size
@@ -167,6 +168,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._measures.signals["rss_margin"],
             0.0 if collision is None else worth(collision, self._reward),
             float(collision is not None and not collision.valid),
+            self._violated.gained(self._measures.robustness),
             self._reward,
         )
         truncated = self._sim.ego_arrived or self._steps >= self.problem.family.horizon_steps
@@ -205,6 +207,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._released_s = self._frame.time_s
         self._adversaries = Adversaries(self.problem.family, limits, self._frame)
         self._check_feasible(scene)
+        self._violated.begin(self._measures.robustness)
         self._sim.hand_over_ego()
         if self._controlled:
             self._sim.release()

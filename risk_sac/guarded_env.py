@@ -53,7 +53,9 @@ class GuardedEnv:
             raise self._invalid(failed) from failed
 
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Plays one control step; see `RiskSacEnv.step`. Also truncates once the actor can stop early.
+        """Plays one control step; see `RiskSacEnv.step`.
+
+        Also truncates once the actor can stop early, if the ego can violate nothing but by a contact.
 
         Raises:
           Unplayable: the ego failed.
@@ -64,7 +66,8 @@ class GuardedEnv:
             observation, reward, terminated, truncated, info = self._env.step(action)
         except EgoFailed as failed:
             raise self._invalid(failed) from failed
-        return observation, reward, terminated, truncated or self._actor.can_stop_early, info
+        stops = self._actor.can_stop_early and self._env.problem.contact_alone_counts
+        return observation, reward, terminated, truncated or stops, info
 
     def _invalid(self, failed: EgoFailed) -> Unplayable:
         logger.warning("episode %d is invalid: %s", self._index, failed)

@@ -26,6 +26,7 @@ from risk_sac.types import STEP_S
 
 RSS_RESPONSE_S = 0.5  # of any ego: a scene is no less dangerous, nor fair, because a slower driver is in it
 RSS_BRAKING_MPS2 = 6.0  # a firm braking: a driver's whose car would stop by 8 and more
+SUMO_KEEPS = frozenset({"on_carriageway", "no_red_light_entry"})  # requirements that its own driver never violates
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +90,12 @@ class Problem:
     def action_size(self) -> int:
         """Entries of a joint action: drive and steering of each adversary."""
         return 2 * len(self.family.adversaries)
+
+    @property
+    def contact_alone_counts(self) -> bool:
+        """Whether the ego can fail by contacts alone: SUMO's driver leaves no road and enters no junction on red."""
+        counting = {each.name for each in self.requirements if each.counts == "failure"}
+        return self.ego.driver is None and counting <= SUMO_KEEPS | {NO_CONTACT}
 
     @property
     def speed_limit_mps(self) -> float:

@@ -3,7 +3,7 @@
 Source: RISK-SAC, Algorithm 1, l. 1-2. Choice: warm start and turns are ours.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.config import RunSpec, method_of
 from risk_sac.problem import Problem
-from risk_sac.records import Collision, EpisodeRecord, Outcome
+from risk_sac.records import Collision, EpisodeRecord, Outcome, Violation
 from risk_sac.scene_optimizer import (
     NOBODY,
     ArchiveOptimizer,
@@ -125,7 +125,7 @@ class Searchers:
         self._episodes += 1
         self._failures += record.outcome is Outcome.FAILURE
         if self._turns:
-            self._turns.tell(OWN if self._next is self._own else GUIDE, record.steps, record.collision)
+            self._turns.tell(OWN if self._next is self._own else GUIDE, record.steps, record.valid_violations)
 
     def state(self) -> dict[str, Any]:
         """Returns all that the next episode depends on, except the records so far; see `load`."""
@@ -172,11 +172,11 @@ class Turns:
         """Draws the arm of the next episode."""
         return int(self._random.random() < self._bandit.probability)
 
-    def tell(self, arm: int, steps: int, collision: Collision | None) -> None:
-        """Counts an episode; what either arm has found is new to neither."""
+    def tell(self, arm: int, steps: int, violations: Sequence[Collision | Violation]) -> None:
+        """Counts an episode and its valid violations; what either arm has found is new to neither."""
         worth = 0.0
-        if collision is not None and collision.valid:
-            worth += NEW * self._found.add(collision)
-            if collision.preventable:
-                worth += NEW_PREVENTABLE * self._preventable.add(collision)
+        for violation in violations:
+            worth += NEW * self._found.add(violation)
+            if violation.preventable:
+                worth += NEW_PREVENTABLE * self._preventable.add(violation)
         self._bandit.tell(arm, worth, steps)

@@ -119,6 +119,7 @@ def episode(run: RunState, env: GuardedEnv) -> EpisodeRecord:
     encounter = Encounter(
         collision=info.get("collision"),
         violations=run.env.violations(kept),
+        margins={name: each.robustness for name, each in kept.items() if each.counts == "failure"},
         encounters_s=run.env.trace.encounters_s(run.problem.family.adversaries),
     )
     objective = run.searchers.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22

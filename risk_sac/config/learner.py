@@ -86,6 +86,8 @@ class RewardConfig(Settings):
 
     valid_collision: Weight = 20.0
     """Bonus for a valid collision that the careful driver would have prevented."""
+    violation: Weight = 10.0
+    """Bonus for each scale by which a requirement that counts is violated without contact, up to one."""
     unpreventable: Fraction = 0.5
     """Share of that bonus where only full braking at once would have prevented it."""
     unavoidable: Fraction = 0.25

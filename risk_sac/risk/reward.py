@@ -8,11 +8,14 @@ reward transformations", ICML 1999.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-from risk_sac.config import LearnerConfig, Method, RewardConfig
-from risk_sac.records import Collision
+import numpy as np
+
+from risk_sac.config import LearnerConfig, Method, Requirement, RewardConfig
+from risk_sac.records import NO_CONTACT, Collision
 from risk_sac.types import Floats
 
 if TYPE_CHECKING:
@@ -22,11 +25,17 @@ Value = TypeVar("Value", float, Floats, "Tensor")
 
 
 def risk_reward(
-    ttc_s: Value, rss_margin: Value, valid_collision: Value, degenerate_collision: Value, config: RewardConfig
+    ttc_s: Value,
+    rss_margin: Value,
+    valid_collision: Value,
+    degenerate_collision: Value,
+    violated: Value,
+    config: RewardConfig,
 ) -> Value:
     """Risk reward of one step.
 
-    R_risk(s, a) = bonus · valid - penalty · [degenerate] + w_ttc · exp(-TTC / scale) + w_rss · [RSS violated]     (1)
+    R_risk(s, a) = bonus · valid - penalty · [degenerate] + w_v · violated
+                   + w_ttc · exp(-TTC / scale) + w_rss · [RSS violated]                                            (1)
 
     Deviation: the paper pays all valid collisions alike. Which of them a careful driver would have prevented is what a
     user wants to know.
@@ -38,14 +47,42 @@ def risk_reward(
       rss_margin: the smallest after the step of the larger of both RSS margins, scaled; below 0 both are violated.
       valid_collision: what the valid collision is worth in which the step ended, in (0, 1]; else 0.
       degenerate_collision: 1 if it ended in contact that a validity rule refuses.
+      violated: scales by which other requirements that count were violated for the first time; see `Violated`.
       config: sizes of the four terms.
 
     Source of the third term: Shalev-Shwartz et al., "On a formal model of safe and scalable self-driving cars", 2017.
     """
     sparse = config.valid_collision * valid_collision - config.degenerate_collision * degenerate_collision
+    sparse += config.violation * violated
     near_miss = config.ttc_weight * math.e ** (-ttc_s / config.ttc_scale_s)  # `**` works on all three containers
     reward: Value = sparse + (near_miss + config.rss_weight * (rss_margin < 0))
     return reward
+
+
+class Violated:
+    """How far an episode has violated the requirements that count, without contact.
+
+    Choice: each pays for its depth, up to a scale and once, so that nothing is gained by staying in a violation, and
+    nothing for what was violated before the adversaries were released.
+    """
+
+    def __init__(self, requirements: Sequence[Requirement]) -> None:
+        """Looks at the requirements, `M`, in the order of their robustness."""
+        counting = [each.counts == "failure" and each.name != NO_CONTACT for each in requirements]
+        self._counting = np.flatnonzero(counting)
+
+    def begin(self, robustness: Floats) -> None:
+        """Begins an episode with the robustness at the release, `M`."""
+        self._depths = self._depth(robustness)
+
+    def gained(self, robustness: Floats) -> float:
+        """Scales, summed over the requirements, by which this step is the deepest violation so far."""
+        before, self._depths = self._depths, np.maximum(self._depths, self._depth(robustness))
+        return float((self._depths - before).sum())
+
+    def _depth(self, robustness: Floats) -> Floats:
+        depth: Floats = (-robustness[self._counting]).clip(0.0, 1.0)
+        return depth
 
 
 def worth(collision: Collision, config: RewardConfig) -> float:

@@ -9,16 +9,15 @@ of cells of its archives is fixed beforehand, and its emitters draw parents even
 
 import math
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.records import Collision
+from risk_sac.records import NO_CONTACT, Collision, Violation
 from risk_sac.scene_optimizer.base import Encounter, SceneOptimizer, State
 from risk_sac.types import Floats
-from risk_sac.verdicts.distinct import cell_of
+from risk_sac.verdicts.distinct import niche_of
 
 INITIAL, RANDOM_SHARE = 12, 0.15  # points drawn at random: the first ones, and of the rest, where elites abound
 DEVIATIONS = (0.05, 0.15, 0.4)  # of a mutation
@@ -28,6 +27,7 @@ PREVENTABLE_WORTH = 1.0
 ALMOST_WORTH, IMPACT_MPS = 0.4, 5.0  # where the careful driver only just touches; a third of it where at 5.5 m/s
 LEAST_WORTH = 0.02  # of a failure
 NEAR_MISS_WORTH = 0.1
+NEAR_MARGIN = 0.3  # of a requirement, in scales: what undisturbed traffic keeps is about 1
 NEW, NEW_PREVENTABLE = 0.5, 2.0  # credit of a parent for a distinct failure, and for a preventable one
 
 
@@ -37,19 +37,19 @@ class Elite:
 
     point: Floats  # its scene and its genes, in the unit cube
     worth: float
-    striker: str
+    target: str  # the adversary that struck, or the requirement that was violated without contact
     kind: str  # elites of one kind share their chances
-    missed_s: float = 0.0  # of a near miss: its smallest time to encounter
+    missed: float = 0.0  # of a near miss: its smallest time to encounter, s, or its least robustness, in scales
     drawn: int = 0
     credit: float = 0.0  # for what was new among its children
 
 
 class Elites:
-    """One elite for each distinct failure, and one near miss for each adversary that has struck nothing."""
+    """One elite for each distinct violation, and a near miss for each adversary or requirement without one."""
 
     def __init__(self) -> None:
         self._failures: dict[str, Elite] = {}  # by niche
-        self._misses: dict[str, Elite] = {}  # by adversary
+        self._misses: dict[str, Elite] = {}  # by target
         self._preventable: set[str] = set()  # niches
 
     @property
@@ -58,9 +58,9 @@ class Elites:
         return len(self._failures)
 
     def pool(self) -> list[Elite]:
-        """Returns all failures, and the near misses of the adversaries that have none."""
-        struck = {elite.striker for elite in self._failures.values()}
-        return [*self._failures.values(), *(miss for name, miss in self._misses.items() if name not in struck)]
+        """Returns all failures, and the near misses of the targets that have none."""
+        hit = {elite.target for elite in self._failures.values()}
+        return [*self._failures.values(), *(miss for name, miss in self._misses.items() if name not in hit)]
 
     def draw(self, pool: list[Elite], random: np.random.Generator) -> Elite:
         """Draws one of the pool.
@@ -73,31 +73,36 @@ class Elites:
         elite.drawn += 1
         return elite
 
-    def add_failure(self, point: Floats, collision: Collision, parent: Elite | None) -> None:
-        """Adds a valid failure if it is the first in its niche, or worth more than that."""
-        kind = collision.signature
-        niche = f"{kind} {cell_of(collision)}"
+    def add_failure(self, point: Floats, violation: Collision | Violation, parent: Elite | None) -> None:
+        """Adds a valid violation if it is the first in its niche, or worth more than that."""
+        niche, kind = " ".join(map(str, niche_of(violation))), violation.signature
         known = self._failures.get(niche)
-        worth = _worth(collision)
+        worth = _worth(violation)
         if parent is not None:
-            new_preventable = collision.preventable and niche not in self._preventable
+            new_preventable = violation.preventable and niche not in self._preventable
             parent.credit += NEW * (known is None) + NEW_PREVENTABLE * new_preventable
-        if collision.preventable:
+        if violation.preventable:
             self._preventable.add(niche)
         if known is None or known.worth < worth:
-            self._failures[niche] = Elite(point=point, worth=worth, striker=collision.other_id, kind=kind)
+            target = violation.other_id if isinstance(violation, Collision) else violation.requirement
+            self._failures[niche] = Elite(point=point, worth=worth, target=target, kind=kind)
 
-    def add_misses(self, point: Floats, encounters_s: Mapping[str, float]) -> None:
-        """Adds near misses by adversary, where none was nearer.
+    def add_misses(self, point: Floats, encounter: Encounter) -> None:
+        """Adds near misses by adversary and by requirement, where none was nearer.
 
-        Choice: by the time to encounter, and not by the gap, which is small whenever something passes by.
+        Choice: of an adversary by the time to encounter, and not by the gap, which is small whenever something passes
+        by. A requirement whose margin nothing has touched is no aim, or a share of the search would go to what this
+        ego cannot do.
         """
-        for name, missed_s in encounters_s.items():
+        missed = dict(encounter.encounters_s)
+        missed |= {
+            name: margin for name, margin in encounter.margins.items() if name != NO_CONTACT and margin < NEAR_MARGIN
+        }
+        for name, nearest in missed.items():
             known = self._misses.get(name)
-            if known is None or missed_s <= known.missed_s:
-                self._misses[name] = Elite(
-                    point=point, worth=NEAR_MISS_WORTH, striker=name, kind=f"near miss of {name}", missed_s=missed_s
-                )
+            if known is None or nearest <= known.missed:
+                kind = f"near miss of {name}"
+                self._misses[name] = Elite(point=point, worth=NEAR_MISS_WORTH, target=name, kind=kind, missed=nearest)
 
     def state(self) -> State:
         """Returns plain values to continue from."""
@@ -122,11 +127,13 @@ def _elite(plain: State) -> Elite:
     return Elite(**{**plain, "point": np.array(plain["point"])})
 
 
-def _worth(collision: Collision) -> float:
-    """1 for a preventable failure; of the rest the more, the slower the careful driver would have touched."""
-    if collision.preventable:
+def _worth(violation: Collision | Violation) -> float:
+    """1 for what is preventable; of other contacts the more, the slower the careful driver would have touched."""
+    if violation.preventable:
         return PREVENTABLE_WORTH
-    judged = collision.judgement
+    if isinstance(violation, Violation):
+        return ALMOST_WORTH * min(-violation.robustness, 1.0) + LEAST_WORTH
+    judged = violation.judgement
     if judged is None or "careful" not in judged.drivers:
         return LEAST_WORTH
     return ALMOST_WORTH * math.exp(-judged.drivers["careful"].impact_speed_mps / IMPACT_MPS) + LEAST_WORTH
@@ -159,9 +166,9 @@ class ArchiveOptimizer(SceneOptimizer):
         parent, self._parent = self._parent, None
         if mean_return is None:
             return
-        self._elites.add_misses(point, encounter.encounters_s)
-        if encounter.collision is not None and encounter.collision.valid:
-            self._elites.add_failure(point, encounter.collision, parent)
+        self._elites.add_misses(point, encounter)
+        for violation in encounter.valid_violations:
+            self._elites.add_failure(point, violation, parent)
 
     def state(self) -> State:
         """See `SceneOptimizer.state`; no point is out then."""

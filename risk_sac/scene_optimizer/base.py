@@ -30,12 +30,20 @@ class Encounter:
     Attributes:
       collision: its contact, if there was one.
       violations: of requirements that count, without contact.
+      margins: least robustness of each requirement that counts, in scales.
       encounters_s: smallest time to encounter by adversary, s, while that is ahead and in sight and the ego moves.
     """
 
     collision: Collision | None = None
     violations: tuple[Violation, ...] = ()
+    margins: Mapping[str, float] = field(default_factory=dict)
     encounters_s: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def valid_violations(self) -> tuple[Collision | Violation, ...]:
+        """What makes the episode a failure."""
+        contact = () if self.collision is None else (self.collision,)
+        return tuple(each for each in (*contact, *self.violations) if each.valid)
 
 
 NOBODY = Encounter()

@@ -76,7 +76,7 @@ def shares(*findings: tuple[int, str, Grade]) -> list[float]:
     """Share of the policy's turns among 2,000, after each finding."""
     turns, found = Turns(seed=0), []
     for arm, signature, grade in findings:
-        turns.tell(arm, 100, collision(judgement=judgement(grade, signature=signature)))
+        turns.tell(arm, 100, [collision(judgement=judgement(grade, signature=signature))])
         found.append(sum(turns.draw() for _ in range(2000)) / 2000)
     return found
 

@@ -102,6 +102,14 @@ def test_a_user_says_which_shipped_requirements_count() -> None:
     assert [r.counts for r in reported if r.name == "no_red_light_entry"] == ["report"]
 
 
+def test_an_episode_goes_on_to_the_horizon_where_more_than_a_contact_can_make_it_fail() -> None:
+    assert problem("dense").contact_alone_counts
+    assert not problem("dense", ego=EgoConfig(driver="idm-aeb")).contact_alone_counts
+    assert not problem("dense", requirements=(Requirement(name="safe_ttc"),)).contact_alone_counts
+    mine = Requirement(name="slow", formula="ego_speed_mps <= 5", counts="report")
+    assert problem("dense", requirements=(mine,)).contact_alone_counts
+
+
 @pytest.mark.parametrize(
     ("requirement", "field"),
     [

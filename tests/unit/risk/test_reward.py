@@ -6,27 +6,39 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.config import METHODS, LearnerConfig, RewardConfig
+from risk_sac.config import METHODS, LearnerConfig, Requirement, RewardConfig
 from risk_sac.risk import reward
 
-CONFIG = RewardConfig(valid_collision=10, degenerate_collision=2, ttc_weight=0.1, ttc_scale_s=2.0, rss_weight=0.05)
+CONFIG = RewardConfig(
+    valid_collision=10, violation=4, degenerate_collision=2, ttc_weight=0.1, ttc_scale_s=2.0, rss_weight=0.05
+)
 finite = st.floats(-1e3, 1e3)
 
 
 def test_risk_reward_adds_its_terms() -> None:
     dense = 0.1 * math.exp(-0.5)
-    assert reward.risk_reward(1.0, -1.0, 1.0, 0.0, CONFIG) == pytest.approx(10.05 + dense)
-    assert reward.risk_reward(1.0, 1.0, 0.0, 1.0, CONFIG) == pytest.approx(dense - 2.0)
+    assert reward.risk_reward(1.0, -1.0, 1.0, 0.0, 0.0, CONFIG) == pytest.approx(10.05 + dense)
+    assert reward.risk_reward(1.0, 1.0, 0.0, 1.0, 0.0, CONFIG) == pytest.approx(dense - 2.0)
+    assert reward.risk_reward(1.0, 1.0, 0.0, 0.0, 0.5, CONFIG) == pytest.approx(dense + 2.0)
 
 
 def test_degenerate_contact_never_pays_more_than_no_contact() -> None:
     for ttc_s in (0.0, 0.5, 10.0):
-        contact = reward.risk_reward(ttc_s, -1.0, 0.0, 1.0, CONFIG)
-        assert contact < reward.risk_reward(ttc_s, 1.0, 0.0, 0.0, CONFIG)
+        contact = reward.risk_reward(ttc_s, -1.0, 0.0, 1.0, 0.0, CONFIG)
+        assert contact < reward.risk_reward(ttc_s, 1.0, 0.0, 0.0, 0.0, CONFIG)
+
+
+def test_a_violation_is_paid_once_by_its_depth_and_only_after_the_release() -> None:
+    counts = {"no_contact": "failure", "on_red": "failure", "gap": "report", "slow": "failure"}
+    violated = reward.Violated([Requirement(name=name, formula="1 > 0", counts=how) for name, how in counts.items()])
+    violated.begin(np.array([1.0, 1.0, 1.0, -0.25]))
+    steps = [[0.0, 0.4, -2.0, -0.25], [0.0, -0.3, -2.0, 1.0], [0.0, 0.5, 1.0, -0.5], [-1.0, -3.0, 1.0, -0.5]]
+    gained = [violated.gained(np.array(robustness)) for robustness in steps]
+    assert gained == pytest.approx([0.0, 0.3, 0.25, 0.7])
 
 
 def test_floats_arrays_and_tensors_agree() -> None:
-    columns = [[0.5, 3.0], [-1.0, 2.0], [1.0, 0.0], [0.0, 1.0]]
+    columns = [[0.5, 3.0], [-1.0, 2.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.4]]
     floats = [reward.risk_reward(*row, CONFIG) for row in zip(*columns, strict=True)]
     arrays = reward.risk_reward(*map(np.array, columns), CONFIG)
     tensors = reward.risk_reward(*(torch.tensor(c, dtype=torch.float64) for c in columns), CONFIG)

@@ -9,7 +9,7 @@ from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision, Grade, ReferenceOutcome
 from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
 from risk_sac.scene_optimizer.archive import INITIAL, NEW, NEW_PREVENTABLE, Elites, mutated
-from tests.builders import collision, judgement
+from tests.builders import collision, judgement, violation
 
 HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)
 
@@ -51,11 +51,22 @@ def test_a_parent_is_credited_with_what_was_new_and_most_with_what_was_preventab
 
 def test_near_misses_stand_in_for_who_has_struck_nobody():
     elites = Elites()
-    elites.add_misses(HERE, {"left": 3.0, "right": 2.0})
-    elites.add_misses(THERE, {"left": 1.0, "right": 5.0})
-    assert {e.striker: e.point[0] for e in elites.pool()} == {"left": 0.75, "right": 0.25}
+    elites.add_misses(HERE, Encounter(encounters_s={"left": 3.0, "right": 2.0}))
+    elites.add_misses(THERE, Encounter(encounters_s={"left": 1.0, "right": 5.0}))
+    assert {e.target: e.point[0] for e in elites.pool()} == {"left": 0.75, "right": 0.25}
     elites.add_failure(HERE, failure(Grade.IDEAL, striker="left"), None)
     assert [e.kind for e in elites.pool()] == ["cut-in", "near miss of right"]
+
+
+def test_a_requirement_is_aimed_at_once_it_is_nearly_violated_and_until_it_is():
+    elites = Elites()
+    elites.add_misses(HERE, Encounter(margins={"no_contact": 0.0, "on_carriageway": 0.9, "no_red_light_entry": 0.2}))
+    elites.add_misses(THERE, Encounter(margins={"no_red_light_entry": 0.1}))
+    assert {e.target: e.point[0] for e in elites.pool()} == {"no_red_light_entry": 0.75}
+    elites.add_failure(HERE, violation(requirement="no_red_light_entry"), None)
+    elites.add_failure(THERE, violation(requirement="on_carriageway", signature="off", robustness=-1.0), None)
+    assert [e.kind for e in elites.pool()] == ["never_fast violated; straight", "off"]
+    assert elites.pool()[0].worth < elites.pool()[1].worth
 
 
 def test_preventable_failures_are_built_on_most_often():
