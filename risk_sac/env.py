@@ -42,6 +42,7 @@ from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import collision_of
+from risk_sac.verdicts.keeping import Played
 from risk_sac.verdicts.online import CarefulReflex, conflicts_now
 from risk_sac.verdicts.path import Path, polyline
 from risk_sac.verdicts.validity import EpisodeFacts
@@ -298,7 +299,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def violations(self, results: Mapping[str, RequirementResult]) -> tuple[Violation, ...]:
         """Violations without contact of the requirements that count; see `violations_of`."""
-        return violations_of(results, self.trace.frames, self.trace.measures, self.evidence(), self._artefacts)
+        played = Played(self.trace.frames, self.trace.measures, self.evidence())
+        return violations_of(self.problem.requirements, results, played, self._gauge, self._artefacts)
 
     def evidence(self) -> Evidence:
         """What a judge may look at, of the episode so far."""

@@ -1,7 +1,7 @@
 """Risk measures of a frame; measuring does not act on the simulation."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from risk_sac.config import Requirement
@@ -58,6 +58,7 @@ class Gauge:
         """Compiles the requirements; `softmin_sharpness` is β of (7)."""
         self._monitor = Monitor(requirements, STEP_S, horizon_steps)
         self._own = OwnMotionGauge()
+        self._horizon_steps = horizon_steps
         self._rss = rss
         self._sharpness = softmin_sharpness
         self.names = self._monitor.names
@@ -73,3 +74,20 @@ class Gauge:
         signals = publish(frame, before, assessment.least, self._own.measure(frame))
         robustness = self._monitor.update(signals)
         return Measures(assessment, signals, robustness, soft_min(robustness[self._monitor.shapes], self._sharpness))
+
+    def remember(self, frame: Frame, signals: Mapping[str, float]) -> None:
+        """Takes over the next frame, of which the signals were measured before."""
+        self._own.remember(frame)
+        self._monitor.update(signals)
+
+    def of(self, requirement: Requirement) -> "Gauge":
+        """A gauge of one requirement on the same net, with a memory of its own."""
+        alone = requirement.model_copy(update={"shapes": True})  # the soft minimum needs one that does
+        gauge = Gauge((alone,), self._horizon_steps, self._rss, self._sharpness)
+        gauge.reset(self.carriageway)
+        return gauge
+
+    @property
+    def carriageway(self) -> Carriageway:
+        """The carriageway of the net."""
+        return self._own.carriageway

@@ -42,25 +42,33 @@ class OwnMotion(NamedTuple):
 
 
 class OwnMotionGauge:
-    """Measures the ego in the frames of an episode one after the other."""
+    """Measures the ego in the frames of an episode one after the other.
+
+    Attributes:
+      carriageway: of the net.
+    """
 
     def __init__(self) -> None:
         self.reset(Carriageway())
 
     def reset(self, carriageway: Carriageway) -> None:
         """Begins an episode on a net."""
-        self._carriageway = carriageway
+        self.carriageway = carriageway
         self._past = deque[tuple[float, float, float]](maxlen=round(WINDOW_S / STEP_S) + 1)
+
+    def remember(self, frame: Frame) -> None:
+        """Takes over the next frame without measuring it."""
+        self._past.append((frame.time_s, frame.state[HEADING, 0], frame.state[ACCEL, 0]))
 
     def measure(self, frame: Frame) -> OwnMotion:
         """Measures the next frame."""
         state = frame.state
         x_m, y_m, heading_rad = state[X, 0], state[Y, 0], state[HEADING, 0]
-        self._past.append((frame.time_s, heading_rad, state[ACCEL, 0]))
-        around = self._carriageway.around(x_m, y_m, sector_of(heading_rad))
+        self.remember(frame)
+        around = self.carriageway.around(x_m, y_m, sector_of(heading_rad))
         measured, overtakes = _measured(state, frame.kind, self._past[0], frame.time_s, *around)
         if overtakes:
-            around = self._carriageway.around(x_m, y_m, ANY_WAY)
+            around = self.carriageway.around(x_m, y_m, ANY_WAY)
             measured, _ = _measured(state, frame.kind, self._past[0], frame.time_s, *around)
         return OwnMotion(*measured)
 

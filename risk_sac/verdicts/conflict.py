@@ -100,21 +100,27 @@ def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wa
     return lane_conflict(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
 
 
-def left_its_lane(evidence: Evidence, striker: int) -> int | None:
-    """The frame in which the ego left its place in its lane and so came over to the striker; None if it did not.
+def left_its_place(evidence: Evidence) -> int | None:
+    """The frame in which the ego began to be more than 0.375 m beside its place in its lane; None if it is not now.
 
-    Choice: it came over if it moved across its lane by more than 0.375 m in the last 3 s and would not have touched the
-    striker at the contact, or within 1 s after it, had it kept its place.
+    Its place is the one that it had across its lane 3 s before the last frame.
     """
     moved = evidence.moved_across_m(0)
     kept_place = np.abs(moved - moved[evidence.since(TURN_WINDOW_S)]) <= WANDER_M
-    if kept_place[-1]:
-        return None
-    left = int(np.flatnonzero(kept_place)[-1]) + 1
-    path = lane_path(evidence, left - 1)
+    return None if kept_place[-1] else int(np.flatnonzero(kept_place)[-1]) + 1
+
+
+def left_its_lane(evidence: Evidence, striker: int) -> int | None:
+    """The frame in which the ego left its place in its lane and so came over to the striker; None if it did not.
+
+    Choice: it came over if it would not have touched the striker at the contact, or within 1 s after it, had it kept
+    its place.
+    """
+    left = left_its_place(evidence)
+    path = None if left is None else lane_path(evidence, left - 1)
     if path is None:
         return None
-    striking = at(recorded_motion(evidence, striker), len(moved) - 1)
+    striking = at(recorded_motion(evidence, striker), len(path.s) - 1)
     speed, size = float(evidence.speed_mps[-1, 0]), recorded_size(evidence, 0)
     touches = time_to_touch(path, float(path.s[-1]), speed, size, striking, OVER_S) <= OVER_S
     return None if touches else left

@@ -111,3 +111,4 @@ def _in_the_way(situation: Situation) -> bool:
 
 FUZZY_DELAY_S = REACTION_S
 RSS_DELAY_S = RSS.response_s
+RSS_BRAKES_MPS2 = RSS.brake_min_mps2

@@ -91,7 +91,7 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
         broke=broke,
         ego_broke=ego_broke,
         unresponsive=unresponsive(evidence, conflict),
-        grade=grade(drivers) if valid else None,
+        grade=grade({name: each.avoids for name, each in drivers.items()}) if valid else None,
         drivers=drivers,
         signature=signature(
             evidence,

@@ -64,11 +64,11 @@ def _met(evidence: Evidence, path: Path, striker: int) -> list[int]:
     return [int(i) for i in np.flatnonzero(near) if i not in (0, striker)]
 
 
-def grade(outcomes: Mapping[str, ReferenceOutcome]) -> Grade:
-    """Who would have prevented the contact."""
-    if outcomes["careful"].avoids:
+def grade(keeps: Mapping[str, bool]) -> Grade:
+    """Returns which reference driver would have prevented a violation: the same rule for contacts and all others."""
+    if keeps["careful"]:
         return Grade.CAREFUL
-    return Grade.IDEAL if outcomes["ideal"].avoids else Grade.UNAVOIDABLE
+    return Grade.IDEAL if keeps["ideal"] else Grade.UNAVOIDABLE
 
 
 def _outcome(
@@ -87,7 +87,7 @@ def _outcome(
     else:
         speed = float(e.speed_mps[first, 0])
         grip = e.ground.friction * GRAVITY_MPS2
-        ending = drive(driver, path, size, track, first, speed, grip, HORIZON_S - perceives_s, e.step_s)
+        ending = drive(driver, path, size, track, first, speed, grip, HORIZON_S - perceives_s, e.step_s, np.empty(0))
     blameless = not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, size, track.size)
     if blameless and (kept or ending.lead_m <= LEAD_M):
         return AVOIDED

@@ -15,7 +15,9 @@ from risk_sac.types import Floats
 from risk_sac.verdicts.along import along
 from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.drivers import (
+    CAREFUL_PERCEIVES_S,
     FUZZY_DELAY_S,
+    RSS_BRAKES_MPS2,
     RSS_DELAY_S,
     Situation,
     careful,
@@ -24,6 +26,7 @@ from risk_sac.verdicts.drivers import (
     rss,
     towards_command,
 )
+from risk_sac.verdicts.fuzzy import HARDEST_MPS2
 from risk_sac.verdicts.path import Path, pose_at
 
 CAREFUL, IDEAL, FUZZY, RSS = range(4)
@@ -55,6 +58,7 @@ def drive(
     grip: float,
     horizon_s: float,
     step_s: float,
+    driven: Floats,
 ) -> Ending:
     """Lets a driver brake for the striker until it stands, touches it, or the horizon is over.
 
@@ -68,6 +72,7 @@ def drive(
       grip: the most braking the road bears, m/s².
       horizon_s: how long it is followed.
       step_s: between two recorded frames.
+      driven: takes the metres along the path at the frames after `first`, as many as it holds and are driven.
     """
     s, braking, wanted, danger_s = path.s[first], 0.0, 0.0, math.inf
     lead, passing = 0.0, speed
@@ -76,7 +81,7 @@ def drive(
         track.x, track.y, track.heading, np.arange(last + 1).astype(np.float64)
     )  # the striker's poses over the frames
     pose, other = pose_at(path, s), pose_at(frames, float(first))
-    looks = driver in (FUZZY, RSS)
+    looks, per_frame = driver in (FUZZY, RSS), round(step_s / FINE_S)
     for step in range(1, round(horizon_s / FINE_S) + 1):
         since = (step - 1) * FINE_S
         frame = first + since / step_s
@@ -108,6 +113,8 @@ def drive(
             speed = slower
         if own_frame <= last:
             lead, passing = s - recorded_s, speed
+        if step % per_frame == 0 and step // per_frame <= len(driven):
+            driven[step // per_frame - 1] = s
         if speed <= STANDING_MPS and braking > 0.0:
             if own_frame < last:  # it stays, while the recorded ego may come past
                 lead = s - path.s[last]
@@ -131,3 +138,23 @@ def _wanted(driver: int, path: Path, s: float, speed: float, braking: float, siz
     reach = abs(math.sin(seen.turn_rad)) * other.size.half_length + abs(math.cos(seen.turn_rad)) * other.size.half_width
     situation = Situation(seen, speed, braking, size.half_width, reach, across)
     return fuzzy(situation) if driver == FUZZY else rss(situation)
+
+
+@compiled
+def stopping_distance(driver: int, speed: float, grip: float) -> float:
+    """Metres in which a driver stops for what it has to perceive first, m.
+
+    Its reaction and braking are those of its reference model; CAREFUL perceives before it reacts.
+    """
+    gone, braking, since = 0.0, 0.0, 0.0
+    while speed > STANDING_MPS:
+        since += FINE_S
+        if driver == CAREFUL:
+            braking = careful(since - CAREFUL_PERCEIVES_S, grip)
+        elif driver == IDEAL:
+            braking = ideal(grip)
+        elif since > (FUZZY_DELAY_S if driver == FUZZY else RSS_DELAY_S):
+            braking = towards_command(braking, HARDEST_MPS2 if driver == FUZZY else RSS_BRAKES_MPS2, grip, FINE_S)
+        speed -= braking * FINE_S
+        gone += speed * FINE_S
+    return gone

@@ -7,16 +7,21 @@ import numpy as np
 
 from risk_sac.config import Requirement
 from risk_sac.records import NO_CONTACT, RequirementResult, Violation
-from risk_sac.risk.measures import Measures
-from risk_sac.risk.publish import ENCOUNTER
+from risk_sac.risk.measures import Gauge, Measures
+from risk_sac.risk.publish import AHEAD, ASIDE, COS, ENCOUNTER, SIN
 from risk_sac.risk.ttc import ENCOUNTER_CAP_S
 from risk_sac.types import STEP_S, Frame, Kind, Role
+from risk_sac.verdicts.conflict import SAME_WAY_COS, find_conflict
 from risk_sac.verdicts.definitions import DEFINITIONS
-from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.labels import MANOEUVRES, manoeuvre
+from risk_sac.verdicts.keeping import NO_RED_LIGHT_ENTRY, ON_CARRIAGEWAY, MetActor, Played, kept_by
+from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, manoeuvre
+from risk_sac.verdicts.offences import ego_offences
+from risk_sac.verdicts.reference import grade
 
 # Of `ARTEFACT_RULES`, those that are about more than a contact.
 RULES = ("no_teleport", "inside_limits")
+VIOLATED = {NO_RED_LIGHT_ENTRY: "red light entered", ON_CARRIAGEWAY: "carriageway left"}
+SAME_OFFENCES = {NO_RED_LIGHT_ENTRY: ("red_light",), ON_CARRIAGEWAY: ("off_road", "wrong_direction")}
 
 
 def requirement_results(
@@ -44,65 +49,69 @@ def requirement_results(
 
 
 def violations_of(
+    requirements: Sequence[Requirement],
     results: Mapping[str, RequirementResult],
-    frames: Sequence[Frame],
-    measures: Sequence[Measures],
-    evidence: Evidence,
+    played: Played,
+    gauge: Gauge,
     artefacts: Mapping[str, float],
 ) -> tuple[Violation, ...]:
     """The violations without contact of the requirements that count, in the order of time.
 
     Args:
+      requirements: of the episode.
       results: how far each requirement was kept.
-      frames: `T`, of the whole episode.
-      measures: of these frames.
-      evidence: of these frames.
+      played: the whole episode.
+      gauge: that measured it.
       artefacts: rules of `ARTEFACT_RULES` that the episode broke, and when it first did, s of the simulator.
     """
-    violated = {
-        name: (each, each.violated_s)
-        for name, each in results.items()
-        if name != NO_CONTACT and each.counts == "failure" and each.violated_s is not None
-    }
-    released = int(np.searchsorted(evidence.time_s, -STEP_S / 2))
+    released = int(np.searchsorted(played.evidence.time_s, -STEP_S / 2))
     found = []
-    for name, (result, time_s) in violated.items():
-        index = released + round(time_s / STEP_S)
-        verdicts = {rule: artefacts.get(rule, math.inf) > frames[index].time_s for rule in RULES}
-        found.append(
-            _violation(name, time_s, result.robustness, frames[index], measures[index], evidence.until(index), verdicts)
-        )
+    for requirement in requirements:
+        result = results[requirement.name]
+        if requirement.name == NO_CONTACT or result.counts != "failure" or result.violated_s is None:
+            continue
+        index = released + round(result.violated_s / STEP_S)
+        verdicts = {rule: artefacts.get(rule, math.inf) > played.frames[index].time_s for rule in RULES}
+        found.append(_violation(requirement, result, played, gauge, index, verdicts))
     return tuple(sorted(found, key=lambda violation: violation.time_s))
 
 
 def _violation(
-    requirement: str,
-    time_s: float,
-    robustness: float,
-    frame: Frame,
-    measures: Measures,
-    evidence: Evidence,
+    requirement: Requirement,
+    result: RequirementResult,
+    played: Played,
+    gauge: Gauge,
+    index: int,
     verdicts: Mapping[str, bool],
 ) -> Violation:
-    """The record of a violation that began in `frame`, with which the evidence ends."""
+    """The record of a violation that began in frame `index`."""
+    frame, measures, evidence = played.frames[index], played.measures[index], played.evidence.until(index)
     nearest = _soonest_met(measures)
-    driven = manoeuvre(evidence)
-    hidden = nearest is not None and not measures.assessment.seen[nearest - 1]
+    met = None
+    if nearest is not None:
+        column = evidence.column(frame.ids[nearest])
+        met = MetActor(column, find_conflict(evidence, column))
+    driven, broke = manoeuvre(evidence), ego_offences(evidence)
+    hidden = met is not None and met.conflict.hidden
+    drivers = kept_by(requirement, gauge.of(requirement), played, index, met) if all(verdicts.values()) else {}
+    actor = "nobody near" if nearest is None else _actor(frame, measures, nearest) + ", hidden" * hidden
+    violated = VIOLATED.get(requirement.name, f"{requirement.name} violated")
+    others = tuple(name for name in broke if name not in SAME_OFFENCES.get(requirement.name, ()))
     return Violation(
-        requirement=requirement,
-        time_s=time_s,
-        robustness=robustness,
+        requirement=requirement.name,
+        time_s=result.violated_s,
+        robustness=result.robustness,
         other_id=None if nearest is None else frame.ids[nearest],
         other_kind=None if nearest is None else Kind(int(frame.kind[nearest])).name.lower(),
         other_role=None if nearest is None else Role(int(frame.role[nearest])).name.lower(),
         ego_speed_mps=frame.ego_speed_mps,
         ego_manoeuvre=driven,
         hidden=hidden,
-        broke=(),
+        broke=broke,
         verdicts=verdicts,
-        grade=None,
-        drivers={},
-        signature=_signature(requirement, driven, None if nearest is None else frame.kind[nearest], hidden),
+        grade=grade(drivers) if drivers else None,
+        drivers=drivers,
+        signature=f"{violated}; {ego_in_words(driven, others)}, {actor}",
         definitions=DEFINITIONS,
     )
 
@@ -114,6 +123,15 @@ def _soonest_met(measures: Measures) -> int | None:
     return nearest + 1 if encounter_s[nearest] < ENCOUNTER_CAP_S else None
 
 
-def _signature(requirement: str, driven: str, kind: int | None, hidden: bool) -> str:
-    actor = "nobody near" if kind is None else f"{Kind(int(kind)).name.lower()} near{', hidden' if hidden else ''}"
-    return f"{requirement} violated; {MANOEUVRES[driven]}, {actor}"
+def _actor(frame: Frame, measures: Measures, actor: int) -> str:
+    """Names an actor by where it is and drives, the same in the mirror but for crossing traffic."""
+    ahead, aside, cos, sin = (float(measures.assessment.others[row, actor - 1]) for row in (AHEAD, ASIDE, COS, SIN))
+    if frame.kind[actor] == Kind.PEDESTRIAN:
+        return "pedestrian near"
+    if cos < ONCOMING_COS:
+        return "oncoming vehicle"
+    if cos < SAME_WAY_COS:
+        return f"vehicle from the {'right' if sin > 0.0 else 'left'}"
+    if abs(aside) > (frame.width_m[0] + frame.width_m[actor]) / 2:
+        return "vehicle beside it"
+    return "vehicle ahead" if ahead > 0.0 else "vehicle behind"

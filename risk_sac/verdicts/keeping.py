@@ -1,0 +1,171 @@
+"""Whether a reference driver in the ego's place keeps a requirement that the ego violated without contact.
+
+Choices:
+- A reference driver keeps its lane, and so it stays on the carriageway: without contact nothing pushes it off.
+- It obeys signals: it does not enter on red if it could stop at the line from when the signal turned yellow or red, in
+  its own reaction time and with its own braking. They are shorter and harder than what signals are timed for, 1 s and
+  3.05 m/s² (Institute of Transportation Engineers; also the Highway Capacity Manual).
+- It keeps the speed limit.
+- Any other requirement is measured again, on the path of its lane and with what the driver brakes in the conflict with
+  the actor that mattered most. Others move as recorded; those that follow the ego are left out, since they would have
+  kept their distance. It is measured until the driver stands, the horizon, or 4 s after a contact of the ego.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from risk_sac.config import Requirement
+from risk_sac.risk.measures import Gauge, Measures
+from risk_sac.risk.publish import AHEAD, COS
+from risk_sac.scenario.limits import GRAVITY_MPS2
+from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, STEP_S, VX, VY, Bools, Floats, Frame, Signal, X, Y
+from risk_sac.verdicts.conflict import Conflict, left_its_place
+from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.path import Path, pose_at
+from risk_sac.verdicts.recorded import ego_path, lane_path, recorded_motion, recorded_size
+from risk_sac.verdicts.reference import DRIVERS
+from risk_sac.verdicts.rollout import HORIZON_S, drive, stopping_distance
+
+NO_RED_LIGHT_ENTRY, ON_CARRIAGEWAY = "no_red_light_entry", "on_carriageway"
+EASES_MPS2 = 2.0  # how a driver that is too fast slows down to the limit
+AFTER_CONTACT_STEPS = 40
+
+
+class Played(NamedTuple):
+    """A played episode, `T` frames."""
+
+    frames: Sequence[Frame]
+    measures: Sequence[Measures]
+    evidence: Evidence
+
+
+class MetActor(NamedTuple):
+    """The actor that mattered most at a violation, and the ego's conflict with it."""
+
+    column: int  # in the evidence
+    conflict: Conflict
+
+
+def kept_by(
+    requirement: Requirement, gauge: Gauge, played: Played, index: int, met: MetActor | None
+) -> Mapping[str, bool]:
+    """Reference driver → whether it keeps a requirement that the ego first violated in frame `index`.
+
+    `gauge` measures that requirement only.
+    """
+    if requirement.name == ON_CARRIAGEWAY:
+        return dict.fromkeys(DRIVERS, True)
+    if requirement.name == NO_RED_LIGHT_ENTRY:
+        return {name: _stops_at_red(driver, played, index) for name, (driver, _) in DRIVERS.items()}
+    return {name: _keeps(name, gauge, played, index, met) for name in DRIVERS}
+
+
+def _stops_at_red(driver: int, played: Played, index: int) -> bool:
+    """Whether a driver could stop at the line from when its signal turned yellow or red."""
+    first = index
+    while first > 0 and played.frames[first - 1].signal in (Signal.YELLOW, Signal.RED):
+        if first < index and played.frames[first - 1].stop_line_m < played.frames[first].stop_line_m - 1.0:
+            break  # of the signal before
+        first -= 1
+    frame = played.frames[first]
+    grip = played.evidence.ground.friction * GRAVITY_MPS2
+    return stopping_distance(driver, frame.ego_speed_mps, grip) <= frame.stop_line_m
+
+
+def _keeps(name: str, gauge: Gauge, played: Played, index: int, met: MetActor | None) -> bool:
+    """Whether the requirement holds on what a driver drives, measured again."""
+    e = played.evidence
+    left = left_its_place(e.until(index))
+    in_lane = left - 1 if left is not None else index if met is None else met.conflict.frame
+    kept = lane_path(e, in_lane)
+    path = ego_path(e) if kept is None else kept
+    s, acts = _driven(name, e, path, met, after_steps=AFTER_CONTACT_STEPS * played.measures[-1].assessment.touched)
+    fast = np.flatnonzero(e.speed_mps[e.time_s > -STEP_S / 2, 0] > e.ground.speed_limit_mps + 1e-6)
+    if len(fast):
+        first = int(np.searchsorted(e.time_s, -STEP_S / 2)) + int(fast[0])
+        s, acts = _within_limit(s, first, e.ground.speed_limit_mps * e.step_s), min(acts, first)
+    acts = acts if kept is None else min(acts, in_lane)
+    if acts >= index:  # it acts when it is too late
+        return False
+    return _holds(gauge, played, path, s, acts)
+
+
+def _driven(name: str, e: Evidence, path: Path, met: MetActor | None, after_steps: int) -> tuple[Floats, int]:
+    """Metres along the path in each frame, NaN once the driver stands, and the frame from which it brakes."""
+    last = len(e.time_s) - 1
+    if met is None:
+        return path.s.copy(), last
+    driver, perceives_s = DRIVERS[name]
+    first = met.conflict.frame + round(perceives_s / e.step_s)
+    if first >= last:
+        return path.s.copy(), last
+    motion = recorded_motion(e, met.column)
+    track = motion._replace(heading=np.unwrap(motion.heading))
+    driven = np.full(last - first + after_steps, np.nan)
+    grip = e.ground.friction * GRAVITY_MPS2
+    speed = float(e.speed_mps[first, 0])
+    drive(driver, path, recorded_size(e, 0), track, first, speed, grip, HORIZON_S - perceives_s, e.step_s, driven)
+    return np.concatenate((path.s[: first + 1], driven)), first
+
+
+def _within_limit(s: Floats, first: int, most_m: float) -> Floats:
+    """The same driven no faster than the limit from frame `first` on; `most_m` is what the limit allows in a step."""
+    steps = np.diff(s, prepend=s[:1])
+    for t in range(first, len(steps)):
+        steps[t] = min(steps[t], max(most_m, steps[t - 1] - EASES_MPS2 * STEP_S**2))
+    driven: Floats = s[0] + np.cumsum(steps)
+    return driven
+
+
+def _holds(gauge: Gauge, played: Played, path: Path, s: Floats, acts: int) -> bool:
+    """Whether the requirement holds where the ego is `s` along a path from frame `acts` on, as long as it drives."""
+    gauge.reset(gauge.carriageway)
+    for frame, measures in zip(played.frames[: acts + 1], played.measures, strict=False):
+        gauge.remember(frame, measures.signals)
+    followers = _followers(played, acts)
+    before = played.frames[acts]
+    for t in range(acts + 1, len(s)):
+        if math.isnan(s[t]):
+            break
+        frame, seen = _placed(played, path, s, t, followers)
+        measured = gauge.measure(frame, before, seen)
+        if measured.assessment.touched or measured.robustness[0] < 0.0:
+            return False
+        before = frame
+    return True
+
+
+def _followers(played: Played, t: int) -> frozenset[str]:
+    """The actors that follow the ego in frame `t`, by id: behind it, and driving its way."""
+    frame, others = played.frames[t], played.measures[t].assessment.others
+    behind = others[AHEAD] + (frame.length_m[1:] + frame.length_m[0]) / 2 < 0.0
+    return frozenset(np.array(frame.ids[1:])[behind & (others[COS] > 0.5)].tolist())
+
+
+def _placed(played: Played, path: Path, s: Floats, t: int, without: frozenset[str]) -> tuple[Frame, Bools]:
+    """Frame `t` with the ego `s[t]` along the path; after the last frame others go on as they move in it."""
+    last = len(played.frames) - 1
+    recorded, measures = played.frames[min(t, last)], played.measures[min(t, last)]
+    stays = np.array([id_ not in without for id_ in recorded.ids])
+    state = recorded.state[:, stays].copy()
+    beyond_s = max(t - last, 0) * STEP_S
+    state[X] += beyond_s * state[VX]
+    state[Y] += beyond_s * state[VY]
+    x, y, heading = pose_at(path, s[t])
+    speed, earlier = (s[t] - s[t - 1]) / STEP_S, (s[t - 1] - s[max(t - 2, 0)]) / STEP_S
+    state[(X, Y, HEADING), 0] = x, y, heading
+    state[(VX, VY), 0] = speed * math.cos(heading), speed * math.sin(heading)
+    state[(SPEED, LATERAL, ACCEL), 0] = speed, 0.0, (speed - earlier) / STEP_S
+    frame = recorded._replace(
+        time_s=recorded.time_s + beyond_s,
+        ids=tuple(id_ for id_, stay in zip(recorded.ids, stays, strict=True) if stay),
+        kind=recorded.kind[stays],
+        role=recorded.role[stays],
+        state=state,
+        link=recorded.link[stays],
+        stop_line_m=recorded.stop_line_m + path.s[min(t, last)] - s[t],
+    )
+    return frame, measures.assessment.seen[stays[1:]]
