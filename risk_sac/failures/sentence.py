@@ -11,7 +11,7 @@ from risk_sac.types import STEP_S, Floats, Kind
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.labels import ONCOMING_COS
-from risk_sac.verdicts.offences import STANDING_MPS
+from risk_sac.verdicts.offences import IN_WORDS, STANDING_MPS
 
 IN_LANE_M = 1.5  # who is nearer to the ego's axis leads it, or follows
 ACROSS_MPS = 0.2  # slower than that nobody changes its place in a lane
@@ -20,16 +20,18 @@ ACTS_MPS2 = 1.5
 
 def sentence(series: Series, collision: Collision) -> str:
     """Returns, e.g., "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.5 s late"."""
-    assert collision.judgement is not None
+    judged = collision.judgement
+    assert judged is not None
     since = series["time_s"] - series["released_s"]
     striker = [str(name) for name in series["ids"]].index(collision.other_id)
-    began = min(int(np.searchsorted(since, collision.judgement.conflict_s - 1e-6)), len(since) - 1)
+    began = min(int(np.searchsorted(since, judged.conflict_s - 1e-6)), len(since) - 1)
     begins = int(np.searchsorted(since, -1e-6))
     does = _does(series, striker, begins)
     first = min(began, does[0]) if does else began
-    who = _who(series, striker, first)
+    who = _who(series, striker, first, _broke(judged.broke))
     what = does[1] if does else f"goes on at {series['speed_mps'][first, striker]:.0f} m/s"
-    return f"{who}, {what}; ego at {series['speed_mps'][began, 0]:.0f} m/s {_response(series, began)}"
+    ego = f"ego at {series['speed_mps'][began, 0]:.0f} m/s{_broke(judged.ego_broke)}"
+    return f"{who}, {what}; {ego} {_response(series, began)}"
 
 
 def story(series: Series, violation: Collision | Violation) -> str:
@@ -39,8 +41,13 @@ def story(series: Series, violation: Collision | Violation) -> str:
     return sentence(series, violation) if violation.judgement else f"contact with {violation.other_id}"
 
 
-def _who(series: Series, striker: int, at: int) -> str:
-    """Returns name and place of the striker in the ego's frame."""
+def _broke(offences: tuple[str, ...]) -> str:
+    """Returns, e.g., " on red speeding"."""
+    return "".join(f" {IN_WORDS[name]}" for name in offences)
+
+
+def _who(series: Series, striker: int, at: int, broke: str) -> str:
+    """Returns name, offences and place of the striker in the ego's frame."""
     x, y = (series[name][at, striker] - series[name][at, 0] for name in ("x_m", "y_m"))
     heading = series["heading_rad"][at, 0]
     turn = series["heading_rad"][at, striker] - heading
@@ -54,6 +61,7 @@ def _who(series: Series, striker: int, at: int) -> str:
         name = "oncoming vehicle"
     else:
         name = f"vehicle from the {'right' if math.sin(turn) > 0.0 else 'left'}"  # as its signature says it
+    name += broke
     if abs(ahead_m) < 1.0:
         return f"{name}, level with it"
     return f"{name}, {abs(ahead_m):.0f} m {'ahead' if ahead_m > 0.0 else 'behind'}"

@@ -59,7 +59,10 @@ def _contact(collision: Collision) -> Iterator[str]:
         before_s = collision.time_s - judgement.conflict_s
         yield judgement.signature
         yield f"the conflict began {before_s:.1f} s before the contact{_grade(judgement.grade)}"
-        yield f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'}"
+        yield (
+            f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'} · "
+            f"by the ego: {_words(', '.join(judgement.ego_broke)) or 'nothing'}"
+        )
 
 
 def _violation(violation: Violation) -> Iterator[str]:

@@ -37,14 +37,25 @@ def during(first_s: float, last_s: float, value: float) -> np.ndarray:
     return np.where((time_s > first_s - 0.05) & (time_s < last_s - 0.05), value, 0.0)
 
 
-def said(conflict_s: float = 1.0, **changes: Any) -> str:
-    hit = collision(time_s=3.5, judgement=judgement(conflict_s=conflict_s))
+def said(conflict_s: float = 1.0, broke: tuple[str, ...] = (), ego_broke: tuple[str, ...] = (), **changes: Any) -> str:
+    hit = collision(time_s=3.5, judgement=judgement(conflict_s=conflict_s, broke=broke, ego_broke=ego_broke))
     return sentence(series(**changes), hit)
 
 
 def test_a_neighbour_that_moves_over_while_the_ego_brakes_late() -> None:
     late = said(lateral_mps=during(1.0, 2.5, -1.1), ego_accel_mps2=during(2.65, 3.5, -3.0))
     assert late == "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.6 s late"
+
+
+def test_offences_are_said_of_whose_they_are() -> None:
+    where = {"x_m": 15.0, "y_m": -9.0, "heading": math.pi / 2}
+    striker_only, ego_only = said(broke=("red_light",), **where), said(ego_broke=("red_light", "speeding"), **where)
+    assert striker_only == (
+        "vehicle from the right on red, 15 m ahead, goes on at 14 m/s; ego at 14 m/s does not brake"
+    )
+    assert ego_only == (
+        "vehicle from the right, 15 m ahead, goes on at 14 m/s; ego at 14 m/s on red speeding does not brake"
+    )
 
 
 def test_in_the_mirror_the_sides_are_exchanged() -> None:

@@ -103,12 +103,13 @@ def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke()
         "which it had seen for 1.0 s",
         JUDGED.signature,
         "the conflict began 1.2 s before the contact · grade careful: a careful driver would have prevented it",
-        "broken by the other: pedestrian on red",
+        "broken by the other: pedestrian on red · by the ego: nothing",
     ]
     assert lines(grade=None, broke=())[-2:] == [
         "the conflict began 1.2 s before the contact",
-        "broken by the other: nothing",
+        "broken by the other: nothing · by the ego: nothing",
     ]
+    assert lines(broke=(), ego_broke=("red_light",))[-1] == "broken by the other: nothing · by the ego: red light"
     assert lines(grade=Grade.UNAVOIDABLE)[-2].endswith(
         "grade unavoidable: not even full braking at once would have prevented it"
     )

@@ -81,13 +81,14 @@ def stage(
     from_s: float = -1.5,
     until_s: float = 12.0,
     offsets: bool = True,
+    contact: bool = True,
 ) -> Evidence:
-    """The record of an episode with these motions, the ego's first, until the ego first touches somebody."""
+    """The record of an episode with these motions, the ego's first, until the ego's first contact, or to its end."""
     times = np.arange(round(from_s / STEP_S), round(until_s / STEP_S) + 1) * STEP_S
     poses = np.array([[motion(t) for motion in motions] for t in times])  # T x n x 3
     before = np.array([[motion(t - STEP_S) for motion in motions] for t in times])
     sizes = np.array([CAR_M if kind is Kind.VEHICLE else PERSON_M for kind in kinds])
-    last = _first_contact(poses, sizes)
+    last = _first_contact(poses, sizes) if contact else len(times) - 1
     poses, before, times = poses[: last + 1], before[: last + 1], times[: last + 1]
     x, y, heading = np.moveaxis(poses, 2, 0)
     vx, vy = ((poses - before)[..., :2] / STEP_S).transpose(2, 0, 1)

@@ -32,7 +32,7 @@ export function Verdict({ failure }: { failure: Failure }) {
           <p>
             {say.responseOf(judgement, collision.ego_peak_braking_mps2)} {say.knownOf(collision)}
           </p>
-          <p class={judgement.broke.length > 0 ? "verdict-broke" : ""}>{say.brokeOf(judgement)}</p>
+          <p class={judgement.broke.length + judgement.ego_broke.length > 0 ? "verdict-broke" : ""}>{say.brokeOf(judgement)}</p>
           <Drivers drivers={judgement.drivers} />
         </>
       )}

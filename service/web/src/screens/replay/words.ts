@@ -73,8 +73,17 @@ export function responseOf(judgement: Judgement, peak: number | null): string {
   return `The ego ${goes} and ${does}${hardest}.${never}`;
 }
 
-export function brokeOf({ broke }: Judgement): string {
-  return broke.length === 0 ? "The striker broke no rule of the road." : `The striker ${broke.map((rule) => BROKE[rule] ?? words(rule)).join(", and ")}.`;
+const EGO_BROKE: Record<string, string> = {
+  ...BROKE,
+  priority: "took the striker's priority",
+  wrong_direction: "was on the oncoming side",
+  off_road: "left the road",
+};
+
+export function brokeOf({ broke, ego_broke }: Judgement): string {
+  const offences = (rules: string[], named: Record<string, string>) =>
+    rules.length === 0 ? "broke no rule of the road" : rules.map((rule) => named[rule] ?? words(rule)).join(", and ");
+  return `The striker ${offences(broke, BROKE)}. The ego ${offences(ego_broke, EGO_BROKE)}.`;
 }
 
 export function repetitionOf({ repetition }: Failure): string {

@@ -1,0 +1,184 @@
+"""Violations without contact: their records, and which reference driver keeps the requirement; also in the mirror."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from risk_sac.config import Requirement
+from risk_sac.records import Grade, Violation
+from risk_sac.risk.measures import Gauge
+from risk_sac.risk.rss_parameters import RssParameters
+from risk_sac.types import Kind, Role, Signal
+from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
+from risk_sac.verdicts.keeping import Played
+from risk_sac.verdicts.violation import requirement_results, violations_of
+from tests.builders import frame_of
+from tests.unit.verdicts.staged import CAR_M, LANE_M, Motion, mirrored, sideways, stage, straight
+
+WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
+
+
+def own(formula: str, name: str = "own") -> Requirement:
+    return Requirement(name=name, formula=formula, scale=1.0)
+
+
+def staged(*motions: Motion, kinds: tuple[Kind, ...] = (Kind.VEHICLE, Kind.VEHICLE), until_s: float = 8.0) -> Evidence:
+    return stage(*motions, kinds=kinds, until_s=until_s, contact=False)
+
+
+def played(
+    evidence: Evidence,
+    requirement: Requirement,
+    signals: list[tuple[Signal, float]] | None = None,
+    artefacts: Mapping[str, float] | None = None,
+) -> list[Violation]:
+    e = evidence
+    frames, measures = [], []
+    gauge = Gauge((requirement,), 1000, RssParameters(), 20.0)
+    gauge.reset()
+    for t, time_s in enumerate(e.time_s.tolist()):
+        signal, stop_line_m = signals[t] if signals else (Signal.NONE, np.inf)
+        rows = {name: getattr(e, name)[t] for name in PER_ACTOR} | {"length_m": e.length_m, "width_m": e.width_m}
+        link = e.link[t].astype(np.uint8).tolist()
+        frame = frame_of(
+            e.kind.tolist(), time_s=time_s, ids=e.ids, signal=signal, stop_line_m=stop_line_m, link=link, **rows
+        )
+        frame = frame._replace(role=e.role)
+        measures.append(gauge.measure(frame, frames[-1] if frames else None, e.known[t, 1:]))
+        frames.append(frame)
+    released = int(np.searchsorted(e.time_s, -1e-6))
+    results = requirement_results((requirement,), e.time_s[released:].tolist(), measures[released:], None)
+    return list(violations_of((requirement,), results, Played(frames, measures, e), gauge, artefacts or {}))
+
+
+def violated(
+    evidence: Evidence, requirement: Requirement, signals: list[tuple[Signal, float]] | None = None
+) -> Violation:
+    [first], [second] = (played(each, requirement, signals) for each in (evidence, mirrored(evidence)))
+    swapped = second.signature.replace("right", "LEFT").replace("left", "right").replace("LEFT", "left")
+    assert second.model_copy(update={"signature": swapped if "vehicle from" in swapped else second.signature}) == first
+    return first
+
+
+def closes_in(gap_m: float = 25.0, late_s: float = 2.0, *others: Motion) -> Evidence:
+    """A leader brakes to a stand at 1 s; the ego brakes with 8 m/s², `late_s` after it."""
+    ego = straight(0.0, 0.0, 0.0, 14.0, (1.0 + late_s, -8.0))
+    leader = straight(CAR_M[0] + gap_m, 0.0, 0.0, 14.0, (1.0, -6.5))
+    return staged(ego, leader, *others, kinds=(Kind.VEHICLE,) * (2 + len(others)))
+
+
+KEEPS_APART = own("vehicle_gap_m >= 4")
+
+
+def test_a_careful_driver_keeps_a_distance_that_the_ego_did_not() -> None:
+    found = violated(closes_in(), KEEPS_APART)
+    assert found.grade is Grade.CAREFUL
+    assert set(found.drivers) == {"careful", "fsm", "rss", "ideal"}
+    assert (found.other_id, found.other_kind, found.other_role) == ("actor_1", "vehicle", "adversary")
+    assert found.signature == "own violated; ego goes straight, vehicle ahead"
+    assert found.time_s == pytest.approx(3.75, abs=0.15)  # it stands 10 m ahead at 3.15 s
+    assert found.robustness < 0.0
+    assert (found.broke, found.hidden, found.valid) == ((), False, True)
+
+
+def test_a_distance_that_nobody_could_keep_is_unavoidable() -> None:
+    assert violated(closes_in(gap_m=4.2), KEEPS_APART).grade is Grade.UNAVOIDABLE
+
+
+def test_followers_would_have_kept_their_distance() -> None:
+    tailgater = straight(-CAR_M[0] - 3.0, 0.0, 0.0, 14.0, (3.1, -8.0))
+    assert violated(closes_in(25.0, 2.0, tailgater), own("vehicle_gap_m >= 2.5")).drivers["careful"]
+
+
+def test_a_driver_acts_too_late_if_it_acts_after_the_violation() -> None:
+    found = violated(staged(straight(0.0, 0.0, 0.0, 12.0), straight(500.0, 0.0, 0.0, 12.0)), own("ego_speed_mps <= 5"))
+    assert (found.time_s, found.grade, any(found.drivers.values())) == (0.0, Grade.UNAVOIDABLE, False)
+    assert found.other_id is None
+    assert found.signature == "own violated; ego goes straight, nobody near"
+
+
+def test_a_reference_driver_keeps_the_limit() -> None:
+    speeds_up = staged(straight(0.0, 0.0, 0.0, 13.0, (2.0, 1.5)), straight(900.0, 0.0, 0.0, 13.0))
+    found = violated(speeds_up, own("ego_speed_mps <= 15.5"))
+    assert (found.grade, found.broke) == (Grade.CAREFUL, ("speeding",))
+    assert found.signature == "own violated; ego goes straight speeding, nobody near"
+
+
+def test_an_ego_that_passes_a_pedestrian_too_closely_would_have_had_room_in_its_lane() -> None:
+    swerves = sideways(straight(0.0, 0.0, 0.0, 10.0), 2.0, 1.0, 2.0)
+    evidence = staged(swerves, straight(60.0, 4.2, 0.0, 0.0), kinds=WALKING)
+    found = violated(evidence, own("pedestrian_gap_m >= 1.5"))
+    assert (found.grade, found.ego_manoeuvre) == (Grade.CAREFUL, "lane_change")
+    straight_on = staged(
+        sideways(straight(0.0, 0.0, 0.0, 10.0), -1.5, 2.0, 2.0), straight(60.0, 4.2, 0.0, 0.0), kinds=WALKING
+    )
+    assert violated(straight_on, own("pedestrian_gap_m >= 1.5")).grade is Grade.UNAVOIDABLE
+
+
+def to_line(evidence: Evidence, line_m: float, yellow_m: float, red_m: float) -> list[tuple[Signal, float]]:
+    """A signal that turns yellow and red when the ego's front is so far from its line; none behind it."""
+    ahead = line_m - evidence.x_m[:, 0] - CAR_M[0] / 2
+    return [
+        (Signal.NONE, np.inf)
+        if d < 0.0
+        else (Signal.RED if d <= red_m else Signal.YELLOW if d <= yellow_m else Signal.GREEN, float(d))
+        for d in ahead
+    ]
+
+
+NO_RED = own("historically[0,1] (red_light_braking_mps2 <= 9)", "no_red_light_entry")
+
+
+@pytest.mark.parametrize(
+    ("yellow_m", "red_m", "grade"),
+    [
+        (200.0, 200.0, Grade.CAREFUL),
+        (40.0, 10.0, Grade.CAREFUL),
+        (26.0, 26.0, Grade.CAREFUL),  # 12 m/s: 13.8 m in 1.15 s, then 0.6 s to 7.6 m/s², about 12 m more
+        (15.0, 15.0, Grade.IDEAL),  # 12² / (2 · 8) = 9 m
+        (8.0, 8.0, Grade.UNAVOIDABLE),
+    ],
+)
+def test_a_reference_driver_stops_at_red_where_it_can(yellow_m: float, red_m: float, grade: Grade) -> None:
+    evidence = staged(straight(0.0, 0.0, 0.0, 12.0), straight(500.0, 0.0, 0.0, 12.0))
+    shown = to_line(evidence, 60.0, yellow_m, red_m)
+    link = np.zeros_like(evidence.link)
+    link[:, 0] = [ord("r") if signal is Signal.RED else 0 for signal, _ in shown]
+    found = violated(replace(evidence, link=link), NO_RED, shown)
+    assert found.grade is grade
+    assert found.signature == "red light entered; ego goes straight, nobody near"
+
+
+def test_a_reference_driver_stays_on_the_carriageway() -> None:
+    evidence = staged(straight(0.0, 0.0, 0.0, 12.0), straight(500.0, 0.0, 0.0, 12.0))
+    found = violated(evidence, own("ego_speed_mps <= 5", "on_carriageway"))
+    assert found.grade is Grade.CAREFUL
+    assert found.signature == "carriageway left; ego goes straight, nobody near"
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "heading", "name"),
+    [
+        (20.0, 0.0, 0.0, "vehicle ahead"),
+        (2.0, LANE_M, 0.0, "vehicle beside it"),
+        (30.0, LANE_M, np.pi, "oncoming vehicle"),
+        (24.0, -20.0, np.pi / 2, "vehicle from the right"),
+    ],
+)
+def test_the_actor_is_named_by_where_it_is_and_drives(x: float, y: float, heading: float, name: str) -> None:
+    other = straight(x, y, heading, 10.0, start_s=0.0)
+    evidence = staged(straight(0.0, 0.0, 0.0, 12.0, start_s=0.0), other)
+    evidence = replace(evidence, role=np.array([Role.EGO, Role.BACKGROUND], dtype=np.int8))
+    found = violated(evidence, own("ego_speed_mps <= 5"))
+    assert found.signature == f"own violated; ego goes straight, {name}"
+    assert found.other_role == "background"
+
+
+@pytest.mark.parametrize(("broken_s", "valid"), [(-0.5, False), (3.0, True)])
+def test_an_artefact_before_a_violation_refuses_it_and_no_driver_is_asked(broken_s: float, valid: bool) -> None:
+    evidence = staged(straight(0.0, 0.0, 0.0, 12.0), straight(500.0, 0.0, 0.0, 12.0))
+    [found] = played(evidence, own("ego_speed_mps <= 5"), artefacts={"inside_limits": broken_s})
+    assert (found.valid, found.broken) == (valid, () if valid else ("inside_limits",))
+    assert (found.grade is not None, bool(found.drivers)) == (valid, valid)
