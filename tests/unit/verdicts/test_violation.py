@@ -10,6 +10,7 @@ from risk_sac.config import Requirement
 from risk_sac.records import Grade, Violation
 from risk_sac.risk.measures import Gauge
 from risk_sac.risk.rss_parameters import RssParameters
+from risk_sac.scenario.carriageway import Carriageway
 from risk_sac.types import Kind, Role, Signal
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
 from risk_sac.verdicts.keeping import Played
@@ -37,7 +38,7 @@ def played(
     e = evidence
     frames, measures = [], []
     gauge = Gauge((requirement,), 1000, RssParameters(), 20.0)
-    gauge.reset()
+    gauge.reset(Carriageway())
     for t, time_s in enumerate(e.time_s.tolist()):
         signal, stop_line_m = signals[t] if signals else (Signal.NONE, np.inf)
         rows = {name: getattr(e, name)[t] for name in PER_ACTOR} | {"length_m": e.length_m, "width_m": e.width_m}
