@@ -2,7 +2,7 @@
 
 import argparse
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -19,7 +19,7 @@ from rich.progress import (
 from rich.table import Table
 
 from risk_sac.metrics import requirement_cells
-from risk_sac.records import Adjustment, RequirementCounts
+from risk_sac.records import Adjustment, Collision, RequirementCounts, Violation
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.terminal import Output, console, notes, printable
 
@@ -148,6 +148,16 @@ def on_one_line(text: str) -> str:
 def counted(count: int, noun: str) -> str:
     """A count with its noun: `1 failure`, `2 failures`."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def offences(violation: Collision | Violation) -> Iterator[str]:
+    """What the ego and the other broke, on a line each."""
+    if isinstance(violation, Violation):
+        broken = {"ego": violation.broke}
+    else:
+        judged = violation.judgement
+        broken = {"ego": judged.ego_broke, "other": judged.broke} if judged else {}
+    yield from (f"{actor}: {in_words(broke)}" for actor, broke in broken.items() if broke)
 
 
 def in_words(names: Iterable[str]) -> str:

@@ -1,12 +1,11 @@
 """`risk-sac show`: the failures of a run, refused ones included, and pictures of them."""
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
 from rich.table import Table
 
-from risk_sac.cli.console import EGO, OK, Commands, add_command, in_words, narrow_table
+from risk_sac.cli.console import EGO, OK, Commands, add_command, in_words, narrow_table, offences
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
@@ -73,13 +72,13 @@ def _failures(results: Results) -> Table:
         if violation is None:
             continue
         cells = _of_contact(violation) if isinstance(violation, Collision) else _without_contact(violation)
-        told = [failure.episode.reason] if failure.episode.reason else _broke(violation)
+        reason = failure.episode.reason
         table.add_row(
             failure.id.removeprefix(f"{run}-"),
             f"{failure.episode.outcome}\n{violation.graded or ''}",
             violation.other_id or "",
             *cells,
-            in_words(told),
+            in_words([reason]) if reason else "\n".join(offences(violation)),
         )
     return table
 
@@ -96,12 +95,6 @@ def _of_contact(collision: Collision) -> tuple[str, ...]:
 def _without_contact(violation: Violation) -> tuple[str, ...]:
     """The same of a violation without contact, which has no zones."""
     return f"{violation.ego_speed_mps:.1f}", "", f"{violation.requirement}\n{violation.time_s:.1f}"
-
-
-def _broke(violation: Collision | Violation) -> Sequence[str]:
-    if isinstance(violation, Collision):
-        return () if violation.judgement is None else violation.judgement.broke
-    return violation.broke
 
 
 def _conflict(judgement: Judgement) -> str:

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.campaigns.output import add_campaign_command, add_limit, print_answer
-from risk_sac.cli.console import OK, Commands, in_words, or_dash, write_out
+from risk_sac.cli.console import OK, Commands, in_words, offences, or_dash, write_out
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
@@ -109,19 +109,9 @@ def failures_table(failures: Sequence[Episode]) -> Table:
             f"{failure.outcome}\n{worst.graded or ''}",
             "\n".join(failure.failed or (worst.requirement,)),
             ", ".join(or_dash(speed, ".1f") for speed in speeds),
-            Text(printable("\n".join([in_words([failure.reason])] if failure.reason else _offences(worst)))),
+            Text(printable("\n".join([in_words([failure.reason])] if failure.reason else offences(worst)))),
         )
     return table
-
-
-def _offences(violation: Collision | Violation) -> Iterator[str]:
-    """What the ego and the other broke, on a line each."""
-    if isinstance(violation, Violation):
-        offences = {"ego": violation.broke}
-    else:
-        judged = violation.judgement
-        offences = {"ego": judged.ego_broke, "other": judged.broke} if judged else {}
-    yield from (f"{actor}: {in_words(broke)}" for actor, broke in offences.items() if broke)
 
 
 def _lines(failure: Episode) -> Iterator[str]:
