@@ -12,7 +12,8 @@ Choice: rain does not shorten the sight. Rain of 50 mm/h attenuates light by 14.
 
 Source: Bosch Automotive Handbook, tyre grip at 50 km/h, with new and with worn tyres, for friction; ITU-R P.1814
 (k = 1.076, α = 0.67) for the attenuation, WMO-No. 8 for visibility as the distance that 5 % of the light passes;
-UN R112, whose low beam is measured at 50 m on the own lane.
+Vienna Convention on Road Traffic (1968), Annex 5: passing lamps light the road for at least 40 m. Drivers recognise
+pedestrians in dark clothes later still (Wood, Tyrrell and Carberry 2005).
 """
 
 import math
@@ -27,7 +28,7 @@ WET_FRICTION: Mapping[Precipitation, Interval] = {
     "rain": Interval(low=0.5, high=0.65),  # 0.2 mm of water: up to 7.6 mm/h
     "heavy_rain": Interval(low=0.4, high=0.55),  # 1 mm of water: up to 50 mm/h
 }
-LOW_BEAM_M = 50.0
+LOW_BEAM_M = 40.0
 VISIBILITY, NIGHT = "visibility_m", "night"
 """Scene parameters of an ODD that states the visibility, or day and night."""
 

@@ -1,4 +1,4 @@
-"""Weather and light of an ODD act on the ego's sight, whoever drives it."""
+"""Each field of an ODD acts on the episodes or is refused; weather and light act on every kind of ego."""
 
 from collections.abc import Mapping
 from contextlib import closing
@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from risk_sac.config import RunSpec
+from risk_sac.config import Odd, RunSpec
 from risk_sac.env import RiskSacEnv
+from risk_sac.errors import InfeasibleScene, OddError
 from risk_sac.scenario.environment import LOW_BEAM_M
+from risk_sac.scenario.odd import paths
 from risk_sac.types import Frame, Kind, Scene
 
 BRAKE, STEPS = -1.0, 60
@@ -90,3 +92,70 @@ def test_heavy_rain_makes_the_road_slippery() -> None:
         assert 0.4 <= env.layout.friction <= 0.55
         [braking] = [each.formula for each in env.problem.requirements if each.name == "bounded_braking"]
         assert braking.endswith(">= 3.53)")  # 0.9 · 0.4 · 9.81
+
+
+NARROWER = {
+    "scenery.lanes": {"low": 4, "high": 5},
+    "scenery.speed_limit_mps": {"low": 1, "high": 9},
+    "scenery.signal_types": ["fixed_time"],
+    "scenery.crossing_types": ["signalised"],
+    "environment.friction": {"low": 0.4, "high": 0.5},
+    "environment.visibility_m": {"low": 40, "high": 60},
+    "environment.precipitation": ["heavy_rain"],
+    "environment.time_of_day": ["night"],
+    "dynamic.actor_kinds": ["vehicle"],
+    "dynamic.ego_speed_mps": {"low": 7, "high": 9},
+    "dynamic.vehicle_speed_mps": {"low": 0, "high": 4},
+    "dynamic.vehicle_accel_mps2": {"low": -2, "high": 1},
+    "dynamic.vehicle_lateral_speed_mps": {"low": 0, "high": 0.3},
+    "dynamic.vehicle_lateral_accel_mps2": {"low": 0, "high": 0.3},
+    "dynamic.pedestrian_speed_mps": {"low": 0, "high": 0.5},
+    "dynamic.pedestrian_accel_mps2": {"low": -0.3, "high": 0.3},
+}
+SEEDS = range(4)
+REFUSED = ("scenery.lanes", "scenery.speed_limit_mps", "dynamic.actor_kinds")
+
+
+def episodes(odd: Mapping[str, Any]) -> bytes:
+    """Where all were and whom the ego saw, with the same seeds, actions and points of the unit cube."""
+    ego = {"sensor": {"occlusion": False}}
+    spec = RunSpec.model_validate({"family": "mixed", "method": "random", "seed": 0, "odd": odd, "ego": ego})
+    played = b""
+    with closing(RiskSacEnv.of(spec)) as env:
+        for seed in SEEDS:
+            draw, actions = np.random.default_rng(seed), np.random.default_rng(seed)
+            try:
+                env.reset(
+                    seed=seed,
+                    options={"scene": env.problem.space.from_unit(draw.random(env.problem.space.dimension))},
+                )
+            except InfeasibleScene:
+                continue
+            for _ in range(40):
+                *_, terminated, _, _ = env.step(actions.uniform(-1, 1, env.action_size).astype(np.float32))
+                if terminated:
+                    break
+            played += b"".join(frame.x_m.tobytes() + frame.y_m.tobytes() for frame in env.trace.frames)
+            played += b"".join(each.assessment.seen.tobytes() for each in env.trace.measures)
+    return played
+
+
+@pytest.fixture(scope="module")
+def usual() -> bytes:
+    return episodes({})
+
+
+def test_there_is_a_narrower_value_of_each_field() -> None:
+    assert set(NARROWER) == set(paths(Odd()))
+
+
+@pytest.mark.parametrize("path", NARROWER)
+def test_each_field_of_an_odd_acts_or_is_refused(path: str, usual: bytes) -> None:
+    branch, name = path.split(".")
+    odd = {branch: {name: NARROWER[path]}}
+    if path in REFUSED:
+        with pytest.raises(OddError) as refused:
+            episodes(odd)
+        assert refused.value.field == f"odd.{path}"
+    else:
+        assert episodes(odd) != usual

@@ -233,7 +233,7 @@ def test_a_dead_end_is_no_missing_connection(tmp_path: Path, roads: str, says: l
 
 @pytest.mark.parametrize("name", ["straight_two_way.xodr", "single_road.osm"])
 def test_a_map_of_one_road_has_places(tmp_path: Path, name: str) -> None:
-    found = survey(Map(present_net(Path(__file__).with_name("maps") / name, tmp_path).file).net)
+    found = survey(Map(present_net(Path(__file__).parents[2] / "cases" / name, tmp_path).file).net)
     assert found.counts["car_following"] >= 1
 
 
