@@ -13,9 +13,10 @@ from risk_sac.metrics import (
     estimate,
     pooled_bins,
     pooled_counts,
+    pooled_requirements,
     pooled_signatures,
 )
-from risk_sac.records import Counts, Phase
+from risk_sac.records import Counts, Phase, RequirementCounts
 from risk_sac.report.runs import FinishedRun
 
 
@@ -42,15 +43,17 @@ class Cell(Counts):
     artefact_rate: float
     """Contacts that the simulator or the control made / episodes."""
     degenerate_rate: float
-    """Contacts that are no valid failure / episodes."""
+    """Contacts that are not valid / episodes."""
     rejected_rate: float
     """Infeasible scenes / episodes."""
     unresponsive_share: float | None
-    """Share of the valid collisions after 1.5 s or more of a visible collision course in which the ego never braked."""
+    """`unresponsive` / valid contacts."""
+    requirements: Mapping[str, RequirementCounts]
+    """Requirement → its funnel, summed over the runs; empty for older runs."""
     signatures: Mapping[str, int]
-    """Signature → valid collisions."""
+    """Signature → valid violations."""
     conflicts_by_second: tuple[int, ...]
-    """Valid collisions by the second after the adversaries' release in which the conflict began."""
+    """Valid contacts by the second after the adversaries' release in which the conflict began."""
     contacts_by_second: tuple[int, ...]
     """The same by the second of the contact."""
 
@@ -71,6 +74,7 @@ def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
         **ratios,
         estimates={metric.name: estimate(metric, metrics) for metric in metrics_of(phase)},
         cpu_s_per_distinct_failure=cpu_s / distinct if distinct and phase == "search" else None,
+        requirements=pooled_requirements(metrics),
         signatures=pooled_signatures(metrics),
         conflicts_by_second=pooled_bins([each.conflicts_by_second for each in metrics]),
         contacts_by_second=pooled_bins([each.contacts_by_second for each in metrics]),

@@ -150,7 +150,7 @@ def _times(comparison: Comparison, drawn: Times) -> Figure:
         counts.append(len(cell.seeds))
         for axes, bins in ((conflict, cell.conflicts_by_second), (contact, cell.contacts_by_second)):
             axes.stairs(bins, label=cell.method, **LOOKS[cell.method].line)
-    conflict.set(xlabel="release to conflict, s", ylabel=f"valid failures ({phase})", ylim=(0, None))
+    conflict.set(xlabel="release to conflict, s", ylabel=f"valid contacts ({phase})", ylim=(0, None))
     contact.set_xlabel("release to contact, s")
     conflict.margins(x=0)
     conflict.set_title(f"{family}: sum over {_seeds(counts)}", fontsize=9, loc="left")

@@ -11,7 +11,7 @@ import numpy as np
 
 from risk_sac.config import METHODS, FamilyName, MethodName
 from risk_sac.errors import ConfigError
-from risk_sac.metrics import METRICS, WINDOW, Metric, preventable
+from risk_sac.metrics import METRICS, WINDOW, Metric
 from risk_sac.records import EpisodeRecord, Outcome, Phase
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.runs import FinishedRun, Found, cpu_s
@@ -51,12 +51,12 @@ class Curve:
 
 def window_ecr(run: FinishedRun) -> Floats:
     """ECR over the newest `WINDOW` episodes, after each episode; over all while there are fewer."""
-    return _window_rate(run, lambda record: record.outcome is Outcome.FAILURE)
+    return _window_rate(run, lambda record: record.collision is not None and record.collision.valid)
 
 
 def window_pcr(run: FinishedRun) -> Floats:
     """The same of PCR."""
-    return _window_rate(run, preventable)
+    return _window_rate(run, lambda record: record.collision is not None and record.collision.preventable)
 
 
 def _window_rate(run: FinishedRun, counted: Callable[[EpisodeRecord], bool]) -> Floats:

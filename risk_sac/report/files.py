@@ -154,6 +154,7 @@ def table_csv(comparison: Comparison) -> str:
     """`table.csv`; empty where there is no value."""
     text = io.StringIO()
     names = ["family", "method", "phase", "runs", *_PLAIN]
+    names += dict.fromkeys(name for cell in comparison.cells for name in _requirements(cell))
     for metric in METRICS:
         names += [metric.name, f"{metric.name}_low", f"{metric.name}_high", f"{metric.name}_runs"]
     writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
@@ -162,9 +163,14 @@ def table_csv(comparison: Comparison) -> str:
     return text.getvalue()
 
 
+def _requirements(cell: Cell) -> dict[str, Any]:
+    """A column for each figure of each requirement."""
+    return {f"{name}.{figure}": value for name, found in cell.requirements.items() for figure, value in found}
+
+
 def _cell_row(cell: Cell) -> dict[str, Any]:
     row: dict[str, Any] = {"family": cell.family, "method": cell.method, "phase": cell.phase, "runs": len(cell.seeds)}
-    row |= {name: getattr(cell, name) for name in _PLAIN}
+    row |= {name: getattr(cell, name) for name in _PLAIN} | _requirements(cell)
     for name, estimate in cell.estimates.items():
         row |= {
             name: estimate.mean,

@@ -7,18 +7,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from statistics import median
-from typing import NamedTuple
 
 from jinja2 import Environment, StrictUndefined, Template
 
 from risk_sac.config import FamilyName, RunSpec
 from risk_sac.failures.clusters import Overview
-from risk_sac.metrics import METRICS, RATIOS, Estimate, Metric, Ratio
+from risk_sac.metrics import COLUMNS, METRICS, RATIOS, Estimate, Metric, Ratio, requirement_cells
 from risk_sac.records import Phase
 from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import DECLARED, REFERENCE, RIVALS, Comparison, declared
 from risk_sac.report.page import DASH, interval, number, percent, platform_in_words, table, versions_in_words
-from risk_sac.report.paired import LEVEL, PairedTest, pairs_needed, smallest_p
+from risk_sac.report.paired import LEVEL, PairedTest, power_of
 from risk_sac.report.runs import HEADLINE, LIMITS, FinishedRun, found_within
 
 CONTROL = "no-adversary"
@@ -101,20 +100,30 @@ class Tables:
         return _filled(columns, (_cell(cell, seeds) for cell in self._comparison.group(family, phase)))
 
     def funnel(self, family: FamilyName, phase: Phase) -> str:
-        """From contacts to what is worth a person's time, summed over seeds."""
-        columns = ["method", "episodes", "contacts", "valid", "distinct", "preventable", "verified"]
+        """Contacts, and failures of any requirement down to what is worth a person's time, summed over seeds."""
+        columns = ["method", "episodes", "contacts", "valid contacts"]
+        columns += ["failures", "distinct", "preventable", "verified"]
         columns.append(symbol("unresponsive_share"))
         rows = (
             [
                 cell.method,
-                *map(str, (cell.episodes, cell.raw_collisions, cell.failures)),
-                *map(str, (cell.distinct_failures, cell.distinct_preventable)),
+                *map(str, (cell.episodes, cell.raw_collisions, cell.collisions)),
+                *map(str, (cell.failures, cell.distinct_failures, cell.distinct_preventable)),
                 verified(self._comparison.of_cell(family, cell.method), phase),
                 DASH if cell.unresponsive_share is None else percent(cell.unresponsive_share),
             ]
             for cell in self._comparison.group(family, phase)
         )
         return _filled(columns, rows)
+
+    def requirements(self, family: FamilyName, phase: Phase) -> str:
+        """The funnel of each requirement, summed over seeds."""
+        rows = (
+            [cell.method, *requirement_cells(name, found)]
+            for cell in self._comparison.group(family, phase)
+            for name, found in cell.requirements.items()
+        )
+        return _filled(["method", *COLUMNS], rows, left=3)
 
     def budgets(self, family: FamilyName) -> str:
         """What a user gets for processor time and for episodes: median over seeds, and the least and the most."""
@@ -269,24 +278,6 @@ def _test(test: PairedTest) -> list[str]:
         number(test.p, ".3g"),
         f"**{p_holm}**" if test.significant else p_holm,
     ]
-
-
-class Power(NamedTuple):
-    """What the number of pairs lets tests say."""
-
-    hypotheses: int  # that have a p
-    pairs: int
-    smallest: float  # p that so many pairs can give
-    corrected: float  # over all hypotheses
-    needed: int | None  # pairs, where these are too few for any test to pass
-
-
-def power_of(tests: Sequence[PairedTest]) -> Power:
-    """What so many pairs can show."""
-    hypotheses, pairs = sum(test.p is not None for test in tests), max(test.pairs for test in tests)
-    corrected = hypotheses * smallest_p(pairs)
-    needed = pairs_needed(hypotheses, LEVEL) if corrected > LEVEL else None
-    return Power(hypotheses, pairs, smallest_p(pairs), min(1.0, corrected), needed)
 
 
 def run_command(spec: RunSpec, spec_file: str, out: str) -> str:

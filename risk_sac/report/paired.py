@@ -7,6 +7,7 @@ software engineering: report an effect size beside every p-value.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,6 +132,24 @@ def smallest_p(pairs: int) -> float:
 def pairs_needed(hypotheses: int, level: float) -> int:
     """The fewest pairs with which one of so many tests can pass Holm's correction at a level."""
     return 1 + math.ceil(math.log2(hypotheses / level))
+
+
+class Power(NamedTuple):
+    """What the number of pairs lets tests say."""
+
+    hypotheses: int  # that have a p
+    pairs: int
+    smallest: float  # p that so many pairs can give
+    corrected: float  # over all hypotheses
+    needed: int | None  # pairs, where these are too few for any test to pass
+
+
+def power_of(tests: Sequence[PairedTest]) -> Power:
+    """What so many pairs can show."""
+    hypotheses, pairs = sum(test.p is not None for test in tests), max(test.pairs for test in tests)
+    corrected = hypotheses * smallest_p(pairs)
+    needed = pairs_needed(hypotheses, LEVEL) if corrected > LEVEL else None
+    return Power(hypotheses, pairs, smallest_p(pairs), min(1.0, corrected), needed)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

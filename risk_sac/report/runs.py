@@ -21,8 +21,8 @@ from risk_sac.scenario.families import family_named
 class Found(NamedTuple):
     """By one run's search."""
 
-    preventable: int  # distinct failures
-    distinct: int  # valid failures
+    preventable: int  # distinct violations
+    distinct: int  # of those that are valid
     covered: int  # cells of the taxonomy
 
 

@@ -23,7 +23,7 @@ from risk_sac.verdicts.distinct import CELLS, FailureKind, kind_of
 BINS, PAIR_BINS = 10, 4
 NOT_PLAYED = (Outcome.REJECTED, Outcome.INVALID)
 ROLES = ("adversary", "background")
-# What a failure can be in each of the taxonomy's respects, as `FailureKind` has it, and in words.
+# What a contact can be in each of the taxonomy's respects, as `FailureKind` has it, and in words.
 VALUES: Mapping[str, Mapping[object, str]] = {
     "striker": {f"{role} {kind}": f"{kind} ({role})" for role in ROLES for kind in ("vehicle", "pedestrian")},
     "ego_manoeuvre": {
@@ -52,7 +52,7 @@ class Bin(Record):
     name: str
     played: int
     failed: int
-    """Valid failures."""
+    """Failures, by any requirement that counts."""
     refused: int
     """Scenes that were not played, or not to the end."""
 
@@ -83,24 +83,24 @@ class PairCoverage(Record):
     played: int
     """Cells with an episode."""
     failed: int
-    """Cells with a valid failure."""
+    """Cells with a failure."""
     never: tuple[str, ...]
     """The cells without an episode, by the bins of both."""
 
 
 class Kinds(Record):
-    """What a family's valid failures are, in the taxonomy's terms."""
+    """What a family's valid contacts are, in the taxonomy's terms."""
 
     cells: int
     """Of the taxonomy; most of them hold what no ego and no road allows."""
     hit: Mapping[str, int]
-    """Cell, in words, → failures, the most frequent first."""
+    """Cell, in words, → contacts, the most frequent first."""
     values: Mapping[str, Mapping[str, int]]
-    """Respect → its values, in words, → failures."""
+    """Respect → its values, in words, → contacts."""
 
     @property
     def never(self) -> tuple[str, ...]:
-        """Values that no failure had."""
+        """Values that no contact had."""
         return tuple(value for counts in self.values.values() for value, count in counts.items() if not count)
 
 
@@ -219,7 +219,7 @@ def _beyond(odd: Odd, space: SceneSpace) -> Iterator[str]:
 
 
 def kinds(collisions: Iterable[Collision | None]) -> Kinds:
-    """Count valid failures by cell of the taxonomy; contacts without a judgement are left out."""
+    """Counts valid contacts by cell of the taxonomy; those without a judgement are left out."""
     found = Counter(
         kind_of(each, each.judgement) for each in collisions if each is not None and each.valid and each.judgement
     )

@@ -1,10 +1,11 @@
 """What a report says as data: bounds of the i.i.d. phase, and coverage of the search and of that phase apart."""
 
 from collections.abc import Callable, Iterable, Mapping
+from typing import Any
 
 from risk_sac.config import FamilyName, IidName
 from risk_sac.errors import ConfigError
-from risk_sac.metrics import clopper_pearson, preventable
+from risk_sac.metrics import clopper_pearson, pooled_requirements, preventable
 from risk_sac.records import RECORDED, EpisodeRecord, Outcome, Record
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.coverage import NOT_PLAYED, Coverage, coverage
@@ -24,6 +25,15 @@ class Bound(Record):
     """Clopper-Pearson, one-sided; an episode without an end counts as one in which it happened."""
 
 
+class RequirementBound(Bound):
+    """How often a requirement was violated, and how often it may be."""
+
+    counts: str
+    """failure | report; where it is a failure, the bounds are of valid violations alone."""
+    violated: int
+    """Episodes that violated it, valid or not."""
+
+
 class Drawn(Record):
     """What came of the scenes of one family and one kind of traffic."""
 
@@ -40,9 +50,11 @@ class Drawn(Record):
     """All others."""
     contacts: Bound
     failures: Bound
-    """Valid ones."""
+    """Valid violations of any requirement that counts."""
     preventable: Bound
-    """Valid ones that the careful driver would have prevented."""
+    """Those that the careful driver would have prevented."""
+    requirements: Mapping[str, RequirementBound]
+    """Empty where requirements were not counted yet."""
 
 
 class FamilyCoverage(Record):
@@ -102,14 +114,19 @@ def drawn(run: FinishedRun) -> Drawn:
     played = [record for record in run.records if record.outcome not in NOT_PLAYED]
     unended = sum(record.outcome is Outcome.INVALID or record.reason == CRASHED for record in run.records)
 
-    def bound(happened: Callable[[EpisodeRecord], bool]) -> Bound:
-        count, trials = sum(map(happened, played)), len(played) + unended
-        return Bound(
-            count=count,
-            low=clopper_pearson(count, trials)[0],
-            high=clopper_pearson(count + unended, trials)[1],
-        )
+    def bounds(count: int) -> dict[str, Any]:
+        trials = len(played) + unended
+        low, high = clopper_pearson(count, trials)[0], clopper_pearson(count + unended, trials)[1]
+        return {"count": count, "low": low, "high": high}
 
+    def bound(happened: Callable[[EpisodeRecord], bool]) -> Bound:
+        return Bound(**bounds(sum(map(happened, played))))
+
+    counted = pooled_requirements(run.metrics.values())
+    requirements = {
+        name: RequirementBound(**bounds(each.in_rate), counts=each.counts, violated=each.violated)
+        for name, each in counted.items()
+    }
     return Drawn.model_validate(
         {
             **{name: getattr(run.spec, name) for name in ("family", "method", "seed")},
@@ -120,5 +137,6 @@ def drawn(run: FinishedRun) -> Drawn:
             "contacts": bound(lambda record: record.collision is not None),
             "failures": bound(lambda record: record.outcome is Outcome.FAILURE),
             "preventable": bound(preventable),
+            "requirements": requirements,
         }
     )

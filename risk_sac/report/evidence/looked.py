@@ -59,6 +59,13 @@ def bounds(comparison: Comparison, evidence: Evidence) -> Section:
         columns = ["family", "traffic", "what", "of played", "at most", "at least", "scenes", "refused"]
         rows = [row for each in evidence.bounds for row in _rows(each)]
         blocks.append(Table("bounds", columns, rows, left=3))
+        if requirements := [row for each in evidence.bounds for row in _requirements(each)]:
+            columns = ["family", "traffic", "requirement", "counts", "violated", "bounded", "at most", "at least"]
+            blocks += [
+                "By requirement. Bounds are of valid violations where the requirement counts as a failure, and of all "
+                "violations where it is reported only:",
+                Table("bounds by requirement", columns, requirements, left=4),
+            ]
     if unended := sum(each.unended for each in evidence.bounds):
         why = f"In {unended} scenes the simulator died, or the ego failed to drive"
         blocks.append(f"{why}: upper bounds count them as failures.")
@@ -74,7 +81,7 @@ def bounds(comparison: Comparison, evidence: Evidence) -> Section:
 def _rows(each: Drawn) -> Iterator[list[str]]:
     told: Mapping[str, Bound] = {
         "contacts": each.contacts,
-        "valid failures": each.failures,
+        "failures": each.failures,
         "preventable failures": each.preventable,
     }
     for what, bound in told.items():
@@ -90,12 +97,27 @@ def _rows(each: Drawn) -> Iterator[list[str]]:
         ]
 
 
+def _requirements(each: Drawn) -> Iterator[list[str]]:
+    for name, bound in each.requirements.items():
+        yield [
+            each.family,
+            TRAFFIC[each.method],
+            name,
+            bound.counts,
+            f"{bound.violated} of {each.played}",
+            f"{bound.count} of {each.played}",
+            percent(bound.high, 2),
+            percent(bound.low, 2),
+        ]
+
+
 def coverage(evidence: Evidence) -> Section:
     """Which part of the ODD was looked at, and what never was."""
     text = (
         f"The range of each scene parameter within the ODD is parted into {BINS} bins of equal width, and that of each "
-        f"pair into {PAIR_BINS} × {PAIR_BINS} cells. A bin says how many episodes began in it, and of how many the end "
-        "was a valid failure; a scene that was refused is none. What unfolds after the beginning is in the taxonomy."
+        f"pair into {PAIR_BINS} × {PAIR_BINS} cells. A bin says how many episodes began in it, and how many of them "
+        "failed, by any requirement that counts; a scene that was refused is none. What unfolds after the beginning is "
+        "in the taxonomy, for contacts."
     )
     parts = [_of_family(family, found) for family, found in evidence.coverage.items()]
     return Section("coverage", "Coverage", [text], parts)
@@ -137,7 +159,7 @@ def _parameters(coverage: Coverage, who: str) -> Iterator[Block]:
     cells = sum(each.cells for each in coverage.pairs)
     yield (
         f"Pairs of parameters: {len(coverage.pairs)} with {cells:,} cells, of which {played:,} have an episode and "
-        f"{failed:,} a valid failure."
+        f"{failed:,} a failure."
     )
 
 
@@ -171,9 +193,9 @@ def _never(found: FamilyCoverage) -> Iterator[str]:
 def _taxonomy(coverage: Coverage) -> Iterator[Block]:
     found = coverage.kinds
     yield (
-        f"Taxonomy of failures: {len(found.hit)} of {found.cells:,} cells hold a valid failure of the search. Most of "
+        f"Taxonomy of contacts: {len(found.hit)} of {found.cells:,} cells hold a valid contact of the search. Most of "
         "the others hold what no ego and no road allows."
     )
     if found.hit:
-        yield Table("taxonomy", ["cell", "failures"], [[name, str(count)] for name, count in found.hit.items()])
-    yield f"In no failure: {', '.join(found.never) or 'nothing; each value was met'}."
+        yield Table("taxonomy", ["cell", "contacts"], [[name, str(count)] for name, count in found.hit.items()])
+    yield f"In no contact: {', '.join(found.never) or 'nothing; each value was met'}."

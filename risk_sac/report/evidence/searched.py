@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 from risk_sac.config import FamilyName
 from risk_sac.failures.clusters import Cluster
-from risk_sac.records import EpisodeRecord, Grade
+from risk_sac.metrics import COLUMNS, requirement_cells
+from risk_sac.records import Collision, EpisodeRecord, Grade, Violation
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Section, Table
 from risk_sac.report.evidence.origin import Origin, draw
@@ -20,7 +21,10 @@ GRADES = {
     Grade.UNAVOIDABLE: "nobody would have prevented it",
     None: "not judged",
 }
-FUNNEL = ["family", "method", "runs", "episodes", "refused", "contacts", "valid", "distinct", "preventable", "verified"]
+FUNNEL = [
+    *("family", "method", "runs", "episodes", "refused", "contacts", "valid contacts"),
+    *("failures", "distinct", "preventable", "verified"),
+]
 
 
 def budget(comparison: Comparison) -> Section:
@@ -51,14 +55,14 @@ def budget(comparison: Comparison) -> Section:
 
 
 def funnel(comparison: Comparison) -> Section:
-    """From contacts to what is worth a person's time."""
+    """Contacts, failures of any requirement down to what is worth a person's time, and each requirement."""
     rows = [
         [
             cell.family,
             cell.method,
             str(len(cell.seeds)),
-            *(f"{count:,}" for count in (cell.episodes, cell.rejected, cell.raw_collisions, cell.failures)),
-            *(f"{count:,}" for count in (cell.distinct_failures, cell.distinct_preventable)),
+            *(f"{count:,}" for count in (cell.episodes, cell.rejected, cell.raw_collisions, cell.collisions)),
+            *(f"{count:,}" for count in (cell.failures, cell.distinct_failures, cell.distinct_preventable)),
             verified(comparison.of_cell(cell.family, cell.method), "search"),
         ]
         for cell in comparison.cells
@@ -67,22 +71,36 @@ def funnel(comparison: Comparison) -> Section:
     blocks: list[Block] = [
         (
             "Refused: the scene was infeasible, and nothing was played. Valid: no artefact of the simulator, and the "
-            "ego had a part in it. Distinct: resembles no earlier one of the same run. Preventable: the distinct ones "
+            "ego had a part in it. Failures: episodes with a valid violation of a requirement that counts, contacts "
+            "among them. Distinct: resembles no earlier one of the same run. Preventable: the distinct ones "
             "that a careful driver in the ego's place would have prevented. Verified: of the first failures of each "
             "kind, those that were the same to the bit each time they were replayed; a dash where none was. The search "
             "chose these scenes: no share of these numbers is a rate of crashes."
         ),
         Table("the funnel", FUNNEL, rows, left=2),
     ]
+    requirements = [
+        [cell.family, cell.method, *requirement_cells(name, found)]
+        for cell in comparison.cells
+        if cell.phase == "search"
+        for name, found in cell.requirements.items()
+    ]
+    if requirements:
+        blocks += [
+            "By requirement. One that is reported only makes no failure, and its rate is of all violations; that of "
+            "another is of valid ones:",
+            Table("the funnel by requirement", ["family", "method", *COLUMNS], requirements, left=4),
+        ]
     return Section("funnel", "The funnel", blocks)
 
 
 def clusters(comparison: Comparison, origin: Origin) -> Section:
     """Which failures there are, one of each as a picture."""
     text = (
-        "Failures of one kind share who strikes, the type of conflict, from where, how the ego responds, whether it "
-        "saw the other, and the ground. Pictured is the one to look at first, from above, 3 s long: the ego is blue, "
-        "who strikes it orange, others grey."
+        "Contacts of one kind share who strikes, the type of conflict, from where, how the ego responds, whether it "
+        "saw the other, and the ground; other violations share the requirement, the ego's manoeuvre and the actor that "
+        "is next. Pictured is the one to look at first, from above, 3 s long: the ego is blue, "
+        "what strikes it orange, others grey."
     )
     parts = [_of_family(comparison, family, origin) for family in comparison.spec.families]
     return Section("failures", "Which failures there are", [text], parts)
@@ -99,7 +117,7 @@ def _of_family(comparison: Comparison, family: FamilyName, origin: Origin) -> Se
         for run in comparison.runs
         if run.spec.family == family
         for record in run.records
-        if record.collision is not None
+        if record.worst_violation is not None
     }
     rest = len(found.clusters) - len(shown)
     said = f"{_counted(len(found.clusters), 'kind')} by all methods together."
@@ -124,14 +142,10 @@ def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Ori
 
 def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
     """Of the pictured failure."""
-    hit = record.collision
-    assert hit is not None  # that is what makes it one
     yield f"pictured: {record.id_in(run.spec.id)}"
-    conflict_s = hit.judgement.conflict_s if hit.judgement else hit.time_s
-    yield (
-        f"touches {hit.other_id} at {hit.ego_speed_mps:.1f} m/s, {hit.time_s - conflict_s:.1f} s after the conflict "
-        f"began; it was in view for {hit.visible_for_s:.1f} s"
-    )
+    if record.collision is not None:
+        yield _contact(record.collision)
+    yield from map(_violation, record.violations)
     repeated = run.verified.episodes.get(record.index) if run.verified else None
     if repeated is not None:
         yield f"replayed {repeated.times} times, {repeated.same} times the same to the bit"
@@ -141,6 +155,21 @@ def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
     if study is not None and study.region is not None:
         shares = ", ".join(f"{share.what} {share.failed} of {share.played}" for share in study.region.shares)
         yield f"neighbours that fail too: {shares}"
+
+
+def _contact(hit: Collision) -> str:
+    conflict_s = hit.judgement.conflict_s if hit.judgement else hit.time_s
+    return (
+        f"touches {hit.other_id} at {hit.ego_speed_mps:.1f} m/s, {hit.time_s - conflict_s:.1f} s after the conflict "
+        f"began; it was in view for {hit.visible_for_s:.1f} s"
+    )
+
+
+def _violation(violation: Violation) -> str:
+    return (
+        f"violates {violation.requirement} from {violation.time_s:.1f} s after the release, at "
+        f"{violation.ego_speed_mps:.1f} m/s; least robustness {violation.robustness:.2f}"
+    )
 
 
 def regression(origin: Origin) -> Section:

@@ -4,9 +4,9 @@ import pytest
 
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.metrics import results_digest
-from risk_sac.records import Collision, Grade, Judgement, Outcome
+from risk_sac.records import Collision, Grade, Judgement, Outcome, RequirementResult
 from risk_sac.report import FinishedRun
-from tests.builders import collision, episode_record, judgement
+from tests.builders import collision, episode_record, judgement, violation
 
 
 def hit(speed: float = 10.0, broken: str = "", judged: Judgement | None = None) -> Collision:
@@ -28,6 +28,30 @@ OUTCOMES = {
 }
 
 
+def results(**violated_s: float | None) -> dict[str, RequirementResult]:
+    """Of these requirements, when each was violated; `safe_ttc` is reported only."""
+    return {
+        name: RequirementResult(
+            counts="report" if name == "safe_ttc" else "failure",
+            robustness=1.0 if time_s is None else -0.4,
+            violated_s=time_s,
+        )
+        for name, time_s in violated_s.items()
+    }
+
+
+# Of a newer run, whose requirements were counted: all are kept, one is violated without contact.
+OUTCOMES |= {"k": (Outcome.SAFE, None), "v": (Outcome.FAILURE, None)}
+NEWER = {
+    "k": {"requirements": results(no_contact=None, safe_ttc=None, never_fast=None)},
+    "v": {
+        "requirements": results(no_contact=None, safe_ttc=0.5, never_fast=1.5),
+        "violations": (violation(grade=Grade.CAREFUL),),
+        "failed": ("never_fast",),
+    },
+}
+
+
 @pytest.fixture
 def finished() -> Callable[..., FinishedRun]:
     """Builds a run from one letter per episode, see `OUTCOMES`; every episode that is not rejected has 50 steps."""
@@ -46,6 +70,7 @@ def finished() -> Callable[..., FinishedRun]:
                     mean_cost=0.2,
                     dual_variable=0.1 * index,
                     collision=contact,
+                    **NEWER.get(letter, {}),
                 )
             )
         return FinishedRun(

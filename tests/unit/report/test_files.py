@@ -66,17 +66,38 @@ def section(page, title):
 
 def test_page_has_the_funnel_of_every_method(comparison):
     assert section(table_markdown(comparison), "### The funnel: low, search\n") == [
-        "| method | episodes | contacts | valid | distinct | preventable | verified | unresponsive |",
-        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
-        "| risk-sac | 8 | 4 | 4 | 3 | 2 | – | 25.0 % |",
-        "| sac | 8 | 3 | 1 | 1 | 1 | – | 0.0 % |",
-        "| no-adversary | 8 | 1 | 0 | 0 | 0 | – | – |",
+        "| method | episodes | contacts | valid contacts | failures | distinct | preventable | verified "
+        "| unresponsive |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+        "| risk-sac | 8 | 4 | 4 | 4 | 3 | 2 | – | 25.0 % |",
+        "| sac | 8 | 3 | 1 | 1 | 1 | 1 | – | 0.0 % |",
+        "| no-adversary | 8 | 1 | 0 | 0 | 0 | 0 | – | – |",
     ]
+    assert "### Requirements" not in table_markdown(comparison)  # runs from before they were counted
+
+
+def test_page_json_and_csv_have_the_funnel_of_every_requirement(spec, finished):
+    only = spec.model_copy(update={"methods": ("sac",), "seeds": (0,)})
+    newer = compare(only, [finished(run, "kvvk", "k") for run in only.runs()], "")
+    page = table_markdown(newer)
+    assert section(page, "### Requirements: low, search\n") == [
+        "| method | requirement | counts | violated | valid | distinct | preventable | rate (95 %) |",
+        "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: |",
+        "| sac | no_contact | failure | 0 | 0 | 0 | 0 | 0.000 [0.000, 0.490] |",
+        "| sac | safe_ttc | report | 2 | – | – | – | 0.500 [0.150, 0.850] |",
+        "| sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 [0.150, 0.850] |",
+    ]
+    assert section(page, "### The funnel: low, search\n")[-1] == "| sac | 4 | 0 | 0 | 2 | 1 | 1 | – | – |"
+    cell = json.loads(table_json(newer))["cells"][0]
+    assert (cell["failures"], cell["collisions"], cell["requirements"]["never_fast"]["valid"]) == (2, 0, 2)
+    search, evaluation = csv.DictReader(io.StringIO(table_csv(newer)))
+    assert (search["never_fast.violated"], search["never_fast.rate"], search["ecr"]) == ("2", "0.5", "0.0")
+    assert (search["safe_ttc.counts"], evaluation["never_fast.valid"]) == ("report", "0")
 
 
 def test_page_has_histograms_and_signatures_of_those_who_found_something(comparison):
     page = table_markdown(comparison)
-    assert section(page, "### Valid failures by the time since the release: low, search\n") == [
+    assert section(page, "### Valid contacts by the time since the release: low, search\n") == [
         "| method | until | 0–1 s | 1–2 s | 2–3 s | 3–4 s |",
         "| --- | --- | ---: | ---: | ---: | ---: |",
         "| risk-sac | conflict | 1 | 3 | 0 | 0 |",
@@ -84,7 +105,7 @@ def test_page_has_histograms_and_signatures_of_those_who_found_something(compari
         "| sac | conflict | 0 | 1 | 0 | 0 |",
         "| sac | contact | 0 | 0 | 0 | 1 |",
     ]
-    assert section(page, "### Valid failures by signature: low, search\n") == [
+    assert section(page, "### Valid violations by signature: low, search\n") == [
         "| signature | risk-sac | sac |",
         "| --- | ---: | ---: |",
         "| cut-in, straight | 3 | 1 |",

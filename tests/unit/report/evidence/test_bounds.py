@@ -34,6 +34,18 @@ def test_contacts_valid_and_preventable_failures_are_of_the_scenes_that_were_pla
     assert (found.failures.low, found.failures.high) == clopper_pearson(2, 9)
 
 
+def test_each_requirement_has_bounds_of_its_own(finished):
+    found = drawn(run_of(finished, "kkkkvvkr")).requirements
+    assert {name: (each.counts, each.violated, each.count) for name, each in found.items()} == {
+        "no_contact": ("failure", 0, 0),
+        "safe_ttc": ("report", 2, 2),
+        "never_fast": ("failure", 2, 2),
+    }
+    assert (found["never_fast"].low, found["never_fast"].high) == clopper_pearson(2, 7)
+    assert found["no_contact"].high == clopper_pearson(0, 7)[1]
+    assert drawn(run_of(finished, "..f.")).requirements == {}  # from before they were counted
+
+
 def test_a_crash_of_the_simulator_may_have_been_a_failure_or_none(finished):
     found = drawn(run_of(finished, "...frr", crashed=1))
     assert (found.refused, found.unended, found.played, found.failures.count) == (1, 1, 4, 1)
