@@ -17,9 +17,9 @@ class Counts(Record):
     episodes: int = 0
     """Finished, rejected scenes included."""
     rejected: int = 0
-    """Infeasible scenes, which are not simulated."""
+    """Infeasible scenes."""
     raw_collisions: int = 0
-    """Episodes in which the ego touched something."""
+    """Episodes with a contact."""
     collisions: int = 0
     """Valid contacts."""
     failures: int = 0
@@ -27,19 +27,19 @@ class Counts(Record):
     distinct_failures: int = 0
     """Valid violations that resemble no earlier one of their run."""
     preventable: int = 0
-    """Failures that the careful driver would have prevented, repetitions included."""
+    """Failures that the careful driver would have prevented."""
     preventable_collisions: int = 0
-    """Valid contacts that the careful driver would have prevented."""
+    """Valid contacts that it would have prevented."""
     avoidable: int = 0
-    """These, and those that only full braking at once would have prevented."""
+    """Valid contacts that it, or full braking at once, would have prevented."""
     distinct_preventable: int = 0
-    """Distinct violations that the careful driver would have prevented."""
+    """Distinct violations that it would have prevented."""
     artefacts: int = 0
     """Contacts that the simulator or the control made."""
     unresponsive: int = 0
     """Valid contacts after 1.5 s or more of a visible collision course without braking."""
     invalid: int = 0
-    """Episodes in which the ego failed to drive; no rate counts them."""
+    """Episodes in which the ego failed to drive; in no rate."""
     environment_steps: int = 0
 
     @model_validator(mode="before")

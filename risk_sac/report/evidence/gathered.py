@@ -1,7 +1,6 @@
 """What a report says as data: bounds of the i.i.d. phase, and coverage of the search and of that phase apart."""
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
 
 from risk_sac.config import FamilyName, IidName
 from risk_sac.errors import ConfigError
@@ -25,13 +24,15 @@ class Bound(Record):
     """Clopper-Pearson, one-sided; an episode without an end counts as one in which it happened."""
 
 
-class RequirementBound(Bound):
-    """How often a requirement was violated, and how often it may be."""
+class RequirementBound(Record):
+    """How often a requirement was violated."""
 
     counts: str
-    """failure | report; where it is a failure, the bounds are of valid violations alone."""
+    """failure | report"""
     violated: int
-    """Episodes that violated it, valid or not."""
+    """Episodes."""
+    bound: Bound
+    """Of valid violations; of one that is reported only, of all."""
 
 
 class Drawn(Record):
@@ -114,17 +115,14 @@ def drawn(run: FinishedRun) -> Drawn:
     played = [record for record in run.records if record.outcome not in NOT_PLAYED]
     unended = sum(record.outcome is Outcome.INVALID or record.reason == CRASHED for record in run.records)
 
-    def bounds(count: int) -> dict[str, Any]:
+    def bound(count: int) -> Bound:
         trials = len(played) + unended
         low, high = clopper_pearson(count, trials)[0], clopper_pearson(count + unended, trials)[1]
-        return {"count": count, "low": low, "high": high}
-
-    def bound(happened: Callable[[EpisodeRecord], bool]) -> Bound:
-        return Bound(**bounds(sum(map(happened, played))))
+        return Bound(count=count, low=low, high=high)
 
     counted = pooled_requirements(run.metrics.values())
     requirements = {
-        name: RequirementBound(**bounds(each.in_rate), counts=each.counts, violated=each.violated)
+        name: RequirementBound(counts=each.counts, violated=each.violated, bound=bound(each.in_rate))
         for name, each in counted.items()
     }
     return Drawn.model_validate(
@@ -134,9 +132,9 @@ def drawn(run: FinishedRun) -> Drawn:
             "refused": len(run.records) - len(played) - unended,
             "unended": unended,
             "played": len(played),
-            "contacts": bound(lambda record: record.collision is not None),
-            "failures": bound(lambda record: record.outcome is Outcome.FAILURE),
-            "preventable": bound(preventable),
+            "contacts": bound(sum(record.collision is not None for record in played)),
+            "failures": bound(sum(record.outcome is Outcome.FAILURE for record in played)),
+            "preventable": bound(sum(map(preventable, played))),
             "requirements": requirements,
         }
     )

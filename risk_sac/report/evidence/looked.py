@@ -98,16 +98,16 @@ def _rows(each: Drawn) -> Iterator[list[str]]:
 
 
 def _requirements(each: Drawn) -> Iterator[list[str]]:
-    for name, bound in each.requirements.items():
+    for name, found in each.requirements.items():
         yield [
             each.family,
             TRAFFIC[each.method],
             name,
-            bound.counts,
-            f"{bound.violated} of {each.played}",
-            f"{bound.count} of {each.played}",
-            percent(bound.high, 2),
-            percent(bound.low, 2),
+            found.counts,
+            f"{found.violated} of {each.played}",
+            f"{found.bound.count} of {each.played}",
+            percent(found.bound.high, 2),
+            percent(found.bound.low, 2),
         ]
 
 

@@ -36,13 +36,14 @@ def test_contacts_valid_and_preventable_failures_are_of_the_scenes_that_were_pla
 
 def test_each_requirement_has_bounds_of_its_own(finished):
     found = drawn(run_of(finished, "kkkkvvkr")).requirements
-    assert {name: (each.counts, each.violated, each.count) for name, each in found.items()} == {
+    assert {name: (each.counts, each.violated, each.bound.count) for name, each in found.items()} == {
         "no_contact": ("failure", 0, 0),
         "safe_ttc": ("report", 2, 2),
         "never_fast": ("failure", 2, 2),
     }
-    assert (found["never_fast"].low, found["never_fast"].high) == clopper_pearson(2, 7)
-    assert found["no_contact"].high == clopper_pearson(0, 7)[1]
+    bound = found["never_fast"].bound
+    assert (bound.low, bound.high) == clopper_pearson(2, 7)
+    assert found["no_contact"].bound.high == clopper_pearson(0, 7)[1]
     assert drawn(run_of(finished, "..f.")).requirements == {}  # from before they were counted
 
 

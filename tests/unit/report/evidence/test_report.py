@@ -87,8 +87,8 @@ def test_it_tells_of_each_requirement_what_was_found_and_how_often(spec, finishe
     told = compare(some, [*(finished(run, "kvvk", "k") for run in some.searches()), *fresh], "")
     document = report(told, gathered(told), origin())
     text = markdown(document)
-    assert "| low | sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 [0.150, 0.850] |" in text
-    assert "| low | sac | safe_ttc | report | 2 | – | – | – | 0.500 [0.150, 0.850] |" in text
+    assert "| low | sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 \\[0.150, 0.850\\] |" in text
+    assert "| low | sac | safe_ttc | report | 2 | – | – | – | 0.500 \\[0.150, 0.850\\] |" in text
     assert "| low | random adversaries | never_fast | failure | 1 of 8 | 1 of 8 | 47.07 % | 0.64 % |" in text
     assert "| low | undisturbed | never_fast | failure | 0 of 8 | 0 of 8 | 31.23 % | 0.00 % |" in text
 
