@@ -110,10 +110,7 @@ class StateChange(Record):
 
 
 class Total(Counts):
-    """All runs of one family and method that have begun. Counts are sums over the runs; other figures are means.
-
-    What two runs found alike counts twice.
-    """
+    """All runs of one family and method that have begun: sums of counts, means of other figures."""
 
     family: Family
     method: SearchMethod
@@ -139,7 +136,7 @@ class Total(Counts):
     signatures: Mapping[str, int]
     """Signature → valid violations."""
     conflicts_by_second: list[int]
-    """Valid contacts by the second after the adversaries' release in which the conflict began."""
+    """Valid contacts by the second after the release in which the conflict began."""
     contacts_by_second: list[int]
     """The same by the second of the contact."""
 

@@ -63,14 +63,14 @@ class RequirementCounts(Record):
     counts: str
     """failure | report"""
     violated: int = 0
-    """Episodes in which it was violated after the adversaries' release."""
+    """Episodes that violated it after the adversaries' release."""
     valid: int = 0
-    """Of these, those in which it counts and the violation is valid."""
+    """Of these, the valid ones of a requirement that counts."""
     distinct: int = 0
     preventable: int = 0
     """Distinct violations that the careful driver would have prevented."""
     rate: Real = 0.0
-    """`valid` / episodes; of a requirement that is reported only, `violated` / episodes."""
+    """`valid` / episodes; `violated` / episodes where it is reported only."""
     rate_low: Real = 0.0
     """95 % interval of Wilson."""
     rate_high: Real = 1.0
@@ -82,10 +82,9 @@ class RequirementCounts(Record):
 
 
 class RunMetrics(Counts):
-    """What a run has achieved so far; rates come with their 95 % interval.
+    """What a run has achieved so far; rates come with their 95 % interval."""
 
-    Fields with a default can be read from what was stored before they were counted.
-    """
+    # Fields with a default can be read from what was stored before they were counted.
 
     ecr: Real
     """Effective collision rate: valid contacts / episodes."""
@@ -118,7 +117,7 @@ class RunMetrics(Counts):
     requirements: Mapping[str, RequirementCounts] = {}
     """Requirement → its funnel; empty in what was stored before requirements were counted."""
     conflicts_by_second: tuple[int, ...] = ()
-    """Valid contacts by the second after the adversaries' release in which the conflict began."""
+    """Valid contacts by the second after the release in which the conflict began."""
     contacts_by_second: tuple[int, ...] = ()
     """The same by the second of the contact."""
 

@@ -53,7 +53,7 @@ class Cell(Counts):
     signatures: Mapping[str, int]
     """Signature → valid violations."""
     conflicts_by_second: tuple[int, ...]
-    """Valid contacts by the second after the adversaries' release in which the conflict began."""
+    """Valid contacts by the second after the release in which the conflict began."""
     contacts_by_second: tuple[int, ...]
     """The same by the second of the contact."""
 

@@ -83,8 +83,7 @@ class Table(Record):
     """By family, phase and method, the reference first; none before a run has finished."""
     tests: list[PairedTest]
     headline: list[PairedTest]
-    """Distinct preventable failures within 30 processor seconds: risk-sac-diverse, or the first method, against the
-    others; declared beforehand, so corrected by themselves."""
+    """Distinct preventable failures within 30 processor seconds; declared beforehand, so corrected by themselves."""
     failures: Mapping[FamilyName, Overview]
     """The kinds of failures that all methods have found together."""
     studies: Mapping[FamilyName, Mapping[str, Studied]]

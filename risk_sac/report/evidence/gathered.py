@@ -15,13 +15,13 @@ CRASHED = "sim_crash"  # the reason of an episode that was left out because the 
 
 
 class Bound(Record):
-    """How often something happened, and how often it may happen at most and at least, each with 95 % confidence."""
+    """How often something happened, and 95 % bounds of its rate."""
 
     count: int
     low: float
     """Clopper-Pearson, one-sided."""
     high: float
-    """Clopper-Pearson, one-sided; an episode without an end counts as one in which it happened."""
+    """The same; it happened in an episode without an end."""
 
 
 class RequirementBound(Record):
@@ -51,11 +51,11 @@ class Drawn(Record):
     """All others."""
     contacts: Bound
     failures: Bound
-    """Valid violations of any requirement that counts."""
+    """Of any requirement that counts."""
     preventable: Bound
-    """Those that the careful driver would have prevented."""
+    """By the careful driver."""
     requirements: Mapping[str, RequirementBound]
-    """Empty where requirements were not counted yet."""
+    """Empty for older runs."""
 
 
 class FamilyCoverage(Record):
