@@ -120,7 +120,7 @@ def drawn(run: FinishedRun) -> Drawn:
         low, high = clopper_pearson(count, trials)[0], clopper_pearson(count + unended, trials)[1]
         return Bound(count=count, low=low, high=high)
 
-    counted = pooled_requirements(run.metrics.values())
+    counted = pooled_requirements(list(run.metrics.values()))
     requirements = {
         name: RequirementBound(counts=each.counts, violated=each.violated, bound=bound(each.in_rate))
         for name, each in counted.items()
