@@ -149,7 +149,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             raise SimulationError("the environment has no episode to step; call reset first")
         shares = shares_of(action, self.action_size)
         if self._controlled:
-            self._adversaries.command(shares, self._sim)
+            self._adversaries.command(shares, self._frame, self._sim)
         if self._reflex is not None:
             self._sim.brake(self._reflex.braking(self._frame, self._ego_path(), self._in_sight()))
         before, self._frame = self._frame, self._sim.step()

@@ -249,18 +249,20 @@ def overlapping_pairs(state: Floats) -> list[tuple[int, int]]:
     pairs = [(0, 0) for _ in range(0)]  # an empty list whose type the compiler can tell
     for i in range(state.shape[1]):
         for j in range(i + 1, state.shape[1]):
-            if touches(_pose(state, i), _size(state, i), _pose(state, j), _size(state, j)):
+            if touches(pose_of(state, i), size_of(state, i), pose_of(state, j), size_of(state, j)):
                 pairs.append((i, j))
     return pairs
 
 
 @compiled
-def _pose(state: Floats, actor: int) -> Pose:
+def pose_of(state: Floats, actor: int) -> Pose:
+    """Pose of an actor in a frame's state."""
     return state[X, actor], state[Y, actor], state[HEADING, actor]
 
 
 @compiled
-def _size(state: Floats, actor: int) -> Size:
+def size_of(state: Floats, actor: int) -> Size:
+    """Size of an actor in a frame's state."""
     return Size(state[LENGTH, actor] / 2, state[WIDTH, actor] / 2)
 
 

@@ -5,7 +5,7 @@ Vehicles take (longitudinal acceleration, lateral velocity), pedestrians (accele
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.commands import Walker, clip, taper
+from risk_sac.sim.solid import Others, walks_into
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.sim.vehicle_control import VehicleControl
 from risk_sac.types import LATERAL, SPEED, STEP_S, VX, VY, Floats, Frame
@@ -33,23 +34,40 @@ class PedestrianControl:
     state: Walker
     across_mps2: float = 0.0
 
-    def step(self, drive: float, turn: float) -> Walker:
-        """One step; acceleration and heading rate (clockwise below 0) are shares of what is allowed, -1 to 1."""
+    @property
+    def _stopping(self) -> tuple[float, float, float]:
+        limits = self.limits
+        return limits.walk_brake_mps2, limits.walk_jerk_mps3, limits.walk_disc_mps2 / limits.heading_rate_radps
+
+    def step(self, drive: float, turn: float, others: Others | None = None) -> Walker:
+        """One step; acceleration and heading rate (clockwise below 0) are shares of what is allowed, -1 to 1.
+
+        It keeps clear of others where they are told.
+        """
+        for wanted in ((drive, turn), (-1.0, 0.0)):
+            walker, across_mps2 = self._walk(*wanted)
+            if others is None or not walks_into(*others, (*astuple(walker), across_mps2), self._stopping):
+                break
+        self.state, self.across_mps2 = walker, across_mps2
+        return walker
+
+    def _walk(self, drive: float, turn: float) -> tuple[Walker, float]:
+        """The next state, and the acceleration across."""
         limits, state = self.limits, self.state
-        accel, self.across_mps2 = self._accelerate(drive, turn)
+        accel, across_mps2 = self._accelerate(drive, turn)
         speed = clip(state.speed_mps + accel * STEP_S, 0.0, limits.walk_speed_mps)
         disc = limits.walk_disc_mps2
-        rate = self.across_mps2 / max(state.speed_mps, speed, disc / limits.heading_rate_radps)
+        rate = across_mps2 / max(state.speed_mps, speed, disc / limits.heading_rate_radps)
         turned = rate * STEP_S
         distance, middle = (state.speed_mps + speed) / 2 * STEP_S, state.heading_rad + turned / 2
-        self.state = Walker(
+        walker = Walker(
             x_m=state.x_m + distance * math.cos(middle),
             y_m=state.y_m + distance * math.sin(middle),
             heading_rad=state.heading_rad + turned,
             speed_mps=speed,
             accel_mps2=(speed - state.speed_mps) / STEP_S,
         )
-        return self.state
+        return walker, across_mps2
 
     def _accelerate(self, drive: float, turn: float) -> tuple[float, float]:
         """Acceleration along and across: towards what is wanted on the disc, by at most the jerk."""
@@ -103,18 +121,21 @@ class Adversaries:
         self._order = family.adversaries
         self._ids: tuple[str, ...] = ()
 
-    def command(self, action: Sequence[float], sim: SumoSimulation) -> None:
-        """Sends one joint action, two entries per adversary in the family's order."""
+    def command(self, action: Sequence[float], frame: Frame, sim: SumoSimulation) -> None:
+        """Sends one joint action, two entries per adversary in the family's order; `frame` is the latest."""
         first, second = action[::2], action[1::2]
+        rows = dict(zip(frame.ids, range(len(frame.ids)), strict=True))
         intended = sim.intended_accel()
         vehicles = {}
         for k, (id_, control) in enumerate(self._vehicles.items()):
             place = sim.place(id_)
             if place is not None:
-                vehicles[id_] = control.step(first[k], second[k], *place, intended[id_])
+                others = frame.state, rows[id_]
+                vehicles[id_] = control.step(first[k], second[k], *place, intended[id_], others)
         k = len(self._vehicles)
         walkers = {
-            id_: control.step(first[k + j], second[k + j]) for j, (id_, control) in enumerate(self._pedestrians.items())
+            id_: control.step(first[k + j], second[k + j], (frame.state, rows[id_]))
+            for j, (id_, control) in enumerate(self._pedestrians.items())
         }
         sim.apply(vehicles, walkers)
 

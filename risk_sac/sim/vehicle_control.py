@@ -16,6 +16,7 @@ from risk_sac.scenario.limits import Limits
 from risk_sac.sim.commands import VehicleCommand, clip, taper
 from risk_sac.sim.paths import HEADING, STATION, Along, Path
 from risk_sac.sim.roads import Room
+from risk_sac.sim.solid import AHEAD, CLEAR, Others, drives_into
 from risk_sac.types import STEP_S, Floats
 
 CORRECTION_PER_M = 0.05  # curvature that is left for steering in the tightest bend, and so before a road's edge
@@ -68,6 +69,7 @@ class VehicleControl:
     accel_mps2: float = 0.0
     lateral_mps: float = 0.0
     _bounds: tuple[float, ...] = field(init=False)
+    _stopping: tuple[tuple[float, float, float], ...] = field(init=False)  # on a straight and in a bend
     _path: Path | None = field(init=False, default=None)
     _bends: Floats = field(init=False)  # of that path
     _at_m: float = field(init=False, default=0.0)  # where on it
@@ -75,8 +77,21 @@ class VehicleControl:
 
     def __post_init__(self) -> None:
         self._bounds = tuple(Bounds.of(self.limits))  # passing one by its name costs as much as a step
+        limits = self.limits
+        straight = min(limits.brake_mps2, math.sqrt(limits.grip_mps2**2 - limits.lateral_accel_mps2**2))
+        self._stopping = tuple(
+            (brake, limits.jerk_mps3, limits.lateral_accel_mps2) for brake in (straight, limits.approach_mps2)
+        )
 
-    def step(self, drive: float, steer: float, room: Room, along: Along, intended_mps2: float = 0.0) -> VehicleCommand:
+    def step(
+        self,
+        drive: float,
+        steer: float,
+        room: Room,
+        along: Along,
+        intended_mps2: float = 0.0,
+        others: Others | None = None,
+    ) -> VehicleCommand:
         """One step of 0.1 s.
 
         Args:
@@ -85,16 +100,26 @@ class VehicleControl:
           room: what is left of the road on both sides.
           along: where it is on the path it takes if it does not steer.
           intended_mps2: acceleration that its driver would choose without a command.
+          others: whom it keeps clear of.
         """
         if along.path is not self._path:
             if self._path is not None:
                 self._behind_per_m = float(self._bends[SOON, index(self._bends, self._at_m)])
             self._path, self._bends = along.path, bends(along.path, self.limits)
         self._at_m = along.station_m
-        motion, wanted = (self.speed_mps, self.accel_mps2, self.lateral_mps), (drive, steer, intended_mps2)
-        self.speed_mps, self.accel_mps2, self.lateral_mps = _drive(
-            self._bounds, self._bends, along.station_m, self._behind_per_m, motion, wanted, tuple(room)
-        )
+        bend = self._at_m < BODY_M or bool(self._bends[SOON, index(self._bends, self._at_m)] > NO_BEND_PER_M)
+        stopping = self._stopping[bend]
+        before, sides = (self.speed_mps, self.accel_mps2, self.lateral_mps), tuple(room)
+        for wanted in ((drive, steer, intended_mps2), (drive, 0.0, intended_mps2), (-1.0, 0.0, 0.0)):
+            motion = _drive(self._bounds, self._bends, along.station_m, self._behind_per_m, before, wanted, sides)
+            if others is None:
+                break
+            met = drives_into(
+                *others, along.path, along.station_m, along.offset_m, motion, stopping, self.limits.brake_mps2
+            )
+            if met == CLEAR or (met != AHEAD and wanted[1] == 0.0):
+                break
+        self.speed_mps, self.accel_mps2, self.lateral_mps = motion
         return VehicleCommand(self.speed_mps, self.lateral_mps)
 
 

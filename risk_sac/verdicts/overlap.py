@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.geometry import overlapping_pairs
-from risk_sac.types import HEADING, LENGTH, WIDTH, X, Y
+from risk_sac.jit import compiled
+from risk_sac.types import HEADING, LENGTH, WIDTH, Floats, X, Y
 from risk_sac.verdicts.evidence import Evidence
 
 
@@ -20,13 +21,20 @@ class Overlap(NamedTuple):
 def overlaps_before_contact(evidence: Evidence) -> list[Overlap]:
     """Finds each frame's overlapping bodies; whom the ego touches in the last frame is left out."""
     e = evidence
-    last = len(e.time_s) - 1
-    state = np.zeros((WIDTH + 1, len(e.ids)))
-    state[LENGTH], state[WIDTH] = e.length_m, e.width_m
-    found = []
-    for frame, time_s in enumerate(e.time_s.tolist()):
-        state[X], state[Y], state[HEADING] = e.x_m[frame], e.y_m[frame], e.heading_rad[frame]
+    pairs = _overlaps(e.x_m, e.y_m, e.heading_rad, e.length_m, e.width_m)
+    return [Overlap(float(e.time_s[frame]), e.ids[i], e.ids[j]) for frame, i, j in pairs]
+
+
+@compiled
+def _overlaps(x: Floats, y: Floats, heading: Floats, length: Floats, width: Floats) -> list[tuple[int, int, int]]:
+    """Frame and columns of each overlap; `x`, `y` and `heading` are `T x n`, NaN where an actor has left."""
+    steps, n = x.shape
+    found = [(0, 0, 0) for _ in range(0)]  # an empty list whose type the compiler can tell
+    state = np.zeros((WIDTH + 1, n))
+    state[LENGTH], state[WIDTH] = length, width
+    for frame in range(steps):
+        state[X], state[Y], state[HEADING] = x[frame], y[frame], heading[frame]
         for i, j in overlapping_pairs(state):
-            if i > 0 or frame < last:
-                found.append(Overlap(time_s, e.ids[i], e.ids[j]))
+            if i > 0 or frame < steps - 1:
+                found.append((frame, i, j))
     return found

@@ -16,9 +16,10 @@ from risk_sac.verdicts.definitions import DEFINITIONS
 from risk_sac.verdicts.keeping import NO_RED_LIGHT_ENTRY, ON_CARRIAGEWAY, MetActor, Played, kept_by
 from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, manoeuvre
 from risk_sac.verdicts.offences import ego_offences
+from risk_sac.verdicts.overlap import overlaps_before_contact
 from risk_sac.verdicts.reference import grade
 
-# Of `ARTEFACT_RULES`, those that are about more than a contact.
+# Of `ARTEFACT_RULES`, those that the episode tells; `solid_bodies` is read from its record.
 RULES = ("no_teleport", "inside_limits")
 VIOLATED = {NO_RED_LIGHT_ENTRY: "red light entered", ON_CARRIAGEWAY: "carriageway left"}
 SAME_OFFENCES = {NO_RED_LIGHT_ENTRY: ("red_light",), ON_CARRIAGEWAY: ("off_road", "wrong_direction")}
@@ -72,6 +73,7 @@ def violations_of(
             continue
         index = released + round(result.violated_s / STEP_S)
         verdicts = {rule: artefacts.get(rule, math.inf) > played.frames[index].time_s for rule in RULES}
+        verdicts["solid_bodies"] = not overlaps_before_contact(played.evidence.until(index))
         found.append(_violation(requirement, result, played, gauge, index, verdicts))
     return tuple(sorted(found, key=lambda violation: violation.time_s))
 

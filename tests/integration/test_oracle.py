@@ -47,7 +47,7 @@ def episode(sim: SumoSimulation, seed: int) -> Iterator[Frame]:
     for _ in range(LOW.horizon_steps):
         action[::2] = np.clip(0.95 * action[::2] + 0.3 * generator.standard_normal(len(LOW.adversaries)), -1, 1)
         action[0] = -1.0
-        adversaries.command(action.tolist(), sim)
+        adversaries.command(action.tolist(), frame, sim)
         frame = sim.step()
         yield frame
 

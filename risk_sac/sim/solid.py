@@ -1,0 +1,194 @@
+"""Keeps adversaries out of other bodies than the ego's.
+
+SUMO's checks are off for vehicles under command, and pedestrians are points of our own. A command is taken if its
+adversary could still stop afterwards before it reaches another body; where it could not, it steers straight or brakes.
+Another vehicle on the same course may brake as hard as the adversary; everything else keeps its velocity.
+"""
+
+import math
+
+import numpy as np
+
+from risk_sac.geometry import Pose, Size, pose_of, size_of, touches
+from risk_sac.jit import compiled
+from risk_sac.sim.commands import clip, taper
+from risk_sac.sim.paths import COS, SIN, STATION
+from risk_sac.sim.paths import HEADING as PATH_HEADING
+from risk_sac.types import HEADING, LENGTH, SPEED, STEP_S, VX, VY, WIDTH, Floats, X, Y
+
+MARGIN_M = 0.15  # that is kept on every side: the foreseen poses are those of a body that follows its path exactly
+WALKER_MARGIN_M = 0.05  # the same of a pedestrian
+SAME_WAY_COS = 0.7  # headings less than 45 degrees apart
+SAME_LANE_M = 0.5  # a follower's offset, at most
+ACROSS_MPS = 0.05  # lateral speed from which a vehicle moves into what is beside it
+REACTION_S = 0.5  # of what is behind
+BUILD_UP_S = 0.5  # of a braking, and a step
+LONGEST_STEPS = 40  # of a braking
+
+Others = tuple[Floats, int]  # a frame's state, and the own column in it
+CLEAR, AHEAD, LEFT, RIGHT = 0, 1, 2, 3
+# Rows of what is foreseen of the others.
+SPEED_MPS = 0  # NaN of those that need no look
+BRAKES_S = 1  # after which time it brakes; infinite if it keeps its velocity
+ACROSS_M = 2  # how far to the left of the adversary it is
+
+
+@compiled
+def drives_into(
+    state: Floats,
+    own: int,
+    path: Floats,
+    station_m: float,
+    offset_m: float,
+    motion: tuple[float, float, float],
+    braking: tuple[float, float, float],
+    hardest_mps2: float,
+) -> int:
+    """Where a vehicle that takes a step and then brakes to a stand meets another body than the ego's.
+
+    Args:
+      state: of a frame, `rows x n`.
+      own: its column.
+      path: the one it takes if it does not steer.
+      station_m: of its front bumper on the path.
+      offset_m: of its middle from the path, positive to the left.
+      motion: speed, acceleration and lateral speed of the step.
+      braking: how it stops: its braking, its jerk, and how fast its lateral speed falls.
+      hardest_mps2: how hard others on its course may brake.
+
+    Returns:
+      `CLEAR`; `AHEAD`; `LEFT` or `RIGHT` if what is beside or behind there runs into it because it moves across.
+    """
+    speed, accel, lateral = motion
+    brake, jerk, lateral_accel = braking
+    before, half_length = state[SPEED, own], state[LENGTH, own] / 2
+    size = Size(half_length + MARGIN_M, state[WIDTH, own] / 2 + MARGIN_M)
+    foreseen = _foresee(state, own, max(before, speed), brake)
+    if foreseen.shape[1] == 0:
+        return CLEAR
+    segment = _segment(path, 0, station_m)
+    tilt = state[HEADING, own] - path[PATH_HEADING, segment]
+    side = RIGHT if lateral < -ACROSS_MPS else LEFT if lateral > ACROSS_MPS else CLEAR  # that it moves to
+    found = CLEAR
+    for step in range(1, LONGEST_STEPS):
+        station_m += (before + speed) / 2 * STEP_S
+        offset_m += lateral * STEP_S
+        segment = _segment(path, segment, station_m)
+        ahead_m, cos, sin = station_m - path[STATION, segment], path[COS, segment], path[SIN, segment]
+        heading = path[PATH_HEADING, segment] + tilt
+        x = path[0, segment] + ahead_m * cos - offset_m * sin - half_length * math.cos(heading)
+        y = path[1, segment] + ahead_m * sin + offset_m * cos - half_length * math.sin(heading)
+        where = _meets(state, foreseen, (x, y, heading), size, step * STEP_S, hardest_mps2, side)
+        if where == AHEAD:
+            return AHEAD
+        found = max(found, where)
+        if speed <= 0.0:
+            break
+        accel = max(accel - jerk * STEP_S, -brake, -taper(speed, jerk))
+        before, speed = speed, max(speed + accel * STEP_S, 0.0)
+        lateral = math.copysign(max(abs(lateral) - lateral_accel * STEP_S, 0.0), lateral)
+    return found
+
+
+@compiled
+def walks_into(state: Floats, own: int, walk: tuple[float, ...], braking: tuple[float, float, float]) -> bool:
+    """Whether a pedestrian that takes a step and then stops walks into another body than the ego's.
+
+    Args:
+      state: of a frame, `rows x n`.
+      own: its column.
+      walk: x, y, heading, speed, and acceleration along and across it after the step.
+      braking: how it stops: its braking, its jerk, and the speed below which it turns no faster.
+    """
+    x, y, heading, speed, along, across = walk
+    brake, jerk, slow = braking
+    half = math.hypot(state[LENGTH, own], state[WIDTH, own]) / 2 + WALKER_MARGIN_M  # however it turns
+    foreseen = _foresee(state, own, speed, brake)
+    if foreseen.shape[1] == 0:
+        return False
+    for step in range(1, LONGEST_STEPS):
+        if _meets(state, foreseen, (x, y, heading), Size(half, half), step * STEP_S, brake, CLEAR) == AHEAD:
+            return True
+        if speed <= 0.0:
+            break
+        change = min(brake, taper(speed, jerk)) + along
+        share = min(jerk * STEP_S / max(math.hypot(change, across), jerk * STEP_S), 1.0)
+        along, across = along - share * change, across - share * across
+        after = max(speed + along * STEP_S, 0.0)
+        turned = across / max(speed, after, slow) * STEP_S
+        x += (speed + after) / 2 * STEP_S * math.cos(heading + turned / 2)
+        y += (speed + after) / 2 * STEP_S * math.sin(heading + turned / 2)
+        heading, speed = heading + turned, after
+    return False
+
+
+@compiled
+def _segment(path: Floats, first: int, station_m: float) -> int:
+    """The segment of a path at a station, from the first one on."""
+    while first + 2 < path.shape[1] and path[STATION, first + 1] <= station_m:
+        first += 1
+    return first
+
+
+@compiled
+def _foresee(state: Floats, own: int, speed: float, brake_mps2: float) -> Floats:
+    """What the others are expected to do, `rows x n`; `rows x 0` if none can be met before the adversary has stopped.
+
+    One that the adversary is inside of is left out.
+    """
+    stops_s, cos, sin = speed / brake_mps2 + BUILD_UP_S, math.cos(state[HEADING, own]), math.sin(state[HEADING, own])
+    foreseen = np.full((3, state.shape[1]), np.nan)
+    near = 0
+    for other in range(1, state.shape[1]):
+        bodies_m = (state[LENGTH, own] + state[WIDTH, own] + state[LENGTH, other] + state[WIDTH, other]) / 2
+        dx, dy = state[X, other] - state[X, own], state[Y, other] - state[Y, own]
+        reach_m = bodies_m + 2 * MARGIN_M + (speed + state[SPEED, other]) * stops_s
+        if other == own or dx * dx + dy * dy > reach_m * reach_m:
+            continue
+        if touches(pose_of(state, own), size_of(state, own), pose_of(state, other), size_of(state, other)):
+            continue
+        near += 1
+        foreseen[SPEED_MPS, other] = math.hypot(state[VX, other], state[VY, other])
+        foreseen[ACROSS_M, other] = dy * cos - dx * sin
+        foreseen[BRAKES_S, other] = math.inf
+        if math.cos(state[HEADING, other] - state[HEADING, own]) > SAME_WAY_COS:
+            foreseen[BRAKES_S, other] = 0.0 if dx * cos + dy * sin > 0.0 else REACTION_S
+    return foreseen if near else foreseen[:, :0]
+
+
+@compiled
+def _meets(
+    state: Floats, foreseen: Floats, pose: Pose, size: Size, after_s: float, hardest_mps2: float, side: int
+) -> int:
+    """Where the adversary, at `pose` after a time, meets another for the first time.
+
+    What comes from behind keeps its own distance, unless it is on the side to which the adversary moves.
+    """
+    found = CLEAR
+    for other in range(1, state.shape[1]):
+        speed = foreseen[SPEED_MPS, other]
+        if math.isnan(speed):
+            continue
+        braking_s = min(max(after_s - foreseen[BRAKES_S, other], 0.0), speed / hardest_mps2)
+        gone_s = min(after_s, foreseen[BRAKES_S, other])
+        if braking_s > 0.0:
+            gone_s += braking_s * (1.0 - hardest_mps2 * braking_s / (2 * speed))
+        x, y = state[X, other] + gone_s * state[VX, other], state[Y, other] + gone_s * state[VY, other]
+        half = size_of(state, other)
+        if not touches(pose, size, (x, y, state[HEADING, other]), half):
+            continue
+        # The point of the other body that is nearest to the adversary's centre.
+        cos, sin = math.cos(state[HEADING, other]), math.sin(state[HEADING, other])
+        along, beside = (pose[0] - x) * cos + (pose[1] - y) * sin, (pose[1] - y) * cos - (pose[0] - x) * sin
+        along, beside = (
+            clip(along, -half.half_length, half.half_length),
+            clip(beside, -half.half_width, half.half_width),
+        )
+        x, y = x + along * cos - beside * sin, y + along * sin + beside * cos
+        if (x - pose[0]) * math.cos(pose[2]) + (y - pose[1]) * math.sin(pose[2]) > 0.0:
+            return AHEAD
+        foreseen[SPEED_MPS, other] = math.nan  # how they meet first counts
+        across_m = foreseen[ACROSS_M, other]
+        if abs(across_m) > SAME_LANE_M and side == (LEFT if across_m > 0.0 else RIGHT):
+            found = side
+    return found
