@@ -31,7 +31,7 @@ class Vehicle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Episode:
-    """What an ego gets before it drives."""
+    """Data that an ego gets before it drives."""
 
     seed: int  # of all chance in the ego: the same seed and the same perceived frames have to give the same commands
     net: str  # the road network's file
@@ -41,7 +41,9 @@ class Episode:
 
 
 class Perceived(NamedTuple):
-    """What an ego knows at one moment. Every array has `n` columns, of which the first is the ego itself.
+    """Perception of an ego at one moment.
+
+    Every array has `n` columns, of which the first is the ego itself.
 
     Rows of `state` are those of `risk_sac.types`; LATERAL, ACCEL and OFFSET of others, which no sensor measures, are
     NaN. An actor that is out of sight, but remembered, is where the ego expects it.
@@ -59,14 +61,14 @@ class Perceived(NamedTuple):
 
 
 class Control(NamedTuple):
-    """A command: how hard to speed up, negative to brake, and where to turn the front wheels to."""
+    """Command: acceleration, negative to brake, and angle of the front wheels."""
 
     accel_mps2: float
     steering_rad: float = 0.0  # positive to the left
 
 
 class Trajectory(NamedTuple):
-    """A command: where to be, and how fast, at times from now on; `k` of each, two or more, the times rising."""
+    """Command: places and speeds at `k` rising times from now on, two or more."""
 
     time_s: Floats
     x_m: Floats

@@ -130,6 +130,8 @@ class Drivers:
     def tell(self, reading: Reading, belief: Belief, braking_mps2: float, moved: MovedEgo | None = None) -> None:
         """Tells all drivers what to do in the next step.
 
+        SUMO's models see what is on their lanes. Where the ego's body is elsewhere, drivers look out for it themselves.
+
         Args:
           reading: the latest.
           belief: the ego's.
@@ -190,7 +192,7 @@ class Drivers:
 
 
 def _with_ego(walks: Bools) -> Bools:
-    """Which actors drivers look out for where SUMO's models do not see the ego."""
+    """Adds the ego to the actors that drivers look out for."""
     candidates = walks.copy()
     candidates[0] = True
     return candidates

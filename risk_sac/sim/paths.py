@@ -57,9 +57,9 @@ class Way(NamedTuple):
 
 
 def way_of(route: Sequence[str], lane: str) -> Way:
-    """The way from the start of `lane` along `route`; it ends where no lane of an edge leads to the next edge.
+    """Returns the way from the start of `lane` along `route`.
 
-    The simulation must have loaded the net.
+    It ends where no lane of an edge leads to the next edge. The simulation must have loaded the net.
     """
     lanes = _lanes_ahead(route, lane)
     lines = [_line(route, lane) for lane in lanes]
@@ -74,7 +74,7 @@ def way_of(route: Sequence[str], lane: str) -> Way:
 
 
 def _controlled() -> dict[tuple[str, str], tuple[str, int]]:
-    """Signal and index of its letter for each pair of lanes that a signal connects, the second in the junction."""
+    """Maps each lane, and the lane behind its stop line, to a signal and the index of its letter."""
     return {
         (before, via or after): (signal, index)
         for signal in libsumo.trafficlight.getIDList()
@@ -84,7 +84,7 @@ def _controlled() -> dict[tuple[str, str], tuple[str, int]]:
 
 
 def leading_lane(route: Sequence[str], lane: str) -> str:
-    """The nearest lane of the lane's edge that leads on along the route, itself first; itself if none does."""
+    """Returns the nearest lane of the same edge that leads on along the route; the lane itself if none does."""
     edge, _, index = lane.rpartition("_")
     beside = sorted(range(libsumo.edge.getLaneNumber(edge)), key=lambda other: abs(other - int(index)))
     return next((other for other in (f"{edge}_{i}" for i in beside) if leads_on(route, other)), lane)
@@ -103,7 +103,7 @@ def leads_on(route: Sequence[str], lane: str) -> bool:
 
 
 def _line(route: Sequence[str], lane: str) -> Floats:
-    """The middle of a lane, `points x 2`, which leads over to its `leading_lane` at the end."""
+    """Returns the middle of a lane, `points x 2`, which leads over to its `leading_lane` at the end."""
     line, leading = np.array(libsumo.lane.getShape(lane)), leading_lane(route, lane)
     if leading == lane:
         return line
@@ -117,7 +117,7 @@ def _line(route: Sequence[str], lane: str) -> Floats:
 
 
 def _cut(line: Floats, station_m: float) -> tuple[Floats, Floats]:
-    """The parts of a line, `points x 2`, before and behind a station."""
+    """Cuts a line, `points x 2`, at a station."""
     stations = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))))
     at = [np.interp(station_m, stations, line[:, 0]), np.interp(station_m, stations, line[:, 1])]
     return np.vstack((line[stations < station_m], at)), np.vstack((at, line[stations > station_m]))

@@ -1,4 +1,4 @@
-"""Pilots, which drive the ego in place of SUMO's models, and how SUMO is told where it is.
+"""Drives the ego by a pilot in place of SUMO's models, and has SUMO put it there.
 
 SUMO maps such an ego onto the nearest lane along its route, so that its drivers follow it and yield to it. Where the
 whole body is beside these lanes, on an oncoming lane or off the road, SUMO keeps it where it is, on no lane.
@@ -81,7 +81,10 @@ class MovedEgo:
         libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, 90.0 - math.degrees(heading), ROUTE_OR_NOWHERE)
 
     def settle(self) -> None:
-        """After the step: SUMO derives a speed from the way along the lane, 0 where a lane begins. Followers see it."""
+        """Finds the ego after a step of SUMO, and corrects its speed there.
+
+        SUMO derives a speed from the way along the lane, 0 where a lane begins; followers go by it.
+        """
         libsumo.vehicle.setPreviousSpeed(self._vehicle, self.motion.speed_mps)
         self._find(libsumo.vehicle.getLaneID(self._vehicle))
 
@@ -126,7 +129,7 @@ def _placed(
     length_m: float,
     width_m: float,
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Where a body is on a path near a station.
+    """Locates a body on a path near a station.
 
     Returns:
       Station and offset of the front bumper, its place, the lateral speed, and how far the body reaches to the left and

@@ -42,7 +42,7 @@ COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GRE
 
 
 class EgoTold(NamedTuple):
-    """What SUMO would tell of an ego that a pilot drives."""
+    """State of an ego that a pilot drives, in SUMO's terms."""
 
     front_x_m: float
     front_y_m: float
@@ -139,7 +139,7 @@ class Reader:
         return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, self._drives, self._walks, near)
 
     def _ahead(self, ego: EgoTold | None) -> tuple[str, float]:
-        """Letter of the signal ahead of the ego, and the distance to its stop line; without one "" and inf."""
+        """Returns the letter of the ego's signal and the distance to its stop line; "" and inf without one."""
         if self._signal is None:
             return "", math.inf
         if ego is not None:

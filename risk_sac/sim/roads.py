@@ -16,7 +16,7 @@ ROUNDED_M = 0.05  # by which a lane's length may differ from that of its line wi
 
 
 class Room(NamedTuple):
-    """Lateral room on a road up to the edges of the drivable lanes: from a vehicle's sides, or a lane's middle."""
+    """Lateral room up to the edges of the drivable lanes: from a vehicle's sides, or from a lane's middle."""
 
     left_m: float
     right_m: float
@@ -37,12 +37,12 @@ class Roads:
             self._way, self._room, self._stretch = cache(way_of), cache(_room), cache(_stretch)
 
     def along(self, vehicle: str) -> Along:
-        """Where a vehicle is on its path."""
+        """Locates a vehicle on its path."""
         lane = libsumo.vehicle.getLaneID(vehicle)
         return self._along(vehicle, lane, libsumo.vehicle.getLateralLanePosition(vehicle))
 
     def way(self, vehicle: str, lane: str) -> Way:
-        """The way from the start of a lane along a vehicle's route."""
+        """Returns the way from the start of a lane along a vehicle's route."""
         return self._way(self._routes[vehicle], lane)
 
     def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
@@ -55,7 +55,7 @@ class Roads:
         return x, y
 
     def place(self, vehicle: str, offset_m: float, width_m: float) -> tuple[Room, Along]:
-        """How far a vehicle may move sideways, and where it is on its path.
+        """Returns how far a vehicle may move sideways, and where it is on its path.
 
         Only lanes that its route continues from count: SUMO halts a vehicle at the end of any other. `offset_m` is that
         of its centre from its lane's, positive to the left.
@@ -66,15 +66,15 @@ class Roads:
         return Room(left_m + spare - offset_m, right_m + spare + offset_m), self._along(vehicle, lane, offset_m)
 
     def room(self, vehicle: str, lane: str) -> Room:
-        """Room from a lane's middle to the edges of the lanes that lead on along a vehicle's route."""
+        """Returns the room from a lane's middle to the edges of the lanes that lead on along a vehicle's route."""
         return self._room(self._routes[vehicle], lane)
 
     def _along(self, vehicle: str, lane: str, offset_m: float) -> Along:
-        """Where a vehicle is on its path, whose lane is known."""
+        """Locates a vehicle on its path, given its lane."""
         return Along(self.way(vehicle, lane).path, self.station_m(vehicle, lane), offset_m)
 
     def station_m(self, vehicle: str, lane: str) -> float:
-        """How far a vehicle is along its lane.
+        """Returns how far a vehicle is along its lane, m.
 
         SUMO counts in lengths of the lane, which are those of its edge; on a bend the outer lanes are drawn longer.
         """
@@ -89,7 +89,7 @@ def _stretch(lane: str) -> float:
 
 
 def _room(route: tuple[str, ...], lane: str) -> Room:
-    """Room from a lane's middle to the edges of the lanes beside it that lead on along `route`."""
+    """Returns the room from a lane's middle to the edges of the lanes beside it that lead on along `route`."""
     edge, _, index = lane.rpartition("_")
     widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
     own, half_m = int(index), libsumo.lane.getWidth(lane) / 2
@@ -98,5 +98,5 @@ def _room(route: tuple[str, ...], lane: str) -> Room:
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
-    """Width of a lane, m; 0 if cars may not use it or it does not lead to the route's next edge."""
+    """Returns a lane's width, m; 0 if cars may not use it or it does not lead to the route's next edge."""
     return float(libsumo.lane.getWidth(lane)) if leads_on(route, lane) else 0.0

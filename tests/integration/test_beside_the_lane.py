@@ -86,16 +86,22 @@ def test_who_drives_past_an_ego_in_the_ditch_does_not_mind_it(sim: SumoSimulatio
 
 
 @pytest.mark.parametrize("y_m", [1.65, 0.0], ids=["on the oncoming lane", "half over the line"])
-def test_who_comes_towards_an_ego_on_its_lane_stops(sim: SumoSimulation, pilot: Told, y_m: float) -> None:
-    pilot.motion = lambda time_s: Motion(150.0, y_m, 0.0, 0.0)
+def test_who_comes_towards_an_ego_on_its_lane_stops_until_the_ego_is_back(
+    sim: SumoSimulation, pilot: Told, y_m: float
+) -> None:
+    back_s = 9.0
+    pilot.motion = lambda time_s: Motion(150.0, y_m if time_s < back_s else -1.65, 0.0, 0.0)
     layout = replace(
         MIXED,
         ego=car("ego", ("e1", "e2"), 2, 152.0, 0.0),
         vehicles=tuple(car(f"o{lane}", ("w1",), lane, 70.0, 12.0) for lane in (1, 2)),  # none may pass on the other
     )
-    frames = play(sim, layout, 100)
+    frames = play(sim, layout, 140)
     assert not any(relative_view(frame).overlap.any() for frame in frames)
-    assert frames[-1].speed_mps[frames[-1].ids.index("o2")] < 0.1 or frames[-1].x_m[2] < 145.0
+    meets = frames[0].ids.index("o2")
+    x_m = [frame.x_m[meets] for frame in frames if "o2" in frame.ids]
+    assert min(x_m[: round(back_s / STEP_S)]) > 150.0
+    assert min(x_m) < 140.0
 
 
 @pytest.mark.parametrize("beside_m", [2.0, 6.0, 20.0])
