@@ -84,6 +84,8 @@ class Campaign(CampaignSummary):
     """A campaign with its runs, in the order they are queued, and what was posted."""
 
     runs: list[Run]
+    requirements: Mapping[str, RequirementCounts] = {}
+    """Requirement → its funnel, summed over the searches."""
     spec: CampaignSpec
 
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from risk_sac.config import METHODS
+from risk_sac.metrics.requirements import pooled_requirements
 from risk_sac.records import Campaign, CampaignSummary, Progress, RunMetrics, State
 from service.store.stored import StoredCampaign, StoredRun
 from service.store.tables import TALLIED
@@ -18,7 +19,10 @@ LEARNING = {name for name, method in METHODS.items() if method.learns}
 
 def campaign_body(campaign: StoredCampaign, workers: int) -> Campaign:
     """A campaign in full; `workers` as `progress` has it."""
-    return Campaign(**dict(summary_body(campaign, workers)), runs=campaign.runs, spec=campaign.spec)
+    pooled = pooled_requirements([run.metrics for run in campaign.searches if run.metrics is not None])
+    return Campaign(
+        **dict(summary_body(campaign, workers)), runs=campaign.runs, requirements=pooled, spec=campaign.spec
+    )
 
 
 def summary_body(campaign: StoredCampaign, workers: int) -> CampaignSummary:

@@ -1,6 +1,6 @@
 /** Names and numbers beside the bodies, placed so that they do not cover each other. */
 
-import { contactOf } from "./contact";
+import { placeOf } from "./moment";
 import { dangerousAt, marginsAt, ttcAt } from "./risk";
 import { pixelX, pixelY, present, seen, type Scene } from "./scene";
 
@@ -81,7 +81,7 @@ function drawLabel(scene: Scene, i: number, count: number, sides: Sides): number
   return count;
 }
 
-/** Bodies that matter, the contact, and what stands in the corners. */
+/** Bodies that matter, the moment, and what stands in the corners. */
 function reserved(scene: Scene): number {
   const { recording, poses, camera, view } = scene;
   take(0, 0, 0, 130, 52);
@@ -89,7 +89,7 @@ function reserved(scene: Scene): number {
   take(2, 0, view.height - 36, 190, view.height);
   let count = 3;
   if (scene.original) {
-    const [x, y] = contactOf(scene);
+    const [x, y] = placeOf(scene);
     const [px, py] = [pixelX(scene, x), pixelY(scene, y)];
     take(count++, px - 8, py - 8, px + 8, py + 8);
   }

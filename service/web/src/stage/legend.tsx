@@ -2,16 +2,16 @@
 
 import { PART_COLOURS, type Colour } from "./colours";
 import { useInk } from "./ink";
-import type { Part } from "./recording";
+import type { Part, Recording } from "./recording";
 
 const PARTS: [Part, string][] = [
   ["ego", "ego"],
-  ["striker", "striker"],
+  ["striker", ""],
   ["adversary", "other adversary"],
   ["background", "background"],
 ];
 
-export function Legend() {
+export function Legend({ moment }: { moment: Recording["moment"] }) {
   const ink = useInk();
   const box = (colour: Colour, part: Part | "hidden") => (
     <svg width="26" height="14" aria-hidden="true">
@@ -25,7 +25,7 @@ export function Legend() {
     <ul class="stage-legend small" aria-label="Legend">
       {PARTS.map(([part, name]) => (
         <li>
-          {box(PART_COLOURS[part], part)} {name}
+          {box(PART_COLOURS[part], part)} {name || (moment === "contact" ? "striker" : "nearest road user")}
         </li>
       ))}
       <li>{box("--background-car", "hidden")} not seen by the ego</li>
@@ -34,7 +34,7 @@ export function Legend() {
           <path d="M4 4 10 10M10 4 4 10" stroke={ink["--text"]} stroke-width="1.5" />
           <circle cx="7" cy="7" r="6" fill="none" stroke={ink["--text"]} stroke-width="1.2" />
         </svg>{" "}
-        contact
+        {moment}
       </li>
       <li>
         <svg width="22" height="12" aria-hidden="true">

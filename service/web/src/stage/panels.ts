@@ -1,6 +1,7 @@
 /** What the plots below a stage show of a recording: a panel for each kind of measurement. */
 
 import { words } from "../ui/text";
+import { isContact, requirementOf } from "../ui/violations";
 import type { Colour } from "./colours";
 import type { Recording } from "./recording";
 import { TTC_CAP_S } from "./risk";
@@ -28,11 +29,14 @@ export interface Panel {
 }
 
 const SERIES: Colour[] = ["--series-1", "--series-3", "--series-4", "--series-5", "--series-6", "--series-2"];
+const BOLD = 2.2;
 export const DASHES = { striker: [6, 3], other: [2, 3] };
 
 export function panelsOf(recording: Recording): Panel[] {
   const { series, striker } = recording;
+  const violated = requirementCurve(recording);
   return [
+    ...(violated ? [violated] : []),
     { title: "Speed", unit: "m/s", curves: both(recording, series.speed_mps) },
     { title: "Acceleration", unit: "m/s²", curves: both(recording, series.accel_mps2), zero: true },
     ...(striker < 0 ? [] : [distance(recording), timeToCollision(recording)]),
@@ -63,20 +67,30 @@ function timeToCollision({ time_s, series, striker }: Recording): Panel {
   return { title: "Time to collision", unit: `s; ${TTC_CAP_S}: no collision course`, curves: [curve], range: [0, TTC_CAP_S * 1.04] };
 }
 
-function requirements({ time_s, series }: Recording): Panel {
+/** The requirement that was violated without contact, by itself: of all of them, it is the one to look at. */
+function requirementCurve({ time_s, series, violation }: Recording): Panel | null {
+  const name = requirementOf(violation);
+  const at = series.requirements.indexOf(name);
+  if (isContact(violation) || at < 0) return null;
+  const curve: Curve = { name: "robustness", time_s, values: column(series.robustness, at), colour: "--bad", width: BOLD };
+  return { title: `${words(name)}, violated below 0`, unit: "in scales", curves: [curve], zero: true };
+}
+
+function requirements({ time_s, series, violation }: Recording): Panel {
   const curves: Curve[] = series.requirements.map((name, i) => ({
     name: words(name),
+    width: name === requirementOf(violation) ? BOLD : undefined,
     time_s,
     values: column(series.robustness, i),
     colour: SERIES[i % SERIES.length]!,
     dash: i % 2 === 0 ? undefined : DASHES.striker,
   }));
   curves.push(softMinimum({ time_s, series } as Recording, "soft minimum", "--text"));
-  return { title: "Requirements, broken below 0", unit: "", curves, zero: true };
+  return { title: "Requirements, violated below 0", unit: "", curves, zero: true };
 }
 
 export function softMinimum({ time_s, series }: Recording, name: string, colour: Colour, dash?: number[]): Curve {
-  return { name, time_s, values: series.soft_min, colour, dash, width: 2.2 };
+  return { name, time_s, values: series.soft_min, colour, dash, width: BOLD };
 }
 
 /** Each adversary has two: drive and steer. The striker's are bold. */

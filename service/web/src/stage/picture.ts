@@ -1,7 +1,7 @@
 /** One picture of the stage, from the ground up. */
 
 import { drawBodies } from "./bodies";
-import { drawContact } from "./contact";
+import { drawMoment } from "./moment";
 import { roundLength } from "./geometry";
 import { drawLabels, signed, type Sides } from "./labels";
 import { drawPaths } from "./paths";
@@ -16,7 +16,7 @@ export function drawPicture(scene: Scene, sides: Sides): void {
   drawGround(scene);
   drawShade(scene);
   drawPaths(scene);
-  drawContact(scene);
+  drawMoment(scene);
   drawSightLines(scene);
   drawRisk(scene);
   drawBodies(scene);
@@ -53,7 +53,8 @@ function drawTime({ ctx, time_s, ink, recording }: Scene): void {
   halo(ctx, ink["--ground"], `${signed(time_s, 2)} s`, 14, 26);
   ctx.font = "12px system-ui, sans-serif";
   ctx.fillStyle = ink["--faint"];
-  halo(ctx, ink["--ground"], ended ? "the recording ended with the contact" : Math.abs(time_s) < 0.005 ? "at the contact" : time_s < 0 ? "to the contact" : "after the contact", 14, 43);
+  const when = ended ? "the recording has ended" : `${Math.abs(time_s) < 0.005 ? "at" : time_s < 0 ? "to" : "after"} the ${recording.moment}`;
+  halo(ctx, ink["--ground"], when, 14, 43);
   ctx.restore();
 }
 

@@ -11,8 +11,8 @@ import type { Mark } from "./transport";
 
 const HEIGHT = 150;
 const FONT = "11px system-ui, sans-serif";
-const MARK_COLOURS: Record<Mark["kind"], Colour> = { release: "--faint", conflict: "--warn", contact: "--text" };
-const MARK_DASHES: Record<Mark["kind"], number[]> = { release: [2, 3], conflict: [6, 3], contact: [] };
+const MARK_COLOURS: Record<Mark["kind"], Colour> = { release: "--faint", conflict: "--warn", moment: "--text" };
+const MARK_DASHES: Record<Mark["kind"], number[]> = { release: [2, 3], conflict: [6, 3], moment: [] };
 
 interface Props {
   panels: Panel[];

@@ -1,16 +1,20 @@
-/** A failure's series as it is played: flat arrays, and time counted from the contact. */
+/** A failure's series as it is played: flat arrays, and time counted from the contact or the violation. */
 
 import type { Body } from "../api/types";
+import { isContact, type Collision, type Violation } from "../ui/violations";
 
 export type Series = Body<"Series">;
-export type Collision = Body<"Collision">;
 export type Part = "ego" | "striker" | "adversary" | "background";
 
 export interface Recording {
   series: Series;
+  /** What names the failure. */
+  violation: Collision | Violation;
+  /** What happened at 0 s. */
+  moment: "contact" | "violation";
   steps: number;
   actors: number;
-  /** Negative before the contact. */
+  /** Negative before the moment. */
   time_s: Float64Array;
   ids: string[];
   parts: Part[];
@@ -21,7 +25,7 @@ export interface Recording {
   x_m: Float64Array;
   y_m: Float64Array;
   heading_rad: Float64Array;
-  /** Column of who touched the ego; -1 if the recording lacks it. */
+  /** Column of who touched the ego, or mattered most to it; -1 if the recording lacks it, or there is none. */
   striker: number;
   /** When the adversaries were handed to the policy. */
   released_s: number;
@@ -31,18 +35,20 @@ export interface Recording {
 
 /**
  * @param series of the failure or of its twin.
- * @param collision of the failure; a twin is timed by it too.
+ * @param violation that names the failure; a twin is timed by it too.
  */
-export function recordingOf(series: Series, collision: Collision): Recording {
+export function recordingOf(series: Series, violation: Collision | Violation): Recording {
   const actors = series.ids.length;
-  const striker = series.ids.indexOf(collision.other_id);
-  const after = collision.time_s ?? 0; // the contact counts from the release
+  const striker = violation.other_id === null ? -1 : series.ids.indexOf(violation.other_id);
+  const after = violation.time_s ?? 0; // counts from the release
   const zero = series.released_s + after;
   const time_s = Float64Array.from(series.time_s, (time) => (time ?? Number.NaN) - zero);
-  const judged = collision.judgement?.conflict_s;
+  const judged = isContact(violation) ? violation.judgement?.conflict_s : null;
   const conflict_s = judged === null || judged === undefined ? null : judged - after;
   return {
     series,
+    violation,
+    moment: isContact(violation) ? "contact" : "violation",
     steps: time_s.length,
     actors,
     time_s,

@@ -10,11 +10,12 @@ import type { Layer, Layers } from "./scene";
 import type { Mark } from "./transport";
 
 const BEFORE_S = 1; // of the conflict: where a replay opens, and what the camera fits
+const AFTER_S = 1; // of the moment: what the camera fits still
 
-export function marksOf({ released_s, conflict_s }: Recording): Mark[] {
+export function marksOf({ released_s, conflict_s, moment }: Recording): Mark[] {
   const marks: Mark[] = [{ time_s: released_s, name: "Release", kind: "release" }];
   if (conflict_s !== null) marks.push({ time_s: conflict_s, name: "Conflict", kind: "conflict" });
-  return [...marks, { time_s: 0, name: "Contact", kind: "contact" }];
+  return [...marks, { time_s: 0, name: moment === "contact" ? "Contact" : "Violation", kind: "moment" }];
 }
 
 /** Shortly before it becomes critical. */
@@ -28,7 +29,7 @@ export function conflictBounds(recording: Recording): Bounds | null {
   const { actors, striker, time_s, x_m, y_m } = recording;
   const points: [number, number][] = [];
   time_s.forEach((time, step) => {
-    if (time < from) return;
+    if (time < from || time > AFTER_S) return;
     for (const actor of striker < 0 ? [0] : [0, striker]) points.push([x_m[step * actors + actor]!, y_m[step * actors + actor]!]);
   });
   return boundsOf(points);

@@ -4,7 +4,7 @@ import type { Camera, View } from "./camera";
 import { projectX, projectY } from "./camera";
 import type { Ink } from "./colours";
 import type { Instant, Poses } from "./interpolate";
-import type { Collision, Recording } from "./recording";
+import type { Recording } from "./recording";
 import type { RoadPaths } from "./roads";
 
 export const LAYERS = ["sight", "risk", "trails", "labels"] as const;
@@ -27,7 +27,6 @@ export interface Scene {
   ink: Ink;
   layers: Layers;
   recording: Recording;
-  collision: Collision;
   /** Whether this is the failure itself and no twin of it. */
   original: boolean;
   sensor: Sensor | null;

@@ -7,7 +7,7 @@ import { keepDrawn } from "./drawn";
 import { useInk } from "./ink";
 import { instantAt, posesAt } from "./interpolate";
 import { drawPicture } from "./picture";
-import type { Collision, Recording } from "./recording";
+import type { Recording } from "./recording";
 import type { RoadPaths } from "./roads";
 import type { Layers, Scene, Sensor } from "./scene";
 
@@ -16,7 +16,6 @@ const MOST_DENSE = 2; // more pixels cost time and show nothing more
 
 interface Props {
   recording: Recording;
-  collision: Collision;
   original?: boolean;
   roads: RoadPaths | null;
   sensor: Sensor | null;
@@ -46,7 +45,6 @@ export function Stage(props: Props) {
       ink,
       layers: props.layers,
       recording,
-      collision: props.collision,
       original: props.original ?? true,
       sensor: props.sensor,
       roads: props.roads,

@@ -7,6 +7,7 @@ import { RATES, useLazyTime, type Clock } from "./clock";
 import { Icon } from "./icons";
 import { KEYS, type Controls } from "./keys";
 import { signed } from "./labels";
+import type { Recording } from "./recording";
 import { LAYERS, type Layer, type Layers } from "./scene";
 
 const LAYER_NAMES: Record<Layer, string> = { sight: "Sight", risk: "TTC, RSS", trails: "Trails", labels: "Labels" };
@@ -15,7 +16,7 @@ const LAYER_NAMES: Record<Layer, string> = { sight: "Sight", risk: "TTC, RSS", t
 export interface Mark {
   time_s: number;
   name: string;
-  kind: "release" | "conflict" | "contact";
+  kind: "release" | "conflict" | "moment";
 }
 
 interface Props extends Controls {
@@ -23,15 +24,17 @@ interface Props extends Controls {
   marks: Mark[];
   /** Spans in which the striker was hidden from the ego. */
   hidden: [number, number][];
+  /** What happened at 0 s. */
+  moment: Recording["moment"];
 }
 
-export function Transport({ clock, tripod, toggle, layers, marks, hidden }: Props) {
+export function Transport({ clock, tripod, toggle, layers, marks, hidden, moment }: Props) {
   const playing = useSignal(clock.playing);
   const rate = useSignal(clock.rate);
   const follow = useSignal(tripod.follow);
   return (
     <div class="transport">
-      <Scrubber clock={clock} marks={marks} hidden={hidden} />
+      <Scrubber {...{ clock, marks, hidden, moment }} />
       <div class="row transport-row" role="group" aria-label="Playback">
         <button onClick={() => clock.seek(clock.start)} aria-label="To the beginning" title="To the beginning (Home)">
           <Icon name="first" />
@@ -88,9 +91,9 @@ export function Transport({ clock, tripod, toggle, layers, marks, hidden }: Prop
 }
 
 /** The slider follows the clock by itself, without a rendering for each frame. */
-function Scrubber({ clock, marks, hidden }: { clock: Clock; marks: Mark[]; hidden: [number, number][] }) {
+function Scrubber({ clock, marks, hidden, moment }: Pick<Props, "clock" | "marks" | "hidden" | "moment">) {
   const slider = useRef<HTMLInputElement>(null);
-  const spoken = inWords(useLazyTime(clock));
+  const spoken = inWords(useLazyTime(clock), moment);
   useEffect(() => {
     const moved = () => (slider.current!.value = clock.time.get().toFixed(3));
     moved();
@@ -103,7 +106,7 @@ function Scrubber({ clock, marks, hidden }: { clock: Clock; marks: Mark[]; hidde
       <input
         ref={slider}
         type="range"
-        aria-label="Time from the contact"
+        aria-label={`Time from the ${moment}`}
         aria-valuetext={spoken}
         min={clock.start}
         max={clock.end}
@@ -125,9 +128,9 @@ function Scrubber({ clock, marks, hidden }: { clock: Clock; marks: Mark[]; hidde
   );
 }
 
-export function inWords(time: number): string {
-  const amount = `${signed(Math.abs(time), 2)} s`;
-  return Math.abs(time) < 0.005 ? "at the contact" : time < 0 ? `${amount} before the contact` : `${amount} after the contact`;
+export function inWords(time: number, moment: Recording["moment"]): string {
+  if (Math.abs(time) < 0.005) return `at the ${moment}`;
+  return `${signed(Math.abs(time), 2)} s ${time < 0 ? "before" : "after"} the ${moment}`;
 }
 
 export function KeyList() {

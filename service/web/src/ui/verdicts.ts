@@ -17,7 +17,7 @@ export const GRADE_WORDS: Record<GradeName, GradeWords> = {
   none: { short: "not graded", long: "No reference driver was asked" },
 };
 
-/** Why a contact was refused: what a rule found. */
+/** Why a violation was refused: what a rule found. */
 const RULES: Record<string, string> = {
   no_teleport: "the simulator moved somebody by a jump",
   no_spawn_overlap: "two bodies overlapped before the release",

@@ -17,12 +17,12 @@ interface Panels {
 }
 
 const RATES = [
-  ["window_ecr", "ECR", `valid failures per episode, last ${WINDOW}`],
-  ["window_pcr", "PCR", `preventable failures per episode, last ${WINDOW}`],
+  ["window_ecr", "ECR", `valid contacts per episode, last ${WINDOW}`],
+  ["window_pcr", "PCR", `preventable contacts per episode, last ${WINDOW}`],
 ] as const;
 const COUNTS = [
-  ["distinct", "Distinct", "distinct valid failures so far"],
-  ["distinct_preventable", "Preventable", "distinct preventable failures so far"],
+  ["distinct", "Distinct", "distinct violations so far, of all requirements"],
+  ["distinct_preventable", "Preventable", "distinct preventable violations so far, of all requirements"],
 ] as const;
 
 export function Charts({ spec, curves, hidden, hide }: Panels) {

@@ -2,6 +2,7 @@
 
 import type { Body } from "../../api/types";
 import type { ServerEvent } from "../../api/events";
+import { isValid } from "../../ui/violations";
 
 export const WINDOW = 100; // episodes of a sliding rate, as in the API
 export const POINTS = 200; // of a curve, about
@@ -25,7 +26,7 @@ export type Curve = Run & { episodes: number[] } & Record<Column, (number | null
 
 const KEPT: Column[] = ["window_ecr", "window_pcr", "distinct", "distinct_preventable", "dual_variable"];
 
-/** The share of valid and of preventable failures among a run's newest episodes, once all of those are known. */
+/** The share of valid and of preventable contacts among a run's newest episodes, once all of those are known. */
 export class Sliding {
   private newest: { valid: boolean; preventable: boolean }[] = [];
   private last = 0; // how many episodes the search had with the newest of them
@@ -122,7 +123,7 @@ export class LiveCurves {
     if (!curve) return;
     const sliding = this.sliding.get(curve.run_id) ?? new Sliding();
     this.sliding.set(curve.run_id, sliding);
-    const valid = episode.outcome === "failure";
+    const valid = episode.outcome === "failure" && episode.collision !== null && isValid(episode.collision);
     const episodes = episode.index + 1;
     sliding.add(episodes, valid, valid && episode.collision?.judgement?.grade === "careful");
     extend(curve, {

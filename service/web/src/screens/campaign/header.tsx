@@ -121,7 +121,7 @@ function Actions({ campaign, again }: { campaign: Campaign; again: () => void })
       {asking === "delete" && (
         <Confirm title="Delete this campaign?" verb="Delete for good" act={async () => { await send("DELETE", path); go("#/campaigns"); }} close={() => setAsking(undefined)}>
           <p>
-            All that it found goes with it: {count(campaign.progress.raw_collisions)} recorded contacts, figures and logs. This cannot be undone.
+            All that it found goes with it: {count(campaign.progress.failures)} recorded failures, figures and logs. This cannot be undone.
           </p>
         </Confirm>
       )}

@@ -2,6 +2,7 @@
 
 import { address } from "../../router";
 import { words } from "../../ui/text";
+import { isContact, signatureOf, gradeOf, worstOf } from "../../ui/violations";
 import type { Found } from "./live";
 
 export function Newest({ campaign, found }: { campaign: string; found: Found[] }) {
@@ -23,9 +24,10 @@ export function Newest({ campaign, found }: { campaign: string; found: Found[] }
   );
 }
 
-function described({ collision }: Found): string {
-  if (!collision) return "failure";
-  const kind = collision.judgement?.signature.split(";")[0] ?? words(collision.other_kind);
-  const closing = collision.relative_speed_mps === null ? "" : `${Math.round(3.6 * collision.relative_speed_mps)} km/h`;
-  return [kind, closing, collision.judgement?.grade].filter(Boolean).join(", ");
+function described(found: Found): string {
+  const worst = worstOf(found);
+  if (worst === null) return "failure";
+  const kind = signatureOf(worst)?.split(";")[0] ?? words(worst.other_kind ?? "failure");
+  const mps = isContact(worst) ? worst.relative_speed_mps : worst.ego_speed_mps;
+  return [kind, mps === null ? "" : `${Math.round(3.6 * mps)} km/h`, gradeOf(worst)].filter(Boolean).join(", ");
 }

@@ -53,7 +53,7 @@ function Card({ run, campaign, away, hide }: { run: Run; campaign: Body<"Campaig
         <span>{time(run)}</span>
       </p>
       <dl class="run-figures">
-        <Figure name="valid" value={count(run.failures)} />
+        <Figure name="failures" value={count(run.failures)} />
         <Figure name="distinct" value={count(run.distinct_failures)} />
         <Figure name="preventable" value={count(run.distinct_preventable)} />
         <Figure name="ECR" value={run.metrics ? `${number(100 * (run.metrics.ecr ?? NaN), 1)} %` : "–"} />

@@ -4,6 +4,7 @@ import { useCallback, useState } from "preact/hooks";
 import { Problem } from "../../api/client";
 import { ended } from "../../api/ended";
 import { Empty, Failed, Loading } from "../../ui/states";
+import { RequirementTable } from "../../ui/requirements";
 import { count, number } from "../../ui/text";
 import { Charts } from "./charts";
 import { Funnel } from "./funnel";
@@ -40,19 +41,25 @@ export function CampaignScreen({ id }: { id: string }) {
       <Header campaign={campaign} again={again} />
       <div class="standing">
         <section class="card" aria-labelledby="funnel-title">
-          <h2 id="funnel-title">From contact to what is worth your time</h2>
+          <h2 id="funnel-title">From failures to what is worth your time</h2>
           <Funnel counts={progress} />
         </section>
         <section class="card tiles" aria-label="Where the search stands">
           <Tile name="sliding ECR" value={percent(progress.window_ecr)} title={OVER} />
           <Tile name="sliding PCR" value={percent(progress.window_pcr)} title={OVER} />
           <Tile name="dual variable λ" value={number(progress.dual_variable)} title={OVER} />
-          <Tile name="valid and preventable, repeats too" value={count(progress.preventable)} />
+          <Tile name="preventable, repeats too" value={count(progress.preventable)} />
           <Tile name="scenes refused" value={count(progress.rejected)} />
           <Tile name="runs ended" value={`${campaign.runs.filter((run) => ended(run)).length} of ${campaign.runs.length}`} />
         </section>
         {!ended(campaign) && <Newest campaign={id} found={found} />}
       </div>
+      {Object.keys(campaign.requirements).length > 0 && (
+        <section class="card" aria-labelledby="requirements-title">
+          <h2 id="requirements-title">By requirement</h2>
+          <RequirementTable requirements={campaign.requirements} of="the campaign" campaign={id} />
+        </section>
+      )}
       {error && !(error instanceof TypeError) && <Failed error={error} again={again} />}
       {drawn ? (
         <Charts spec={campaign.spec} curves={curves!} hidden={hidden} hide={hide} />

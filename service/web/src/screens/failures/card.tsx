@@ -5,6 +5,7 @@ import { number, words } from "../../ui/text";
 import { reactionOf } from "./features";
 import { GradeTag, Mark } from "./grade";
 import { refusal } from "../../ui/verdicts";
+import { NO_CONTACT } from "../../ui/violations";
 import { halves, TRIAGE } from "./naming";
 import { useThumbnail } from "./thumbnails";
 import type { FailureTable } from "./wire";
@@ -24,10 +25,12 @@ export function Card({ campaign, table, at, often, triage }: Props) {
   const kind = table.kinds[table.kind[at]!]!.name;
   const [striker, ego] = halves(kind);
   const state = table.triage[at]!;
+  const other = table.striker[at] ?? null;
   return (
     <article class="failure">
       <Thumbnail campaign={campaign} id={id} />
       <div class="judged">
+        <span class="tag">{words(table.requirement[at]!)}</span>
         {table.valid[at] ? <GradeTag grade={table.grade[at] ?? "none"} /> : <Refusal rules={table.refused_by[at]!} />}
         <Repeats repeats={table.repeats[at]!} />
       </div>
@@ -38,13 +41,22 @@ export function Card({ campaign, table, at, often, triage }: Props) {
         <p class="faint small ego">{ego}</p>
       </div>
       <dl class="measures">
-        <Measure name="closing" value={number(table.relative_speed_mps[at], 1)} unit="m/s" />
-        <Measure name="from conflict" value={number(reactionOf(table, at), 1)} unit="s" />
+        {table.requirement[at] === NO_CONTACT ? (
+          <>
+            <Measure name="closing" value={number(table.relative_speed_mps[at], 1)} unit="m/s" />
+            <Measure name="from conflict" value={number(reactionOf(table, at), 1)} unit="s" />
+          </>
+        ) : (
+          <>
+            <Measure name="ego" value={number(table.ego_speed_mps[at], 1)} unit="m/s" />
+            <Measure name="after release" value={number(table.time_s[at], 1)} unit="s" />
+          </>
+        )}
         {table.valid[at] && <Measure name="of this kind" value={`${often}`} unit="" />}
       </dl>
       <div class="foot small">
-        <span class="faint" title={`${words(table.striker[at]!)} (${table.striker_kind[at]}), ${id}`}>
-          <b>{words(table.striker[at]!)}</b> · {table.families[at]} · {table.methods[at]}
+        <span class="faint" title={other === null ? `no other road user near, ${id}` : `${words(other)} (${table.striker_kind[at]}), ${id}`}>
+          <b>{other === null ? "ego alone" : words(other)}</b> · {table.families[at]} · {table.methods[at]}
         </span>
         <button class={`tag triage-${state}`} onClick={() => triage(at)} aria-label={`Triage: ${TRIAGE[state]}. Change`}>
           {TRIAGE[state]} ▾

@@ -80,7 +80,7 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
         <section class="found" aria-label="Failures">
           <div class="row found-head">
             <p role="status">
-              <b>{count(shown.length)}</b> of {count(all.length)} {asked.tab === "refused" ? "refused contacts" : asked.every ? "failures" : "distinct failures"}
+              <b>{count(shown.length)}</b> of {count(all.length)} {asked.tab === "refused" ? "refused" : asked.every ? "failures" : "distinct failures"}
             </p>
             {asked.tab === "failures" && (
               <label>
@@ -139,7 +139,7 @@ function FamilyHint({ families, choose }: { families: readonly string[]; choose:
 }
 
 function Nothing({ filters, all, resetAll }: { filters: Filters; all: number; resetAll: () => void }) {
-  const what = filters.tab === "refused" ? "refused contact" : "failure";
+  const what = filters.tab === "refused" ? "refused violation" : "failure";
   return (
     <div class="state">
       <p>{all && isNarrowed(filters) ? `No ${what} passes all the filters.` : `There is no ${what}.`}</p>

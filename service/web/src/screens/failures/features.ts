@@ -1,4 +1,4 @@
-/** What failures are measured by: how the contact came out, and the scene it began from. */
+/** What failures are measured by: how the violation came out, and the scene it began from. */
 
 import type { FailureTable } from "./wire";
 import { words } from "../../ui/text";
@@ -22,7 +22,7 @@ interface Outcome {
 const OUTCOMES: Record<string, Outcome> = {
   closing: { label: "closing speed", unit: "m/s", of: (t, i) => t.relative_speed_mps[i]! },
   reaction: { label: "conflict to contact", unit: "s", of: reactionOf },
-  ego_speed: { label: "ego at contact", unit: "m/s", of: (t, i) => t.ego_speed_mps[i]! },
+  ego_speed: { label: "ego at that time", unit: "m/s", of: (t, i) => t.ego_speed_mps[i]! },
   striker_speed: { label: "striker at contact", unit: "m/s", of: (t, i) => t.other_speed_mps[i]! },
   seen: { label: "striker seen for", unit: "s", of: (t, i) => t.visible_for_s[i]! },
   braking: { label: "ego's peak braking", unit: "m/s²", of: (t, i) => t.ego_peak_braking_mps2[i]! },
@@ -30,7 +30,7 @@ const OUTCOMES: Record<string, Outcome> = {
   rss_margin: { label: "least RSS margin", unit: "m", of: (t, i) => t.min_rss_margin_m[i]! },
   ttc: { label: "least TTC", unit: "s", of: (t, i) => t.min_ttc_s[i]! },
   offset: { label: "lateral offset", unit: "m", of: (t, i) => t.lateral_offset_m[i]! },
-  time: { label: "release to contact", unit: "s", of: (t, i) => t.time_s[i]! },
+  time: { label: "release to violation", unit: "s", of: (t, i) => t.time_s[i]! },
 };
 
 /** From when the conflict began to the contact, s: how long a driver had to act. */

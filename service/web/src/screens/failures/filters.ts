@@ -5,11 +5,11 @@ import { SORTS, type Sort } from "./sorting";
 import type { FailureTable } from "./wire";
 
 /** Filters that want one value; the empty text wants any. */
-export const FACETS = ["family", "method", "run", "grade", "kind", "striker", "triage", "broke", "rule"] as const;
+export const FACETS = ["requirement", "family", "method", "run", "grade", "kind", "striker", "triage", "broke", "ego_broke", "rule"] as const;
 export type Facet = (typeof FACETS)[number];
 
 export interface Filters extends Record<Facet, string> {
-  /** Failures, or the contacts that a rule refused. */
+  /** Failures, or the episodes whose violations a rule refused. */
   tab: "failures" | "refused";
   /** Each failure, and not only the first of its kind in a run. */
   every: boolean;
@@ -64,6 +64,8 @@ export function isNarrowed(filters: Filters): boolean {
 /** What a failure has of a facet: none, one or several values. */
 export function valuesOf(table: FailureTable, facet: Facet, i: number): readonly string[] {
   switch (facet) {
+    case "requirement":
+      return table.valid[i] ? table.failed[i]! : [table.requirement[i]!];
     case "family":
       return [table.families[i]!];
     case "method":
@@ -75,11 +77,13 @@ export function valuesOf(table: FailureTable, facet: Facet, i: number): readonly
     case "kind":
       return [table.kinds[table.kind[i]!]!.name];
     case "striker":
-      return [table.striker[i]!];
+      return [table.striker[i] ?? "none"];
     case "triage":
       return [table.triage[i]!];
     case "broke":
       return table.broke[i]!.length ? table.broke[i]! : ["nothing"];
+    case "ego_broke":
+      return table.ego_broke[i]!.length ? table.ego_broke[i]! : ["nothing"];
     case "rule":
       return table.refused_by[i]!;
   }
@@ -107,7 +111,8 @@ export function passing(table: FailureTable, failures: readonly number[], filter
 }
 
 function said(table: FailureTable, i: number, terms: string[]): boolean {
-  const text = [table.ids[i], table.kinds[table.kind[i]!]!.name, table.striker[i], ...table.broke[i]!, ...table.refused_by[i]!];
+  const lists = [table.failed, table.broke, table.ego_broke, table.refused_by].flatMap((column) => column[i]!);
+  const text = [table.ids[i], table.requirement[i], table.kinds[table.kind[i]!]!.name, table.striker[i] ?? "", ...lists];
   const all = text.join(" ").toLowerCase();
   return terms.every((term) => all.includes(term));
 }

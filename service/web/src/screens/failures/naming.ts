@@ -13,6 +13,7 @@ export const TRIAGE: Record<TriageState, string> = {
 };
 
 export const FACET_LABELS: Record<Facet, string> = {
+  requirement: "Requirement",
   family: "Family",
   method: "Method",
   run: "Run",
@@ -21,15 +22,18 @@ export const FACET_LABELS: Record<Facet, string> = {
   striker: "Striker",
   triage: "Triage",
   broke: "Striker broke",
+  ego_broke: "Ego broke",
   rule: "Refused by",
 };
+
+const WORDED: ReadonlySet<Facet> = new Set(["requirement", "striker", "broke", "ego_broke"]);
 
 /** A value of a facet as people read it. */
 export function valueWords(facet: Facet, value: string): string {
   if (facet === "grade" && Object.hasOwn(GRADE_WORDS, value)) return GRADE_WORDS[value as GradeName].short;
   if (facet === "triage" && Object.hasOwn(TRIAGE, value)) return TRIAGE[value as TriageState].toLowerCase();
   if (facet === "rule") return refusal(value);
-  return facet === "striker" || facet === "broke" ? words(value) : value;
+  return WORDED.has(facet) ? words(value) : value;
 }
 
 /** "cut-in, alongside; ego goes straight, brakes" -> what the striker did, and what the ego did. */

@@ -1,4 +1,4 @@
-/** How many contacts each rule refused; a bar filters by its rule. */
+/** How many violations each rule refused; a bar filters by its rule. */
 
 import { useMemo } from "preact/hooks";
 import { tally } from "./filters";
@@ -19,7 +19,7 @@ export function RefusedBy({ table, all, chosen, choose }: Props) {
     <section class="card plot" aria-label="Rules">
       <div class="plot-head">
         <h2>Why they do not count</h2>
-        <p class="faint small">One contact may break several rules.</p>
+        <p class="faint small">One violation may break several rules.</p>
       </div>
       <ul class="bars">
         {rules.map(([rule, count]) => (

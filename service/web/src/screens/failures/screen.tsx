@@ -1,4 +1,4 @@
-/** What a campaign found: its failures, and the contacts that do not count. */
+/** What a campaign found: its failures, and what looked like one and was refused. */
 
 import "./failures.css";
 import { useMemo } from "preact/hooks";
@@ -50,7 +50,7 @@ function Head({ campaign, about, query, table }: HeadProps) {
         <h1>Failures</h1>
         {about && <span class={`tag ${about.state}`}>{about.state}</span>}
         {funnel && (
-          <ol class="funnel" aria-label="From contacts to what is worth a person's time">
+          <ol class="funnel" aria-label="From failures to what is worth a person's time">
             {funnel.map(([name, number, meaning]) => (
               <li key={name} title={meaning}>
                 <b>{count(number)}</b> {name}
@@ -62,10 +62,10 @@ function Head({ campaign, about, query, table }: HeadProps) {
       {funnel && (
         <nav class="tabs" aria-label="What is shown">
           <a href={to("failures")} aria-current={filters.tab === "failures" ? "page" : undefined}>
-            Failures <span class="faint">{count(funnel[1]![1])}</span>
+            Failures <span class="faint">{count(funnel[0]![1])}</span>
           </a>
           <a href={to("refused")} aria-current={filters.tab === "refused" ? "page" : undefined}>
-            Refused contacts <span class="faint">{count(funnel[0]![1] - funnel[1]![1])}</span>
+            Refused <span class="faint">{count(table!.ids.length - funnel[0]![1])}</span>
           </a>
         </nav>
       )}
@@ -77,8 +77,7 @@ function Head({ campaign, about, query, table }: HeadProps) {
 function funnelOf({ valid, distinct, grade }: FailureTable): [string, number, string][] {
   const among = (test: (i: number) => boolean) => valid.reduce((sum, _, i) => sum + (test(i) ? 1 : 0), 0);
   return [
-    ["contacts", valid.length, "The bodies touched"],
-    ["valid", among((i) => valid[i]!), "No rule refused them"],
+    ["failures", among((i) => valid[i]!), "A requirement that counts was violated, and no rule refused it"],
     ["distinct", among((i) => distinct[i]!), "The first of their kind in their run"],
     ["preventable", among((i) => distinct[i]! && grade[i] === "careful"), "Distinct, and a careful driver would have prevented them"],
   ];
@@ -92,7 +91,7 @@ function NothingFound({ about }: { about: Body<"Campaign"> | undefined }) {
       {about && (
         <p>
           {count(about.progress.episodes_done)} of {count(about.progress.episodes_total)} episodes are done
-          {running ? "; what they find appears here." : "; in none of them did the ego touch anybody."}
+          {running ? "; what they find appears here." : "; in none of them was a requirement violated that counts."}
         </p>
       )}
       {about && <a href={address(["campaigns", about.id])}>To the campaign</a>}

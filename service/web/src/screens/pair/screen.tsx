@@ -9,13 +9,14 @@ import { Clock } from "../../stage/clock";
 import { useKeys } from "../../stage/keys";
 import { Legend } from "../../stage/legend";
 import { Plots } from "../../stage/plots";
-import { hiddenSpans, recordingOf, type Collision, type Series } from "../../stage/recording";
+import { hiddenSpans, recordingOf, type Series } from "../../stage/recording";
 import { roadPaths } from "../../stage/roads";
 import { askedTime, conflictBounds, marksOf, opening, useLayers, useStopped, useTimeInAddress } from "../../stage/room";
 import { Stage } from "../../stage/stage";
 import { KeyList, Transport } from "../../stage/transport";
 import { Empty, Shown } from "../../ui/states";
-import { contactOf, verdictOf } from "../replay/words";
+import { isContact, worstOf, type Collision, type Violation } from "../../ui/violations";
+import { happenedOf, verdictOf } from "../replay/words";
 import { between, commonTimes, pairPanels, sensorOf, TWINS } from "./twins";
 import { Waiting } from "./waiting";
 import "../../stage/stage.css";
@@ -51,13 +52,14 @@ export function PairScreen({ campaign, failure, twin, query }: Props) {
         </nav>
       </div>
       <Shown asked={asked} what="the failure">
-        {(known) =>
-          known.series === null || known.collision === null ? (
+        {(known) => {
+          const violation = worstOf(known);
+          return known.series === null || violation === null ? (
             <Empty>{known.series_problem ?? "Nothing of it was recorded that could be played."}</Empty>
           ) : (
-            <Pair campaign={campaign} path={path} twin={twin} known={known} series={known.series} collision={known.collision} query={query} />
-          )
-        }
+            <Pair campaign={campaign} path={path} twin={twin} known={known} series={known.series} violation={violation} query={query} />
+          );
+        }}
       </Shown>
     </>
   );
@@ -69,17 +71,17 @@ interface PairProps {
   twin: string;
   known: Body<"Failure">;
   series: Series;
-  collision: Collision;
+  violation: Collision | Violation;
   query: URLSearchParams;
 }
 
-function Pair({ campaign, path, twin, known, series, collision, query }: PairProps) {
+function Pair({ campaign, path, twin, known, series, violation, query }: PairProps) {
   const asked = useAsked<Body<"TwinPlay">>(`${path}/twins/${twin}`);
   const roads = useAsked<Body<"Roads">>(`${path}/roads`).value;
   const sensor = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value?.spec.ego?.sensor ?? null;
   const played = asked.value;
-  const failure = useMemo(() => recordingOf(series, collision), [series, collision]);
-  const other = useMemo(() => (played ? recordingOf(played.series, collision) : null), [played, collision]);
+  const failure = useMemo(() => recordingOf(series, violation), [series, violation.time_s]);
+  const other = useMemo(() => (played ? recordingOf(played.series, violation) : null), [played, violation.time_s]);
   const at = useRef<Clock>();
   const clock = useMemo(() => {
     const time = at.current?.time.get() ?? askedTime(query) ?? opening(failure); // the twin comes later, and time goes on
@@ -95,17 +97,17 @@ function Pair({ campaign, path, twin, known, series, collision, query }: PairPro
   useKeys({ clock, tripod, toggle });
   useStopped(clock);
   useTimeInAddress(clock, query);
-  const shared = { collision, roads: paths, clock, tripod, layers, followed };
+  const shared = { roads: paths, clock, tripod, layers, followed };
   return (
     <div class="grid pair-screen">
       <div class="card stage-card">
         <div class="pair">
           <section aria-label="The failure">
-            <Caption title="The failure" outcome={`${contactOf(collision)} ${verdictOf(known)}`} kind="failed" />
+            <Caption title="The failure" outcome={`${happenedOf(violation)} ${verdictOf(known)}`} kind="failed" />
             <Stage {...shared} recording={failure} sensor={sensor} label="The failure from above" />
           </section>
           <section aria-label="Its twin">
-            <Caption title={TWINS[twin]!} outcome={played ? sentence(played.outcome) : ""} kind={played?.collision ? "failed" : "passed"} />
+            <Caption title={TWINS[twin]!} outcome={played ? sentence(played.outcome) : ""} kind={isContact(violation) && !played?.collision ? "passed" : "failed"} />
             {other ? (
               <Stage {...shared} recording={other} original={false} sensor={sensorOf(twin, sensor)} label="Its twin from above" />
             ) : (
@@ -115,12 +117,12 @@ function Pair({ campaign, path, twin, known, series, collision, query }: PairPro
             )}
           </section>
         </div>
-        <Legend />
-        <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} />
+        <Legend moment={failure.moment} />
+        <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} moment={failure.moment} />
       </div>
       {other && (
         <>
-          <p class="faint small time-hint">Time in s from the contact of the failure. Grey: the striker is hidden from the failure's ego.</p>
+          <p class="faint small time-hint">Time in s from the {failure.moment}. Grey: the {failure.moment === "contact" ? "striker" : "nearest road user"} is hidden from the failure's ego.</p>
           <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
         </>
       )}

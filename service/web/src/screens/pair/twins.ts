@@ -6,6 +6,8 @@ import { column, DASHES, softMinimum } from "../../stage/panels";
 import type { Recording } from "../../stage/recording";
 import type { Followed } from "../../stage/camera";
 import { instantAt, posesAt } from "../../stage/interpolate";
+import { words } from "../../ui/text";
+import { requirementOf } from "../../ui/violations";
 
 /** As the API names them, with what is different. */
 export const TWINS: Record<string, string> = {
@@ -49,11 +51,16 @@ export function pairPanels(failure: Recording, twin: Recording, name: string): P
     { name, time_s: twin.time_s, values: values(twin), colour: "--series-3", dash: DASHES.striker, width: 2 },
   ];
   const striker = (recording: Recording) => Math.max(recording.striker, 0);
+  const requirement = requirementOf(failure.violation);
+  const robustness = ({ series }: Recording) => column(series.robustness, series.requirements.indexOf(requirement));
   return [
+    ...(failure.moment === "violation" ? [{ title: `${words(requirement)}, violated below 0`, unit: "in scales", curves: both(robustness), zero: true }] : []),
     { title: "Ego's speed", unit: "m/s", curves: both(({ series }) => column(series.speed_mps, 0)) },
-    { title: "Distance to the striker", unit: "m", curves: both((recording) => column(recording.series.distance_m, striker(recording))), zero: true },
+    ...(failure.striker < 0
+      ? []
+      : [{ title: `Distance to ${failure.moment === "contact" ? "the striker" : failure.ids[failure.striker]}`, unit: "m", curves: both((recording) => column(recording.series.distance_m, striker(recording))), zero: true }]),
     {
-      title: "Soft minimum, broken below 0",
+      title: "Soft minimum, violated below 0",
       unit: "",
       curves: [softMinimum(failure, "failure", "--text"), softMinimum(twin, name, "--series-3", DASHES.striker)],
       zero: true,

@@ -1,0 +1,41 @@
+/** Violations of an episode, with and without contact: which one names it, and what was judged of it. */
+
+import type { Body } from "../api/types";
+
+export type Collision = Body<"Collision">;
+export type Violation = Body<"Violation">;
+type Recorded = Pick<Body<"Episode">, "outcome" | "collision" | "violations">;
+
+export const NO_CONTACT = "no_contact";
+
+export function isContact(violation: Collision | Violation): violation is Collision {
+  return !("requirement" in violation);
+}
+
+export function isValid({ verdicts }: Collision | Violation): boolean {
+  return Object.values(verdicts).every(Boolean);
+}
+
+export function requirementOf(violation: Collision | Violation): string {
+  return isContact(violation) ? NO_CONTACT : violation.requirement;
+}
+
+/** What makes the episode a failure: a contact first, then by time. */
+export function validOf({ outcome, collision, violations }: Recorded): (Collision | Violation)[] {
+  if (outcome !== "failure") return [];
+  return [...(collision ? [collision] : []), ...violations].filter(isValid);
+}
+
+/** The violation that names the episode: a valid contact, the first valid violation, a refused contact. */
+export function worstOf(episode: Recorded): Collision | Violation | null {
+  return validOf(episode)[0] ?? episode.collision ?? episode.violations[0] ?? null;
+}
+
+export function gradeOf(violation: Collision | Violation): Body<"Grade"> | null {
+  return isContact(violation) ? (violation.judgement?.grade ?? null) : violation.grade;
+}
+
+/** Null of a contact that was stored before contacts were judged. */
+export function signatureOf(violation: Collision | Violation): string | null {
+  return isContact(violation) ? (violation.judgement?.signature ?? null) : violation.signature;
+}
