@@ -1,6 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { instantAt, posesAt, turned, velocityAt } from "./interpolate";
-import { hiddenSpans, recordingOf, type Collision, type Series } from "./recording";
+import type { Collision } from "../ui/violations";
+import { hiddenSpans, recordingOf, type Series } from "./recording";
 
 const TIMES = [-0.3, -0.2, -0.1, 0];
 

@@ -56,14 +56,20 @@ function both(recording: Recording, rows: Values[]): Curve[] {
   return curves;
 }
 
-function distance({ time_s, series, striker }: Recording): Panel {
-  const curve: Curve = { name: "to the striker", time_s, values: column(series.distance_m, striker), colour: "--text" };
+function towards({ moment, ids, striker }: Recording): string {
+  return moment === "contact" ? "to the striker" : `to ${ids[striker]}`;
+}
+
+function distance(recording: Recording): Panel {
+  const { time_s, series, striker } = recording;
+  const curve: Curve = { name: towards(recording), time_s, values: column(series.distance_m, striker), colour: "--text" };
   return { title: "Distance", unit: "m", curves: [curve], zero: true };
 }
 
-function timeToCollision({ time_s, series, striker }: Recording): Panel {
+function timeToCollision(recording: Recording): Panel {
+  const { time_s, series, striker } = recording;
   const values = column(series.ttc_s, striker).map((ttc) => (ttc === null ? null : Math.min(ttc, TTC_CAP_S)));
-  const curve: Curve = { name: "to the striker", time_s, values, colour: "--text" };
+  const curve: Curve = { name: towards(recording), time_s, values, colour: "--text" };
   return { title: "Time to collision", unit: `s; ${TTC_CAP_S}: no collision course`, curves: [curve], range: [0, TTC_CAP_S * 1.04] };
 }
 

@@ -3,7 +3,7 @@
 import { useEffect, useRef } from "preact/hooks";
 import { useSignal } from "../signal";
 import { ZOOM_STEP } from "./camera";
-import { RATES, useLazyTime, type Clock } from "./clock";
+import { RATES, useLazyTime } from "./clock";
 import { Icon } from "./icons";
 import { KEYS, type Controls } from "./keys";
 import { signed } from "./labels";

@@ -5,6 +5,7 @@ import { keepListed } from "../../listed";
 import { address, go, replace } from "../../router";
 import { signal } from "../../signal";
 import { count } from "../../ui/text";
+import { NO_CONTACT } from "../../ui/violations";
 import { within, type Brushes } from "./brushes";
 import { Cards } from "./cards";
 import { Controls } from "./controls";
@@ -45,6 +46,7 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
   const scene = useMemo(() => sceneFeatures(read_, family), [read_, family]);
   const features = useMemo(() => [...outcomes, ...scene], [outcomes, scene]);
   const axes = useMemo(() => [...outcomes.slice(0, AXES), ...scene], [outcomes, scene]);
+  const touched = useMemo(() => read_.requirement.includes(NO_CONTACT), [read_]); // else what contacts are plotted by is empty
   const plotted = useMemo(() => (asked.family ? all.filter((i) => table.families[i] === asked.family) : all), [all, asked.family]);
   const passed = useMemo(() => passing(table, all, asked), [table, all, asked]);
   const shown = useMemo(
@@ -67,8 +69,8 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
             {asked.tab === "refused" && <RefusedBy {...{ table, all }} chosen={asked.rule} choose={(rule) => change({ rule })} />}
             <Scatter
               {...{ table, features, shown, hovered }}
-              x={asked.x}
-              y={asked.y}
+              x={touched ? asked.x : asked.x === "reaction" ? "time" : asked.x}
+              y={touched ? asked.y : asked.y === "closing" ? "ego_speed" : asked.y}
               all={plotted}
               choose={change}
               open={(i) => go(address(["campaigns", campaign, "failures", table.ids[i]!]))}

@@ -1,7 +1,9 @@
-/** The user's own requirements: formulas over the published signals, with what the service thinks of them. */
+/** What counts as a failure: the shipped requirements, and the user's own formulas over the published signals. */
 
 import { useRef } from "preact/hooks";
 import type { Body } from "../../api/types";
+import { words } from "../../ui/text";
+import { NO_CONTACT } from "../../ui/violations";
 import { Labelled, NumberInput, Wrongs, described } from "./field";
 import { faultOf, inserted, pointed } from "./formula";
 import { useField } from "./form";
@@ -14,7 +16,14 @@ interface Requirement extends Values {
   name: string;
   formula: string;
   scale: number | null;
+  counts: Counts;
   shapes: boolean;
+}
+type Counts = Family["requirements"][number]["counts"];
+
+/** An entry without a formula says what a shipped requirement counts as, and nothing else. */
+function adjusts({ name, formula }: Requirement, shipped: readonly string[]): boolean {
+  return formula === "" && shipped.includes(name);
 }
 
 interface Shown {
@@ -27,23 +36,71 @@ interface Shown {
 export function Requirements({ shape, signals, families }: Shown) {
   const { value, change, wrong } = useField<Requirement[]>(["requirements"]);
   const last = useRef<HTMLTextAreaElement>(null);
-  const add = () => {
-    const name = firstFree(value.map((each) => each.name));
-    change([...value, { ...(filled(shape, {}) as Values), name, formula: "", scale: 1 }]);
+  const shipped = sharedBy(families);
+  const names = shipped.map((each) => each.name);
+  const entry = (changed: Partial<Requirement> & { name: string }): Requirement => ({ ...(filled(shape, {}) as Requirement), formula: "", scale: 1, ...changed });
+  const add = () => change([...value, entry({ name: firstFree(value.map((each) => each.name)) })]);
+  const count = ({ name, counts: usual }: Family["requirements"][number], counts: Counts) => {
+    const others = value.filter((each) => each.name !== name);
+    change(counts === usual ? others : [...others, entry({ name, counts })]);
   };
   return (
     <>
-      <p class="help">They come on top of what each family asks of the ego already. A formula looks back only, never ahead.</p>
+      <p class="help">An episode that violates a requirement which counts as a failure is a failure; the others are measured and reported.</p>
       <Wrongs id="field-requirements" wrong={wrong} />
-      {value.map((_, index) => (
-        <One key={index} index={index} shape={shape} last={last} remove={() => change(value.filter((_, i) => i !== index))} />
-      ))}
+      <Shipped requirements={shipped} value={value} count={count} />
+      <p class="help">Requirements of your own come on top. A formula looks back only, never ahead.</p>
+      {value.map((each, index) =>
+        adjusts(each, names) ? null : (
+          <One key={index} index={index} shape={shape} last={last} remove={() => change(value.filter((_, i) => i !== index))} />
+        ),
+      )}
       <button type="button" onClick={add}>
         Add a requirement
       </button>
       <Given families={families} />
       <Signals signals={signals} insert={value.length > 0 ? (name) => insert(last.current, name) : undefined} />
     </>
+  );
+}
+
+/** Those that all of the families have: a requirement that one of them lacks cannot be told apart there. */
+function sharedBy(families: readonly Family[]): Family["requirements"] {
+  const [first, ...others] = families;
+  return first?.requirements.filter(({ name }) => others.every(({ requirements }) => requirements.some((each) => each.name === name))) ?? [];
+}
+
+interface ShippedProps {
+  requirements: Family["requirements"];
+  value: readonly Requirement[];
+  count: (requirement: Family["requirements"][number], counts: Counts) => void;
+}
+
+function Shipped({ requirements, value, count }: ShippedProps) {
+  if (requirements.length === 0) return null;
+  return (
+    <fieldset class="requirement">
+      <legend>What counts already</legend>
+      {requirements.map((requirement) => {
+        const { name, counts } = requirement;
+        const id = `counts-${name}`;
+        return (
+          <div key={name} class="counted">
+            <label for={id}>{words(name)}</label>
+            <CountsAs id={id} value={value.find((each) => each.name === name)?.counts ?? counts} disabled={name === NO_CONTACT} change={(next) => count(requirement, next)} />
+          </div>
+        );
+      })}
+    </fieldset>
+  );
+}
+
+function CountsAs({ change, ...rest }: { id: string; value: Counts; disabled?: boolean; change: (counts: Counts) => void }) {
+  return (
+    <select {...rest} onChange={(event) => change(event.currentTarget.value as Counts)}>
+      <option value="failure">counts as a failure</option>
+      <option value="report">is only reported</option>
+    </select>
   );
 }
 
@@ -59,6 +116,7 @@ function One({ index, shape, last, remove }: Single) {
   const name = useField<string>([...path, "name"]);
   const formula = useField<string>([...path, "formula"]);
   const scale = useField<number | null>([...path, "scale"]);
+  const counts = useField<Counts>([...path, "counts"]);
   const shapes = useField<boolean>([...path, "shapes"]);
   const about = (field: string) => (shape.kind === "object" ? (shape.fields.find((each) => each.name === field)?.about ?? "") : "");
   const faults = formula.wrong.map(({ message }) => faultOf(message));
@@ -115,6 +173,10 @@ function One({ index, shape, last, remove }: Single) {
         />
       </Labelled>
       <div class="field">
+        <label for={counts.id}>When it is violated</label>
+        <CountsAs id={counts.id} value={counts.value} change={counts.change} />
+      </div>
+      <div class="field">
         <label class="check">
           <input id={shapes.id} type="checkbox" checked={shapes.value} onChange={() => shapes.change(!shapes.value)} /> Shapes the reward
         </label>
@@ -132,7 +194,7 @@ function Given({ families }: { families: readonly Family[] }) {
   if (families.length === 0) return null;
   return (
     <details class="sub">
-      <summary>What the default ego has to meet already</summary>
+      <summary>The formulas that the default ego has to meet already</summary>
       {families.map((family) => (
         <div key={family.name}>
           <h4>{family.name}</h4>

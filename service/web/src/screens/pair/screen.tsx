@@ -80,8 +80,8 @@ function Pair({ campaign, path, twin, known, series, violation, query }: PairPro
   const roads = useAsked<Body<"Roads">>(`${path}/roads`).value;
   const sensor = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value?.spec.ego?.sensor ?? null;
   const played = asked.value;
-  const failure = useMemo(() => recordingOf(series, violation), [series, violation.time_s]);
-  const other = useMemo(() => (played ? recordingOf(played.series, violation) : null), [played, violation.time_s]);
+  const failure = useMemo(() => recordingOf(series, violation), [series, violation]);
+  const other = useMemo(() => (played ? recordingOf(played.series, violation) : null), [played, violation]);
   const at = useRef<Clock>();
   const clock = useMemo(() => {
     const time = at.current?.time.get() ?? askedTime(query) ?? opening(failure); // the twin comes later, and time goes on

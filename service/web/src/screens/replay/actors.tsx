@@ -22,7 +22,7 @@ export function Actors({ recording, clock }: { recording: Recording; clock: Cloc
   return (
     <section class="card" aria-live="off" aria-label="Actors at this time">
       <h2>
-        Actors {inWords(time)}
+        Actors {inWords(time, recording.moment)}
         {signal && signal !== "none" && <span class="faint">, {signal} ahead of the ego</span>}
       </h2>
       <div class="scroll" tabIndex={0} role="region" aria-label="Table of actors">
@@ -51,7 +51,7 @@ export function Actors({ recording, clock }: { recording: Recording; clock: Cloc
                 <tr class={`actor-${parts[i]}`}>
                   <th scope="row">{ids[i]}</th>
                   <td>
-                    {ROLES[parts[i]!]}
+                    {parts[i] === "striker" && recording.moment === "violation" ? "nearest" : ROLES[parts[i]!]}
                     {pedestrian[i] && ", on foot"}
                   </td>
                   <td class="number">{number(at(series.speed_mps, i), 1)} m/s</td>

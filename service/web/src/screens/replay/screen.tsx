@@ -11,7 +11,7 @@ import { useKeys } from "../../stage/keys";
 import { Legend } from "../../stage/legend";
 import { panelsOf } from "../../stage/panels";
 import { Plots } from "../../stage/plots";
-import { hiddenSpans, recordingOf, type Collision, type Series } from "../../stage/recording";
+import { hiddenSpans, recordingOf, type Series } from "../../stage/recording";
 import { roadPaths } from "../../stage/roads";
 import { askedTime, conflictBounds, marksOf, opening, useLayers, useStopped, useTimeInAddress } from "../../stage/room";
 import { Stage } from "../../stage/stage";
@@ -19,6 +19,7 @@ import { KeyList, Transport } from "../../stage/transport";
 import { Empty, Shown } from "../../ui/states";
 import { words } from "../../ui/text";
 import { GRADE_WORDS } from "../../ui/verdicts";
+import { gradeOf, signatureOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import { Actors } from "./actors";
 import { Take } from "./take";
 import { Verdict } from "./verdict";
@@ -38,16 +39,17 @@ export function ReplayScreen({ campaign, failure, query }: Props) {
     <>
       <Head campaign={campaign} failure={failure} query={query} known={asked.value} />
       <Shown asked={asked} what="the failure">
-        {(known) =>
-          known.series === null || known.collision === null ? (
+        {(known) => {
+          const violation = worstOf(known);
+          return known.series === null || violation === null ? (
             <>
               <Empty>{known.series_problem ?? "Nothing of it was recorded that could be played."}</Empty>
               <Verdict failure={known} />
             </>
           ) : (
-            <Replay campaign={campaign} path={path} known={known} series={known.series} collision={known.collision} query={query} />
-          )
-        }
+            <Replay campaign={campaign} path={path} known={known} series={known.series} violation={violation} query={query} />
+          );
+        }}
       </Shown>
     </>
   );
@@ -61,7 +63,8 @@ function Head({ campaign, failure, query, known }: Props & { known: Body<"Failur
         {text}
       </a>
     );
-  const signature = known?.collision?.judgement?.signature;
+  const violation = known && worstOf(known);
+  const signature = violation && signatureOf(violation);
   return (
     <div class="head">
       <nav class="crumbs" aria-label="Breadcrumb">
@@ -81,10 +84,19 @@ function Head({ campaign, failure, query, known }: Props & { known: Body<"Failur
   );
 }
 
-function Replay({ campaign, path, known, series, collision, query }: { campaign: string; path: string; known: Body<"Failure">; series: Series; collision: Collision; query: URLSearchParams }) {
+interface Played {
+  campaign: string;
+  path: string;
+  known: Body<"Failure">;
+  series: Series;
+  violation: Collision | Violation;
+  query: URLSearchParams;
+}
+
+function Replay({ campaign, path, known, series, violation, query }: Played) {
   const roads = useAsked<Body<"Roads">>(`${path}/roads`).value;
   const spec = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value?.spec;
-  const recording = useMemo(() => recordingOf(series, collision), [series, collision]);
+  const recording = useMemo(() => recordingOf(series, violation), [series, violation]);
   const clock = useMemo(() => new Clock(recording.time_s, askedTime(query) ?? opening(recording)), [recording]);
   const tripod = useMemo(() => new Tripod(conflictBounds(recording)), [recording]);
   const panels = useMemo(() => panelsOf(recording), [recording]);
@@ -102,7 +114,6 @@ function Replay({ campaign, path, known, series, collision, query }: { campaign:
         <section class="card stage-card" ref={card} aria-label="Replay">
           <Stage
             recording={recording}
-            collision={collision}
             roads={paths}
             sensor={spec?.ego?.sensor ?? null}
             clock={clock}
@@ -110,12 +121,15 @@ function Replay({ campaign, path, known, series, collision, query }: { campaign:
             layers={layers}
             label="View from above; the table of actors says in text what is seen"
           />
-          <Legend />
-          <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} />
+          <Legend moment={recording.moment} />
+          <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} moment={recording.moment} />
         </section>
         <Verdict failure={known} />
       </div>
-      <p class="faint small time-hint">Time in s from the contact. Grey: the striker is hidden from the ego. Dotted: release; dashed: the conflict begins.</p>
+      <p class="faint small time-hint">
+        Time in s from the {recording.moment}. Dotted: release
+        {recording.moment === "contact" ? "; dashed: the conflict begins. Grey: the striker is hidden from the ego." : `${recording.striker < 0 ? "." : `. Grey: ${recording.ids[recording.striker]} is hidden from the ego.`}`}
+      </p>
       <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
       <Actors recording={recording} clock={clock} />
       <div class="replay-end">
@@ -133,6 +147,7 @@ function capital(text: string): string {
 }
 
 function Grade({ failure }: { failure: Body<"Failure"> }) {
-  const grade = failure.collision?.judgement?.grade;
+  const violation = worstOf(failure);
+  const grade = violation && gradeOf(violation);
   return <span class={`tag ${grade ?? ""}`}>{grade ? GRADE_WORDS[grade].short : words(failure.outcome)}</span>;
 }

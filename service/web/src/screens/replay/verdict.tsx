@@ -2,19 +2,20 @@
 
 import type { Body } from "../../api/types";
 import { number, words } from "../../ui/text";
+import { gradeOf, isContact, requirementOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import * as say from "./words";
 
 type Failure = Body<"Failure">;
 
 export function Verdict({ failure }: { failure: Failure }) {
-  const { collision } = failure;
-  if (collision === null) return <p class="card">No contact is on record.</p>;
-  const { judgement } = collision;
-  const refused = say.refusals(collision);
+  const violation = worstOf(failure);
+  if (violation === null) return <p class="card">No violation is on record.</p>;
+  const refused = say.refusals(violation);
+  const others = say.othersOf(failure, requirementOf(violation));
   const flaky = failure.repetition !== null && failure.repetition.same < failure.repetition.times;
   return (
     <section class="card replay-verdict" aria-label="Verdict">
-      <p class={`verdict-grade grade-${judgement?.grade ?? "none"}`}>{say.verdictOf(failure)}</p>
+      <p class={`verdict-grade grade-${gradeOf(violation) ?? "none"}`}>{say.verdictOf(failure)}</p>
       {refused.length > 0 && (
         <div class="verdict-refused">
           <p>Refused by {refused.length === 1 ? "this rule" : "these rules"}:</p>
@@ -25,20 +26,56 @@ export function Verdict({ failure }: { failure: Failure }) {
           </ul>
         </div>
       )}
-      <p>{say.contactOf(collision)}</p>
-      {judgement !== null && (
-        <>
-          <p>{say.conflictOf(judgement, collision.time_s)}</p>
-          <p>
-            {say.responseOf(judgement, collision.ego_peak_braking_mps2)} {say.knownOf(collision)}
-          </p>
-          <p class={judgement.broke.length + judgement.ego_broke.length > 0 ? "verdict-broke" : ""}>{say.brokeOf(judgement)}</p>
-          <Drivers drivers={judgement.drivers} />
-        </>
-      )}
+      <p>{say.happenedOf(violation)}</p>
+      {isContact(violation) ? <OfContact collision={violation} /> : <OfViolation violation={violation} />}
+      {others.length > 0 && <p class="faint">The episode violated too: {others.join("; ")}.</p>}
       <p class={flaky ? "bad" : "faint"}>{say.repetitionOf(failure)}</p>
       <Triage failure={failure} />
     </section>
+  );
+}
+
+function OfContact({ collision }: { collision: Collision }) {
+  const { judgement } = collision;
+  if (judgement === null) return null;
+  return (
+    <>
+      <p>{say.conflictOf(judgement, collision.time_s)}</p>
+      <p>
+        {say.responseOf(judgement, collision.ego_peak_braking_mps2)} {say.knownOf(collision)}
+      </p>
+      <p class={judgement.broke.length + judgement.ego_broke.length > 0 ? "verdict-broke" : ""}>{say.brokeOf(judgement)}</p>
+      <Drivers drivers={judgement.drivers} />
+    </>
+  );
+}
+
+function OfViolation({ violation }: { violation: Violation }) {
+  const rows = Object.entries(violation.drivers);
+  return (
+    <>
+      <p>The ego {say.manoeuvreOf(violation.ego_manoeuvre)}.</p>
+      <p class={violation.broke.length > 0 ? "verdict-broke" : ""}>{say.egoBrokeOf(violation.broke)}</p>
+      {rows.length > 0 && (
+        <table class="verdict-drivers">
+          <caption>In the ego's place</caption>
+          <thead>
+            <tr>
+              <th scope="col">Driver</th>
+              <th scope="col">Would</th>
+            </tr>
+          </thead>
+          <tbody>
+            {rows.map(([name, keeps]) => (
+              <tr key={name}>
+                <th scope="row">{say.DRIVERS[name] ?? words(name)}</th>
+                <td>{keeps ? <span class="good">✓ keep the requirement</span> : <span class="bad">✗ violate it</span>}</td>
+              </tr>
+            ))}
+          </tbody>
+        </table>
+      )}
+    </>
   );
 }
 

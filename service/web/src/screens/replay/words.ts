@@ -3,9 +3,9 @@
 import type { Body } from "../../api/types";
 import { number, words } from "../../ui/text";
 import { GRADE_WORDS, refusal } from "../../ui/verdicts";
+import { gradeOf, isContact, worstOf, type Collision, type Violation } from "../../ui/violations";
 
 type Failure = Body<"Failure">;
-type Collision = Body<"Collision">;
 type Judgement = Body<"Judgement">;
 
 const CONFLICTS: Record<string, string> = {
@@ -24,6 +24,8 @@ export const DRIVERS: Record<string, string> = {
   r157_ttc: "By R157's time to collision",
 };
 
+const MANOEUVRES: Record<string, string> = { straight: "goes straight", left_turn: "turns left", right_turn: "turns right", lane_change: "changes lanes" };
+
 const BROKE: Record<string, string> = {
   red_light: "ran a red light",
   priority: "took the ego's priority",
@@ -32,18 +34,46 @@ const BROKE: Record<string, string> = {
   pedestrian_on_red: "walked on red",
 };
 
-export function verdictOf({ collision, outcome }: Failure): string {
-  const grade = collision?.judgement?.grade;
+const EGO_BROKE: Record<string, string> = {
+  ...BROKE,
+  priority: "took the striker's priority",
+  wrong_direction: "was on the oncoming side",
+  off_road: "left the road",
+};
+
+export function verdictOf(failure: Failure): string {
+  const { outcome } = failure;
+  const violation = worstOf(failure);
+  const grade = violation && gradeOf(violation);
   if (grade) return `${GRADE_WORDS[grade].long}.`;
   return outcome === "failure" ? "It counts as a failure; nobody judged who would have prevented it." : "It is refused as a failure.";
 }
 
 /** Names of the rules that refused it, with what each means. */
-export function refusals(collision: Collision): string[] {
-  return Object.entries(collision.verdicts).flatMap(([rule, passed]) => (passed ? [] : [refusal(rule)]));
+export function refusals(violation: Collision | Violation): string[] {
+  return Object.entries(violation.verdicts).flatMap(([rule, passed]) => (passed ? [] : [refusal(rule)]));
 }
 
-export function contactOf(collision: Collision): string {
+/** What happened, in a sentence or two. */
+export function happenedOf(violation: Collision | Violation): string {
+  return isContact(violation) ? contactOf(violation) : violationOf(violation);
+}
+
+export function violationOf({ requirement, time_s, robustness, ego_speed_mps, other_id, other_role, other_kind, hidden }: Violation): string {
+  const when = `${number(time_s, 1)} s after the release, at ${number(ego_speed_mps, 1)} m/s`;
+  const least = `The least robustness was ${number(robustness, 2)} scales.`;
+  const near = other_id === null ? "The ego was on course to meet no other road user then." : `The ego would have met the ${other_role} ${other_kind} ${other_id} soonest then${hidden ? ", of which it knew nothing" : ""}.`;
+  return `The ego violated ${words(requirement)} ${when}. ${least} ${near}`;
+}
+
+/** The other requirements that the episode violated, and those that are only reported. */
+export function othersOf({ requirements }: Failure, named: string): string[] {
+  return Object.entries(requirements).flatMap(([name, { counts, violated_s }]) =>
+    name === named || violated_s === null ? [] : [`${words(name)} at ${number(violated_s, 1)} s${counts === "report" ? ", which is only reported" : ""}`],
+  );
+}
+
+function contactOf(collision: Collision): string {
   const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, other_speed_mps, relative_speed_mps } = collision;
   return (
     `The ego's ${ego_zone}, at ${number(ego_speed_mps, 1)} m/s, touched the ${other_zone} of the ${other_role} ${other_id}, ` +
@@ -63,27 +93,29 @@ export function conflictOf({ conflict_type, conflict_s, hidden, position }: Judg
   return `The conflict is ${CONFLICTS[conflict_type] ?? words(conflict_type)}${before}; the striker was ${where} then${sight}.`;
 }
 
+export function manoeuvreOf(name: string): string {
+  return MANOEUVRES[name] ?? words(name);
+}
+
 export function responseOf(judgement: Judgement, peak: number | null): string {
-  const manoeuvre = { straight: "goes straight", left_turn: "turns left", right_turn: "turns right", lane_change: "changes lanes" };
   const response = { none: "does not brake", late_braking: "brakes late", braking: "brakes", standing: "stands", starting: "starts" };
-  const goes = manoeuvre[judgement.ego_manoeuvre as keyof typeof manoeuvre] ?? words(judgement.ego_manoeuvre);
+  const goes = manoeuvreOf(judgement.ego_manoeuvre);
   const does = response[judgement.ego_response as keyof typeof response] ?? words(judgement.ego_response);
   const hardest = peak === null || peak < 0.05 ? "" : `; its hardest braking was ${number(peak, 1)} m/s²`;
   const never = judgement.unresponsive ? " It saw a collision course for 1.5 s or more, and never braked." : "";
   return `The ego ${goes} and ${does}${hardest}.${never}`;
 }
 
-const EGO_BROKE: Record<string, string> = {
-  ...BROKE,
-  priority: "took the striker's priority",
-  wrong_direction: "was on the oncoming side",
-  off_road: "left the road",
-};
-
 export function brokeOf({ broke, ego_broke }: Judgement): string {
-  const offences = (rules: string[], named: Record<string, string>) =>
-    rules.length === 0 ? "broke no rule of the road" : rules.map((rule) => named[rule] ?? words(rule)).join(", and ");
-  return `The striker ${offences(broke, BROKE)}. The ego ${offences(ego_broke, EGO_BROKE)}.`;
+  return `The striker ${offences(broke, BROKE)}. ${egoBrokeOf(ego_broke)}`;
+}
+
+export function egoBrokeOf(broke: readonly string[]): string {
+  return `The ego ${offences(broke, EGO_BROKE)}.`;
+}
+
+function offences(rules: readonly string[], named: Record<string, string>): string {
+  return rules.length === 0 ? "broke no rule of the road" : rules.map((rule) => named[rule] ?? words(rule)).join(", and ");
 }
 
 export function repetitionOf({ repetition }: Failure): string {
