@@ -37,7 +37,7 @@ def _known(
         return None
     known = dict.fromkeys([*SHIPPED, *service.store.own_requirements(campaign_id, caller.sees)])
     if requirement not in known:
-        raise invalid_field("requirement", requirement, f"one of the campaign's: {', '.join(known)}")
+        raise invalid_field("requirement", requirement, f"one of: {', '.join(known)}")
     return requirement
 
 

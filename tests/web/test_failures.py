@@ -182,7 +182,7 @@ def test_the_scatter_plot_says_what_the_pointer_is_at(screen: Callable[..., Page
 
 def test_refused_contacts_by_rule(screen: Callable[..., Page], table: dict[str, Any]) -> None:
     page = screen()
-    page.get_by_role("link", name="Refused contacts").click()
+    page.get_by_role("link", name="Refused").click()
     refused = [i for i, valid in enumerate(table["valid"]) if not valid]
     wait_for(page, len(refused))
     rules = Counter(rule for i in refused for rule in table["refused_by"][i])
@@ -278,7 +278,7 @@ def test_hostile_text_is_shown_and_runs_nothing(
     expect(page.locator(".crumbs")).to_contain_text("<b>7</b>")
     page.locator(".cards li").first.hover()
     expect(page.locator(".tip")).to_contain_text("<img src=x")
-    page.get_by_role("link", name="Refused contacts").click()
+    page.get_by_role("link", name="Refused").click()
     expect(page.locator(".cards li").first).to_contain_text("<script>")
     assert page.evaluate("window.hacked") is None
 

@@ -3,7 +3,7 @@
 import type { ComponentChildren } from "preact";
 import type { Body } from "../api/types";
 import { address } from "../router";
-import { count, percent, words } from "./text";
+import { capital, count, percent, words } from "./text";
 import "./requirements.css";
 
 export type Requirements = Record<string, Body<"RequirementCounts">>;
@@ -72,8 +72,4 @@ function Linked({ to, children }: { to: string | undefined; children: ComponentC
 
 function bracket({ rate_low, rate_high }: Requirements[string]): string {
   return rate_low === null || rate_high === null ? "" : `[${(100 * rate_low).toFixed(1)}, ${(100 * rate_high).toFixed(1)}]`;
-}
-
-function capital(text: string): string {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

@@ -28,3 +28,8 @@ export function moment(iso: string | null): string {
 export function percent(value: number | null | undefined): string {
   return value === null || value === undefined || !Number.isFinite(value) ? "–" : `${(100 * value).toFixed(1)} %`;
 }
+
+/** With a capital at the beginning; an identifier stays as it is. */
+export function capital(text: string): string {
+  return /^\w*_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1);
+}

@@ -45,8 +45,9 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
   const outcomes = useMemo(() => outcomeFeatures(read_), [read_]);
   const scene = useMemo(() => sceneFeatures(read_, family), [read_, family]);
   const features = useMemo(() => [...outcomes, ...scene], [outcomes, scene]);
-  const axes = useMemo(() => [...outcomes.slice(0, AXES), ...scene], [outcomes, scene]);
-  const touched = useMemo(() => read_.requirement.includes(NO_CONTACT), [read_]); // else what contacts are plotted by is empty
+  const axes = useMemo(() => [...outcomes.filter(({ values }) => !values.every(Number.isNaN)).slice(0, AXES), ...scene], [outcomes, scene]);
+  // What contacts are plotted by at first, a violation without contact does not have.
+  const touched = asked.requirement ? asked.requirement === NO_CONTACT : read_.requirement.includes(NO_CONTACT);
   const plotted = useMemo(() => (asked.family ? all.filter((i) => table.families[i] === asked.family) : all), [all, asked.family]);
   const passed = useMemo(() => passing(table, all, asked), [table, all, asked]);
   const shown = useMemo(

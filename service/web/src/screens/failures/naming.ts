@@ -1,6 +1,6 @@
 /** What can be filtered by, in words. */
 
-import { words } from "../../ui/text";
+import { capital, words } from "../../ui/text";
 import { GRADE_WORDS, refusal, type GradeName } from "../../ui/verdicts";
 import type { Facet } from "./filters";
 import type { TriageState } from "./wire";
@@ -41,8 +41,4 @@ export function halves(kind: string): [string, string] {
   const at = kind.indexOf("; ");
   const [striker, ego] = at < 0 ? [kind, ""] : [kind.slice(0, at), kind.slice(at + 2)];
   return [capital(striker), capital(ego)];
-}
-
-function capital(text: string): string {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

@@ -172,10 +172,9 @@ function One({ index, shape, last, remove }: Single) {
           more={described(scale.id, scale.wrong, about("scale"))}
         />
       </Labelled>
-      <div class="field">
-        <label for={counts.id}>When it is violated</label>
+      <Labelled {...counts} title="An episode that violates it" about={about("counts")}>
         <CountsAs id={counts.id} value={counts.value} change={counts.change} />
-      </div>
+      </Labelled>
       <div class="field">
         <label class="check">
           <input id={shapes.id} type="checkbox" checked={shapes.value} onChange={() => shapes.change(!shapes.value)} /> Shapes the reward

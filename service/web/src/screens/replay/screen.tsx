@@ -17,7 +17,7 @@ import { askedTime, conflictBounds, marksOf, opening, useLayers, useStopped, use
 import { Stage } from "../../stage/stage";
 import { KeyList, Transport } from "../../stage/transport";
 import { Empty, Shown } from "../../ui/states";
-import { words } from "../../ui/text";
+import { capital, words } from "../../ui/text";
 import { GRADE_WORDS } from "../../ui/verdicts";
 import { gradeOf, signatureOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import { Actors } from "./actors";
@@ -140,10 +140,6 @@ function Replay({ campaign, path, known, series, violation, query }: Played) {
       </div>
     </div>
   );
-}
-
-function capital(text: string): string {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 function Grade({ failure }: { failure: Body<"Failure"> }) {

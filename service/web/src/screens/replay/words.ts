@@ -46,7 +46,7 @@ export function verdictOf(failure: Failure): string {
   const violation = worstOf(failure);
   const grade = violation && gradeOf(violation);
   if (grade) return `${GRADE_WORDS[grade].long}.`;
-  return outcome === "failure" ? "It counts as a failure; nobody judged who would have prevented it." : "It is refused as a failure.";
+  return outcome === "failure" ? "It counts as a failure; no reference driver was asked." : "It is refused as a failure.";
 }
 
 /** Names of the rules that refused it, with what each means. */
