@@ -60,7 +60,7 @@ def test_the_numbers_of_a_report_are_the_services(
             assert numbers(text) == per_cent(estimate["mean"], estimate["low"], estimate["high"])
         funnel = page.get_by_role("group", name=f"Funnel of {cell['method']}")
         assert funnel.locator("b").all_inner_texts() == [
-            str(cell[name]) for name in ("raw_collisions", "failures", "distinct_failures", "distinct_preventable")
+            str(cell[name]) for name in ("failures", "distinct_failures", "distinct_preventable")
         ]
     tests = page.get_by_role("region", name=f"{table['reference']} against the others").locator("tbody tr")
     assert tests.count() == sum(test["family"] == "low" for test in table["tests"])
