@@ -49,8 +49,8 @@ def draw_from_above(axis: Axes, family: FamilyName, recording: Recording, apart_
     if bystanders:
         grey: dict[str, Any] = {"facecolor": BYSTANDER_COLOUR, "edgecolor": BYSTANDER_COLOUR, "alpha": 0.2}
         axis.add_patch(Polygon(np.empty((0, 2)), label="others", **grey))
-    when = "at the contact" if recording.collision else f"as {recording.violation.requirement} was violated"
-    legend(axis, title=f"filled: {when}{' in the failure' if recording.twin else ''}")
+    when = "contact" if recording.collision else "violation"
+    legend(axis, title=f"filled: at the {when}{' in the failure' if recording.twin else ''}")
 
 
 def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float]]:

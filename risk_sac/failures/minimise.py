@@ -67,7 +67,7 @@ class _Search:
         """Goes on with a variant if it fails in the same way, and so do most of its copies."""
         if self.stage.played + 1 + COPIES > self._most - COPIES - 1:  # as many are counted afresh in the end
             return False
-        found = self.stage.play(variant)
+        found = alike(self.stage.play(variant)[:1], self.stage.failure)
         if found is None or found.graded != self.stage.grade or not self._holds(variant):
             return False
         self.left = variant

@@ -36,9 +36,18 @@ def sentence(series: Series, collision: Collision) -> str:
 
 def story(series: Series, violation: Collision | Violation) -> str:
     """Returns a sentence about any violation; see `sentence` for a contact that was judged."""
-    if isinstance(violation, Violation):
-        return f"{violation.signature}; ego at {violation.ego_speed_mps:.0f} m/s after {violation.time_s:.1f} s"
-    return sentence(series, violation) if violation.judgement else f"contact with {violation.other_id}"
+    if isinstance(violation, Collision):
+        return sentence(series, violation) if violation.judgement else f"contact with {violation.other_id}"
+    ego = f"ego at {violation.ego_speed_mps:.0f} m/s violates {violation.requirement}"
+    if violation.other_id is None:
+        return f"nobody near; {ego}"
+    since = series["time_s"] - series["released_s"]
+    at, begins = (int(np.searchsorted(since, time_s - 1e-6)) for time_s in (violation.time_s, 0.0))
+    other = [str(name) for name in series["ids"]].index(violation.other_id)
+    until = {name: series[name][: at + 1] for name in ("accel_mps2", "lateral_mps")}
+    does = _does({**series, **until}, other, begins)
+    what = does[1] if does else f"goes on at {series['speed_mps'][at, other]:.0f} m/s"
+    return f"{_who(series, other, does[0] if does else at)}, {what}; {ego}"
 
 
 def _broke(offences: tuple[str, ...]) -> str:

@@ -62,7 +62,7 @@ class Stage:
             seed=episode.seed,
         )
         self.played = 0  # episodes so far
-        found = self.play(self.original)
+        found = alike(self.play(self.original), self.failure)
         if found is None:
             self.env.close()
             raise SimulationError(f"{bundle.manifest.id} does not happen here")
@@ -72,18 +72,18 @@ class Stage:
         """Returns the scene of a variant."""
         return Scene(self.space.family, dict(zip(self.space.names, variant.scene.tolist(), strict=True)))
 
-    def play(self, variant: Variant) -> Collision | Violation | None:
-        """Returns how the ego fails as it did, see `alike`; None if it does not, or if the scene is infeasible."""
+    def play(self, variant: Variant) -> Sequence[Collision | Violation]:
+        """Returns the violations of a variant, that which names it first; none if its scene is infeasible."""
         self.played += 1
         try:
             found = play(self.env, self.scene(variant), variant.seed, variant.actions).found
         except (InfeasibleScene, SimulationError):
-            return None
-        return alike(found, self.failure)
+            return ()
+        return sorted(found, key=lambda each: not each.valid)
 
     def fails(self, variant: Variant) -> bool:
         """Whether the ego fails as it did."""
-        return self.play(variant) is not None
+        return alike(self.play(variant), self.failure) is not None
 
     def copies(self, variant: Variant, share: float, count: int, random: np.random.Generator) -> Iterator[Variant]:
         """Yields copies whose scene and actions are perturbed by up to a share."""

@@ -23,7 +23,7 @@ def test_failures_of_a_signature_are_a_cluster_with_the_most_preventable_and_sho
     assert (first.representative, first.grade) == ("e3", Grade.CAREFUL)
     assert (second.name, second.failures, second.preventable) == ("leader", 9, 0)
     assert overviewed.covered == 1  # the signature is no part of the taxonomy
-    assert overviewed.cells == 1440
+    assert overviewed.cells == 1872
 
 
 def test_contacts_that_are_no_failures_are_left_out() -> None:
