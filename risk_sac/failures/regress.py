@@ -119,7 +119,7 @@ def _judge(bundle: Bundle, ego: EgoConfig) -> _Ending:
             first, second = attack(), attack()
             if trajectory_digest(first.series) != trajectory_digest(second.series):
                 return _Ending(Verdict.FLAKY, f"with {name} this ego went another way the second time")
-            endings[name] = _compared(first.found, wanted)._replace(played=first if first.found else None)
+            endings[name] = compared(first.found, wanted)._replace(played=first if first.found else None)
     except InfeasibleScene as error:
         return _Ending(Verdict.NOT_COMPARABLE, f"its scene is refused with this ego: {error.reason}")
     except RiskSacError as error:
@@ -129,7 +129,7 @@ def _judge(bundle: Bundle, ego: EgoConfig) -> _Ending:
     return worst._replace(reason="; ".join(reasons))
 
 
-def _compared(found: Sequence[Collision | Violation], wanted: Sequence[Collision | Violation]) -> _Ending:
+def compared(found: Sequence[Collision | Violation], wanted: Sequence[Collision | Violation]) -> _Ending:
     """What became of the violations of a failure, by what the other ego violates."""
     if still := [each for each in found if any(_persists(old, each) for old in wanted)]:
         return _Ending(Verdict.STILL_FAILING, _events(still), still[0].signature)

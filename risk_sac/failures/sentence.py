@@ -38,7 +38,7 @@ def story(series: Series, violation: Collision | Violation) -> str:
     """Returns a sentence about any violation; see `sentence` for a contact that was judged."""
     if isinstance(violation, Collision):
         return sentence(series, violation) if violation.judgement else f"contact with {violation.other_id}"
-    ego = f"ego at {violation.ego_speed_mps:.0f} m/s violates {violation.requirement}"
+    ego = f"ego at {violation.ego_speed_mps:.0f} m/s{_broke(violation.broke)} violates {violation.requirement}"
     if violation.other_id is None:
         return f"nobody near; {ego}"
     since = series["time_s"] - series["released_s"]
@@ -47,7 +47,7 @@ def story(series: Series, violation: Collision | Violation) -> str:
     until = {name: series[name][: at + 1] for name in ("accel_mps2", "lateral_mps")}
     does = _does({**series, **until}, other, begins)
     what = does[1] if does else f"goes on at {series['speed_mps'][at, other]:.0f} m/s"
-    return f"{_who(series, other, does[0] if does else at)}, {what}; {ego}"
+    return f"{_who(series, other, does[0] if does else at, '')}, {what}; {ego}"
 
 
 def _broke(offences: tuple[str, ...]) -> str:

@@ -15,6 +15,7 @@ from risk_sac.types import HEADING, SPEED, X, Y
 HEADWAY_S = 1.5
 EMERGENCY_MPS2 = 3.0  # braking that IDM alone would build up too late
 PREVIEW_S, LEAST_PREVIEW_M = 0.5, 3.0
+SLOWING_MPS2, WALK_MPS = -1.5, 2.0
 
 
 class Lqr(Driver):
@@ -61,3 +62,14 @@ def lqr_gains(speed_mps: int, wheelbase_m: float, step_s: float) -> np.ndarray:
     cost, effort = np.diag([1.0, 2.0]), np.array([[8.0]])
     p = solve_discrete_are(a, b, cost, effort)
     return np.linalg.solve(effort + b.T @ p @ b, b.T @ p @ a)[0]
+
+
+class Crawler(Lqr):
+    """Slows down to a walk."""
+
+    version = "1.0"
+    response_time_s = 0.3
+
+    def accel_mps2(self, perceived: Perceived) -> float:
+        ahead = super().accel_mps2(perceived)
+        return min(ahead, SLOWING_MPS2 if perceived.state[SPEED, 0] > WALK_MPS else 0.0)

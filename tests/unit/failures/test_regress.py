@@ -5,7 +5,9 @@ import pytest
 from risk_sac.cli.regress import junit
 from risk_sac.config import EgoConfig
 from risk_sac.failures.cases import Case, Regression, Verdict
-from risk_sac.records import Grade
+from risk_sac.failures.regress import compared
+from risk_sac.records import Collision, Grade, Violation
+from tests.builders import collision, judgement, violation
 
 
 def case(verdict: Verdict, name: str = "a", *, found: str = "", known: bool = False) -> Case:
@@ -58,3 +60,38 @@ def test_junit_has_a_case_for_each_failure() -> None:
     assert wrong == {"flaky", "not_comparable"}
     assert skipped == {"old"}
     assert report.find("testsuite").get("tests") == "6"
+
+
+HIT = collision(other_id="lead", judgement=judgement(signature="cut-in"))
+ARTEFACT = violation(requirement="gentle", verdicts={"no_teleport": False})
+
+
+@pytest.mark.parametrize(
+    ("found", "verdict", "reason"),
+    [
+        ([], Verdict.FIXED, "never_fast is kept"),
+        ([violation(other_id="another")], Verdict.STILL_FAILING, "violates never_fast after 1.5 s, at 9.0 m/s"),
+        ([HIT, violation()], Verdict.STILL_FAILING, "violates never_fast after 1.5 s, at 9.0 m/s"),
+        ([HIT], Verdict.NEW_KIND, "touches lead at 9.0 m/s: cut-in"),
+        (
+            [violation(requirement="gentle")],
+            Verdict.NEW_KIND,
+            "violates gentle after 1.5 s, at 9.0 m/s: ",
+        ),
+        ([ARTEFACT], Verdict.NOT_COMPARABLE, "which is not its failure: no_teleport"),
+    ],
+)
+def test_a_violation_without_contact_is_compared_by_its_requirement(
+    found: list[Collision | Violation], verdict: Verdict, reason: str
+) -> None:
+    ending = compared(found, [violation(other_id="lead")])
+    assert ending.verdict is verdict
+    assert reason in ending.reason
+
+
+def test_every_requirement_that_a_failure_violated_has_to_be_kept() -> None:
+    other = HIT.model_copy(update={"other_id": "left"})
+    assert compared([violation()], [HIT, violation()]).verdict is Verdict.STILL_FAILING
+    assert compared([HIT], [HIT, violation()]).found == "cut-in"
+    assert compared([other], [HIT, violation()]).verdict is Verdict.NEW_KIND
+    assert compared([], [HIT, violation()]).reason == "nobody is touched and never_fast is kept"

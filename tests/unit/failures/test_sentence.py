@@ -4,8 +4,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from risk_sac.failures.sentence import sentence
-from tests.builders import collision, judgement
+from risk_sac.failures.sentence import sentence, story
+from tests.builders import collision, judgement, violation
 
 RELEASE = 5  # frames before it
 ROWS = 41
@@ -88,3 +88,10 @@ def test_what_it_does_is_told_in_the_order_in_which_it_begins() -> None:
 
 def test_who_brakes_in_time_is_not_called_late() -> None:
     assert said(ego_accel_mps2=during(1.5, 3.5, -6.0)).endswith("ego at 14 m/s brakes, and touches it still")
+
+
+def test_a_violation_without_contact_tells_what_the_nearest_actor_did_until_then() -> None:
+    braking = series(x_m=20.0, y_m=0.0, accel_mps2=during(0.5, 3.0, -4.0))
+    told = story(braking, violation(time_s=1.5, other_id="lead", ego_speed_mps=14.0, broke=("speeding",)))
+    assert told == "leader, 20 m ahead, brakes at 4.0 m/s² for 1.1 s; ego at 14 m/s speeding violates never_fast"
+    assert story(braking, violation(time_s=0.0)) == "nobody near; ego at 9 m/s violates never_fast"

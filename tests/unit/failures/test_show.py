@@ -8,6 +8,8 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.show import CAPTION_WIDTH, caption, draw, draw_recording
 from risk_sac.records import Grade, Outcome
+from risk_sac.run_folder.results import RecordedFailure
+from tests.builders import episode_record, violation
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 
 
@@ -122,3 +124,37 @@ def test_rules_that_the_contact_failed_are_named_in_full_on_lines_that_the_page_
     title = caption("mixed", Recording(replace(contact, episode=failed), with_release()))
     assert max(map(len, title.splitlines())) <= CAPTION_WIDTH
     assert rules.replace("_", " ") in title.replace("\n", " ")
+
+
+@pytest.mark.parametrize("other_id", ["pedestrian", None])
+def test_a_violation_without_contact_is_marked_while_the_episode_goes_on(other_id: str | None) -> None:
+    near = {"other_id": other_id, "other_kind": "pedestrian", "other_role": "adversary"} if other_id else {}
+    broken = violation(requirement="safe_ttc", time_s=1.0, grade=Grade.CAREFUL, **near)
+    episode = episode_record(7, Outcome.FAILURE, scene=synthetic_contact().episode.scene, violations=(broken,))
+    recording = Recording(RecordedFailure.of("low-random-0", episode), with_release())
+    figure = draw_recording("mixed", recording)
+    view, *panels = figure.axes
+    bodies = [text.get_text() for text in view.get_legend().get_texts()]
+    assert ("pedestrian (adversary)" in bodies, "ego" in bodies) == (other_id is not None, True)
+    assert "touched here" not in bodies
+    (ego,) = (patch for patch in view.patches if patch.get_label() == "ego")
+    np.testing.assert_allclose(ego.get_path().vertices[:-1].mean(axis=0), (290.0, -1.65))  # as it was violated
+    assert [text.get_text() for text in panels[0].texts] == ["safe_ttc violated", "adversaries released"]
+    assert all(panel.lines for panel in panels)
+    assert panels[0].get_xlim()[1] == pytest.approx(recording.time_s[-1]) == pytest.approx(1.0)
+    bold = [line.get_label() for line in panels[-1].lines if line.get_linewidth() > 2]
+    assert bold == ["safe_ttc"]
+    title = figure.get_suptitle()
+    assert "the ego, at 9.0 m/s, violated safe_ttc" in title
+    assert ("'pedestrian' first" in title) == (other_id is not None)
+    assert "grade careful: a careful driver would have prevented it" in title
+
+
+def test_other_violations_of_the_episode_are_marked_and_named() -> None:
+    contact = synthetic_contact()
+    both = {"failed": ("no_contact", "safe_ttc"), "violations": (violation(requirement="safe_ttc", time_s=1.0),)}
+    recording = Recording(replace(contact, episode=contact.episode.model_copy(update=both)), with_release())
+    assert caption("mixed", recording).splitlines()[-1] == "also violated: safe_ttc"
+    _, panel, *_ = draw_recording("mixed", recording).axes
+    (mark,) = (text for text in panel.texts if text.get_text() == "safe_ttc violated")
+    assert mark.xy[0] == pytest.approx(-0.95)

@@ -12,6 +12,8 @@ import sumo_nets
 from risk_sac.failures.net import read_net, roads_of, surfaces
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.thumbnail import EGO, GREY, HEIGHT, STRIKER, WIDTH, thumbnail
+from risk_sac.run_folder.results import RecordedFailure
+from tests.builders import violation
 from tests.unit.failures.staged import synthetic_contact, synthetic_series
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -99,3 +101,13 @@ def test_the_roads_in_view_lie_below_everything_else_with_stripes_across_a_cross
     for shape in ground:
         assert Polygon(points(shape)).intersects(view) if shape.get("fill") != "none" else len(points(shape)) == 2
     assert 0 < len(ground) < len(surfaces(read_net(Path(sumo_nets.__path__[0]) / "mixed" / "mixed.net.xml")))
+
+
+def test_a_violation_near_nothing_shows_the_ego_and_its_path_up_to_then() -> None:
+    episode = synthetic_contact().episode.model_copy(update={"collision": None, "violations": (violation(time_s=1.0),)})
+    shapes = list(ET.fromstring(thumbnail(Recording(RecordedFailure.of("a", episode), synthetic_series()), ())))
+    assert not [shape for shape in shapes if shape.get("fill") == STRIKER]
+    (path,) = (shape for shape in shapes if shape.get("stroke") == EGO)
+    assert len(points(path)) == pytest.approx(11, abs=1)
+    end, ego = points(path)[-1], points(body(shapes, EGO)).mean(axis=0)
+    np.testing.assert_allclose(end, ego, atol=5.0)

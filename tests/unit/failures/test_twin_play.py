@@ -4,7 +4,7 @@ import numpy as np
 
 from risk_sac.config import EgoConfig
 from risk_sac.failures.question import TwinPlay, read_twin, twin_bytes
-from tests.builders import collision
+from tests.builders import collision, violation
 from tests.unit.failures.staged import synthetic_series
 
 
@@ -24,3 +24,12 @@ def test_a_twin_reads_back_with_its_series_and_what_is_not_finite() -> None:
     assert series.keys() == synthetic_series().keys()
     for name, array in synthetic_series().items():
         np.testing.assert_array_equal(series[name], array)
+
+
+def test_the_twin_of_a_violation_says_whether_it_keeps_that_requirement() -> None:
+    broken, hit = violation(), collision(other_id="lead", ego_speed_mps=5.44)
+    assert TwinPlay.of(None, broken, []).outcome == "keeps never_fast"
+    assert TwinPlay.of(None, broken, [broken]).outcome == "violates never_fast after 1.5 s, at 9.0 m/s"
+    told = TwinPlay.of(None, broken, [hit])
+    assert (told.outcome, told.collision) == ("keeps never_fast, touches lead at 5.4 m/s", hit)
+    assert TwinPlay.of(None, hit, [broken]).outcome == "touches nobody, violates never_fast after 1.5 s, at 9.0 m/s"

@@ -1,8 +1,10 @@
 """Which failures are refused because one of them does not repeat."""
 
+from risk_sac.config import RunSpec
 from risk_sac.records import REPEATS, EpisodeRecord, Grade, Outcome, Repetition
-from risk_sac.run_folder.verified import Verified
-from tests.builders import collision, episode_record, judgement
+from risk_sac.run_folder.results import RecordedFailure, Results
+from risk_sac.run_folder.verified import Verified, distinct_failures
+from tests.builders import collision, episode_record, judgement, violation
 
 
 def failure(index: int, phase: str = "train", **changes: object) -> EpisodeRecord:
@@ -44,3 +46,35 @@ def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not(
 def test_where_all_repeat_nothing_is_refused() -> None:
     records = (failure(0), failure(1))
     assert verified(e0=2).judged(records) == records
+
+
+def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_stays() -> None:
+    contact, broken = collision(judgement=judgement()), violation()
+    records = [
+        episode_record(0, Outcome.FAILURE, violations=(broken,)),
+        episode_record(
+            1, Outcome.FAILURE, violations=(broken,), collision=contact, failed=("no_contact", "never_fast")
+        ),
+        episode_record(2, Outcome.FAILURE, violations=(violation(requirement="gentle"),)),
+    ]
+    found = verified(e0=1).judged(records)
+    assert [record.refused_by(REPEATS) for record in found] == [("never_fast",), ("never_fast",), ()]
+    assert [record.outcome for record in found] == [Outcome.DEGENERATE, Outcome.FAILURE, Outcome.FAILURE]
+    assert found[1].failed == ("no_contact",)
+    assert found[1].collision == contact
+
+
+def test_an_episode_is_distinct_by_any_of_its_violations() -> None:
+    hit = collision(judgement=judgement())
+    episodes = [
+        episode_record(0, Outcome.FAILURE, violations=(violation(),)),
+        episode_record(1, Outcome.FAILURE, violations=(violation(),)),
+        episode_record(2, Outcome.FAILURE, violations=(violation(),), collision=hit),
+        episode_record(
+            3, Outcome.DEGENERATE, violations=(violation(requirement="a", verdicts={"no_teleport": False}),)
+        ),
+    ]
+    spec = RunSpec(family="low", method="random", seed=0)
+    failures = tuple(RecordedFailure.of(spec.id, each) for each in episodes)
+    results = Results(spec=spec, spec_digest="", finished=True, failures=failures)
+    assert [episode.index for episode in distinct_failures(results)] == [0, 2]
