@@ -93,7 +93,7 @@ def test_an_ego_that_keeps_the_requirement_has_fixed_it_and_its_own_still_fails(
 
 
 def test_its_core_fails_by_the_same_requirement_with_less(bundle: Path, tell: Tell, tmp_path: Path) -> None:
-    minimal = minimise(read_bundle(bundle), most=60)
+    minimal = minimise(read_bundle(bundle), most=40)
     core = minimal.manifest.core
     assert core is not None
     assert core.after.segments < core.before.segments
