@@ -58,12 +58,12 @@ class OwnMotionGauge:
 
     def remember(self, frame: Frame) -> None:
         """Takes over the next frame without measuring it."""
-        self._past.append((frame.time_s, frame.state[HEADING, 0], frame.state[ACCEL, 0]))
+        self._past.append((frame.time_s, frame.state.item(HEADING, 0), frame.state.item(ACCEL, 0)))
 
     def measure(self, frame: Frame) -> OwnMotion:
         """Measures the next frame."""
         state = frame.state
-        x_m, y_m, heading_rad = state[X, 0], state[Y, 0], state[HEADING, 0]
+        x_m, y_m, heading_rad = state.item(X, 0), state.item(Y, 0), state.item(HEADING, 0)
         self.remember(frame)
         around = self.carriageway.around(x_m, y_m, sector_of(heading_rad))
         measured, overtakes = _measured(state, frame.kind, self._past[0], frame.time_s, *around)
@@ -107,16 +107,17 @@ def nearest_lane(lanes: Floats, x: float, y: float, heading: float) -> tuple[flo
     The limit where there is none is that of the nearest lane of any direction; inf without one.
     """
     cos, sin = math.cos(heading), math.sin(heading)
-    least, least_any, limit, limit_any = math.inf, math.inf, math.inf, math.inf
+    least2, least2_any, limit, limit_any = math.inf, math.inf, math.inf, math.inf
     for i in range(len(lanes)):
         dx, dy = x - lanes[i, 0], y - lanes[i, 1]
         along = min(max(dx * lanes[i, 2] + dy * lanes[i, 3], 0.0), lanes[i, 4])
-        distance = math.hypot(dx - along * lanes[i, 2], dy - along * lanes[i, 3])
-        if distance < least_any:
-            least_any, limit_any = distance, lanes[i, 5]
-        if distance < least and cos * lanes[i, 2] + sin * lanes[i, 3] > SAME_WAY_COS:
-            least, limit = distance, lanes[i, 5]
-    return least, limit_any if math.isinf(limit) else limit
+        dx, dy = dx - along * lanes[i, 2], dy - along * lanes[i, 3]
+        distance2 = dx * dx + dy * dy
+        if distance2 < least2_any:
+            least2_any, limit_any = distance2, lanes[i, 5]
+        if distance2 < least2 and cos * lanes[i, 2] + sin * lanes[i, 3] > SAME_WAY_COS:
+            least2, limit = distance2, lanes[i, 5]
+    return math.sqrt(least2), limit_any if math.isinf(limit) else limit
 
 
 @compiled
@@ -141,8 +142,8 @@ def depth(edges: Floats, x: float, y: float) -> float:
         wx, wy = edges[i, 2] - edges[i, 0], edges[i, 3] - edges[i, 1]
         if (y < edges[i, 1]) != (y < edges[i, 3]) and dx < wx * dy / wy:
             inside = not inside
-        if edges[i, 4] != 0.0 and (wx != 0.0 or wy != 0.0):
-            share = min(max((dx * wx + dy * wy) / (wx * wx + wy * wy), 0.0), 1.0)
+        if edges[i, 4] != 0.0:
+            share = min(max((dx * wx + dy * wy) * edges[i, 4], 0.0), 1.0)
             dx, dy = dx - share * wx, dy - share * wy
             least2 = min(least2, dx * dx + dy * dy)
     return math.sqrt(least2) if inside else -math.sqrt(least2)
@@ -152,7 +153,7 @@ def depth(edges: Floats, x: float, y: float) -> float:
 def overtakes(edges: Floats, state: Floats) -> bool:
     """Whether an actor stands, or is slower than the ego, on the carriageway of the ego's direction beside or ahead.
 
-    From `PASSED_M` behind the ego's rear, room to come back, to `PASSING_M` ahead of its centre.
+    Choice: from `PASSED_M` behind the ego's rear, room to come back, to `PASSING_M` ahead of its centre.
     """
     cos, sin = math.cos(state[HEADING, 0]), math.sin(state[HEADING, 0])
     for i in range(1, state.shape[1]):

@@ -34,7 +34,7 @@ EXACT_M = 0.01
 class Surroundings(NamedTuple):
     """The carriageway around a square of the net, for one sector of headings."""
 
-    edges: Floats  # `k x 5`: x, y of both ends of a piece of the outline; 1 for an edge, 0 for a mere cut
+    edges: Floats  # `k x 5`: x, y of both ends of a piece of the outline; 1 / length², 0 for a mere cut
     lanes: Floats  # `l x 6`: x, y, cos, sin and length of a segment of a lane's middle, any direction; speed limit
 
 
@@ -126,5 +126,6 @@ def _outline(ground: shapely.Geometry, bounds: tuple[float, float, float, float]
             points = shapely.get_coordinates(ring).round(3)  # so that no digit of GEOS's own is left
             for a, b in pairwise(points):
                 on = [abs(a[k % 2] - bounds[k]) < 1e-6 and abs(b[k % 2] - bounds[k]) < 1e-6 for k in range(4)]
-                rows.append((*a, *b, 0.0 if any(on) else 1.0))
+                length2 = ((b - a) ** 2).sum()
+                rows.append((*a, *b, 0.0 if any(on) or length2 == 0.0 else 1.0 / length2))
     return np.array(rows, dtype=np.float64).reshape(-1, 5)
