@@ -299,8 +299,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def violations(self, results: Mapping[str, RequirementResult]) -> tuple[Violation, ...]:
         """Violations without contact of the requirements that count; see `violations_of`."""
-        played = Played(self.trace.frames, self.trace.measures, self.evidence())
-        return violations_of(self.problem.requirements, results, played, self._gauge, self._artefacts)
+        return violations_of(self.problem.requirements, results, self._played, self._gauge, self._artefacts)
+
+    def _played(self) -> Played:
+        return Played(self.trace.frames, self.trace.measures, self.evidence())
 
     def evidence(self) -> Evidence:
         """What a judge may look at, of the episode so far."""

@@ -26,7 +26,7 @@ ANY_WAY = SECTORS  # the sector of an ego that may use oncoming lanes
 LEAST_COS = math.cos(math.radians(112.0))  # of a lane against a sector: crossing roads count, oncoming ones do not
 SQUARE_M = 32.0
 REACH_M = 10.0  # how far distances are measured
-MARGIN_M = REACH_M + 5.0  # and half of a long body
+MARGIN_M = 35.0  # around a square: what an ego overtakes is up to 30 m ahead of it, see `overtakes`
 SLIT_M = 0.6  # gaps no wider lie between lanes that belong together: nets are rounded, and some are drawn loosely
 EXACT_M = 0.01
 

@@ -37,11 +37,12 @@ class Ground:
     crossings: tuple[Area, ...] = ()  # pedestrian crossings
     junctions: tuple[Area, ...] = ()
     roadway: tuple[Area, ...] = ()  # where vehicles drive; none: pedestrians are judged as if always on it
+    net: str = ""  # the net's file; none: the ego is judged as if always on its carriageway
 
     @classmethod
     def of(cls, layout: Layout, speed_limit_mps: float) -> "Ground":
         """Where a layout is."""
-        names = ("friction", "lane_width_m", "crossings", "junctions", "roadway")
+        names = ("friction", "lane_width_m", "crossings", "junctions", "roadway", "net")
         return cls(speed_limit_mps=speed_limit_mps, **{name: getattr(layout, name) for name in names})
 
 

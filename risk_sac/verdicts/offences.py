@@ -4,12 +4,15 @@ import math
 
 import numpy as np
 
-from risk_sac.types import Bools, Floats, Kind, Role
+from risk_sac.risk.own_motion import depths, overtakes
+from risk_sac.scenario.carriageway import ANY_WAY, carriageway_of, sector_of
+from risk_sac.types import HEADING, LENGTH, SPEED, WIDTH, Bools, Floats, Kind, Role, X, Y
 from risk_sac.verdicts.evidence import Evidence, Letters, inside
 
 EGO = 0
 JUNCTION_S = 6.0  # the longest way through a junction
 RECENT_S = 3.0
+LOOK_STEPS = 2  # frames between two looks at where the ego is
 SPEEDING_FACTOR = 1.1
 STANDING_MPS = 0.5
 KERB_M = 0.5  # a pedestrian this near to a crossing is stepping onto it
@@ -50,12 +53,39 @@ def ego_offences(evidence: Evidence, striker: int | None = None, *, crossing: bo
     if striker is not None and not red_light:
         walks = evidence.kind[striker] == Kind.PEDESTRIAN
         priority = took_crossing(evidence, striker) if walks else crossing and took_priority(evidence, EGO, striker)
+    left = left_carriageway(evidence)
     rules = {
         "red_light": red_light,
         "priority": priority,
+        "wrong_direction": "wrong_direction" in left,
         "speeding": speeds(evidence, EGO),
+        "off_road": "off_road" in left,
     }
     return tuple(name for name, broke in rules.items() if broke)
+
+
+def left_carriageway(evidence: Evidence) -> frozenset[str]:
+    """Names where the ego's whole body was in the last 3 s beside the carriageway of its direction.
+
+    `wrong_direction`: on an oncoming lane, without overtaking; `off_road`: beside any lane.
+    """
+    e, found = evidence, set()
+    if not e.ground.net:
+        return frozenset()
+    carriageway = carriageway_of(e.ground.net)
+    state = np.zeros((WIDTH + 1, len(e.ids)))
+    state[LENGTH], state[WIDTH] = e.length_m, e.width_m
+    for t in range(len(e.time_s) - 1, e.since(RECENT_S) - 1, -LOOK_STEPS):
+        state[X], state[Y], state[HEADING], state[SPEED] = e.x_m[t], e.y_m[t], e.heading_rad[t], e.speed_mps[t]
+        place = float(state[X, EGO]), float(state[Y, EGO])
+        own = carriageway.around(*place, sector_of(float(state[HEADING, EGO]))).edges
+        if depths(own, state)[1] >= 0.0:
+            continue
+        if depths(carriageway.around(*place, ANY_WAY).edges, state)[1] < 0.0:
+            found.add("off_road")
+        elif not overtakes(own, state):
+            found.add("wrong_direction")
+    return frozenset(found)
 
 
 def took_priority(evidence: Evidence, taker: int, other: int) -> bool:

@@ -45,12 +45,12 @@ def lane_path(evidence: Evidence, first: int) -> Path | None:
     moved = np.where(np.arange(len(moved)) > first, moved - moved[first], 0.0)
     if np.abs(moved).max() <= WANDER_M:
         return None
-    heading = _lane_heading(evidence, recorded, first)
+    heading = lane_heading(evidence, recorded, first)
     x, y = recorded.x + moved * np.sin(heading), recorded.y - moved * np.cos(heading)
     return recorded_path(x, y, heading)
 
 
-def _lane_heading(evidence: Evidence, recorded: Path, first: int) -> Floats:
+def lane_heading(evidence: Evidence, recorded: Path, first: int) -> Floats:
     """Heading of the lane beside the ego after frame `first`, `T`; of the ego's body up to it."""
     dx, dy = (np.diff(each, prepend=each[:1]) for each in (recorded.x, recorded.y))
     driven = np.hypot(dx, dy)

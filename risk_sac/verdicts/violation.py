@@ -1,22 +1,24 @@
 """The record of a requirement that counts and was violated without contact."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from risk_sac.config import Requirement
 from risk_sac.records import NO_CONTACT, RequirementResult, Violation
 from risk_sac.risk.measures import Gauge, Measures
-from risk_sac.risk.publish import AHEAD, ASIDE, COS, ENCOUNTER, SIN
+from risk_sac.risk.publish import AHEAD, ASIDE, ENCOUNTER
 from risk_sac.risk.ttc import ENCOUNTER_CAP_S
 from risk_sac.types import STEP_S, Frame, Kind, Role
 from risk_sac.verdicts.conflict import SAME_WAY_COS, find_conflict
 from risk_sac.verdicts.definitions import DEFINITIONS
+from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.keeping import NO_RED_LIGHT_ENTRY, ON_CARRIAGEWAY, MetActor, Played, kept_by
 from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, manoeuvre
 from risk_sac.verdicts.offences import ego_offences
 from risk_sac.verdicts.overlap import overlaps_before_contact
+from risk_sac.verdicts.recorded import ego_path, lane_heading
 from risk_sac.verdicts.reference import grade
 
 # Of `ARTEFACT_RULES`, those that the episode tells; `solid_bodies` is read from its record.
@@ -52,7 +54,7 @@ def requirement_results(
 def violations_of(
     requirements: Sequence[Requirement],
     results: Mapping[str, RequirementResult],
-    played: Played,
+    gather: Callable[[], Played],
     gauge: Gauge,
     artefacts: Mapping[str, float],
 ) -> tuple[Violation, ...]:
@@ -61,20 +63,22 @@ def violations_of(
     Args:
       requirements: of the episode.
       results: how far each requirement was kept.
-      played: the whole episode.
+      gather: returns the whole episode; it takes milliseconds, and is called if there is a violation.
       gauge: that measured it.
       artefacts: rules of `ARTEFACT_RULES` that the episode broke, and when it first did, s of the simulator.
     """
+    counting = [each for each in requirements if each.name != NO_CONTACT and each.counts == "failure"]
+    violated = [(each, time_s) for each in counting if (time_s := results[each.name].violated_s) is not None]
+    if not violated:
+        return ()
+    played, found = gather(), []
+    overlap_s = min((each.time_s for each in overlaps_before_contact(played.evidence)), default=math.inf)
     released = int(np.searchsorted(played.evidence.time_s, -STEP_S / 2))
-    found = []
-    for requirement in requirements:
-        result = results[requirement.name]
-        if requirement.name == NO_CONTACT or result.counts != "failure" or result.violated_s is None:
-            continue
-        index = released + round(result.violated_s / STEP_S)
+    for requirement, time_s in violated:
+        index = released + round(time_s / STEP_S)
         verdicts = {rule: artefacts.get(rule, math.inf) > played.frames[index].time_s for rule in RULES}
-        verdicts["solid_bodies"] = not overlaps_before_contact(played.evidence.until(index))
-        found.append(_violation(requirement, result, played, gauge, index, verdicts))
+        verdicts["solid_bodies"] = time_s < overlap_s
+        found.append(_violation(requirement, results[requirement.name], played, gauge, index, verdicts))
     return tuple(sorted(found, key=lambda violation: violation.time_s))
 
 
@@ -96,7 +100,7 @@ def _violation(
     driven, broke = manoeuvre(evidence), ego_offences(evidence)
     hidden = met is not None and met.conflict.hidden
     drivers = kept_by(requirement, gauge.of(requirement), played, index, met) if all(verdicts.values()) else {}
-    actor = "nobody near" if nearest is None else _actor(frame, measures, nearest) + ", hidden" * hidden
+    actor = "nobody near" if nearest is None else _actor(frame, measures, nearest, evidence) + ", hidden" * hidden
     violated = VIOLATED.get(requirement.name, f"{requirement.name} violated")
     others = tuple(name for name in broke if name not in SAME_OFFENCES.get(requirement.name, ()))
     return Violation(
@@ -125,15 +129,17 @@ def _soonest_met(measures: Measures) -> int | None:
     return nearest + 1 if encounter_s[nearest] < ENCOUNTER_CAP_S else None
 
 
-def _actor(frame: Frame, measures: Measures, actor: int) -> str:
+def _actor(frame: Frame, measures: Measures, actor: int, evidence: Evidence) -> str:
     """Names an actor by where it is and drives, the same in the mirror but for crossing traffic."""
-    ahead, aside, cos, sin = (float(measures.assessment.others[row, actor - 1]) for row in (AHEAD, ASIDE, COS, SIN))
+    ahead, aside = (float(measures.assessment.others[row, actor - 1]) for row in (AHEAD, ASIDE))
     if frame.kind[actor] == Kind.PEDESTRIAN:
         return "pedestrian near"
-    if cos < ONCOMING_COS:
+    # From the lane's heading: an ego that leaves the road turns away from it.
+    turn = float(frame.heading_rad[actor] - lane_heading(evidence, ego_path(evidence), 0)[-1])
+    if math.cos(turn) < ONCOMING_COS:
         return "oncoming vehicle"
-    if cos < SAME_WAY_COS:
-        return f"vehicle from the {'right' if sin > 0.0 else 'left'}"
+    if math.cos(turn) < SAME_WAY_COS:
+        return f"vehicle from the {'right' if math.sin(turn) > 0.0 else 'left'}"
     if abs(aside) > (frame.width_m[0] + frame.width_m[actor]) / 2:
         return "vehicle beside it"
     return "vehicle ahead" if ahead > 0.0 else "vehicle behind"

@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,15 +8,17 @@ from risk_sac.records import ConflictType
 from risk_sac.scenario.ground import Area
 from risk_sac.types import Kind, Role
 from risk_sac.verdicts.conflict import find_conflict
-from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.offences import ego_offences, striker_offences
 from tests.unit.verdicts.staged import (
     STREET,
+    Motion,
     crossing_car,
     cut_in,
     leader_brakes,
     mirrored,
     pedestrian_crosses,
+    sideways,
     stage,
     straight,
 )
@@ -178,3 +181,38 @@ def test_a_pedestrian_that_walks_into_an_ego_on_the_crossing_has_lost_nothing() 
 def test_background_traffic_is_taken_to_have_entered_on_green() -> None:
     evidence = replace(crossing([(0.0, "g"), (3.5, "")], []), role=np.array([Role.EGO, Role.BACKGROUND], dtype=np.int8))
     assert of_ego(evidence) == ("priority",)
+
+
+def on_two_way_road(moved_m: float, *others: Motion, until_s: float = 6.0) -> tuple[str, ...]:
+    """What an ego broke that moved across from its lane (y = -1.65) on a road whose left half is oncoming."""
+    ego = sideways(straight(100.0, -1.65, 0.0, 12.0), 0.0, math.copysign(3.0, moved_m), moved_m)
+    far = straight(280.0, -4.95, 0.0, 12.0)
+    ground = Ground(net="mixed/mixed.net.xml")
+    kinds = (Kind.VEHICLE,) * (2 + len(others))
+    return ego_offences(stage(ego, far, *others, kinds=kinds, ground=ground, until_s=until_s, contact=False))
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "expected"),
+    [(0.01, ()), (-3.3, ()), (1.6, ()), (3.3, ("wrong_direction",)), (13.2, ("off_road",)), (-9.9, ("off_road",))],
+    ids=["stays", "changes lanes", "over the line", "oncoming lane", "beyond it", "ditch"],
+)
+def test_an_ego_beside_its_carriageway_is_off_the_road_or_in_oncoming_traffic(
+    moved_m: float, expected: tuple[str, ...]
+) -> None:
+    assert on_two_way_road(moved_m, until_s=9.0) == expected
+
+
+def test_an_ego_that_overtakes_may_use_the_oncoming_lane() -> None:
+    assert on_two_way_road(3.3, straight(160.0, -1.65, 0.0, 4.0)) == ()
+
+
+def test_an_ego_that_came_back_three_seconds_ago_has_broken_nothing() -> None:
+    away = sideways(straight(100.0, -1.65, 0.0, 12.0), 0.0, 3.0, 3.3)
+    back = sideways(away, 2.0, -3.0, 3.3)
+    ground = Ground(net="mixed/mixed.net.xml")
+    far = straight(280.0, -4.95, 0.0, 12.0)
+    found = [
+        ego_offences(stage(back, far, ground=ground, until_s=until_s, contact=False)) for until_s in (2.0, 4.0, 6.5)
+    ]
+    assert found == [("wrong_direction",), ("wrong_direction",), ()]

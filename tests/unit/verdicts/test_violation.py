@@ -51,7 +51,7 @@ def played(
         frames.append(frame)
     released = int(np.searchsorted(e.time_s, -1e-6))
     results = requirement_results((requirement,), e.time_s[released:].tolist(), measures[released:], None)
-    return list(violations_of((requirement,), results, Played(frames, measures, e), gauge, artefacts or {}))
+    return list(violations_of((requirement,), results, lambda: Played(frames, measures, e), gauge, artefacts or {}))
 
 
 def violated(
