@@ -12,6 +12,18 @@ settings.register_profile("first call may compile", deadline=None)
 settings.load_profile("first call may compile")
 
 
+@pytest.fixture(scope="session", autouse=True)
+def every_failure_is_clean(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Looks into all run folders of the session: before no valid contact may two bodies overlap."""
+    yield
+    unclean = {}
+    for results in tmp_path_factory.getbasetemp().rglob("results.json"):
+        from tests.overlaps import overlaps_before_valid_contacts  # here, because few sessions play anything
+
+        unclean |= overlaps_before_valid_contacts(results)
+    assert not unclean
+
+
 @pytest.fixture(scope="session")
 def postgresql() -> Iterator[PostgreSql]:
     """A PostgreSQL server; tests that need one are skipped where it is not installed."""

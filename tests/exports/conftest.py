@@ -12,6 +12,7 @@ from risk_sac.failures.export.formats import FORMATS, FormatName, export
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.export.written import write
 from tests.exports.make_examples import FOLDER, played_here
+from tests.overlaps import overlaps_in
 from tests.server import ROOT
 
 CM = 0.01  # that a round trip may move anything, m
@@ -27,7 +28,9 @@ def failure() -> Callable[[str], Recorded]:
 
     def of(family: str) -> Recorded:
         if family not in played:
-            played[family] = Recorded.of(played_here(read_bundle(FOLDER / f"{family}.npz")))
+            bundle = played_here(read_bundle(FOLDER / f"{family}.npz"))
+            assert overlaps_in(bundle.series) == []
+            played[family] = Recorded.of(bundle)
         return played[family]
 
     return of

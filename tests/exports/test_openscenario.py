@@ -3,12 +3,14 @@
 import json
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 from lxml import etree
+from shapely.affinity import rotate, translate
 
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.export.recorded import Actor, Recorded, colour
@@ -62,6 +64,35 @@ def test_trajectories_come_back_within_a_centimetre(
         assert [(float(box.get("length")), float(box.get("width"))) for box in boxes] == [
             (actor.length_m, actor.width_m)
         ]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_no_two_bodies_overlap_before_the_end_as_a_reader_of_the_standard_draws_them(
+    family: str, exported: Callable[..., Path]
+) -> None:
+    bodies = drawn_bodies(exported(family, FormatName.OPENSCENARIO) / "failure-as-recorded.xosc")
+    last_s = max(max(at) for at in bodies.values())
+    for a, b in combinations(bodies, 2):
+        for time_s in bodies[a].keys() & bodies[b].keys():
+            if "ego" not in (a, b) or time_s < last_s:
+                assert not bodies[a][time_s].intersects(bodies[b][time_s]), (a, b, time_s)
+
+
+def drawn_bodies(file: Path) -> dict[str, dict[float, shapely.Polygon]]:
+    """Entity → time → outline of its bounding box."""
+    root = etree.parse(file).getroot()
+    found: dict[str, dict[float, shapely.Polygon]] = {}
+    for thing in root.iter("ScenarioObject"):
+        name, box = thing.get("name"), thing.find(".//BoundingBox")
+        ahead_m = float(box.find("Center").get("x"))
+        length_m, width_m = (float(box.find("Dimensions").get(side)) for side in ("length", "width"))
+        outline = shapely.box(ahead_m - length_m / 2, -width_m / 2, ahead_m + length_m / 2, width_m / 2)
+        (trajectory,) = (each for each in root.iter("Trajectory") if each.get("name") == f"{name} recorded")
+        for vertex in trajectory.iter("Vertex"):
+            x, y, heading = (float(vertex.find(".//WorldPosition").get(key)) for key in ("x", "y", "h"))
+            turned = rotate(outline, heading, origin=(0, 0), use_radians=True)
+            found.setdefault(name, {})[round(float(vertex.get("time")), 3)] = translate(turned, x, y)
+    return found
 
 
 @pytest.mark.parametrize("family", FAMILIES)

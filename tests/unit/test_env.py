@@ -159,6 +159,15 @@ def test_a_scene_is_refused_by_what_it_has_come_to_at_the_release(
     assert refusal(low, middle("low", **changes)) == rule
 
 
+@each_family
+def test_hardly_a_random_scene_has_bodies_that_overlap_before_the_release(family: FamilyName) -> None:
+    space, generator = FAMILIES[family].space, np.random.default_rng(5)
+    with closing(make_default(family)) as env:
+        reasons = [refusal(env, space.from_unit(generator.random(space.dimension))) for _ in range(100)]
+    assert reasons.count("initial_overlap") <= 1
+    assert sum(reason is not None for reason in reasons) <= 10
+
+
 def test_a_scene_is_refused_by_bodies_that_overlap_at_its_start_although_they_part_before_the_release(
     low: RiskSacEnv,
 ) -> None:
