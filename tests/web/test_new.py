@@ -191,6 +191,17 @@ def test_a_slider_is_dragged_by_its_thumb(page_at: Callable[..., Page]) -> None:
     assert 900 <= visibility["high"] <= 1200
 
 
+def test_what_a_family_does_not_support_is_said_before_the_campaign_starts(page_at: Callable[..., Page]) -> None:
+    page = page_at("new")
+    odd = opened(page, "Operational design domain")
+    page.get_by_role("checkbox", name="mixed").check()
+    odd.get_by_label("night", exact=True).check()
+    assert curl_body(page)["odd"] == {"environment": {"time_of_day": ["day", "night"]}}
+    expect(page.locator(".adjustments")).to_contain_text("odd.environment.time_of_day low: asked for {day, night}")
+    odd.get_by_label("night", exact=True).uncheck()
+    expect(page.locator(".adjustments")).to_have_count(0)
+
+
 def test_presets_fill_the_form_and_the_cost_follows(page_at: Callable[..., Page]) -> None:
     page = page_at("new")
     page.get_by_label("Label", exact=True).fill("mine")
