@@ -40,7 +40,9 @@ def test_interrupted_and_resumed_run_equals_an_uninterrupted_one(
 ) -> None:
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     assert cli.main(arguments(whole)) == 0
-    assert re.search(r"ECR \(95 %\)", capsys.readouterr().out)
+    printed = capsys.readouterr().out
+    assert re.search(r"ECR \(95 %\)", printed)
+    assert re.search(r"search\s+no_contact +failure .*evaluation\s+no_contact +failure", printed, re.DOTALL)
     stored = results(whole)
     assert (stored["finished"], stored["metrics"]["episodes"], stored["evaluation"]["episodes"]) == (True, EPISODES, 1)
 

@@ -11,13 +11,27 @@ from risk_sac.failures.export.parquet import SPECS
 from risk_sac.run_folder.results import EPISODES, records_from_lines
 
 RUNS = {"low": "random", "mixed": "random"}
+OWN = {"requirements": [{"name": "never_fast", "formula": "ego_speed_mps <= 5", "scale": 5}]}
 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("runs")
+    folder, spec = tmp_path_factory.mktemp("runs"), tmp_path_factory.mktemp("spec") / "spec.json"
+    spec.write_text(json.dumps(OWN))
     for family, method in RUNS.items():
-        command = ["run", "--family", family, "--method", method, "--episodes", "20", "--seed", "601"]
+        command = [
+            "run",
+            "--spec",
+            str(spec),
+            "--family",
+            family,
+            "--method",
+            method,
+            "--episodes",
+            "20",
+            "--seed",
+            "601",
+        ]
         assert main([*command, "--out", str(folder / family)]) == 0
     return folder
 
@@ -37,9 +51,16 @@ def test_every_episode_of_every_run_is_a_row_with_its_fields(runs: Path, tmp_pat
             assert dict(row["scene"]) == dict(record.scene)
             assert row["min_ttc_s"] == record.min_ttc_s
             assert (row["collision"] is None) == (record.collision is None)
+            requirements = {name: result.model_dump() for name, result in record.requirements.items()}
+            assert dict(row["requirements"]) == requirements
+            assert row["failed"] == list(record.failed)
+            assert [each["requirement"] for each in row["violations"]] == [
+                each.requirement for each in record.violations
+            ]
             if record.collision is not None:
                 assert dict(row["collision"]["verdicts"]) == dict(record.collision.verdicts)
                 assert row["collision"]["early_min_ttc_s"] == record.collision.min_ttc_s
+    assert sum("never_fast" in row for row in table["failed"].to_pylist()) > 10
     specs = json.loads(table.schema.metadata[SPECS])
     assert {spec["family"] for spec in specs.values()} == set(RUNS)
 

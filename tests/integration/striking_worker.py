@@ -6,7 +6,7 @@ Those in episodes 1, 7, 13, … are preventable.
 import scripted_worker
 
 from risk_sac.metrics import wilson_interval
-from risk_sac.records import EpisodeRecord, Grade, Outcome, RunMetrics
+from risk_sac.records import NO_CONTACT, EpisodeRecord, Grade, Outcome, RequirementCounts, RunMetrics
 from tests.builders import LOW_SCENE, collision, episode_record, judgement, run_metrics
 
 _record = scripted_worker.record
@@ -25,6 +25,17 @@ def metrics(episodes: int) -> RunMetrics:
     failures = episodes // 2
     preventable = (failures + 2) // 3
     low, high = wilson_interval(preventable, episodes)
+    rate_low, rate_high = wilson_interval(failures, episodes)
+    contacts = RequirementCounts(
+        counts="failure",
+        violated=failures,
+        valid=failures,
+        distinct=failures - failures // 3,
+        preventable=preventable,
+        rate=failures / episodes,
+        rate_low=rate_low,
+        rate_high=rate_high,
+    )
     return run_metrics(
         episodes,
         failures=failures,
@@ -37,6 +48,7 @@ def metrics(episodes: int) -> RunMetrics:
         pcr_low=low,
         pcr_high=high,
         signatures={"cut-in, straight": failures},
+        requirements={NO_CONTACT: contacts},
     )
 
 

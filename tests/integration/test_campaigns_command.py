@@ -64,10 +64,12 @@ def test_submit_watch_shows_the_way_on_one_channel_and_the_results_on_the_other(
 ) -> None:
     assert call(*SUBMIT, "--watch") == 0
     printed = capsys.readouterr()
-    assert "succeeded: 12/12 episodes, 6 failures, 2 distinct and preventable, ECR " in printed.err
+    assert "succeeded: 12/12 episodes, 6 failures (no_contact 6), 2 distinct and preventable, ECR " in printed.err
     assert "\x1b" not in printed.err + printed.out
-    (row,) = (line for line in printed.out.splitlines() if "random" in line)
+    row, _ = (line for line in printed.out.splitlines() if "random" in line)
     assert row.split() == ["low", "random", "12", "6", "6", "4", "2", "0.50", "0.17"]
+    (row,) = (line for line in printed.out.splitlines() if "no_contact" in line)
+    assert row.split() == ["no_contact", "failure", "6", "6", "4", "2", "0.500", "[0.254,", "0.746]"]
 
 
 def test_rates_that_may_be_above_the_bound_are_exit_status_1_unless_the_rate_is_judged(
@@ -75,7 +77,7 @@ def test_rates_that_may_be_above_the_bound_are_exit_status_1_unless_the_rate_is_
 ) -> None:
     assert call("results", finished, "--max-ecr", 0.5) == 1
     assert capsys.readouterr().err.startswith(
-        "ECR may be above 0.5: low random 0.500, 95 % interval up to 0.746 (6 valid failures in 12 episodes)\n"
+        "ECR may be above 0.5: low random 0.500, 95 % interval up to 0.746 (6 valid contacts in 12 episodes)\n"
     )
     assert call("results", finished, "--max-ecr", 0.75) == 0
     assert capsys.readouterr().err.startswith("ECR within 0.75: low random 0.500, 95 % interval up to 0.746")
@@ -85,10 +87,36 @@ def test_rates_that_may_be_above_the_bound_are_exit_status_1_unless_the_rate_is_
     file = tmp_path / "deeply" / "nested" / "junit.xml"
     capsys.readouterr()
     assert call("results", finished, "--max-pcr", 0.16, "--judge-by", "rate", "--junit", file) == 1
-    assert "PCR above 0.16: low random 0.167 (2 preventable failures in 12 episodes)\n" in capsys.readouterr().err
+    assert "PCR above 0.16: low random 0.167 (2 preventable contacts in 12 episodes)\n" in capsys.readouterr().err
     (failure,) = ElementTree.parse(file).getroot().iter("failure")
-    assert failure.attrib["message"] == "PCR above 0.16: 0.167 (2 preventable failures in 12 episodes)"
+    assert failure.attrib["message"] == "PCR above 0.16: 0.167 (2 preventable contacts in 12 episodes)"
     assert (failure.text or "").splitlines()[1] == "low-random-0-train-1: cut-in, straight; grade careful"
+
+
+def test_the_rate_of_a_requirement_has_a_bound_of_its_own(
+    finished: str, call: Callable[..., int], answer: Callable[..., Any], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("results", finished, "--max-rate", "no_contact=0.75") == 0
+    assert call("results", finished, "--max-rate", "no_contact=0.49", "--judge-by", "rate") == 1
+    assert "no_contact above 0.49: low random 0.500 (6 valid violations in 12 episodes)" in capsys.readouterr().err
+    wrong = ("--max-rate", "never_fast=0.1")
+    before = newest(answer)
+    for arguments in (["results", finished, *wrong], ["watch", finished, *wrong], [*SUBMIT, "--watch", *wrong]):
+        capsys.readouterr()
+        assert call(*arguments) == 2
+        assert "--max-rate: got the requirement 'never_fast'; wanted one of no_contact" in capsys.readouterr().err
+    assert newest(answer) == before
+
+
+def test_failures_are_listed_by_the_requirement_that_they_violate(
+    finished: str, answer: Callable[..., Any], call: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = answer("failures", "list", finished, "--requirement", "no_contact")
+    assert len(found) == 6
+    assert answer("failures", "list", finished, "--requirement", "bounded_braking") == []
+    capsys.readouterr()
+    assert call("failures", "list", finished, "--requirement", "never_fast") == 2
+    assert "no_contact" in capsys.readouterr().err
 
 
 def test_results_and_metrics_tell_the_funnel(finished: str, service: Service) -> None:

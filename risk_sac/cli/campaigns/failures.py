@@ -92,11 +92,10 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def failures_table(failures: Sequence[Episode]) -> Table:
-    """Two lines per failure; 80 columns hold it."""
+    """Three lines per failure; 80 columns hold it."""
     table = Table(box=SIMPLE_HEAD, padding=0)
-    table.add_column("id,\nwhat kind of failure it is")
+    table.add_column("id, what it violates,\nand its kind", overflow="fold")
     table.add_column("outcome\ngrade", no_wrap=True)
-    table.add_column("violates", overflow="fold")
     table.add_column("ego's, other's\nm/s", no_wrap=True, justify="right")
     table.add_column("failed rules,\nor offences")
     for failure in failures:
@@ -105,9 +104,8 @@ def failures_table(failures: Sequence[Episode]) -> Table:
             continue
         speeds = [worst.ego_speed_mps, *([worst.other_speed_mps] if isinstance(worst, Collision) else [])]
         table.add_row(
-            Text(printable(f"{failure.id}\n{worst.signature}")),
+            Text(printable(f"{failure.id}\n{', '.join(failure.failed or [worst.requirement])}\n{worst.signature}")),
             f"{failure.outcome}\n{worst.graded or ''}",
-            "\n".join(failure.failed or (worst.requirement,)),
             ", ".join(or_dash(speed, ".1f") for speed in speeds),
             Text(printable("\n".join([in_words([failure.reason])] if failure.reason else offences(worst)))),
         )

@@ -2,10 +2,14 @@ import pytest
 from rich.console import Console
 
 from risk_sac.cli.campaigns.gate import Bounds
-from risk_sac.cli.campaigns.output import line, results_table
-from risk_sac.client import CampaignSummary, Results
+from risk_sac.cli.campaigns.failures import failures_table
+from risk_sac.cli.campaigns.output import line, results_table, results_tables
+from risk_sac.client import CampaignSummary, Episode, Results
 from risk_sac.config import METHODS
+from risk_sac.records import NO_CONTACT, Outcome
+from tests.builders import collision, episode_record, judgement, violation
 from tests.unit.cli.test_gate import TOTAL as ORDINARY
+from tests.unit.cli.test_gate import requirements
 from tests.unit.client.scripted_server import PROGRESS, campaign
 
 TOTAL = ORDINARY | {
@@ -45,6 +49,41 @@ def test_a_rate_that_may_be_above_says_up_to_where(capsys: pytest.CaptureFixture
     printed = capsys.readouterr().out
     assert "up to 0.14" in printed
     assert "above" not in printed
+
+
+def test_each_requirement_is_a_row_below_its_family_and_method(capsys: pytest.CaptureFixture[str]) -> None:
+    own = "keeps_a_distance_of_some_forty_letters_x"
+    found = requirements(no_contact=(0.1, 0.2), safe_ttc=(0.3, 0.4), **{own: (0.999, 1.0)})
+    totals = [ORDINARY | {"requirements": found}, ORDINARY | {"method": "random"}]  # the latter from before
+    results = {"campaign_id": "c1", "state": "succeeded", "complete": True, "runs": [], "totals": totals}
+    bounds = Bounds(requirements={"no_contact": 0.15, "safe_ttc": 0.1})
+    Console(width=80).print(results_tables(Results.model_validate(results), bounds))
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    rows = [row.split() for row in printed[printed.index("low sac") :].splitlines()]
+    assert rows[1] == ["no_contact", "failure", "12", "12", "2", "0", "0.100", "[0.000,", "0.200]"]
+    assert rows[2] == ["may", "be", "above", "0.15"]
+    assert rows[3] == ["safe_ttc", "report", "12", "–", "–", "–", "0.300", "[0.000,", "0.400]"]
+    assert rows[4] == ["above", "0.1"]
+    assert rows[5][0] + rows[6][0] == own
+    assert "low random" not in printed
+
+
+def test_a_failure_without_contact_is_listed_by_what_it_violates(capsys: pytest.CaptureFixture[str]) -> None:
+    struck = {"collision": collision(judgement=judgement()), "failed": (NO_CONTACT,)}
+    told = {"violations": (violation(broke=("red_light",)),), "failed": ("never_fast",)}
+    failures = [
+        Episode(
+            **dict(episode_record(index, Outcome.FAILURE, **each)), id=f"low-sac-0-train-{index}", run_id="", wall_s=0
+        )
+        for index, each in enumerate((struck, told))
+    ]
+    Console(width=80).print(failures_table(failures))
+    contact, own = capsys.readouterr().out.split("low-sac-0-train-0")[1].split("low-sac-0-train-1")
+    assert "no_contact" in contact
+    assert "9.0, 2.0" in contact
+    assert "never_fast" in own
+    assert "9.0 ego: red light" in own
 
 
 @pytest.mark.parametrize(("count", "said"), [(0, "0 failures"), (1, "1 failure"), (2, "2 failures")])
