@@ -2,7 +2,7 @@
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
@@ -17,7 +17,8 @@ from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_campaign, read_ego
 from risk_sac.egos.registry import SHIPPED, cards
 from risk_sac.machine import cores
-from risk_sac.metrics import pooled_counts, wilson_interval
+from risk_sac.metrics import COLUMNS as REQUIREMENT_COLUMNS
+from risk_sac.metrics import pooled_counts, pooled_requirements, requirement_cells, wilson_interval
 from risk_sac.terminal import complain, console
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ SEEDS = 2
 PROFILES: Sequence[str] = get_args(EgoConfig.model_fields["profile"].annotation)
 COLUMNS = (
     *("family", "ego", "runs", "episodes", "invalid", "contacts"),
-    *("valid", "ECR (95 %)", "preventable", "PCR (95 %)"),
+    *("valid", "ECR (95 %)", "preventable", "PCR (95 %)", "failures"),
 )
 
 
@@ -60,7 +61,9 @@ def _ladder(options: argparse.Namespace) -> int:
     defaults = {"families": ["low"], "methods": ["archive"], "seeds": list(range(SEEDS))}
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS), defaults)
     egos = {name: read_ego(name) for name in options.egos}
-    from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
+    # Here, because loading what checks the settings takes seconds.
+    from risk_sac.execution.evaluate import evaluate
+    from risk_sac.report.page import table
 
     found: dict[str, Sequence[FinishedRun]] = {}
     jobs, executor = options.jobs or cores(), os.environ.get("RISK_SAC_EXECUTOR", "local")
@@ -74,7 +77,9 @@ def _ladder(options: argparse.Namespace) -> int:
             return INTERRUPTED
         found[name] = evaluation.comparison.runs
     rows = [row for family in spec.families for row in _rows(family, found)]
-    text = "".join(f"| {' | '.join(line)} |\n" for line in (COLUMNS, ["---"] * len(COLUMNS), *rows))
+    text = table(COLUMNS, rows, left=2)
+    if requirements := [row for family in spec.families for row in _requirements(family, found)]:
+        text += "\n" + table(["family", "ego", *REQUIREMENT_COLUMNS], requirements, left=4)
     (options.out / "ladder.md").write_text(f"`{options.typed}`\n\n{text}", encoding="utf-8")
     console.print(text, markup=False, soft_wrap=True)
     return OK if all(found.values()) else FAILED
@@ -88,11 +93,18 @@ def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[s
         if not of_family:
             continue
         pooled = pooled_counts(of_family)
-        valid, preventable, driven = pooled.failures, pooled.preventable, pooled.driven
+        valid, preventable, driven = pooled.collisions, pooled.preventable_collisions, pooled.driven
         counts = map(str, (len(of_family), pooled.episodes, pooled.invalid, pooled.raw_collisions, valid))
-        rates = _rate(valid, driven), str(preventable), _rate(preventable, driven)
+        rates = _rate(valid, driven), str(preventable), _rate(preventable, driven), str(pooled.failures)
         rows.append(((preventable / max(driven, 1), valid / max(driven, 1)), [family, name, *counts, *rates]))
     return [row for _, row in sorted(rows, key=lambda each: each[0], reverse=True)]
+
+
+def _requirements(family: str, found: "dict[str, Sequence[FinishedRun]]") -> Iterator[list[str]]:
+    """The funnel of each requirement of each ego."""
+    for name, runs in found.items():
+        pooled = pooled_requirements([run.metrics["search"] for run in runs if run.spec.family == family])
+        yield from ([family, name, *requirement_cells(each, counts)] for each, counts in pooled.items())
 
 
 def _rate(count: int, driven: int) -> str:

@@ -134,7 +134,7 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
         "contacts": f"{metrics.raw_collisions} ({counted(metrics.artefacts, 'artefact')})",
         "valid contacts": f"{metrics.collisions} ({metrics.unresponsive} unresponsive)",
         "failures of any requirement": f"{metrics.failures}",
-        "distinct": f"{metrics.distinct_failures}",
+        "distinct violations": f"{metrics.distinct_failures}",
         "distinct and preventable": f"{metrics.distinct_preventable}",
         **dict(_figure(metric, metrics) for metric in shown),
         "steps per distinct failure": or_dash(metrics.steps_per_distinct_failure, ".0f"),

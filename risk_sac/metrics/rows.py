@@ -153,7 +153,7 @@ METRICS = (
     Metric(
         name="distinct_per_1000_steps",
         symbol=f"distinct / {PER_STEPS} steps",
-        meaning=f"distinct valid failures per {PER_STEPS} environment steps",
+        meaning=f"distinct valid violations per {PER_STEPS} environment steps",
         formula=lambda counts: _per_steps(counts.distinct_failures, counts),
         search_only=True,
         tabled=False,  # its reciprocal is
@@ -161,7 +161,7 @@ METRICS = (
     Metric(
         name="preventable_per_1000_steps",
         symbol=f"preventable / {PER_STEPS} steps",
-        meaning=f"distinct preventable failures per {PER_STEPS} environment steps",
+        meaning=f"distinct preventable violations per {PER_STEPS} environment steps",
         formula=lambda counts: _per_steps(counts.distinct_preventable, counts),
         search_only=True,
         tested=False,

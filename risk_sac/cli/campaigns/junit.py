@@ -54,7 +54,7 @@ def _case(run: RunResult, named: str) -> TestCase:
     if (found := run.metrics) is not None:
         funnel = (
             f"{counted(found.raw_collisions, 'contact')}, {found.collisions} valid; "
-            f"{counted(found.failures, 'failure')}, {found.distinct_failures} distinct, "
+            f"{counted(found.failures, 'failure')}; {counted(found.distinct_failures, 'distinct violation')}, "
             f"{found.distinct_preventable} preventable"
         )
         case.add_property("funnel", funnel)

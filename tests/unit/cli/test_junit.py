@@ -180,7 +180,7 @@ def test_a_run_that_failed_or_was_cancelled_is_an_error_and_one_that_goes_on_is_
 def test_digests_versions_and_where_to_look_are_properties() -> None:
     root = report({}, {"seed": 1, "versions": {"libsumo": "1.29.0"}})
     assert properties(root[0]) == {"campaign": "c1", "url": URL, "version.libsumo": "1.28.0, 1.29.0"}
-    funnel = "12 contacts, 10 valid; 10 failures, 4 distinct, 2 preventable"
+    funnel = "12 contacts, 10 valid; 10 failures; 4 distinct violations, 2 preventable"
     assert properties(root[0][1]) == {"run": "low-sac-0", "spec_digest": "aa", "digest": "bb", "funnel": funnel}
 
 

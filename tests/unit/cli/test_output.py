@@ -1,8 +1,8 @@
 import pytest
 from rich.console import Console
 
-from risk_sac.cli.campaigns.gate import Bounds
 from risk_sac.cli.campaigns.failures import failures_table
+from risk_sac.cli.campaigns.gate import Bounds
 from risk_sac.cli.campaigns.output import line, results_table, results_tables
 from risk_sac.client import CampaignSummary, Episode, Results
 from risk_sac.config import METHODS

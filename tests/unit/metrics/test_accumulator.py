@@ -13,9 +13,9 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.records import Funnel, Grade, Outcome, RunMetrics
+from risk_sac.records import Funnel, Grade, Outcome, RequirementResult, RunMetrics
 from risk_sac.verdicts.distinct import distinct_failures, kind_of
-from tests.builders import judgement
+from tests.builders import judgement, violation
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
 
 
@@ -39,6 +39,37 @@ def test_funnel_literals():
     assert metrics.pcr == metrics.window_pcr == preventable_collision_rate(counted(JUDGED)) == 3 / 8
     # Wilson for 3 of 8 by hand: centre (0.375 + 0.2401)/1.4802 = 0.4155, half width 0.2787.
     assert (metrics.pcr_low, metrics.pcr_high) == pytest.approx((0.1368, 0.6943), abs=5e-4)
+
+
+def test_each_requirement_has_a_funnel_and_records_from_before_have_none():
+    def results(**violated_s):
+        kept = {"counts": "failure", "robustness": 0.0}
+        return {name: RequirementResult(**kept, violated_s=time_s) for name, time_s in violated_s.items()}
+
+    struck = contact(judgement=judgement())
+    slow = violation(grade=Grade.CAREFUL)
+    refused = violation(verdicts={"no_teleport": False})
+    metrics = feed(
+        [
+            episode(Outcome.FAILURE, hit=struck, requirements=results(no_contact=3.0, never_fast=None)),
+            *[both(struck, slow, results(no_contact=3.0, never_fast=1.5))] * 2,
+            episode(Outcome.DEGENERATE, requirements=results(no_contact=None, never_fast=1.5)).model_copy(
+                update={"collision": None, "violations": (refused,)}
+            ),
+        ]
+    )
+    funnels = {
+        name: (each.violated, each.valid, each.distinct, each.preventable, each.rate)
+        for name, each in metrics.requirements.items()
+    }
+    assert funnels == {"no_contact": (3, 3, 1, 1, 0.75), "never_fast": (3, 2, 1, 1, 0.5)}
+    assert (metrics.failures, metrics.collisions, metrics.distinct_failures) == (3, 3, 2)
+    assert feed(JUDGED).requirements == {}
+
+
+def both(struck, without, results):
+    """A failure by a contact and by a violation without one."""
+    return episode(Outcome.FAILURE, hit=struck, violations=(without,), requirements=results)
 
 
 def test_signatures_are_counted_in_the_order_in_which_they_were_met():
