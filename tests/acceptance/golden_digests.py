@@ -31,7 +31,7 @@ from tests.listener import Listener
 RECORDED = Path(__file__).with_suffix(".json")
 METHODS = ("random", "bo-only", "risk-sac")
 SEEDS = {"low": 67, "mixed": 0, "dense": 68}  # at least one of each family's runs has a contact to be judged
-PACKAGES = ("botorch", "gpytorch", "libsumo", "llvmlite", "numba", "numpy", "scipy", "torch")
+PACKAGES = ("botorch", "gpytorch", "libsumo", "llvmlite", "numba", "numpy", "scipy", "shapely", "torch")
 # Small enough for a second, and still learning and modelling before the run is over.
 BUDGET = Budget(episodes=3, evaluation_episodes=1)
 LEARNER = LearnerConfig(
