@@ -46,7 +46,7 @@ from service.store.database import READERS, held
 from service.store.reading import Store
 from service.store.server import cursor_secret
 from service.views.on_demand import Helper
-from service.views.pictures import pictures as pictures_of_contacts
+from service.views.pictures import pictures as pictures_of_failures
 from service.views.reports import Reports
 from service.views.studies import Studies, Tables
 
@@ -124,7 +124,7 @@ def opened(
                 store=store,
                 manager=manager,
                 reports=Reports(settings),
-                pictures=pictures_of_contacts(settings),
+                pictures=pictures_of_failures(settings),
                 studies=Studies(settings, helper),
                 tables=Tables(helper),
                 regressions=regression_queue,

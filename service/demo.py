@@ -162,7 +162,7 @@ def draw_command(campaign: Campaign, failures: Sequence[Episode], data_dir: Path
 
 
 def _preventable(failure: Episode) -> bool:
-    return failure.collision is not None and failure.collision.preventable
+    return any(violation.preventable for violation in failure.valid_violations)
 
 
 def conclude(campaign: Campaign) -> int:

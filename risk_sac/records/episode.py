@@ -192,7 +192,7 @@ class Triage(Record):
 
 
 class Failure(Episode):
-    """A contact of the ego with its full time series."""
+    """A failure, valid or refused, with its full time series."""
 
     series: Series | None
     """Null when the record is lost; `series_problem` says why."""

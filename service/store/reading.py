@@ -16,7 +16,7 @@ from service.store.database import open_database, storage_errors
 from service.store.finding import Judged, episode_page, find_campaign, find_failure, find_run, find_triage
 from service.store.revisions import Revisions
 from service.store.sequence import event_page
-from service.store.stored import PlainEpisode, StoredCampaign, StoredContact, StoredPage, Usage, read_episode
+from service.store.stored import PlainEpisode, StoredCampaign, StoredFailure, StoredPage, Usage, read_episode
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
 
 DAY_HOURS = 24
@@ -135,12 +135,12 @@ class Store:
             for found in session.execute(query.execution_options(yield_per=BATCH)):
                 yield PlainEpisode(*found[:-1], from_json(found.record))
 
-    def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredContact:
+    def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredFailure:
         """The episode with this id in which a requirement that counts was violated."""
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             row = find_failure(session, campaign, failure_id)
-            return StoredContact(read_episode(row), row.series, row.series_sha256)
+            return StoredFailure(read_episode(row), row.series, row.series_sha256)
 
     def own_requirements(self, campaign_id: str, project: str | None = None) -> list[str]:
         """Names of the requirements that were posted with a campaign."""

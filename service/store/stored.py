@@ -1,4 +1,4 @@
-"""What the store hands out: frozen records of campaigns, runs and contacts, each made of its row."""
+"""What the store hands out: frozen records of campaigns, runs and failures, each made of its row."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -130,8 +130,8 @@ _read_spec = lru_cache(maxsize=64)(CampaignSpec.model_validate_json)
 
 
 @dataclass(frozen=True, slots=True)
-class StoredContact:
-    """An episode in which the ego touched something, with the file of its full time series."""
+class StoredFailure:
+    """An episode in which a requirement that counts was violated, with the file of its full time series."""
 
     episode: Episode
     series: str | None  # name of the file

@@ -1,4 +1,4 @@
-"""What is shown of one contact: pictures, the ground, and how its twin went."""
+"""What is shown of one failure: pictures, the ground, and how its twin went."""
 
 import hashlib
 from dataclasses import dataclass, field, replace
@@ -12,7 +12,7 @@ from risk_sac.records import Collision, Episode, Record
 from risk_sac.run_folder.results import RecordedFailure
 from risk_sac.series import Series
 from service.settings import ServiceSettings
-from service.store.stored import StoredCampaign, StoredContact, StoredRun
+from service.store.stored import StoredCampaign, StoredFailure, StoredRun
 from service.views.on_demand import OnDemandCache
 from service.views.series import load_arrays, series_body, series_file
 
@@ -20,13 +20,13 @@ MM = 3  # decimals of a metre
 
 
 @dataclass(frozen=True, slots=True)
-class ContactOfARun:
-    """A contact; two with the same edition look the same."""
+class FailureOfARun:
+    """A failure; two with the same edition look the same."""
 
     edition: str  # changes whenever its pictures would
     campaign: StoredCampaign = field(compare=False)
     run: StoredRun = field(compare=False)
-    stored: StoredContact = field(compare=False)
+    stored: StoredFailure = field(compare=False)
 
     @property
     def episode(self) -> Episode:
@@ -34,8 +34,8 @@ class ContactOfARun:
         return self.stored.episode
 
     @classmethod
-    def of(cls, campaign: StoredCampaign, stored: StoredContact) -> "ContactOfARun":
-        """A contact of a campaign."""
+    def of(cls, campaign: StoredCampaign, stored: StoredFailure) -> "FailureOfARun":
+        """A failure of a campaign."""
         episode = stored.episode
         run = next(run for run in campaign.runs if run.id == episode.run_id)
         # The run's digest: what is made of a run that has ended holds its policy too.
@@ -45,10 +45,10 @@ class ContactOfARun:
         return cls(edition, campaign, run, stored)
 
 
-def recording_of(contact: ContactOfARun, settings: ServiceSettings) -> Recording:
-    """What is drawn of a contact; SeriesLost if its time series is lost."""
-    episode = contact.episode
-    path, sha256 = series_file(contact.campaign.id, contact.stored, settings)
+def recording_of(failure: FailureOfARun, settings: ServiceSettings) -> Recording:
+    """What is drawn of a failure; SeriesLost if its time series is lost."""
+    episode = failure.episode
+    path, sha256 = series_file(failure.campaign.id, failure.stored, settings)
     arrays = load_arrays(path, sha256)
     return Recording(RecordedFailure(id=episode.id, series=path.name, episode=episode), arrays)
 
@@ -57,7 +57,7 @@ def recording_of(contact: ContactOfARun, settings: ServiceSettings) -> Recording
 class Picture:
     """What is drawn."""
 
-    contact: ContactOfARun
+    failure: FailureOfARun
     twin: Twin | None = None
     """What is drawn beside it."""
     played: bytes = field(default=b"", compare=False)
@@ -65,16 +65,16 @@ class Picture:
 
 
 def pictures(settings: ServiceSettings) -> OnDemandCache[Picture]:
-    """PNGs of contacts; SeriesLost where the time series is lost."""
+    """PNGs of failures; SeriesLost where the time series is lost."""
 
     def draw(picture: Picture) -> bytes:
         from risk_sac.failures.show import recording_bytes  # here, because it loads matplotlib
 
-        recording, twin = recording_of(picture.contact, settings), None
+        recording, twin = recording_of(picture.failure, settings), None
         if picture.twin is not None:
             told, series = read_twin(picture.played)
             twin = replace(recording, series=series, twin=told.title)
-        return recording_bytes(picture.contact.run.family, recording, "png", twin)
+        return recording_bytes(picture.failure.run.family, recording, "png", twin)
 
     return OnDemandCache(draw, "pictures")
 
@@ -88,14 +88,14 @@ class Surface(Record):
 
 
 class Roads(Record):
-    """The ground on which a contact came about."""
+    """The ground on which a failure came about."""
 
     surfaces: list[Surface]
     """In the order in which they are to be drawn; none where the scene's family had other roads then."""
 
 
 class TwinPlay(Record):
-    """The scene of a contact, played with one thing changed."""
+    """The scene of a failure, played with one thing changed."""
 
     twin: Twin
     """`idle`: no adversary attacks; else the profile of another ego."""
@@ -104,19 +104,19 @@ class TwinPlay(Record):
     collision: Collision | None
     """Null without a contact."""
     series: Series
-    """From the same start as the contact's own, up to 3 s after it, or until a contact."""
+    """From the same start as the failure's own, up to 3 s after it, or until a contact."""
 
 
-def roads_body(contact: ContactOfARun) -> Roads:
-    """The surfaces of a contact's scene."""
-    roads = roads_of(contact.run.family, contact.episode.scene)
+def roads_body(failure: FailureOfARun) -> Roads:
+    """The surfaces of a failure's scene."""
+    roads = roads_of(failure.run.family, failure.episode.scene)
     return Roads(surfaces=[Surface(use=road.use, outline=road.outline.round(MM).tolist()) for road in roads])
 
 
-def thumbnail_of(contact: ContactOfARun, settings: ServiceSettings) -> str:
-    """A contact as a small SVG; SeriesLost if its time series is lost."""
-    roads = roads_of(contact.run.family, contact.episode.scene)
-    return thumbnail(recording_of(contact, settings), roads)
+def thumbnail_of(failure: FailureOfARun, settings: ServiceSettings) -> str:
+    """A failure as a small SVG; SeriesLost if its time series is lost."""
+    roads = roads_of(failure.run.family, failure.episode.scene)
+    return thumbnail(recording_of(failure, settings), roads)
 
 
 def twin_body(twin: Twin, played: bytes) -> TwinPlay:

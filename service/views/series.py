@@ -17,27 +17,27 @@ from risk_sac.series import Series
 from risk_sac.types import Kind, Role, Signal
 from service.errors import SeriesLost
 from service.settings import ServiceSettings
-from service.store.stored import StoredContact
+from service.store.stored import StoredFailure
 
 _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 
 
-def failure_body(campaign_id: str, contact: StoredContact, triage: Triage | None, settings: ServiceSettings) -> Failure:
-    """A contact with its time series, or with why there is none, and with its triage."""
+def failure_body(campaign_id: str, failure: StoredFailure, triage: Triage | None, settings: ServiceSettings) -> Failure:
+    """A failure with its time series, or with why there is none, and with its triage."""
     series, problem = None, None
     try:
-        series = load_series(*series_file(campaign_id, contact, settings))
+        series = load_series(*series_file(campaign_id, failure, settings))
     except SeriesLost as error:
         problem = str(error)
-    return Failure(**dict(contact.episode), series=series, series_problem=problem, triage=triage)
+    return Failure(**dict(failure.episode), series=series, series_problem=problem, triage=triage)
 
 
-def series_file(campaign_id: str, contact: StoredContact, settings: ServiceSettings) -> tuple[Path, str | None]:
-    """Path and SHA-256 of a contact's time series; SeriesLost if none was recorded."""
-    if contact.series is None:
+def series_file(campaign_id: str, failure: StoredFailure, settings: ServiceSettings) -> tuple[Path, str | None]:
+    """Path and SHA-256 of a failure's time series; SeriesLost if none was recorded."""
+    if failure.series is None:
         raise SeriesLost("no time series was recorded")
-    folder = settings.run_folder(campaign_id, contact.episode.run_id) / FAILURES
-    return folder / contact.series, contact.series_sha256
+    folder = settings.run_folder(campaign_id, failure.episode.run_id) / FAILURES
+    return folder / failure.series, failure.series_sha256
 
 
 def load_series(path: Path, sha256: str | None) -> Series:

@@ -20,7 +20,7 @@ from risk_sac.run_folder.results import RESULTS
 from service.errors import NotPlayable, OutdatedError, StorageError
 from service.settings import ServiceSettings
 from service.views.on_demand import WALL_S, Helper, OnDemandCache
-from service.views.pictures import ContactOfARun
+from service.views.pictures import FailureOfARun
 from service.views.series import load_arrays, series_file
 
 logger = logging.getLogger(__name__)
@@ -31,9 +31,9 @@ TABLES_KEPT = 1  # of some megabytes each
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A question about a contact."""
+    """A question about a failure."""
 
-    contact: ContactOfARun
+    failure: FailureOfARun
     subject: Subject
     twin: Twin | None = None
     """Of a twin: which."""
@@ -51,7 +51,7 @@ class Studies(OnDemandCache[Study]):
     async def get(self, subject: Study) -> bytes:
         """The answer; what has no core or region is refused before anything waits or is played."""
         if subject.subject in ("core", "region"):
-            episode = subject.contact.episode
+            episode = subject.failure.episode
             try:
                 valid_failure(episode.id, episode)
             except ConfigError as error:
@@ -59,17 +59,17 @@ class Studies(OnDemandCache[Study]):
         return await super().get(subject)
 
     def _answer(self, study: Study) -> bytes:
-        contact = study.contact
-        path, sha256 = series_file(contact.campaign.id, contact.stored, self._settings)
+        failure = study.failure
+        path, sha256 = series_file(failure.campaign.id, failure.stored, self._settings)
         load_arrays(path, sha256)  # raises where it is lost or damaged
         try:
-            spec = contact.campaign.run_spec(contact.run)
+            spec = failure.campaign.run_spec(failure.run)
         except OutdatedError as error:
             raise NotPlayable(str(error)) from error
         question = Question(
             subject=study.subject,
             spec=spec,
-            episode=contact.episode,
+            episode=failure.episode,
             series=path,
             format=study.format,
             twin=None if study.twin in (None, IDLE) else EgoConfig.model_validate({"profile": study.twin}),

@@ -104,9 +104,9 @@ def list_failures(
 @router.get("/failures/{failure_id}", response_model=Failure)
 def get_failure(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> Response:
     """One failure, valid or not, with its full time series."""
-    contact = service.store.failure(campaign_id, failure_id, caller.sees)
+    failure = service.store.failure(campaign_id, failure_id, caller.sees)
     triage = service.store.triage(campaign_id, failure_id, caller.sees)
-    return as_json(failure_body(campaign_id, contact, triage, service.settings))
+    return as_json(failure_body(campaign_id, failure, triage, service.settings))
 
 
 @router.put("/failures/{failure_id}/triage", responses=MALFORMED | NOT_JSON, openapi_extra=documented("PostedTriage"))

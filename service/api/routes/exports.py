@@ -51,11 +51,11 @@ EpisodesFormat = Annotated[
     response_class=Response,
     responses=made(*(FORMATS[name].media_type for name in names("failure"))) | PLAYED | LACKING,
 )
-async def get_export(contact: Asked, format: FailureFormat, headers: Headers, service: Service) -> Response:
+async def get_export(failure: Asked, format: FailureFormat, headers: Headers, service: Service) -> Response:
     """One failure in a format of other tools, see `GET /v1/formats`; some are several files, and come as a zip."""
-    content = await service.studies.get(Study(contact, "export", format=format))
+    content = await service.studies.get(Study(failure, "export", format=format))
     row = FORMATS[format]
-    name = f"{contact.episode.id}-{contact.edition[:8]}{f'-{format}' if row.media_type == ZIP else ''}{row.suffix}"
+    name = f"{failure.episode.id}-{failure.edition[:8]}{f'-{format}' if row.media_type == ZIP else ''}{row.suffix}"
     return Response(content, headers=headers | _attachment(name), media_type=row.media_type)
 
 

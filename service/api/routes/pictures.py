@@ -11,7 +11,7 @@ from risk_sac.records import wire
 from service.api.answers.representations import cacheable
 from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, WAIT, Responses, problem
 from service.api.context import CurrentCaller, Service
-from service.views.pictures import ContactOfARun, Picture, Roads, TwinPlay, roads_body, thumbnail_of, twin_body
+from service.views.pictures import FailureOfARun, Picture, Roads, TwinPlay, roads_body, thumbnail_of, twin_body
 from service.views.studies import Study
 
 PNG, SVG, JSON, ZIP = "image/png", "image/svg+xml", "application/json", "application/zip"
@@ -28,26 +28,26 @@ def made(*media_types: str) -> Responses:
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
 
 
-async def _contact(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> ContactOfARun:
+async def _failure(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> FailureOfARun:
     campaign = await run_in_threadpool(service.store.campaign, campaign_id, caller.sees)
     stored = await run_in_threadpool(service.store.failure, campaign_id, failure_id, caller.sees)
-    return ContactOfARun.of(campaign, stored)
+    return FailureOfARun.of(campaign, stored)
 
 
-Asked = Annotated[ContactOfARun, Depends(_contact)]
+Asked = Annotated[FailureOfARun, Depends(_failure)]
 
 
-async def _headers(contact: Asked, request: Request) -> dict[str, str]:
-    return cacheable(request, contact.edition)  # routes differ in their paths, so the edition is tag enough
+async def _headers(failure: Asked, request: Request) -> dict[str, str]:
+    return cacheable(request, failure.edition)  # routes differ in their paths, so the edition is tag enough
 
 
 Headers = Annotated[dict[str, str], Depends(_headers)]
 
 
 @router.get("/failures/{failure_id}/roads", response_model=Roads, responses=TAGGED)
-def get_roads(contact: Asked, headers: Headers) -> Response:
+def get_roads(failure: Asked, headers: Headers) -> Response:
     """The ground on which a failure came about, as polygons on the map that its time series is on."""
-    return Response(roads_body(contact).model_dump_json(), headers=headers, media_type=JSON)
+    return Response(roads_body(failure).model_dump_json(), headers=headers, media_type=JSON)
 
 
 @router.get(
@@ -55,45 +55,45 @@ def get_roads(contact: Asked, headers: Headers) -> Response:
     response_class=Response,
     responses=TAGGED | LOST | {200: made(SVG)[200]},
 )
-def get_thumbnail(contact: Asked, headers: Headers, service: Service) -> Response:
+def get_thumbnail(failure: Asked, headers: Headers, service: Service) -> Response:
     """One failure from above, small: the roads, the paths in the last 3 s, and the bodies at that moment."""
-    return Response(thumbnail_of(contact, service.settings), headers=headers, media_type=SVG)
+    return Response(thumbnail_of(failure, service.settings), headers=headers, media_type=SVG)
 
 
 @router.get("/failures/{failure_id}/picture.png", response_class=Response, responses=made(PNG))
-async def get_picture(contact: Asked, headers: Headers, service: Service) -> Response:
+async def get_picture(failure: Asked, headers: Headers, service: Service) -> Response:
     """One failure, valid or not: the paths from above, and what was measured along the way."""
-    return Response(await service.pictures.get(Picture(contact)), headers=headers, media_type=PNG)
+    return Response(await service.pictures.get(Picture(failure)), headers=headers, media_type=PNG)
 
 
 @router.get("/failures/{failure_id}/bundle.npz", response_class=Response, responses=made(ZIP) | PLAYED)
-async def get_bundle(contact: Asked, headers: Headers, service: Service) -> Response:
+async def get_bundle(failure: Asked, headers: Headers, service: Service) -> Response:
     """One failure in a file that stands alone, once it was played again; `risk-sac replay` plays it anywhere."""
-    return Response(await service.studies.get(Study(contact, "bundle")), headers=headers, media_type=ZIP)
+    return Response(await service.studies.get(Study(failure, "bundle")), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/core.npz", response_class=Response, responses=made(ZIP) | PLAYED)
-async def get_core(contact: Asked, headers: Headers, service: Service) -> Response:
+async def get_core(failure: Asked, headers: Headers, service: Service) -> Response:
     """The same with all taken away that the failure does not need; takes up to 150 episodes, some 10 s."""
-    return Response(await service.studies.get(Study(contact, "core")), headers=headers, media_type=ZIP)
+    return Response(await service.studies.get(Study(failure, "core")), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=made(JSON) | PLAYED)
-async def get_region(contact: Asked, headers: Headers, service: Service) -> Response:
+async def get_region(failure: Asked, headers: Headers, service: Service) -> Response:
     """How many of its neighbours fail as it does: nearby scenes, other traffic, other actions; takes 170 episodes."""
-    return Response(await service.studies.get(Study(contact, "region")), headers=headers, media_type=JSON)
+    return Response(await service.studies.get(Study(failure, "region")), headers=headers, media_type=JSON)
 
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=made(PNG) | PLAYED)
-async def get_twin(contact: Asked, twin: Twin, headers: Headers, service: Service) -> Response:
+async def get_twin(failure: Asked, twin: Twin, headers: Headers, service: Service) -> Response:
     """One failure beside the same scene without an attack (`idle`), or with another ego, on one clock."""
-    played = await service.studies.get(Study(contact, "twin", twin))
-    return Response(await service.pictures.get(Picture(contact, twin, played)), headers=headers, media_type=PNG)
+    played = await service.studies.get(Study(failure, "twin", twin))
+    return Response(await service.pictures.get(Picture(failure, twin, played)), headers=headers, media_type=PNG)
 
 
 @router.get("/failures/{failure_id}/twins/{twin}", response_model=TwinPlay, responses=made(JSON) | PLAYED)
-async def get_twin_play(contact: Asked, twin: Twin, headers: Headers, service: Service) -> Response:
+async def get_twin_play(failure: Asked, twin: Twin, headers: Headers, service: Service) -> Response:
     """What the same scene comes to without an attack (`idle`), or with another ego, and its full time series."""
-    played = await service.studies.get(Study(contact, "twin", twin))
+    played = await service.studies.get(Study(failure, "twin", twin))
     body = await run_in_threadpool(lambda: wire(twin_body(twin, played)))
     return Response(body, headers=headers, media_type=JSON)

@@ -15,6 +15,11 @@ const COLUMNS = [
   ["preventable", "Distinct, and a careful driver would have prevented them"],
 ] as const;
 
+/** Those that count first. */
+export function byWeight(requirements: Requirements): [string, Requirements[string]][] {
+  return Object.entries(requirements).sort(([, a], [, b]) => Number(b.counts === "failure") - Number(a.counts === "failure"));
+}
+
 interface Props {
   requirements: Requirements;
   /** Of whom they are, for people who hear the table. */
@@ -24,7 +29,7 @@ interface Props {
 }
 
 export function RequirementTable({ requirements, of, campaign }: Props) {
-  const rows = Object.entries(requirements).sort(([, a], [, b]) => Number(b.counts === "failure") - Number(a.counts === "failure"));
+  const rows = byWeight(requirements);
   if (!rows.length) return null;
   return (
     <div class="scroll" tabIndex={0} role="region" aria-label={`Requirements of ${of}`}>
@@ -56,7 +61,7 @@ export function RequirementTable({ requirements, of, campaign }: Props) {
                 </td>
               ))}
               <td class="number rate-cell">
-                {percent(row.rate)} <span class="faint">{bracket(row)}</span>
+                {percent(row.rate)} <span class="faint">{bracketOf(row)}</span>
               </td>
             </tr>
           ))}
@@ -70,6 +75,6 @@ function Linked({ to, children }: { to: string | undefined; children: ComponentC
   return to === undefined ? <>{children}</> : <a href={to}>{children}</a>;
 }
 
-function bracket({ rate_low, rate_high }: Requirements[string]): string {
+export function bracketOf({ rate_low, rate_high }: Requirements[string]): string {
   return rate_low === null || rate_high === null ? "" : `[${(100 * rate_low).toFixed(1)}, ${(100 * rate_high).toFixed(1)}]`;
 }

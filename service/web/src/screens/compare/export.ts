@@ -17,7 +17,7 @@ const COLUMNS: [string, (line: Line) => string | number | null][] = [
   ["runs", ({ row }) => row.runs],
   ["episodes", ({ row }) => row.episodes],
   ["contacts", ({ row }) => row.raw_collisions],
-  ["valid", ({ row }) => row.failures],
+  ["failures", ({ row }) => row.failures],
   ["distinct", ({ row }) => row.distinct_failures],
   ["preventable", ({ row }) => row.distinct_preventable],
   ["ecr", ({ row }) => row.ecr.mean],

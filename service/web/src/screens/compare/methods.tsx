@@ -92,7 +92,7 @@ function end(estimates: Estimate[]): number {
 }
 
 export function Funnels({ rows }: { rows: Row[] }) {
-  const most = Math.max(1, ...rows.map((row) => row.raw_collisions));
+  const most = Math.max(1, ...rows.map((row) => Math.max(row.failures, row.distinct_failures)));
   return (
     <div class="funnels">
       {rows.map((row) => (
@@ -109,14 +109,15 @@ export function Funnels({ rows }: { rows: Row[] }) {
 
 /** Each measure with what it means. */
 const MEASURES: [string, string, (row: Row) => string][] = [
-  ["ES", "efficiency: 1 − mean steps to the valid failure / horizon", (row) => measured(row.more.efficiency)],
+  ["ES", "efficiency: 1 − mean steps to the valid contact / horizon", (row) => measured(row.more.efficiency)],
   ["ρ̄_c", "mean realism cost per step; lower is more realistic", (row) => measured(row.more.cost_rate)],
-  ["OFD", "mean distance between two valid failures, 0 to 1", (row) => measured(row.more.dispersion)],
+  ["OFD", "mean distance between two valid contacts, 0 to 1", (row) => measured(row.more.dispersion)],
   ["steps / distinct", "environment steps per distinct failure", (row) => whole(row.more.steps_per_distinct_failure)],
   ["CPU s / distinct", "processor seconds per distinct failure", (row) => number(row.more.cpu_s_per_distinct_failure, 1)],
-  ["preventable, repeats too", "valid failures that the careful driver would have prevented", (row) => count(row.more.preventable)],
+  ["preventable, repeats too", "failures that the careful driver would have prevented", (row) => count(row.more.preventable)],
+  ["contacts", "episodes in which the ego touched something", (row) => count(row.raw_collisions)],
   ["artefacts", "contacts that the simulator or the control made", (row) => count(row.more.artefacts)],
-  ["unresponsive", "valid failures with a visible collision course of 1.5 s in which the ego never braked", (row) => percent(row.more.unresponsive_share)],
+  ["unresponsive", "valid contacts with a visible collision course of 1.5 s in which the ego never braked", (row) => percent(row.more.unresponsive_share)],
   ["refused scenes", "infeasible scenes", (row) => count(row.rejected)],
   ["steps", "environment steps", (row) => count(row.more.environment_steps)],
 ];

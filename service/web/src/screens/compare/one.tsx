@@ -10,6 +10,7 @@ import { markOf } from "../campaign/look";
 import { Figures } from "./figures";
 import { Kinds } from "./kinds";
 import { Funnels, Measures, Methods } from "./methods";
+import { ByRequirement } from "./requirements";
 import { rowOfCell } from "./rows";
 import { Tests } from "./tests";
 
@@ -123,6 +124,7 @@ function Family({ id, table, family, phase }: { id: string; table: Table; family
       </h2>
       <Methods what="Method" family={family} rows={rows} />
       <Funnels rows={rows} />
+      <ByRequirement what="Method" family={family} rows={rows} />
       <Measures what="Method" family={family} rows={rows} />
       <Tests tests={headline} family={family} reference={headline[0]?.reference ?? table.reference} caption={`Declared beforehand: ${headline[0]?.metric}`} />
       <Tests tests={tests} family={family} reference={table.reference} caption={`${table.reference} against the others`} />

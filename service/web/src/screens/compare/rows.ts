@@ -1,6 +1,7 @@
 /** What is compared, as rows: a method's cell of a report, or a campaign's total of a method. Pure. */
 
 import type { Body } from "../../api/types";
+import type { Requirements } from "../../ui/requirements";
 import type { Mark } from "../campaign/look";
 
 export interface Estimate {
@@ -20,6 +21,8 @@ export interface Row {
   failures: number;
   distinct_failures: number;
   distinct_preventable: number;
+  /** Requirement -> its funnel; none in what was stored before requirements were counted. */
+  requirements: Requirements;
   ecr: Estimate;
   pcr: Estimate;
   more: More;
@@ -38,7 +41,7 @@ export interface More {
   environment_steps: number;
 }
 
-const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable"] as const;
+const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "requirements"] as const;
 const FURTHER = ["artefacts", "unresponsive_share", "preventable", "environment_steps", "steps_per_distinct_failure"] as const;
 const NOTHING: Estimate = { mean: null, low: null, high: null };
 

@@ -11,6 +11,7 @@ import { COLOURS, type Mark } from "../campaign/look";
 import { differences } from "./differences";
 import { csv, json, markdown, type Line } from "./export";
 import { Funnels, Measures, Methods } from "./methods";
+import { ByRequirement } from "./requirements";
 import { rowOfTotal } from "./rows";
 
 interface One {
@@ -64,6 +65,7 @@ export function Several({ ids }: { ids: string[] }) {
             <h2 id={`family-${family}`}>Family {family}</h2>
             <Methods what="Campaign" family={family} rows={rows} />
             <Funnels rows={rows} />
+            <ByRequirement what="Campaign" family={family} rows={rows} />
             <Measures what="Campaign" family={family} rows={rows} />
           </section>
         );
