@@ -86,7 +86,7 @@ def test_failures_and_episodes_are_filtered_by_requirement(client):
         assert problem.status_code == 422
         (error,) = problem.json()["errors"]
         assert (error["field"], error["got"]) == ("requirement", '"never_fats"')
-        assert error["wanted"].startswith("one of: no_contact, safe_ttc")
+        assert error["wanted"].startswith("one of: no_contact, on_carriageway, ")
         assert error["wanted"].endswith("never_fast")
 
 
