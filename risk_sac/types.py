@@ -95,7 +95,9 @@ class Frame(FrameFields):
     speed_mps = Row(SPEED)  # along the lane or the walking direction, never negative
     lateral_mps = Row(LATERAL)  # across the lane, positive to the left
     accel_mps2 = Row(ACCEL)
-    lane_offset_m = Row(OFFSET)  # a vehicle's centre from its lane's centre, positive to the left; 0 of pedestrians
+    lane_offset_m = Row(
+        OFFSET
+    )  # from its lane's middle, or a piloted ego's path; positive to the left; 0 of pedestrians
     length_m = Row(LENGTH)
     width_m = Row(WIDTH)
 

@@ -53,7 +53,7 @@ class Perceived(NamedTuple):
     ids: tuple[str, ...]  # as long as an actor is known, it keeps its id
     kind: NDArray[np.int8]  # of `risk_sac.types.Kind`
     state: Floats  # rows x n
-    path: Floats  # rows of `risk_sac.egos.road` x p: the middle of the lane it is on, or was on last, along its route
+    path: Floats  # rows of `risk_sac.egos.road` x p: the middle of its first lane, on along its route
     station_m: float  # of its front bumper on the path
     offset_m: float  # of its front bumper's middle from the path, positive to the left
     signal: Signal  # ahead of it

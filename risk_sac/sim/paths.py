@@ -54,6 +54,8 @@ class Way(NamedTuple):
     path: Path
     stop_lines: tuple[StopLine, ...]
     complete: bool  # whether it ends where its route ends
+    lane_m: float  # length of its first lane
+    following: str | None  # the lane that follows this one
 
 
 def way_of(route: Sequence[str], lane: str) -> Way:
@@ -70,7 +72,8 @@ def way_of(route: Sequence[str], lane: str) -> Way:
         signal = controlled.get((leading_lane(route, before), following))
         if signal is not None:
             stop_lines.append(StopLine(station_m, *signal))
-    return Way(path, tuple(stop_lines), complete=_edge(lanes[-1]) == route[-1])
+    complete, following = _edge(lanes[-1]) == route[-1], lanes[1] if len(lanes) > 1 else None
+    return Way(path, tuple(stop_lines), complete, _length(lines[0]), following)
 
 
 def _controlled() -> dict[tuple[str, str], tuple[str, int]]:

@@ -13,16 +13,15 @@ from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.lookout import project, stretch
-from risk_sac.sim.paths import STATION, Along, StopLine, Way
+from risk_sac.sim.paths import STATION, Along, StopLine
 from risk_sac.sim.reading import EgoTold
-from risk_sac.sim.roads import Roads, Room
+from risk_sac.sim.roads import Roads
 from risk_sac.types import Floats, Frame
 
 ROUTE_OR_NOWHERE = 3  # SUMO's word for the nearest place along the route (1), or off the road (2)
 NO_LANE_CHANGE = 0
 NEAR_M = 20.0  # of its path, on which the ego is looked for: a path may come back beside itself
 HANGS_OVER_M = 0.3  # over the edge of its lanes, which no driver has to mind
-NO_ROOM = Room(-math.inf, -math.inf)
 PASSES_M = 10.0  # from its path; an ego that is farther off passes no stop line and no end of its route
 
 
@@ -53,7 +52,7 @@ class MovedEgo:
 
     Attributes:
       motion: after its latest step.
-      along: where it is on its path, that of the lane that it is on, or was on last, along its route.
+      along: where it is on its path, that of its first lane along its route, whichever lane it is on.
       inside: whether its body is on lanes that lead along its route. SUMO's drivers see what is on these lanes.
       arrived: whether it reached its route's end. SUMO, which removes its own vehicles there, keeps one that is moved.
       told: what SUMO would tell of it.
@@ -63,7 +62,6 @@ class MovedEgo:
     inside: bool
     arrived: bool
     told: EgoTold
-    _way: Way
     _stop_line: StopLine | None
 
     def __init__(self, vehicle: str, motion: Motion, size_m: tuple[float, float], roads: Roads) -> None:
@@ -71,7 +69,8 @@ class MovedEgo:
         self._vehicle, self._size_m, self._roads = vehicle, size_m, roads
         self.motion, self._stop_line = motion, None
         libsumo.vehicle.setLaneChangeMode(vehicle, NO_LANE_CHANGE)
-        self._find(libsumo.vehicle.getLaneID(vehicle))
+        self._lane = libsumo.vehicle.getLaneID(vehicle)
+        self._find(roads.station_m(vehicle, self._lane))
 
     def move(self, motion: Motion) -> None:
         """Has SUMO put it there in its next step."""
@@ -86,26 +85,27 @@ class MovedEgo:
         SUMO derives a speed from the way along the lane, 0 where a lane begins; followers go by it.
         """
         libsumo.vehicle.setPreviousSpeed(self._vehicle, self.motion.speed_mps)
-        self._find(libsumo.vehicle.getLaneID(self._vehicle))
+        self._find(self.along.station_m)
 
-    def _find(self, lane: str) -> None:
-        """Finds the ego on its path; `lane` is SUMO's, empty where the ego is off the road."""
-        if lane:
-            self._way = self._roads.way(self._vehicle, lane)
-            near_m = self._roads.station_m(self._vehicle, lane)
-        else:
-            near_m = self.along.station_m
-        path, (x, y, heading, speed, accel, _, slip) = self._way.path, self.motion
+    def _find(self, near_m: float) -> None:
+        """Finds the ego on its path near a station."""
+        way = self._roads.way(self._vehicle, self._lane)
+        while way.following is not None and near_m >= way.lane_m:  # stations count from the start of the lane
+            near_m, self._lane = near_m - way.lane_m, way.following
+            if self._stop_line is not None:
+                self._stop_line = self._stop_line._replace(station_m=self._stop_line.station_m - way.lane_m)
+            way = self._roads.way(self._vehicle, self._lane)
+        path, (x, y, heading, speed, accel, _, slip) = way.path, self.motion
         station_m, offset_m, front_x, front_y, lateral, left_m, right_m = _placed(
             path, near_m, x, y, heading, speed, slip, *self._size_m
         )
         self.along = Along(path, station_m, offset_m)
-        room = self._roads.room(self._vehicle, lane) if lane else NO_ROOM
+        room = self._roads.room(self._vehicle, self._lane)
         self.inside = left_m < room.left_m + HANGS_OVER_M and right_m < room.right_m + HANGS_OVER_M
         passes = abs(offset_m) < PASSES_M
-        self.arrived = passes and self._way.complete and station_m >= path[STATION, -1]
+        self.arrived = passes and way.complete and station_m >= path[STATION, -1]
         if passes:
-            self._stop_line = next((line for line in self._way.stop_lines if line.station_m >= station_m), None)
+            self._stop_line = next((line for line in way.stop_lines if line.station_m >= station_m), None)
         angle = 90.0 - math.degrees(heading)
         self.told = EgoTold(front_x, front_y, angle, speed, lateral, accel, offset_m, self._ahead(station_m))
 

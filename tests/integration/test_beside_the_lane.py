@@ -131,7 +131,7 @@ def test_the_path_of_a_lane_that_leads_elsewhere_leads_back_to_the_route(
 ) -> None:
     route = ("from_south", to)
     sim.reset(replace(DENSE, ego=car("ego", route, lane, 100.0, 10.0)), 1)
-    path, (line,), complete = way_of(route, f"from_south_{lane}")
+    path, (line,), complete, *_ = way_of(route, f"from_south_{lane}")
     assert complete
     own_m, other_m = (6.45, 3.15) if lane == 1 else (3.15, 6.45)
     straight = path[:, path[Y] < -19.0]
@@ -155,15 +155,13 @@ def test_an_ego_that_reaches_the_end_of_its_route_has_arrived(sim: SumoSimulatio
 
 
 @pytest.mark.parametrize("beside_m", [0.0, 4.0])
-def test_beside_its_road_an_ego_s_path_is_that_of_its_last_lane(
-    sim: SumoSimulation, pilot: Told, beside_m: float
-) -> None:
+def test_an_ego_s_path_stays_that_of_its_first_lane(sim: SumoSimulation, pilot: Told, beside_m: float) -> None:
     away_m = beside_m + 3.3
     pilot.motion = lambda time_s: Motion(300.0 + 10.0 * time_s, -min(2.0 * time_s, away_m), 0.0, 10.0)
     play(sim, replace(LOW, ego=car("ego", ("road",), 1, 300.0, 10.0)), 50)
     path, station_m, offset_m = pilot.paths[-1]
-    assert path[Y, 0] == -3.3
-    assert offset_m == pytest.approx(-beside_m)
+    assert path[Y, 0] == 0.0
+    assert offset_m == pytest.approx(-away_m)
     assert station_m == pytest.approx(300.0 + 49.0 + 2.3)
     assert bool(libsumo.vehicle.getLaneID("ego")) == (beside_m == 0.0)
     assert libsumo.vehicle.getPosition("ego") == pytest.approx((352.3, -away_m))
@@ -192,7 +190,7 @@ def cut_in(sim: SumoSimulation, pilot: Told, begins: int, ends: int, beside: int
         cued = step if cued is None and cue(CUT_IN, seen, False) else cued
         action = np.zeros(2 * len(low.adversaries))
         action[slot : slot + 2] = act(CUT_IN, seen, -STEP_S if cued is None else (step - cued) * STEP_S, False)
-        adversaries.command(action.tolist(), sim)
+        adversaries.command(action.tolist(), frame, sim)
         frame = sim.step()
         found.append((float(frame.y_m[0]), float(frame.y_m[row])))
     ego_m, other_m = np.array(found).T

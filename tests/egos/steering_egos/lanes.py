@@ -20,18 +20,14 @@ class LaneChanger(Lqr):
 
     def reset(self, episode: Episode) -> None:
         super().reset(episode)
-        self.steps, self.lanes, self.aside_now_m = 0, 0, 0.0
-        self.offset_m: float | None = None
+        self.steps, self.aside_now_m = 0, 0.0
 
     def aside_m(self, perceived: Perceived) -> float:
-        # The path moves with the ego to the next lane; then its offset drops by a lane's width.
-        before_m, self.offset_m = self.offset_m, perceived.offset_m
-        self.lanes += 0 if before_m is None else round((before_m - perceived.offset_m) / LANE_M)
         left = LEAVES_S <= self.steps * self.step_s < self.returns_s
         most_m = ACROSS_MPS * self.step_s
         self.aside_now_m += min(max(LANE_M * left - self.aside_now_m, -most_m), most_m)
         self.steps += 1
-        return self.aside_now_m - LANE_M * self.lanes
+        return self.aside_now_m
 
 
 class Overtaker(LaneChanger):
