@@ -72,8 +72,13 @@ def way_of(route: Sequence[str], lane: str) -> Way:
         signal = controlled.get((leading_lane(route, before), following))
         if signal is not None:
             stop_lines.append(StopLine(station_m, *signal))
-    complete, following = _edge(lanes[-1]) == route[-1], lanes[1] if len(lanes) > 1 else None
-    return Way(path, tuple(stop_lines), complete, _length(lines[0]), following)
+    return Way(
+        path=path,
+        stop_lines=tuple(stop_lines),
+        complete=_edge(lanes[-1]) == route[-1],
+        lane_m=_length(lines[0]),
+        following=lanes[1] if len(lanes) > 1 else None,
+    )
 
 
 def _controlled() -> dict[tuple[str, str], tuple[str, int]]:
