@@ -17,7 +17,16 @@ from risk_sac.verdicts.along import WANDER_M, Along, lane_conflict
 from risk_sac.verdicts.course import HORIZON_S, Body, at, entry_distance, time_to_touch, with_margin
 from risk_sac.verdicts.evidence import Evidence, inside, soon_inside
 from risk_sac.verdicts.path import Path
-from risk_sac.verdicts.recorded import column, ego_path, lane_path, recorded_motion, recorded_size, seen_along
+from risk_sac.verdicts.recorded import (
+    IN_PLACE_M,
+    column,
+    ego_path,
+    lane_path,
+    moved_across,
+    recorded_motion,
+    recorded_size,
+    seen_along,
+)
 
 BODY_M = 0.5  # from a pedestrian's centre: what a body on the kerb reaches of the carriageway
 KERB_S = 1.0  # a pedestrian this near to the carriageway is about to step onto it
@@ -101,13 +110,14 @@ def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wa
 
 
 def left_its_place(evidence: Evidence) -> int | None:
-    """The frame in which the ego began to be more than 0.375 m beside its place in its lane; None if it is not now.
+    """The frame in which the ego began to leave its place in its lane; None if it is at its place in the last frame.
 
-    Its place is the one that it had across its lane 3 s before the last frame.
+    Its place is the one that it had across its lane 3 s before the last frame. Choice: it has left it if it is more
+    than 0.75 m beside it, and began to when it was 0.375 m beside it.
     """
-    moved = evidence.moved_across_m(0)
-    kept_place = np.abs(moved - moved[evidence.since(TURN_WINDOW_S)]) <= WANDER_M
-    return None if kept_place[-1] else int(np.flatnonzero(kept_place)[-1]) + 1
+    moved = moved_across(evidence)
+    beside = np.abs(moved - moved[evidence.since(TURN_WINDOW_S)])
+    return int(np.flatnonzero(beside <= WANDER_M)[-1]) + 1 if beside[-1] > IN_PLACE_M else None
 
 
 def left_its_lane(evidence: Evidence, striker: int) -> int | None:

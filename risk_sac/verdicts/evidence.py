@@ -107,14 +107,6 @@ class Evidence:
         """The first frame of the last `before_s` seconds."""
         return int(np.searchsorted(self.time_s, self.time_s[-1] - before_s - 1e-6))
 
-    def moved_across_m(self, actor: int) -> Floats:
-        """How far an actor has moved across its lanes since the first frame, `T`, m, positive to the left.
-
-        It says nothing of the lane's centre, and so it is the same over a lane change and beside the road.
-        """
-        moved: Floats = np.cumsum(self.lateral_mps[:, actor]) * self.step_s
-        return moved
-
 
 def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.0) -> Bools:
     """Which points lie in any of the areas, or no further than `margin_m` outside one."""

@@ -26,12 +26,6 @@ def test_what_is_stored_is_judged_alike(evidence: Evidence) -> None:
     assert again.model_copy(update={"conflict_s": first.conflict_s, "noticed_s": first.noticed_s}) == first
 
 
-def test_what_moved_across_is_the_same_over_a_lane_change() -> None:
-    evidence = cut_in(rate=1.2, at_s=2.0)
-    moved = evidence.moved_across_m(1)
-    assert moved - moved[0] == pytest.approx(evidence.y_m[:, 1] - evidence.y_m[0, 1])
-
-
 def test_the_last_seconds_are_counted_from_the_contact() -> None:
     evidence = stage(straight(0.0, 0.0, 0.0, 10.0), straight(60.0, 0.0, 0.0, 0.0))
     assert evidence.time_s[-1] - evidence.time_s[evidence.since(2.0)] == pytest.approx(2.0)

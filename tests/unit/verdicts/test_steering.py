@@ -119,7 +119,10 @@ def bend(t: float, radius_m: float = 60.0, speed: float = 10.0) -> tuple[float, 
     return radius_m * math.sin(angle) + speed * min(t, 0.0), radius_m * (1 - math.cos(angle)), angle
 
 
-def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend() -> None:
+@pytest.mark.parametrize(
+    ("recorded", "next_lane"), [(True, False), (True, True), (False, False)], ids=["ditch", "next lane", "no offsets"]
+)
+def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend(recorded: bool, next_lane: bool) -> None:
     def leaves(t: float) -> tuple[float, float, float]:
         x, y, heading = bend(t)
         right_m = max(t - 2.0, 0.0)
@@ -129,9 +132,14 @@ def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend() -> None:
     post = straight(x + 3.5 * math.sin(heading), y - 3.5 * math.cos(heading), heading, 0.0)
     ground = replace(STREET, roadway=())
     evidence = stage(leaves, post, kinds=(Kind.VEHICLE, Kind.PEDESTRIAN), ground=ground)
-    lateral = evidence.lateral_mps.copy()
-    lateral[:, 0] = np.where(evidence.time_s > 2.0 + 1e-9, -1.0, 0.0)
-    evidence = replace(evidence, lateral_mps=lateral)
+    leaving = evidence.time_s > 2.0 + 1e-9
+    lateral, offset = evidence.lateral_mps.copy(), evidence.lane_offset_m.copy()
+    lateral[:, 0] = np.where(leaving, -1.0, 0.0)
+    offset[:, 0] = leaving * (2.0 - evidence.time_s - CAR_M[0] / 2 * math.sin(0.1))  # of its front
+    offset[offset < -LANE_M / 2] += LANE_M * next_lane
+    evidence = replace(
+        evidence, lateral_mps=lateral, lane_offset_m=offset if recorded else np.full_like(offset, np.nan)
+    )
     began = int(np.searchsorted(evidence.time_s, 2.0))
     path = lane_path(evidence, began)
     assert path is not None
