@@ -1,6 +1,7 @@
 """`risk-sac show`: the failures of a run, refused ones included, and pictures of them."""
 
 import argparse
+import textwrap
 from pathlib import Path
 
 from rich.table import Table
@@ -13,6 +14,8 @@ from risk_sac.records import Collision, Judgement, Violation
 from risk_sac.run_folder.results import Results, read_results
 from risk_sac.run_folder.series import read_series
 from risk_sac.terminal import console
+
+NAME_WIDTH = 20  # of a requirement's name in the list
 
 
 def add(commands: Commands) -> None:
@@ -94,7 +97,8 @@ def _of_contact(collision: Collision) -> tuple[str, ...]:
 
 def _without_contact(violation: Violation) -> tuple[str, ...]:
     """The same of a violation without contact, which has no zones."""
-    return f"{violation.ego_speed_mps:.1f}", "", f"{violation.requirement}\n{violation.time_s:.1f}"
+    name = textwrap.fill(violation.requirement, NAME_WIDTH)
+    return f"{violation.ego_speed_mps:.1f}", "", f"{name}\n{violation.time_s:.1f}"
 
 
 def _conflict(judgement: Judgement) -> str:

@@ -21,6 +21,7 @@ from service.settings import ServiceSettings
 from service.store.database import READERS
 from service.views import on_demand
 from service.views.studies import Studies
+from tests.builders import collision
 from tests.contract.recorded_campaigns import ENDED_ID, Recorded, known_times_and_ids
 from tests.contract.serving import serving
 
@@ -179,7 +180,7 @@ def test_the_picture_and_the_series_of_a_twin_are_of_one_play_and_need_not_be_se
         asked.append(study)
         file = tmp_path / "campaigns" / ENDED_ID / RUN / FAILURES / study.contact.stored.series
         with np.load(file) as arrays:
-            return twin_bytes(TwinPlay.of(None, None), dict(arrays))
+            return twin_bytes(TwinPlay.of(None, collision(), []), dict(arrays))
 
     monkeypatch.setattr(Studies, "_answer", answer)
     with recorded(ServiceSettings(data_dir=tmp_path, max_workers=1)) as client:

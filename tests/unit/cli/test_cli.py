@@ -17,7 +17,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.runs import run
 from risk_sac.records import ConflictType, Grade, Outcome, RunMetrics
 from risk_sac.run_folder.results import RecordedFailure, Results, read_results, write_results
-from tests.builders import judgement
+from tests.builders import judgement, violation
 from tests.unit.failures.staged import synthetic_contact
 
 SPEC = RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=3))
@@ -98,6 +98,21 @@ def test_the_list_names_failed_rules_in_full_within_80_columns(capsys: pytest.Ca
     printed = capsys.readouterr().out
     assert "…" not in printed
     for word in rules.replace(",", "").replace("_", " ").split():
+        assert word in printed
+
+
+def test_the_list_says_which_requirement_was_violated_without_contact(capsys: pytest.CaptureFixture[str]) -> None:
+    near = {"other_id": "pedestrian", "other_kind": "pedestrian", "other_role": "adversary"}
+    long = violation(
+        requirement="a" * 20 + "b" * 20, time_s=12.25, broke=("red_light",), grade=Grade.UNAVOIDABLE, **near
+    )
+    episode = synthetic_contact().episode.model_copy(update={"collision": None, "violations": (long, violation())})
+    results = Results(spec=SPEC, spec_digest="", finished=True, failures=(RecordedFailure.of(SPEC.id, episode),))
+    Console(width=80).print(_failures(results))
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    assert "ego: red" in printed
+    for word in ("a" * 20, "b" * 20, "12.2", "pedestrian", "unavoidable"):
         assert word in printed
 
 

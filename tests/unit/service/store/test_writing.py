@@ -93,7 +93,13 @@ def test_failures_that_did_not_repeat_are_refused_with_the_end_of_their_run(stor
     campaign = ledger.create(SPEC)
     first, second = start(store, ledger), start(store, ledger)
     ledger.add_episodes([(run, episode(index, Outcome.FAILURE)) for run in (first, second) for index in range(3)])
-    end = {"evaluation": None, "digest": "abc", "versions": {}, "wall_s": 1.0, "flaky": dict.fromkeys((0, 2), ("no_contact",))}
+    end = {
+        "evaluation": None,
+        "digest": "abc",
+        "versions": {},
+        "wall_s": 1.0,
+        "flaky": dict.fromkeys((0, 2), ("no_contact",)),
+    }
     ledger.end_run(first, State.SUCCEEDED, result=Finished(finished=True, metrics=metrics, **end))
     runs = store.campaign(campaign.id).runs
     assert [(run.episodes_done, run.raw_collisions, run.failures) for run in runs[:2]] == [(3, 3, 1), (3, 3, 3)]
