@@ -178,7 +178,7 @@ def test_the_picture_and_the_series_of_a_twin_are_of_one_play_and_need_not_be_se
 
     def answer(studies, study):
         asked.append(study)
-        file = tmp_path / "campaigns" / ENDED_ID / RUN / FAILURES / study.contact.stored.series
+        file = tmp_path / "campaigns" / ENDED_ID / RUN / FAILURES / study.failure.stored.series
         with np.load(file) as arrays:
             return twin_bytes(TwinPlay.of(None, collision(), []), dict(arrays))
 
