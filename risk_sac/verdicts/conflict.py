@@ -18,11 +18,10 @@ from risk_sac.verdicts.course import HORIZON_S, Body, at, entry_distance, time_t
 from risk_sac.verdicts.evidence import Evidence, inside, soon_inside
 from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.recorded import (
-    IN_PLACE_M,
     column,
     ego_path,
+    front_moved_across,
     lane_path,
-    moved_across,
     recorded_motion,
     recorded_size,
     seen_along,
@@ -56,6 +55,11 @@ class Conflict:
     hidden: bool  # the ego knew nothing of the striker when the bodies' motion made it a conflict
     course_from: int  # first frame of the visible collision course that lasted until the contact
     in_lane: int  # the last frame in which the ego was in its lane: that of its beginning, unless it came over before
+
+    @property
+    def came_over(self) -> bool:
+        """Whether the ego left its lane and so came over to the striker."""
+        return self.in_lane < self.frame
 
 
 def find_conflict(evidence: Evidence, striker: int) -> Conflict:
@@ -110,14 +114,13 @@ def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wa
 
 
 def left_its_place(evidence: Evidence) -> int | None:
-    """The frame in which the ego began to leave its place in its lane; None if it is at its place in the last frame.
+    """The frame in which the ego's front came to be more than 0.375 m beside its place; None if it is not in the last.
 
-    Its place is the one that it had across its lane 3 s before the last frame. Choice: it has left it if it is more
-    than 0.75 m beside it, and began to when it was 0.375 m beside it.
+    Its place is the one that it had across its lane 3 s before the last frame.
     """
-    moved = moved_across(evidence)
-    beside = np.abs(moved - moved[evidence.since(TURN_WINDOW_S)])
-    return int(np.flatnonzero(beside <= WANDER_M)[-1]) + 1 if beside[-1] > IN_PLACE_M else None
+    moved = front_moved_across(evidence)
+    in_place = np.abs(moved - moved[evidence.since(TURN_WINDOW_S)]) <= WANDER_M
+    return None if in_place[-1] else int(np.flatnonzero(in_place)[-1]) + 1
 
 
 def left_its_lane(evidence: Evidence, striker: int) -> int | None:
@@ -127,9 +130,9 @@ def left_its_lane(evidence: Evidence, striker: int) -> int | None:
     its place.
     """
     left = left_its_place(evidence)
-    path = None if left is None else lane_path(evidence, left - 1)
-    if path is None:
+    if left is None:
         return None
+    path = lane_path(evidence, left - 1)
     striking = at(recorded_motion(evidence, striker), len(path.s) - 1)
     speed, size = float(evidence.speed_mps[-1, 0]), recorded_size(evidence, 0)
     touches = time_to_touch(path, float(path.s[-1]), speed, size, striking, OVER_S) <= OVER_S

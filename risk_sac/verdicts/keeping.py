@@ -25,7 +25,7 @@ from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, STEP_S, VX, VY, Bools
 from risk_sac.verdicts.conflict import Conflict, left_its_place
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path, pose_at
-from risk_sac.verdicts.recorded import ego_path, lane_path, recorded_motion, recorded_size
+from risk_sac.verdicts.recorded import ego_path, keeps_lane, lane_path, recorded_motion, recorded_size
 from risk_sac.verdicts.reference import DRIVERS
 from risk_sac.verdicts.rollout import HORIZON_S, drive, stopping_distance
 
@@ -80,14 +80,14 @@ def _keeps(name: str, gauge: Gauge, played: Played, index: int, met: MetActor | 
     e = played.evidence
     left = left_its_place(e.until(index))
     in_lane = left - 1 if left is not None else index if met is None else met.conflict.frame
-    kept = lane_path(e, in_lane)
-    path = ego_path(e) if kept is None else kept
+    stays = left is None and keeps_lane(e, in_lane)
+    path = ego_path(e) if stays else lane_path(e, in_lane)
     s, acts = _driven(name, e, path, met, after_steps=AFTER_CONTACT_STEPS * played.measures[-1].assessment.touched)
     fast = np.flatnonzero(e.speed_mps[e.time_s > -STEP_S / 2, 0] > e.ground.speed_limit_mps + 1e-6)
     if len(fast):
         first = int(np.searchsorted(e.time_s, -STEP_S / 2)) + int(fast[0])
         s, acts = _within_limit(s, first, e.ground.speed_limit_mps * e.step_s), min(acts, first)
-    acts = acts if kept is None else min(acts, in_lane)
+    acts = acts if stays else min(acts, in_lane)
     if acts >= index:  # it acts when it is too late
         return False
     return _holds(gauge, played, path, s, acts)

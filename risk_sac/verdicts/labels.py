@@ -10,7 +10,7 @@ from risk_sac.verdicts.conflict import BRAKES_MPS2, Conflict
 from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence, inside
 from risk_sac.verdicts.offences import IN_WORDS, RECENT_S, STANDING_MPS
-from risk_sac.verdicts.recorded import moved_across
+from risk_sac.verdicts.recorded import front_moved_across
 
 BESIDE_M = 3.0  # a pedestrian this near to a crossing means to use it
 RECENT_M = 12.0  # a quarter of a circle of 8 m: an ego that creeps through its turn is turning
@@ -66,7 +66,7 @@ def manoeuvre(evidence: Evidence) -> str:
     turned = float(heading[-1] - heading[0])
     if abs(turned) > TURN_RAD:
         return "left_turn" if turned > 0.0 else "right_turn"
-    moved = moved_across(evidence)[first:]
+    moved = front_moved_across(evidence)[first:]
     return "lane_change" if abs(moved[-1] - moved[0]) > LANE_CHANGE_M else "straight"
 
 

@@ -4,12 +4,11 @@ import numpy as np
 
 from risk_sac.geometry import Size
 from risk_sac.types import Floats
-from risk_sac.verdicts.along import Along, along_series
+from risk_sac.verdicts.along import WANDER_M, Along, along_series
 from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path, recorded_path
 
-IN_PLACE_M = 0.75  # what an ego moves across that keeps its lane; round a tight turn its centre moves in by 0.5 m
 NO_JUMP_M = 0.5  # what the offset may differ in a step from what the ego moved across
 STANDING_M = 0.01  # driven in a step; below it the direction of motion is noise
 
@@ -36,52 +35,52 @@ def ego_path(evidence: Evidence) -> Path:
     return recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
 
 
-def moved_across(evidence: Evidence) -> Floats:
-    """How far the ego's centre has moved across its lanes since the first frame, `T`, m, positive to the left.
+def front_moved_across(evidence: Evidence) -> Floats:
+    """How far the ego's front has moved across its lanes since the first frame, `T`, m, positive to the left.
 
-    It is the offset of its front bumper from the lane that SUMO has it on, without the jumps to the next lane and what
-    the front is turned aside. SUMO goes on with the last lane beside the road. Without recorded offsets it is the sum
-    of the lateral speed, which drifts where lanes bend.
+    It is the front bumper's offset from the lane that SUMO has it on, without the jumps to the next lane; beside the
+    road SUMO goes on with the last lane. Without recorded offsets it is the sum of the lateral speed, which drifts
+    where lanes bend.
     """
     e = evidence
     lateral = e.lateral_mps[:, 0] * e.step_s
     offset, width = e.lane_offset_m[:, 0], e.ground.lane_width_m
-    if np.isnan(offset).any():
-        summed: Floats = np.cumsum(lateral)
-        return summed
     steps = np.diff(offset, prepend=offset[:1])
     steps -= width * np.round((steps - lateral) / width)
-    steps = np.where(np.abs(steps - lateral) > NO_JUMP_M, lateral, steps)  # to a lane of another width
-    aside = e.length_m[0] / 2 * np.sin(e.heading_rad[:, 0] - lane_heading(e, ego_path(e), 0))
-    moved: Floats = np.cumsum(steps) - aside
+    jumps = ~(np.abs(steps - lateral) <= NO_JUMP_M)  # to a lane of another width; NaN without offsets
+    moved: Floats = np.cumsum(np.where(jumps, lateral, steps))
     return moved
 
 
-def lane_path(evidence: Evidence, first: int) -> Path | None:
-    """The ego's path if it had kept its lane from frame `first` on; None if it did.
+def keeps_lane(evidence: Evidence, first: int) -> bool:
+    """Whether the ego kept its lane from frame `first` on. Choice: its front moved across by 0.375 m at most."""
+    moved = front_moved_across(evidence)[first:]
+    return bool(np.abs(moved - moved[0]).max() <= WANDER_M)
 
-    It is the recorded path without what the ego moved across: the lane is the one that it was in at `first`, and its
-    place across that lane stays the same. Choice: an ego that moved across by no more than 0.75 m kept its lane.
+
+def lane_path(evidence: Evidence, first: int) -> Path:
+    """The ego's path if it had kept its lane from frame `first` on: the recorded one without what it moved across.
+
+    The lane is the one that the ego was in at `first`, and its place across that lane stays the same.
     """
-    recorded = ego_path(evidence)
-    moved = moved_across(evidence)
-    moved = np.where(np.arange(len(moved)) > first, moved - moved[first], 0.0)
-    if np.abs(moved).max() <= IN_PLACE_M:
-        return None
-    heading = lane_heading(evidence, recorded, first)
-    x, y = recorded.x + moved * np.sin(heading), recorded.y - moved * np.cos(heading)
-    return recorded_path(x, y, heading)
+    recorded, moved, lane = ego_path(evidence), front_moved_across(evidence), lane_heading(evidence)
+    if not np.isnan(evidence.lane_offset_m[:, 0]).any():  # of its centre: less than its front, if it is turned aside
+        moved = moved - evidence.length_m[0] / 2 * np.sin(evidence.heading_rad[:, 0] - lane)
+    after = np.arange(len(moved)) > first
+    moved = np.where(after, moved - moved[first], 0.0)
+    x, y = recorded.x + moved * np.sin(lane), recorded.y - moved * np.cos(lane)
+    return recorded_path(x, y, np.where(after, lane, recorded.heading))
 
 
-def lane_heading(evidence: Evidence, recorded: Path, first: int) -> Floats:
-    """Heading of the lane beside the ego after frame `first`, `T`; of the ego's body up to it."""
-    dx, dy = (np.diff(each, prepend=each[:1]) for each in (recorded.x, recorded.y))
+def lane_heading(evidence: Evidence) -> Floats:
+    """Heading of the lane beside the ego, `T`; while the ego stands, the heading before, at first its own."""
+    x, y = evidence.x_m[:, 0], evidence.y_m[:, 0]
+    dx, dy = np.diff(x, prepend=x[:1]), np.diff(y, prepend=y[:1])
     driven = np.hypot(dx, dy)
     across = evidence.lateral_mps[:, 0] * evidence.step_s
     lane = np.arctan2(dy, dx) - np.arcsin(np.clip(across / np.maximum(driven, STANDING_M), -1.0, 1.0))
-    frames = np.arange(len(driven))
-    lane = np.where(frames > first, lane, recorded.heading)
-    latest: Floats = lane[np.maximum.accumulate(np.where((driven > STANDING_M) | (frames <= first), frames, 0))]
+    lane[0] = evidence.heading_rad[0, 0]
+    latest: Floats = lane[np.maximum.accumulate(np.where(driven > STANDING_M, np.arange(len(lane)), 0))]
     return latest
 
 

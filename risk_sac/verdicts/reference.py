@@ -16,7 +16,7 @@ from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path
-from risk_sac.verdicts.recorded import ego_path, lane_path, recorded_motion, recorded_size, seen_along
+from risk_sac.verdicts.recorded import ego_path, keeps_lane, lane_path, recorded_motion, recorded_size, seen_along
 from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, drive
 
 # Who perceives, and how long after the conflict began. Choice: fsm and rss look out from the beginning of the conflict
@@ -39,7 +39,9 @@ def reference_outcomes(evidence: Evidence, striker: int, conflict: Conflict) -> 
     to avoid them too.
     `r157_ttc` speaks of cut-ins only and is left out of everything else.
     """
-    recorded, kept = ego_path(evidence), lane_path(evidence, conflict.in_lane)
+    recorded, kept = ego_path(evidence), None
+    if conflict.came_over or not keeps_lane(evidence, conflict.frame):
+        kept = lane_path(evidence, conflict.in_lane)
     outcomes = {}
     for name, (driver, perceives_s) in DRIVERS.items():
         if kept is None:

@@ -18,7 +18,7 @@ from risk_sac.verdicts.keeping import NO_RED_LIGHT_ENTRY, ON_CARRIAGEWAY, MetAct
 from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, manoeuvre
 from risk_sac.verdicts.offences import ego_offences
 from risk_sac.verdicts.overlap import overlaps_before_contact
-from risk_sac.verdicts.recorded import ego_path, lane_heading
+from risk_sac.verdicts.recorded import lane_heading
 from risk_sac.verdicts.reference import grade
 
 # Of `ARTEFACT_RULES`, those that the episode tells; `solid_bodies` is read from its record.
@@ -98,6 +98,8 @@ def _violation(
         column = evidence.column(frame.ids[nearest])
         met = MetActor(column, find_conflict(evidence, column))
     driven, broke = manoeuvre(evidence), ego_offences(evidence)
+    if requirement.name == NO_RED_LIGHT_ENTRY:  # it may be violated before the line, when the ego cannot stop any more
+        broke = tuple(dict.fromkeys(("red_light", *broke)))
     hidden = met is not None and met.conflict.hidden
     drivers = kept_by(requirement, gauge.of(requirement), played, index, met) if all(verdicts.values()) else {}
     actor = "nobody near" if nearest is None else _actor(frame, measures, nearest, evidence) + ", hidden" * hidden
@@ -135,7 +137,7 @@ def _actor(frame: Frame, measures: Measures, actor: int, evidence: Evidence) -> 
     if frame.kind[actor] == Kind.PEDESTRIAN:
         return "pedestrian near"
     # From the lane's heading: an ego that leaves the road turns away from it.
-    turn = float(frame.heading_rad[actor] - lane_heading(evidence, ego_path(evidence), 0)[-1])
+    turn = float(frame.heading_rad[actor] - lane_heading(evidence)[-1])
     if math.cos(turn) < ONCOMING_COS:
         return "oncoming vehicle"
     if math.cos(turn) < SAME_WAY_COS:

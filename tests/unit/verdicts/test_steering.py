@@ -10,7 +10,7 @@ from risk_sac.records import ConflictType, Grade, Judgement
 from risk_sac.types import Kind
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import judge
-from risk_sac.verdicts.recorded import lane_path
+from risk_sac.verdicts.recorded import keeps_lane, lane_path
 from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,
@@ -142,11 +142,11 @@ def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend(recorded: bool, next
     )
     began = int(np.searchsorted(evidence.time_s, 2.0))
     path = lane_path(evidence, began)
-    assert path is not None
     wanted = np.array([bend(t) for t in evidence.time_s]).T
     assert np.hypot(path.x - wanted[0], path.y - wanted[1]).max() < 0.05
     assert np.abs(path.heading - wanted[2])[began + 1 :].max() < 0.02
-    assert lane_path(evidence, len(evidence.time_s) - 2) is None
+    assert not keeps_lane(evidence, began)
+    assert keeps_lane(evidence, len(evidence.time_s) - 2)
 
 
 def leaves_the_road(walker_y: float = -9.0) -> Evidence:

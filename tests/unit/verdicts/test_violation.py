@@ -150,6 +150,7 @@ def test_a_reference_driver_stops_at_red_where_it_can(yellow_m: float, red_m: fl
     found = violated(replace(evidence, link=link), NO_RED, shown)
     assert found.grade is grade
     assert found.signature == "red light entered; ego goes straight, nobody near"
+    assert found.broke == ("red_light",)
 
 
 def test_a_reference_driver_stays_on_the_carriageway() -> None:
