@@ -12,8 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
-import numpy as np
-
 from risk_sac.config import LearnerConfig, Method, Requirement, RewardConfig
 from risk_sac.records import NO_CONTACT, Collision
 from risk_sac.types import Floats
@@ -68,21 +66,23 @@ class Violated:
 
     def __init__(self, requirements: Sequence[Requirement]) -> None:
         """Looks at the requirements, `M`, in the order of their robustness."""
-        counting = [each.counts == "failure" and each.name != NO_CONTACT for each in requirements]
-        self._counting = np.flatnonzero(counting)
+        self._counting = [
+            i for i, each in enumerate(requirements) if each.counts == "failure" and each.name != NO_CONTACT
+        ]
 
     def begin(self, robustness: Floats) -> None:
         """Begins an episode with the robustness at the release, `M`."""
-        self._depths = self._depth(robustness)
+        self._least = [min(robustness.item(i), 0.0) for i in self._counting]
 
     def gained(self, robustness: Floats) -> float:
         """Scales, summed over the requirements, by which this step is the deepest violation so far."""
-        before, self._depths = self._depths, np.maximum(self._depths, self._depth(robustness))
-        return float((self._depths - before).sum())
-
-    def _depth(self, robustness: Floats) -> Floats:
-        depth: Floats = (-robustness[self._counting]).clip(0.0, 1.0)
-        return depth
+        gained = 0.0
+        for k, i in enumerate(self._counting):
+            now, least = max(robustness.item(i), -1.0), self._least[k]
+            if now < least:
+                gained += least - now
+                self._least[k] = now
+        return gained
 
 
 def worth(collision: Collision, config: RewardConfig) -> float:

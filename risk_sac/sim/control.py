@@ -5,7 +5,7 @@ Vehicles take (longitudinal acceleration, lateral velocity), pedestrians (accele
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +46,8 @@ class PedestrianControl:
         """
         for wanted in ((drive, turn), (-1.0, 0.0)):
             walker, across_mps2 = self._walk(*wanted)
-            if others is None or not walks_into(*others, (*astuple(walker), across_mps2), self._stopping):
+            walk = (walker.x_m, walker.y_m, walker.heading_rad, walker.speed_mps, walker.accel_mps2, across_mps2)
+            if others is None or not walks_into(*others, walk, self._stopping):
                 break
         self.state, self.across_mps2 = walker, across_mps2
         return walker
