@@ -18,7 +18,7 @@ from risk_sac.scenario.families import FAMILIES
 from risk_sac.sim import drivers, holder, paths, placing, reading, roads, sumo
 
 CALLERS = (sumo, holder, placing, reading, roads, drivers, paths)  # the modules that import libsumo
-STEP_RATIO = 3.0
+STEP_RATIO = 3.5
 RESET_MS = 20.0
 EPISODES, ROUNDS = 8, 5
 SOAK_EPISODES, GROWTH_MIB = 5000, 50.0
@@ -102,7 +102,7 @@ def cpu_of_calls(setup: list[Call], steps: list[list[Call]]) -> float:
 
 @pytest.mark.bench
 @pytest.mark.parametrize("family", FAMILIES)
-def test_a_step_costs_at_most_three_times_its_libsumo_calls(family: str) -> None:
+def test_a_step_costs_at_most_three_and_a_half_times_its_libsumo_calls(family: str) -> None:
     horizon = FAMILIES[family].horizon_steps
     with closing(make_default(family)) as env:
         env.reset(seed=0)  # starts the simulator, so that every episode below begins with a load
