@@ -57,7 +57,8 @@ def chosen(service: Service, campaign: str) -> str:
         hidden = collision["judgement"]["hidden"] and collision["other_kind"] == "pedestrian"
         return not hidden, WORTH.index(collision["judgement"]["grade"]), -collision["relative_speed_mps"]
 
-    return min(service.get(campaign, "/failures", limit=500)["items"], key=order)["id"]
+    contacts = service.get(campaign, "/failures", requirement="no_contact", limit=500)["items"]
+    return str(min(contacts, key=order)["id"])
 
 
 def picture(browser: Browser, address: str, file: Path, viewport: dict[str, int], scheme: str) -> None:
