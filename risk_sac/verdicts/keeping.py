@@ -21,7 +21,7 @@ from risk_sac.config import Requirement
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import AHEAD, COS
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, STEP_S, VX, VY, Bools, Floats, Frame, Signal, X, Y
+from risk_sac.types import ACCEL, HEADING, LATERAL, LENGTH, SPEED, STEP_S, VX, VY, Bools, Floats, Frame, Signal, X, Y
 from risk_sac.verdicts.conflict import Conflict, left_its_place
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path, pose_at
@@ -130,7 +130,7 @@ def _holds(gauge: Gauge, played: Played, path: Path, s: Floats, acts: int) -> bo
     for t in range(acts + 1, len(s)):
         if math.isnan(s[t]):
             break
-        frame, seen = _placed(played, path, s, t, followers)
+        frame, seen = placed(played, path, s, t, followers, before)
         measured = gauge.measure(frame, before, seen)
         if measured.assessment.touched or measured.robustness[0] < 0.0:
             return False
@@ -145,8 +145,13 @@ def _followers(played: Played, t: int) -> frozenset[str]:
     return frozenset(np.array(frame.ids[1:])[behind & (others[COS] > 0.5)].tolist())
 
 
-def _placed(played: Played, path: Path, s: Floats, t: int, without: frozenset[str]) -> tuple[Frame, Bools]:
-    """Frame `t` with the ego `s[t]` along the path; after the last frame others go on as they move in it."""
+def placed(
+    played: Played, path: Path, s: Floats, t: int, without: frozenset[str], before: Frame
+) -> tuple[Frame, Bools]:
+    """Frame `t` with the ego `s[t]` along the path, and what it sees; `before` is the frame before it.
+
+    After the last frame others go on as they move in it. `without` lists actors that are left out.
+    """
     last = len(played.frames) - 1
     recorded, measures = played.frames[min(t, last)], played.measures[min(t, last)]
     stays = np.array([id_ not in without for id_ in recorded.ids])
@@ -155,10 +160,15 @@ def _placed(played: Played, path: Path, s: Floats, t: int, without: frozenset[st
     state[X] += beyond_s * state[VX]
     state[Y] += beyond_s * state[VY]
     x, y, heading = pose_at(path, s[t])
-    speed, earlier = (s[t] - s[t - 1]) / STEP_S, (s[t - 1] - s[max(t - 2, 0)]) / STEP_S
+    speed = (s[t] - s[t - 1]) / STEP_S
+    if t + 1 < len(s) and not math.isnan(s[t + 1]):  # now, not on average over the step before
+        speed = (s[t + 1] - s[t - 1]) / (2 * STEP_S)
     state[(X, Y, HEADING), 0] = x, y, heading
-    state[(VX, VY), 0] = speed * math.cos(heading), speed * math.sin(heading)
-    state[(SPEED, LATERAL, ACCEL), 0] = speed, 0.0, (speed - earlier) / STEP_S
+    # As frames have it: the velocity of the front over the step.
+    reach, b = state[LENGTH, 0] / 2, before.state[:, 0]
+    state[VX, 0] = (x - b[X] + reach * (math.cos(heading) - math.cos(b[HEADING]))) / STEP_S
+    state[VY, 0] = (y - b[Y] + reach * (math.sin(heading) - math.sin(b[HEADING]))) / STEP_S
+    state[(SPEED, LATERAL, ACCEL), 0] = speed, 0.0, (speed - before.ego_speed_mps) / STEP_S
     frame = recorded._replace(
         time_s=recorded.time_s + beyond_s,
         ids=tuple(id_ for id_, stay in zip(recorded.ids, stays, strict=True) if stay),

@@ -1,0 +1,58 @@
+"""Violations without contact, of real episodes."""
+
+import numpy as np
+import pytest
+
+from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.env import RiskSacEnv
+from risk_sac.records import Grade, Violation
+from risk_sac.verdicts.keeping import Played, placed
+from risk_sac.verdicts.recorded import ego_path
+
+EPISODES = 12
+
+
+def play(env: RiskSacEnv, seed: int, *, undisturbed: bool = False) -> tuple[Violation, ...]:
+    rng = np.random.default_rng(seed)
+    env.reset(seed=seed)
+    for step in range(env.problem.family.horizon_steps):
+        if step % 10 == 0:
+            action = np.zeros(env.action_size) if undisturbed else rng.uniform(-1.0, 1.0, env.action_size)
+        *_, terminated, truncated, _ = env.step(action.astype(np.float32))
+        if terminated or truncated:
+            break
+    return env.violations(env.requirement_results())
+
+
+@pytest.mark.usefixtures("steering_egos")
+def test_an_ego_that_leaves_the_road_would_have_been_kept_on_it_by_its_lane() -> None:
+    env = RiskSacEnv.of(RunSpec(family="low", method="random", seed=0, ego=EgoConfig(driver="off-roader")))
+    found = [violation for seed in range(EPISODES) for violation in play(env, seed)]
+    env.close()
+    assert found
+    assert {violation.requirement for violation in found} == {"on_carriageway"}
+    assert {violation.grade for violation in found} == {Grade.CAREFUL}
+    assert {violation.broke for violation in found} == {("off_road",)}
+    assert all(violation.signature.startswith("carriageway left; ego ") for violation in found)
+
+
+@pytest.mark.parametrize("family", ["low", "mixed", "dense"])
+def test_what_the_ego_drove_is_measured_again_as_it_was(family: str) -> None:
+    env = RiskSacEnv.of(RunSpec.model_validate({"family": family, "method": "random", "seed": 0}))
+    play(env, 3, undisturbed=True)
+    played = Played(env.trace.frames, env.trace.measures, env.evidence())
+    env.close()
+    path = ego_path(played.evidence)
+    gauge = env._gauge
+    gauge.reset(gauge.carriageway)
+    gauge.remember(played.frames[0], played.measures[0].signals)
+    before = played.frames[0]
+    for t in range(1, len(played.frames)):
+        frame, seen = placed(played, path, path.s, t, frozenset(), before)
+        again = gauge.measure(frame, before, seen).signals
+        first = played.measures[t].signals
+        # SUMO's drivers change their acceleration with every step, which positions tell less exactly.
+        noisy = {"ego_jerk_mps3", "ego_braking_mps2"}
+        wanted = {name: value for name, value in first.items() if name not in noisy}
+        assert {name: again[name] for name in wanted} == pytest.approx(wanted, abs=0.3, rel=0.05), (t, frame.time_s)
+        before = frame
