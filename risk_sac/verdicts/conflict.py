@@ -29,13 +29,13 @@ from risk_sac.verdicts.recorded import (
 
 BODY_M = 0.5  # from a pedestrian's centre: what a body on the kerb reaches of the carriageway
 KERB_S = 1.0  # a pedestrian this near to the carriageway is about to step onto it
-YIELDING_MPS2 = 3.4  # what a driver who means to stop brakes with
-FIRM_MPS2 = 6.0  # what one who brakes already can go up to, without an emergency
+YIELDING_MPS2 = 3.4  # what a driver brakes with to stop at leisure
+FIRM_MPS2 = 6.0  # what a driver that brakes already can go up to, without an emergency
 SAME_WAY_COS = math.cos(math.radians(30.0))
 TURNING_COS = math.cos(math.radians(60.0))
 TURN_WINDOW_S = 3.0
 OVER_S = 1.0
-SETTLED_S = 2.0  # who has been in the ego's lane for so long is its leader, and no longer cuts in
+SETTLED_S = 2.0  # a vehicle that has been in the ego's lane for so long is its leader, and no longer cuts in
 BRIDGE = 2  # frames, 0.2 s: a conflict interrupted for no longer has not ended
 UNRESPONSIVE_S = 1.5
 BRAKES_MPS2 = 1.5  # Krauss's drivers dawdle with up to σ · accel = 1.3 m/s², and mean nothing by it
@@ -46,9 +46,9 @@ class Conflict:
     """How the conflict that ended in the contact came about."""
 
     type: ConflictType
-    frame: int  # when it began for a driver who sees what the ego sees
+    frame: int  # when it began for a driver that sees what the ego sees
     time_s: float  # t0, from the release
-    noticed_s: float  # the same for a wary driver, who trusts nobody beside it and nobody who brakes; never later
+    noticed_s: float  # the same for a wary driver: it trusts nothing beside it and nothing that brakes; never later
     x_m: float  # where the striker was then
     y_m: float
     position: str  # ahead | alongside
@@ -66,8 +66,8 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     """The conflict with the actor in column `striker`, which lasted until the contact in the last frame.
 
     A conflict begins no earlier than the ego knows of the striker; with a pedestrian that steps out from behind a
-    truck, when it comes into sight. With one that nobody could see it begins with the contact. Where the ego came over
-    to the striker, it begins no earlier than the ego left its place in its lane.
+    truck, when it comes into sight. With a striker that was never in sight it begins with the contact. Where the ego
+    came over to the striker, it begins no earlier than the ego left its place in its lane.
     """
     path = ego_path(evidence)
     known = evidence.known[:, striker]
@@ -114,7 +114,7 @@ def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wa
 
 
 def left_its_place(evidence: Evidence) -> int | None:
-    """The frame in which the ego's front came to be more than 0.375 m beside its place; None if it is not in the last.
+    """Finds when the ego's front came to be more than 0.375 m beside its place; None if it is not in the last frame.
 
     Its place is the one that it had across its lane 3 s before the last frame.
     """
@@ -124,7 +124,7 @@ def left_its_place(evidence: Evidence) -> int | None:
 
 
 def left_its_lane(evidence: Evidence, striker: int) -> int | None:
-    """The frame in which the ego left its place in its lane and so came over to the striker; None if it did not.
+    """Finds the frame in which the ego left its lane and so came over to the striker; None if it did not.
 
     Choice: it came over if it would not have touched the striker at the contact, or within 1 s after it, had it kept
     its place.
@@ -214,7 +214,7 @@ def _way_to_corridor(path: Path, evidence: Evidence, striker: int) -> Floats:
 def _cannot_stop(to_go_m: Floats, evidence: Evidence, striker: int, *, wary: bool) -> Bools:
     """Frames in which the striker could no longer stop before the ego's corridor, `T`.
 
-    Choice: whoever brakes already is taken to yield as long as firm braking suffices, but by a wary driver.
+    Choice: a striker that brakes already is taken to yield as long as firm braking suffices, but by a wary driver.
     """
     yielding = (evidence.accel_mps2[:, striker] <= -BRAKES_MPS2) & (not wary)
     braking_mps2 = np.where(yielding, FIRM_MPS2, YIELDING_MPS2)

@@ -61,7 +61,7 @@ def collision_of(
 
 
 def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflict | None = None) -> Judgement:
-    """How the contact in the last frame came about, and, of a valid one, who would have prevented it.
+    """Judges how the contact in the last frame came about, and which driver would have prevented a valid one.
 
     A valid contact passed every rule of `artefact_verdicts` and `validity_verdicts`. The conflict is found again if not
     given.

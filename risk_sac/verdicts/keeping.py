@@ -2,9 +2,9 @@
 
 Choices:
 - A reference driver keeps its lane, and so it stays on the carriageway: without contact nothing pushes it off.
-- It obeys signals: it does not enter on red if it could stop at the line from when the signal turned yellow or red, in
-  its own reaction time and with its own braking. They are shorter and harder than what signals are timed for, 1 s and
-  3.05 m/s² (Institute of Transportation Engineers; also the Highway Capacity Manual).
+- It obeys signals: it does not enter on red if it could stop at the line from when the signal turned yellow or red.
+  It needs its own reaction time and braking for that, R157's of `careful`: 1.15 s and up to 0.774 g. Signals are timed
+  for 1 s and 3.05 m/s² (Institute of Transportation Engineers).
 - It keeps the speed limit.
 - Any other requirement is measured again, on the path of its lane and with what the driver brakes in the conflict with
   the actor that mattered most. Others move as recorded; those that follow the ego are left out, since they would have
@@ -94,7 +94,7 @@ def _keeps(name: str, gauge: Gauge, played: Played, index: int, met: MetActor | 
 
 
 def _driven(name: str, e: Evidence, path: Path, met: MetActor | None, after_steps: int) -> tuple[Floats, int]:
-    """Metres along the path in each frame, NaN once the driver stands, and the frame from which it brakes."""
+    """Returns metres along the path per frame, NaN once the driver stands, and the frame from which it brakes."""
     last = len(e.time_s) - 1
     if met is None:
         return path.s.copy(), last
@@ -112,7 +112,7 @@ def _driven(name: str, e: Evidence, path: Path, met: MetActor | None, after_step
 
 
 def _within_limit(s: Floats, first: int, most_m: float) -> Floats:
-    """The same driven no faster than the limit from frame `first` on; `most_m` is what the limit allows in a step."""
+    """Drives the same no faster than the limit from frame `first` on; `most_m` is the limit's way in a step."""
     steps = np.diff(s, prepend=s[:1])
     for t in range(first, len(steps)):
         steps[t] = min(steps[t], max(most_m, steps[t - 1] - EASES_MPS2 * STEP_S**2))
@@ -121,7 +121,7 @@ def _within_limit(s: Floats, first: int, most_m: float) -> Floats:
 
 
 def _holds(gauge: Gauge, played: Played, path: Path, s: Floats, acts: int) -> bool:
-    """Whether the requirement holds where the ego is `s` along a path from frame `acts` on, as long as it drives."""
+    """Measures whether the requirement holds on `s` along a path from frame `acts` on, until the driver stands."""
     gauge.reset(gauge.carriageway)
     for frame, measures in zip(played.frames[: acts + 1], played.measures, strict=False):
         gauge.remember(frame, measures.signals)
@@ -148,7 +148,9 @@ def _followers(played: Played, t: int) -> frozenset[str]:
 def placed(
     played: Played, path: Path, s: Floats, t: int, without: frozenset[str], before: Frame
 ) -> tuple[Frame, Bools]:
-    """Frame `t` with the ego `s[t]` along the path, and what it sees; `before` is the frame before it.
+    """Places the ego `s[t]` along the path in frame `t`; returns the frame and what the ego sees.
+
+    `before` is the frame before it.
 
     After the last frame others go on as they move in it. `without` lists actors that are left out.
     """

@@ -73,7 +73,8 @@ def manoeuvre(evidence: Evidence) -> str:
 def response(evidence: Evidence, conflict: Conflict) -> str:
     """none, late_braking, braking, standing or starting: what the ego did from the conflict's beginning on.
 
-    Late is later than the careful driver. Who stood within the last 3 s and gains speed at the contact is starting.
+    Late is later than the careful driver. An ego that stood within the last 3 s and gains speed at the contact is
+    starting.
     """
     speed = evidence.speed_mps[:, 0]
     if speed[-1] < STANDING_MPS:

@@ -89,9 +89,9 @@ def left_carriageway(evidence: Evidence) -> frozenset[str]:
 
 
 def took_priority(evidence: Evidence, taker: int, other: int) -> bool:
-    """Whether a vehicle entered from a signal that told it to yield, and the other from one that did not.
+    """Whether a vehicle entered though it had to yield, and the other had not.
 
-    Of background traffic no signals are recorded: SUMO's drivers enter on green.
+    The signals from which they entered decide. None are recorded of background traffic: SUMO's drivers enter on green.
     """
     if not entered_on(evidence, taker, MUST_YIELD):
         return False
@@ -136,7 +136,7 @@ def took_crossing(evidence: Evidence, striker: int) -> bool:
 
 
 def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
-    """Whether a vehicle passed a stop line while its signal showed one of these letters, in the last 6 s.
+    """Whether a vehicle entered a junction on one of these letters in the last 6 s.
 
     Its signal then goes from them to none. To another letter it turned, unless the vehicle came into a junction in that
     step and it is the next junction's.

@@ -36,7 +36,7 @@ def ego_path(evidence: Evidence) -> Path:
 
 
 def front_moved_across(evidence: Evidence) -> Floats:
-    """How far the ego's front has moved across its lanes since the first frame, `T`, m, positive to the left.
+    """Sums how far the ego's front moved across its lanes since the first frame, `T`, m, positive to the left.
 
     It is the front bumper's offset from the lane that SUMO has it on, without the jumps to the next lane; beside the
     road SUMO goes on with the last lane. Without recorded offsets it is the sum of the lateral speed, which drifts
@@ -53,15 +53,18 @@ def front_moved_across(evidence: Evidence) -> Floats:
 
 
 def keeps_lane(evidence: Evidence, first: int) -> bool:
-    """Whether the ego kept its lane from frame `first` on. Choice: its front moved across by 0.375 m at most."""
+    """Whether the ego kept its lane from frame `first` on.
+
+    Choice: its front moved across by 0.375 m at most.
+    """
     moved = front_moved_across(evidence)[first:]
     return bool(np.abs(moved - moved[0]).max() <= WANDER_M)
 
 
 def lane_path(evidence: Evidence, first: int) -> Path:
-    """The ego's path if it had kept its lane from frame `first` on: the recorded one without what it moved across.
+    """Returns the path of the lane that the ego was in at frame `first`.
 
-    The lane is the one that the ego was in at `first`, and its place across that lane stays the same.
+    It is the recorded path without what the ego moved across since; its place across the lane stays the same.
     """
     recorded, moved, lane = ego_path(evidence), front_moved_across(evidence), lane_heading(evidence)
     if not np.isnan(evidence.lane_offset_m[:, 0]).any():  # of its centre: less than its front, if it is turned aside
@@ -73,7 +76,10 @@ def lane_path(evidence: Evidence, first: int) -> Path:
 
 
 def lane_heading(evidence: Evidence) -> Floats:
-    """Heading of the lane beside the ego, `T`; while the ego stands, the heading before, at first its own."""
+    """Heading of the ego's lane, `T`: from where it drove and how much of that was across.
+
+    While the ego stands it is the heading before, in the first frame the ego's own.
+    """
     x, y = evidence.x_m[:, 0], evidence.y_m[:, 0]
     dx, dy = np.diff(x, prepend=x[:1]), np.diff(y, prepend=y[:1])
     driven = np.hypot(dx, dy)

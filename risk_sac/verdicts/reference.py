@@ -1,4 +1,4 @@
-"""Who would have prevented a contact: the reference drivers' verdicts, and the grade that follows.
+"""Reference drivers against a contact, and the grade that follows.
 
 Source: UN Regulation 157, 5.2.5 and Annex 3; the drivers in `risk_sac.verdicts.drivers`.
 """
@@ -19,13 +19,13 @@ from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.recorded import ego_path, keeps_lane, lane_path, recorded_motion, recorded_size, seen_along
 from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, drive
 
-# Who perceives, and how long after the conflict began. Choice: fsm and rss look out from the beginning of the conflict
-# on, not before, and perceive what they themselves hold to be dangerous: all drivers judge the same conflict.
+# The driver, and how long after the conflict began it perceives. Choice: fsm and rss look out from the beginning of the
+# conflict on, not before, and perceive what they themselves hold to be dangerous: all drivers judge the same conflict.
 DRIVERS = {"careful": (CAREFUL, CAREFUL_PERCEIVES_S), "fsm": (FUZZY, 0.0), "rss": (RSS, 0.0), "ideal": (IDEAL, 0.0)}
 INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
 R157_BRAKES_MPS2, R157_DELAY_S = 6.0, 0.35
-# Choice: who was further along than the ego by the time of the contact, and so is missed, avoids it by being faster and
-# not by care. Such is a driver who brakes later than the ego did for a pedestrian that then runs into the ego's flank.
+# Choice: a driver that was further along than the ego at the contact, and so is missed, avoids it by being faster and
+# not by care. Such is one that brakes later than the ego did for a pedestrian that then runs into the ego's flank.
 LEAD_M = 0.1
 NEAR_M = 30.0  # further from the ego's place than that, an actor is not in the way of a reference driver
 AVOIDED = ReferenceOutcome(avoids=True, impact_speed_mps=0.0)
@@ -58,7 +58,7 @@ def reference_outcomes(evidence: Evidence, striker: int, conflict: Conflict) -> 
 
 
 def _met(evidence: Evidence, path: Path, striker: int) -> list[int]:
-    """The other actors that the ego knew of and that came near its place on a path that it did not take."""
+    """Lists the other known actors that came near the ego's place on a path that it did not take."""
     e = evidence
     apart_m = np.hypot(e.x_m - path.x[:, None], e.y_m - path.y[:, None])
     near = np.where(e.known & np.isfinite(apart_m), apart_m, np.inf).min(axis=0) <= NEAR_M
@@ -76,7 +76,7 @@ def grade(keeps: Mapping[str, bool]) -> Grade:
 def _outcome(
     evidence: Evidence, path: Path, other: int, driver: int, began: int, perceives_s: float, *, kept: bool = False
 ) -> ReferenceOutcome:
-    """How a driver fares against one actor; `kept`: on a path that the ego did not take."""
+    """Drives against one actor; `kept`: on a path that the ego did not take."""
     e, size, motion = evidence, recorded_size(evidence, 0), recorded_motion(evidence, other)
     track = motion._replace(heading=np.unwrap(motion.heading))
     first = began + round(perceives_s / e.step_s)
