@@ -108,6 +108,7 @@ def series_arrays() -> dict[str, np.ndarray]:
     rows = np.arange(6, dtype=float).reshape(3, 2)
     rows[1, 1] = np.nan
     return dict.fromkeys((*PER_ACTOR, *PER_OTHER), rows) | {
+        "y_m": 10 * rows,  # side by side before the contact
         "time_s": np.arange(3) / 10,
         "released_s": np.array(0.0),
         "ids": np.array(["ego", "lead"]),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.cli.campaigns.output import COUNTS_AND_RATES
+from risk_sac.cli.campaigns.output import COUNTS, RATES
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("risk_sac", "service", "docker", "sumo_nets", "tests")
@@ -26,7 +26,7 @@ def test_readme_has_at_most_250_lines() -> None:
 
 def test_glossary_explains_every_column_of_the_demo() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    for column in ("family", "method", *COUNTS_AND_RATES):
+    for column in ("family", "method", *COUNTS, *RATES):
         name = column.replace("-\n", "").replace("\n", " ")
         assert f"\n| {name} |" in readme, name
 
