@@ -126,7 +126,7 @@ def _reduce_actions(search: _Search) -> None:
     """Leaves adversaries to SUMO: altogether, their drive or steering, or for 0.5 s; then weakens what is left."""
     for units in _units(search):
         without(units, lambda cells: search.take(_zeroed(search.left, cells)))
-    while any(search.take(_weaker(search.left, factor)) for factor in AMPLITUDES):
+    while search.left.actions.any() and any(search.take(_weaker(search.left, factor)) for factor in AMPLITUDES):
         pass
 
 

@@ -131,7 +131,7 @@ def _judge(bundle: Bundle, ego: EgoConfig) -> _Ending:
 
 def compared(found: Sequence[Collision | Violation], wanted: Sequence[Collision | Violation]) -> _Ending:
     """What became of the violations of a failure, by what the other ego violates."""
-    if still := [each for each in found if any(_persists(old, each) for old in wanted)]:
+    if still := [each for each in found if any(alike([each], old) for old in wanted)]:
         return _Ending(Verdict.STILL_FAILING, _events(still), still[0].signature)
     if valid := [each for each in found if each.valid]:
         return _Ending(Verdict.NEW_KIND, f"{_events(valid)}: {valid[0].signature}", valid[0].signature)
@@ -145,12 +145,6 @@ def compared(found: Sequence[Collision | Violation], wanted: Sequence[Collision 
     if BLIND in broken:
         return _Ending(Verdict.NEW_KIND, f"{events}, which it never saw", found[0].signature)
     return _Ending(Verdict.FIXED, said)
-
-
-def _persists(old: Collision | Violation, new: Collision | Violation) -> bool:
-    if isinstance(old, Collision):
-        return alike([new], old) is not None
-    return new.valid and new.requirement == old.requirement
 
 
 def _events(violations: Sequence[Collision | Violation]) -> str:

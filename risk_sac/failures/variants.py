@@ -19,7 +19,9 @@ from risk_sac.types import STEP_S, Floats, Scene
 SCENES, COPIES = (0.01, 0.02, 0.05), 40  # of a region: shares of the scene parameters' ranges, and copies at each
 SEEDS = 10  # of the traffic
 ACTIONS = 0.05
-TAIL_S = 3.0  # that is played on without any action: what is done less, or elsewhere, takes longer to end in a contact
+TAIL_S = (
+    3.0  # of no action after the failure, in which a variant may fail: what is done less, or elsewhere, takes longer
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,13 +75,17 @@ class Stage:
         return Scene(self.space.family, dict(zip(self.space.names, variant.scene.tolist(), strict=True)))
 
     def play(self, variant: Variant) -> Sequence[Collision | Violation]:
-        """Returns the violations of a variant, that which names it first; none if its scene is infeasible."""
+        """Returns the violations of a variant, that which names it first; none if its scene is infeasible.
+
+        What begins more than `TAIL_S` after the failure is left out.
+        """
         self.played += 1
         try:
             found = play(self.env, self.scene(variant), variant.seed, variant.actions).found
         except (InfeasibleScene, SimulationError):
             return ()
-        return sorted(found, key=lambda each: not each.valid)
+        in_time = [each for each in found if each.time_s <= self.failure.time_s + TAIL_S + STEP_S]
+        return sorted(in_time, key=lambda each: not each.valid)
 
     def fails(self, variant: Variant) -> bool:
         """Whether the ego fails as it did."""
@@ -92,21 +98,22 @@ class Stage:
 
 
 def alike(found: Sequence[Collision | Violation], wanted: Collision | Violation) -> Collision | Violation | None:
-    """Returns the violation that is valid, of the same requirement and with the same actor, if there was one.
+    """Returns a valid violation that is like another one; None if there is none.
 
-    Contacts that are alike came about in the same type of conflict too. None if no violation is alike.
+    Contacts that are alike have the same striker and came about in the same type of conflict. Violations without
+    contact are of the same requirement. Choice: whatever is near, since that changes from copy to copy where no actor
+    makes the ego fail; where one does, the violation goes with what that actor does.
     """
     return next((each for each in found if each.valid and _alike(each, wanted)), None)
 
 
 def _alike(found: Collision | Violation, wanted: Collision | Violation) -> bool:
-    if found.requirement != wanted.requirement or wanted.other_id not in (None, found.other_id):
-        return False
     if not isinstance(found, Collision) or not isinstance(wanted, Collision):
-        return True
+        return found.requirement == wanted.requirement
     if found.judgement is None or wanted.judgement is None:
         return False
-    return found.judgement.conflict_type is wanted.judgement.conflict_type
+    same_type = found.judgement.conflict_type is wanted.judgement.conflict_type
+    return same_type and found.other_id == wanted.other_id
 
 
 def _up_to(failure: Collision | Violation, actions: Floats, horizon_steps: int) -> Floats:
