@@ -1,8 +1,12 @@
 from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
-from risk_sac.failures.minimise import without
+from risk_sac.failures.minimise import _reduce_actions, without
+from risk_sac.failures.variants import Variant
 
 
 class Needs:
@@ -37,3 +41,19 @@ def test_nothing_at_all_is_not_tried() -> None:
     failure = Needs((), set())
     without((), failure.unneeded)
     assert failure.tried == 0
+
+
+def test_where_no_action_is_left_nothing_is_weakened() -> None:
+    family = SimpleNamespace(adversaries=("lead",))
+    env = SimpleNamespace(problem=SimpleNamespace(family=family))
+    search: Any = SimpleNamespace(stage=SimpleNamespace(env=env, failure=SimpleNamespace(other_id=None)), taken=0)
+    search.left = Variant(scene=np.zeros(1), actions=np.ones((10, 2)), seed=0)
+
+    def take(variant: Variant) -> bool:
+        search.left = variant
+        search.taken += 1
+        return search.taken < 20  # so that the test ends
+
+    search.take = take
+    _reduce_actions(search)
+    assert search.taken == 1
