@@ -40,5 +40,6 @@ from risk_sac.records.violation import (
     Judgement,
     ReferenceOutcome,
     RequirementResult,
+    Severity,
     Violation,
 )

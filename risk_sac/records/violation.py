@@ -45,6 +45,14 @@ class Grade(StrEnum):
     UNAVOIDABLE = "unavoidable"
 
 
+class Severity(StrEnum):
+    """How bad a contact is, by closing speed and risk of injury; see `risk_sac.verdicts.severity`."""
+
+    MINOR = "minor"  # between vehicles that close at less than 2 m/s
+    MODERATE = "moderate"
+    SEVERE = "severe"  # a risk of 1 % or more that a pedestrian dies, or an occupant is seriously injured
+
+
 def _early(name: str) -> Any:
     """A minimum that ends 1 s before the contact is called so; under its plain name in what was stored before."""
     return Field(validation_alias=AliasChoices(f"early_{name}", name), serialization_alias=f"early_{name}")
@@ -85,9 +93,14 @@ class Judgement(Record):
     ground: str
     """lane | junction | crossing | beside_crossing: where the striker was struck."""
     broke: tuple[str, ...]
-    """What the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red."""
+    """What the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red, unsafe_lane_change,
+    brake_check, turned_into_path."""
     ego_broke: tuple[str, ...] = ()
     """What the ego broke: red_light, priority, wrong_direction, speeding, off_road. Empty in older records."""
+    severity: Severity | None = None
+    """minor | moderate | severe. Null in older records."""
+    injury_risk: float | None = None
+    """Risk that the pedestrian dies, or an occupant is seriously injured (MAIS 3 or more). Null in older records."""
     unresponsive: bool
     """A visible collision course of 1.5 s or more during which the ego never braked."""
     grade: Grade | None
@@ -209,6 +222,7 @@ class Collision(Violated):
     ego_speed_mps: Real
     other_speed_mps: Real
     relative_speed_mps: Real
+    """The closing speed: of either body as seen from the other."""
     lateral_offset_m: Real
     """The other's centre across the ego's axis at contact."""
     min_ttc_s: Least = _early("min_ttc_s")

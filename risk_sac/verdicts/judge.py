@@ -11,10 +11,12 @@ from risk_sac.sim.collision import Contact
 from risk_sac.types import STEP_S, Frame, Kind, Role
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.definitions import DEFINITIONS
+from risk_sac.verdicts.endangering import endangered_ego
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.labels import ground, manoeuvre, response, signature
 from risk_sac.verdicts.offences import ego_offences, striker_offences
 from risk_sac.verdicts.reference import grade, reference_outcomes
+from risk_sac.verdicts.severity import severity_of
 from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, validity_verdicts
 
 WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
@@ -73,9 +75,10 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
     conflict = conflict or find_conflict(evidence, striker)
     ego_manoeuvre, ego_response = manoeuvre(evidence), response(evidence, conflict)
     where, crossing = ground(evidence, striker), conflict.type is ConflictType.CROSSING
-    broke = striker_offences(evidence, striker, crossing=crossing)
+    broke = striker_offences(evidence, striker, crossing=crossing) + endangered_ego(evidence, striker, conflict)
     ego_broke = ego_offences(evidence, striker, crossing=crossing)
     drivers = reference_outcomes(evidence, striker, conflict) if valid else {}
+    severity, injury_risk = severity_of(evidence, striker)
     return Judgement(
         definitions=DEFINITIONS,
         conflict_type=conflict.type,
@@ -90,6 +93,8 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
         ground=where,
         broke=broke,
         ego_broke=ego_broke,
+        severity=severity,
+        injury_risk=injury_risk,
         unresponsive=unresponsive(evidence, conflict),
         grade=grade({name: each.avoids for name, each in drivers.items()}) if valid else None,
         drivers=drivers,

@@ -24,6 +24,9 @@ IN_WORDS = {
     "speeding": "speeding",
     "off_road": "off the road",
     "pedestrian_on_red": "on red",
+    "unsafe_lane_change": "without a safe gap",
+    "brake_check": "brake-checking",
+    "turned_into_path": "turning into the way",
 }
 
 

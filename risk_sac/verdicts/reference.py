@@ -10,20 +10,18 @@ import numpy as np
 from risk_sac.geometry import Size, contact_point, frame_view, zone
 from risk_sac.records import ConflictType, Grade, ReferenceOutcome
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.types import HEADING, LENGTH, WIDTH, Floats, X, Y
-from risk_sac.verdicts.along import Along
+from risk_sac.types import HEADING, LENGTH, WIDTH, X, Y
 from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
+from risk_sac.verdicts.endangering import enters_safely
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path
-from risk_sac.verdicts.recorded import ego_path, keeps_lane, lane_path, recorded_motion, recorded_size, seen_along
+from risk_sac.verdicts.recorded import ego_path, keeps_lane, lane_path, recorded_motion, recorded_size
 from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, drive
 
 # The driver, and how long after the conflict began it perceives. Choice: fsm and rss look out from the beginning of the
 # conflict on, not before, and perceive what they themselves hold to be dangerous: all drivers judge the same conflict.
 DRIVERS = {"careful": (CAREFUL, CAREFUL_PERCEIVES_S), "fsm": (FUZZY, 0.0), "rss": (RSS, 0.0), "ideal": (IDEAL, 0.0)}
-INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
-R157_BRAKES_MPS2, R157_DELAY_S = 6.0, 0.35
 # Choice: a driver that was further along than the ego at the contact, and so is missed, avoids it by being faster and
 # not by care. Such is one that brakes later than the ego did for a pedestrian that then runs into the ego's flank.
 LEAD_M = 0.1
@@ -105,25 +103,10 @@ def _from_behind(ending: Ending, size: Size, other_size: Size) -> bool:
 
 
 def _by_ttc(evidence: Evidence, path: Path, striker: int) -> ReferenceOutcome:
-    """UN R157, 5.2.5.2: a cut-in is preventable if TTC > v_rel / (2 · 6 m/s²) + 0.35 s when it intrudes by 0.3 m.
+    """UN R157, 5.2.5.2: a cut-in that leaves room enough is preventable.
 
     Its impact speed is the recorded ego's: the rule knows no driver.
     """
-    seen = seen_along(path, evidence, striker)
-    t = _intrusion(evidence, striker, seen)
-    closing = evidence.speed_mps[t, 0] - seen.speed_mps[t]
-    needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_DELAY_S
-    if seen.gap_m[t] > 0.0 and seen.ttc_s[t] > needed_s:
+    if enters_safely(evidence, path, striker):
         return AVOIDED
     return ReferenceOutcome(avoids=False, impact_speed_mps=float(evidence.speed_mps[-1, 0]))
-
-
-def _intrusion(evidence: Evidence, striker: int, seen: Along[Floats]) -> int:
-    """The frame in which the striker last came 0.3 m into the ego's lane; the contact's if it did not."""
-    e = evidence
-    reach = (
-        np.abs(np.sin(seen.turn_rad)) * e.length_m[striker] + np.abs(np.cos(seen.turn_rad)) * e.width_m[striker]
-    ) / 2
-    intrudes = np.abs(seen.across_m) - reach <= e.ground.lane_width_m / 2 - INTRUSION_M
-    outside = np.flatnonzero(~intrudes)
-    return min(int(outside[-1]) + 1, len(intrudes) - 1) if len(outside) else 0

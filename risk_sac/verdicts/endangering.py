@@ -1,0 +1,118 @@
+"""What a striker did that endangered the ego: an unsafe lane change, a brake check, a turn into the ego's way.
+
+Background traffic is not asked for brake checks: SUMO's drivers brake for a reason, which is not always on record.
+"""
+
+import math
+
+import numpy as np
+
+from risk_sac.records import ConflictType
+from risk_sac.types import Floats, Kind, Role
+from risk_sac.verdicts.along import WANDER_M, Along
+from risk_sac.verdicts.conflict import Conflict
+from risk_sac.verdicts.course import HORIZON_S, at, time_to_touch, with_margin
+from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.offences import RECENT_S, STANDING_MPS, took_crossing
+from risk_sac.verdicts.path import Path
+from risk_sac.verdicts.recorded import ego_path, recorded_motion, recorded_size, seen_along
+
+INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
+R157_BRAKES_MPS2, R157_DELAY_S = 6.0, 0.35
+CHECKS_MPS2 = 4.0
+CLEAR_M = 30.0  # a vehicle without any other this near ahead, from its front, brakes for none
+STEPS_ASIDE_M = 1.0  # a pedestrian this far beside a vehicle's way may be about to step into it
+STOPPING_LETTERS = tuple(b"ruygos")  # signals at which a vehicle may have to stop
+TURN_RAD = math.radians(30.0)
+WALKING_MPS = 0.3  # below it the direction of a pedestrian is noise
+
+
+def endangered_ego(evidence: Evidence, striker: int, conflict: Conflict) -> tuple[str, ...]:
+    """Lists how the striker endangered the ego: unsafe_lane_change, brake_check, turned_into_path."""
+    rules = {
+        "unsafe_lane_change": conflict.type is ConflictType.CUT_IN and changes_lane_unsafely(evidence, striker),
+        "brake_check": conflict.type in (ConflictType.CUT_IN, ConflictType.LEADER)
+        and evidence.role[striker] == Role.ADVERSARY
+        and checks_brakes(evidence, striker, conflict.frame),
+        "turned_into_path": conflict.type is ConflictType.PEDESTRIAN
+        and not took_crossing(evidence, striker)  # one that the ego has to let cross may turn
+        and turns_into_path(evidence, striker),
+    }
+    return tuple(name for name, did in rules.items() if did)
+
+
+def changes_lane_unsafely(evidence: Evidence, striker: int) -> bool:
+    """Whether a vehicle came over into the ego's lane beside the ego, or with less room than `enters_safely` asks."""
+    moved = evidence.moved_across_m(striker)[evidence.since(RECENT_S) :]
+    if np.ptp(moved) <= WANDER_M:  # it kept its place
+        return False
+    return not enters_safely(evidence, ego_path(evidence), striker)
+
+
+def enters_safely(evidence: Evidence, path: Path, striker: int) -> bool:
+    """Whether a cut-in leaves the ego room to brake, by UN R157, 5.2.5.2.
+
+    When it intrudes by 0.3 m into the ego's lane, it is ahead and TTC > v_rel / (2 · 6 m/s²) + 0.35 s.
+    """
+    seen = seen_along(path, evidence, striker)
+    t = _intrusion(evidence, striker, seen)
+    closing = evidence.speed_mps[t, 0] - seen.speed_mps[t]
+    needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_DELAY_S
+    return bool(seen.gap_m[t] > 0.0 and seen.ttc_s[t] > needed_s)
+
+
+def checks_brakes(evidence: Evidence, striker: int, began: int) -> bool:
+    """Whether a vehicle before the ego braked harder than 4 m/s² without a reason on record.
+
+    It is asked of the last 3 s, or from frame `began` of the conflict on. A reason is a road user within 30 m ahead of
+    it, or a signal at which it may have to stop.
+    """
+    e = evidence
+    first = min(began, e.since(RECENT_S))
+    seen = seen_along(ego_path(e), e, striker)
+    behind = (seen.gap_m > 0.0) & (seen.gap_m <= HORIZON_S * e.speed_mps[:, 0])
+    behind &= np.abs(seen.across_m) <= e.ground.lane_width_m / 2
+    braked = behind & (e.accel_mps2[:, striker] < -CHECKS_MPS2) & ~np.isin(e.link[:, striker], STOPPING_LETTERS)
+    return any(not _any_ahead(e, striker, first + int(t)) for t in np.flatnonzero(braked[first:]))
+
+
+def turns_into_path(evidence: Evidence, striker: int) -> bool:
+    """Whether a pedestrian turned by 30° or more, and so came on a collision course with an ego that it could see.
+
+    It is asked of the last 4 s. What the ego sees can see the ego.
+    """
+    e = evidence
+    first = e.since(HORIZON_S)
+    vx, vy = e.vx_mps[first:, striker], e.vy_mps[first:, striker]
+    if math.hypot(vx[-1], vy[-1]) < WALKING_MPS:
+        return False
+    turned = np.abs(np.angle((vx + 1j * vy) / (vx[-1] + 1j * vy[-1]))) >= TURN_RAD
+    before = np.flatnonzero(turned & (np.hypot(vx, vy) >= WALKING_MPS) & e.known[first:, striker])
+    if len(before) == 0 or e.speed_mps[first + before[-1], 0] < STANDING_MPS:
+        return False
+    path, size, motion = ego_path(e), with_margin(recorded_size(e, 0)), recorded_motion(e, striker)
+    t = first + int(before[-1])
+    return time_to_touch(path, float(path.s[t]), float(e.speed_mps[t, 0]), size, at(motion, t), HORIZON_S) > HORIZON_S
+
+
+def _intrusion(evidence: Evidence, striker: int, seen: Along[Floats]) -> int:
+    """The frame in which the striker last came 0.3 m into the ego's lane; the contact's if it did not."""
+    e = evidence
+    reach = (
+        np.abs(np.sin(seen.turn_rad)) * e.length_m[striker] + np.abs(np.cos(seen.turn_rad)) * e.width_m[striker]
+    ) / 2
+    intrudes = np.abs(seen.across_m) - reach <= e.ground.lane_width_m / 2 - INTRUSION_M
+    outside = np.flatnonzero(~intrudes)
+    return min(int(outside[-1]) + 1, len(intrudes) - 1) if len(outside) else 0
+
+
+def _any_ahead(evidence: Evidence, vehicle: int, t: int) -> bool:
+    """Whether any other road user is within 30 m before a vehicle, in its way or stepping into it."""
+    e = evidence
+    dx, dy = e.x_m[t] - e.x_m[t, vehicle], e.y_m[t] - e.y_m[t, vehicle]
+    cos, sin = math.cos(e.heading_rad[t, vehicle]), math.sin(e.heading_rad[t, vehicle])
+    ahead = dx * cos + dy * sin - (e.length_m + e.length_m[vehicle]) / 2
+    aside = np.abs(dy * cos - dx * sin) - (e.width_m + e.width_m[vehicle]) / 2
+    aside -= np.where(e.kind == Kind.PEDESTRIAN, STEPS_ASIDE_M, 0.0)
+    near = (ahead > 0.0) & (ahead <= CLEAR_M) & (aside <= 0.0)
+    return bool(near[np.arange(len(e.ids)) != vehicle].any())
