@@ -19,7 +19,7 @@ from rich.progress import (
 from rich.table import Table
 
 from risk_sac.metrics import requirement_cells
-from risk_sac.records import Adjustment, Collision, RequirementCounts, Violation
+from risk_sac.records import Adjustment, Collision, EpisodeRecord, RequirementCounts, Violation
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.terminal import Output, console, notes, printable
 
@@ -158,6 +158,15 @@ def offences(violation: Collision | Violation) -> Iterator[str]:
         judged = violation.judgement
         broken = {"ego": judged.ego_broke, "other": judged.broke} if judged else {}
     yield from (f"{actor}: {in_words(broke)}" for actor, broke in broken.items() if broke)
+
+
+OUTCOME = "outcome\ngrade\nseverity"
+
+
+def outcome(episode: EpisodeRecord, violation: Collision | Violation) -> str:
+    """The cell below `OUTCOME`, with as many lines as there are."""
+    severity = violation.severity if isinstance(violation, Collision) else None
+    return "\n".join(str(line) for line in (episode.outcome, violation.graded, severity) if line)
 
 
 def in_words(names: Iterable[str]) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.table import Table
 
-from risk_sac.cli.console import EGO, OK, Commands, add_command, in_words, narrow_table, offences
+from risk_sac.cli.console import EGO, OK, OUTCOME, Commands, add_command, in_words, narrow_table, offences, outcome
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
@@ -61,7 +61,7 @@ def _failures(results: Results) -> Table:
     run = results.spec.id
     table = narrow_table(
         "id",
-        "outcome\ngrade",
+        OUTCOME,
         "other",
         "ego's\nother's\nm/s",
         "ego's\nother's\nzone",
@@ -78,7 +78,7 @@ def _failures(results: Results) -> Table:
         reason = failure.episode.reason
         table.add_row(
             failure.id.removeprefix(f"{run}-"),
-            f"{failure.episode.outcome}\n{violation.graded or ''}",
+            outcome(failure.episode, violation),
             violation.other_id or "",
             *cells,
             in_words([reason]) if reason else "\n".join(offences(violation)),

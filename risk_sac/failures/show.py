@@ -58,6 +58,8 @@ def _contact(collision: Collision) -> Iterator[str]:
     if judgement is not None:
         before_s = collision.time_s - judgement.conflict_s
         yield judgement.signature
+        if collision.severity_in_words:
+            yield collision.severity_in_words
         yield f"the conflict began {before_s:.1f} s before the contact{_grade(judgement.grade)}"
         yield (
             f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'} · "

@@ -250,6 +250,22 @@ class Collision(Violated):
         return None if self.judgement is None else self.judgement.grade
 
     @property
+    def severity(self) -> Severity | None:
+        """How bad it is; None in older records."""
+        return None if self.judgement is None else self.judgement.severity
+
+    @property
+    def severity_in_words(self) -> str:
+        """Such as "severe: they close at 11.0 m/s, the risk of death is 3.5 %"; empty in older records."""
+        if self.judgement is None or self.judgement.severity is None:
+            return ""
+        risk = "death" if self.other_kind == "pedestrian" else "serious injury"
+        return (
+            f"{self.judgement.severity}: they close at {self.relative_speed_mps:.1f} m/s, "
+            f"the risk of {risk} is {100 * (self.judgement.injury_risk or 0.0):.1f} %"
+        )
+
+    @property
     def event(self) -> str:
         """What the ego does, such as "touches lead at 9.0 m/s"."""
         return f"touches {self.other_id} at {self.ego_speed_mps:.1f} m/s"

@@ -19,7 +19,8 @@ from risk_sac.verdicts.recorded import ego_path, recorded_motion, recorded_size,
 
 INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
 R157_BRAKES_MPS2, R157_DELAY_S = 6.0, 0.35
-CHECKS_MPS2 = 4.0
+R157_GAP_M = 2.0  # 5.2.3.3: the least distance to a vehicle ahead at any speed
+CHECKS_MPS2, CHECKS_STEPS = 4.0, 5  # 0.5 s: longer than it takes to come over in front of the ego
 CLEAR_M = 30.0  # a vehicle without any other this near ahead, from its front, brakes for none
 STEPS_ASIDE_M = 1.0  # a pedestrian this far beside a vehicle's way may be about to step into it
 STOPPING_LETTERS = tuple(b"ruygos")  # signals at which a vehicle may have to stop
@@ -42,27 +43,27 @@ def endangered_ego(evidence: Evidence, striker: int, conflict: Conflict) -> tupl
 
 
 def changes_lane_unsafely(evidence: Evidence, striker: int) -> bool:
-    """Whether a vehicle came over into the ego's lane beside the ego, or with less room than `enters_safely` asks."""
+    """Whether a vehicle came over into the ego's lane beside the ego, or with less room than UN R157 allows."""
     moved = evidence.moved_across_m(striker)[evidence.since(RECENT_S) :]
     if np.ptp(moved) <= WANDER_M:  # it kept its place
         return False
-    return not enters_safely(evidence, ego_path(evidence), striker)
+    return not enters_safely(evidence, ego_path(evidence), striker, R157_GAP_M)
 
 
-def enters_safely(evidence: Evidence, path: Path, striker: int) -> bool:
+def enters_safely(evidence: Evidence, path: Path, striker: int, least_gap_m: float = 0.0) -> bool:
     """Whether a cut-in leaves the ego room to brake, by UN R157, 5.2.5.2.
 
-    When it intrudes by 0.3 m into the ego's lane, it is ahead and TTC > v_rel / (2 · 6 m/s²) + 0.35 s.
+    When it intrudes by 0.3 m into the ego's lane, it is that far ahead and TTC > v_rel / (2 · 6 m/s²) + 0.35 s.
     """
     seen = seen_along(path, evidence, striker)
     t = _intrusion(evidence, striker, seen)
     closing = evidence.speed_mps[t, 0] - seen.speed_mps[t]
     needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_DELAY_S
-    return bool(seen.gap_m[t] > 0.0 and seen.ttc_s[t] > needed_s)
+    return bool(seen.gap_m[t] > least_gap_m and seen.ttc_s[t] > needed_s)
 
 
 def checks_brakes(evidence: Evidence, striker: int, began: int) -> bool:
-    """Whether a vehicle before the ego braked harder than 4 m/s² without a reason on record.
+    """Whether a vehicle before the ego braked harder than 4 m/s² for 0.5 s without a reason on record.
 
     It is asked of the last 3 s, or from frame `began` of the conflict on. A reason is a road user within 30 m ahead of
     it, or a signal at which it may have to stop.
@@ -73,7 +74,8 @@ def checks_brakes(evidence: Evidence, striker: int, began: int) -> bool:
     behind = (seen.gap_m > 0.0) & (seen.gap_m <= HORIZON_S * e.speed_mps[:, 0])
     behind &= np.abs(seen.across_m) <= e.ground.lane_width_m / 2
     braked = behind & (e.accel_mps2[:, striker] < -CHECKS_MPS2) & ~np.isin(e.link[:, striker], STOPPING_LETTERS)
-    return any(not _any_ahead(e, striker, first + int(t)) for t in np.flatnonzero(braked[first:]))
+    checked = [t for t in np.flatnonzero(braked[first:]) if not _any_ahead(e, striker, first + int(t))]
+    return len(checked) >= CHECKS_STEPS
 
 
 def turns_into_path(evidence: Evidence, striker: int) -> bool:

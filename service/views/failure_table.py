@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from risk_sac.config import FamilyName, MethodName
-from risk_sac.records import NO_CONTACT, ConflictType, Grade, Outcome, Real, Record, TriageState
+from risk_sac.records import NO_CONTACT, ConflictType, Grade, Outcome, Real, Record, Severity, TriageState
 from risk_sac.verdicts.distinct import Niche, cell
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
 
@@ -27,7 +27,17 @@ OF_CONTACT = (
     "min_rss_margin_m",
     "ego_peak_braking_mps2",
 )
-OF_JUDGEMENT = ("grade", "conflict_type", "conflict_s", "hidden", "ego_response", "ground", "broke", "ego_broke")
+OF_JUDGEMENT = (
+    "grade",
+    "severity",
+    "conflict_type",
+    "conflict_s",
+    "hidden",
+    "ego_response",
+    "ground",
+    "broke",
+    "ego_broke",
+)
 COUNTED = ("failures", "distinct", "preventable")
 UNJUDGED: Plain = dict.fromkeys((*OF_JUDGEMENT, "signature")) | {"broke": [], "ego_broke": []}
 
@@ -84,6 +94,8 @@ class FailureTable(Record):
     """All requirements that count and were validly violated."""
     grade: list[Grade | None]
     """Null where it is not valid, or was never judged."""
+    severity: list[Severity | None]
+    """How bad the contact is; null without one, or where that was never judged."""
     distinct: list[bool]
     """Whether one of its valid violations is the first of its kind in its run and phase."""
     kind: list[int]
@@ -220,7 +232,7 @@ def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, A
     """A failure's entries of most columns, by the violation that names it."""
     judged = {**UNJUDGED, **_judged(violation)}
     repetition = run.repetitions.get(failure.index)
-    row = {name: judged[name] for name in OF_JUDGEMENT}
+    row = {name: judged.get(name) for name in OF_JUDGEMENT}
     if "requirement" in violation:  # whose offences are the ego's own
         row |= {"broke": [], "ego_broke": violation["broke"]}
         row |= {"min_ttc_s": None, "min_robustness": violation["robustness"]}

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.campaigns.output import add_campaign_command, add_limit, print_answer
-from risk_sac.cli.console import OK, Commands, in_words, offences, or_dash, write_out
+from risk_sac.cli.console import OK, OUTCOME, Commands, in_words, offences, or_dash, outcome, write_out
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
@@ -95,7 +95,7 @@ def failures_table(failures: Sequence[Episode]) -> Table:
     """Three lines per failure; 80 columns hold it."""
     table = Table(box=SIMPLE_HEAD, padding=0)
     table.add_column("id, what it violates,\nand its kind", overflow="fold")
-    table.add_column("outcome\ngrade", no_wrap=True)
+    table.add_column(OUTCOME, no_wrap=True)
     table.add_column("ego's, other's\nm/s", no_wrap=True, justify="right")
     table.add_column("failed rules,\nor offences")
     for failure in failures:
@@ -105,7 +105,7 @@ def failures_table(failures: Sequence[Episode]) -> Table:
         speeds = [worst.ego_speed_mps, *([worst.other_speed_mps] if isinstance(worst, Collision) else [])]
         table.add_row(
             Text(printable(f"{failure.id}\n{', '.join(failure.failed or [worst.requirement])}\n{worst.signature}")),
-            f"{failure.outcome}\n{worst.graded or ''}",
+            outcome(failure, worst),
             ", ".join(or_dash(speed, ".1f") for speed in speeds),
             Text(printable("\n".join([in_words([failure.reason])] if failure.reason else offences(worst)))),
         )
@@ -146,5 +146,7 @@ def _contact(collision: Collision) -> Iterator[str]:
     if (judgement := collision.judgement) is not None:
         yield f"  kind       {printable(judgement.signature)}"
         yield f"  grade      {_grade(collision)}"
+        if collision.severity_in_words:
+            yield f"  severity   {collision.severity_in_words}"
         yield f"  the ego    broke {in_words(judgement.ego_broke) or 'nothing'}"
         yield f"  the other  broke {in_words(judgement.broke) or 'nothing'}"

@@ -160,9 +160,10 @@ def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
 
 def _contact(hit: Collision) -> str:
     conflict_s = hit.judgement.conflict_s if hit.judgement else hit.time_s
+    bad = f"; {hit.severity_in_words}" if hit.severity_in_words else ""
     return (
         f"touches {hit.other_id} at {hit.ego_speed_mps:.1f} m/s, {hit.time_s - conflict_s:.1f} s after the conflict "
-        f"began; it was in view for {hit.visible_for_s:.1f} s"
+        f"began; it was in view for {hit.visible_for_s:.1f} s{bad}"
     )
 
 

@@ -17,6 +17,7 @@ from tests.unit.verdicts.staged import (
     merge,
     mirrored,
     pedestrian_crosses,
+    sideways,
     stage,
     straight,
 )
@@ -100,3 +101,15 @@ def test_a_pedestrian_that_turns_into_the_way() -> None:
 
 def test_a_pedestrian_that_goes_straight_on_turns_nowhere() -> None:
     assert named(pedestrian_crosses()) == ()
+
+
+@pytest.mark.parametrize(
+    ("ahead_m", "expected"),
+    [
+        (-1.0, CHECKS),  # it has come over before the ego, and then brakes
+        (-7.0, ("unsafe_lane_change",)),  # it touches the ego while it comes over
+    ],
+)
+def test_a_vehicle_that_comes_over_and_brakes(ahead_m: float, expected: tuple[str, ...]) -> None:
+    beside = sideways(straight(ahead_m, LANE_M, 0.0, 12.0, (2.5, -6.0)), 2.0, -1.2, LANE_M)
+    assert named(stage(straight(0.0, 0.0, 0.0, 9.0), beside)) == expected

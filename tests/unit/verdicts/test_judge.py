@@ -42,9 +42,9 @@ def judged(evidence: Evidence) -> Judgement:
         (cut_in(), "cut-in, ahead, in a lane; ego goes straight, does not brake"),
         (
             cut_in(gap=-3.0, ego=12.0, other=12.0),
-            "cut-in, alongside, in a lane; ego goes straight, does not brake",
+            "cut-in without a safe gap, alongside, in a lane; ego goes straight, does not brake",
         ),
-        (leader_brakes(), "leader, ahead, in a lane; ego goes straight, does not brake"),
+        (leader_brakes(), "leader brake-checking, ahead, in a lane; ego goes straight, does not brake"),
         (crossing_car(side=-1), "vehicle from the right, ahead, in a lane; ego goes straight, does not brake"),
         (
             crossing_car(side=1, other=16.0),

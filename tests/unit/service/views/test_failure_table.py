@@ -49,6 +49,7 @@ def test_a_column_has_what_the_record_has(ledger):
         "requirement": "no_contact",
         "failed": [],
         "grade": None,
+        "severity": None,
         "distinct": False,
         "kind": 0,
         "striker": "lead",

@@ -32,6 +32,7 @@ export function Card({ campaign, table, at, often, triage }: Props) {
       <div class="judged">
         <span class="tag">{words(table.requirement[at]!)}</span>
         {table.valid[at] ? <GradeTag grade={table.grade[at] ?? "none"} /> : <Refusal rules={table.refused_by[at]!} />}
+        {table.severity[at] && <span class="tag">{table.severity[at]}</span>}
         <Repeats repeats={table.repeats[at]!} />
       </div>
       <div class="what">

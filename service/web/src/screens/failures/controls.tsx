@@ -7,8 +7,8 @@ import type { FailureTable } from "./wire";
 
 const TYPING_MS = 150;
 const SHOWN: Record<Filters["tab"], readonly Facet[]> = {
-  failures: ["requirement", "family", "method", "run", "grade", "kind", "striker", "broke", "ego_broke", "triage"],
-  refused: ["requirement", "family", "method", "run", "rule", "kind", "striker", "broke", "ego_broke"],
+  failures: ["requirement", "family", "method", "run", "grade", "severity", "kind", "striker", "broke", "ego_broke", "triage"],
+  refused: ["requirement", "family", "method", "run", "rule", "severity", "kind", "striker", "broke", "ego_broke"],
 };
 
 interface Props {

@@ -18,6 +18,7 @@ export const FACET_LABELS: Record<Facet, string> = {
   method: "Method",
   run: "Run",
   grade: "Grade",
+  severity: "Severity",
   kind: "Kind",
   striker: "Striker",
   triage: "Triage",

@@ -32,6 +32,9 @@ const BROKE: Record<string, string> = {
   wrong_direction: "went in the wrong direction",
   speeding: "was more than 10 % too fast",
   pedestrian_on_red: "walked on red",
+  unsafe_lane_change: "changed lanes without a safe gap",
+  brake_check: "braked hard before the ego for no reason",
+  turned_into_path: "turned into the ego's way",
 };
 
 const EGO_BROKE: Record<string, string> = {
@@ -74,11 +77,19 @@ export function othersOf({ requirements }: Failure, named: string): string[] {
 }
 
 function contactOf(collision: Collision): string {
-  const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, other_speed_mps, relative_speed_mps } = collision;
+  const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, other_speed_mps } = collision;
   return (
     `The ego's ${ego_zone}, at ${number(ego_speed_mps, 1)} m/s, touched the ${other_zone} of the ${other_role} ${other_id}, ` +
-    `at ${number(other_speed_mps, 1)} m/s. They closed at ${number(relative_speed_mps, 1)} m/s.`
+    `at ${number(other_speed_mps, 1)} m/s. ${severityOf(collision)}`
   );
+}
+
+/** How fast the bodies closed, and how bad that is. */
+function severityOf({ relative_speed_mps, other_kind, judgement }: Collision): string {
+  const closing = `They closed at ${number(relative_speed_mps, 1)} m/s`;
+  if (judgement?.severity == null || judgement.injury_risk == null) return `${closing}.`;
+  const harm = other_kind === "pedestrian" ? "death" : "serious injury";
+  return `${closing}: ${judgement.severity}, with a risk of ${harm} of ${number(100 * judgement.injury_risk, 1)} %.`;
 }
 
 export function knownOf({ visible_for_s, other_id }: Collision): string {
