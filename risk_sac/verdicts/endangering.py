@@ -44,10 +44,11 @@ def endangered_ego(evidence: Evidence, striker: int, conflict: Conflict) -> tupl
 
 def changes_lane_unsafely(evidence: Evidence, striker: int) -> bool:
     """Whether a vehicle came over into the ego's lane beside the ego, or with less room than UN R157 allows."""
-    moved = evidence.moved_across_m(striker)[evidence.since(RECENT_S) :]
-    if np.ptp(moved) <= WANDER_M:  # it kept its place
+    path = ego_path(evidence)
+    across_m = seen_along(path, evidence, striker).across_m[evidence.since(RECENT_S) :]
+    if np.ptp(across_m) <= WANDER_M:  # it kept its place
         return False
-    return not enters_safely(evidence, ego_path(evidence), striker, R157_GAP_M)
+    return not enters_safely(evidence, path, striker, R157_GAP_M)
 
 
 def enters_safely(evidence: Evidence, path: Path, striker: int, least_gap_m: float = 0.0) -> bool:
