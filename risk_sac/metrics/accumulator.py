@@ -12,7 +12,19 @@ from risk_sac.records import Counts, EpisodeRecord, Record, RunMetrics
 HISTOGRAMS = ("signatures", "conflicts_by_second", "contacts_by_second")
 
 # Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
-FIELDS_ADDED_LATER = frozenset({"judgement", "noticed_s", "script", "requirements", "violations", "failed"})
+FIELDS_ADDED_LATER = frozenset(
+    {
+        "judgement",
+        "noticed_s",
+        "ego_broke",
+        "severity",
+        "injury_risk",
+        "script",
+        "requirements",
+        "violations",
+        "failed",
+    }
+)
 EMPTY: tuple[object, ...] = (None, (), {})
 
 
