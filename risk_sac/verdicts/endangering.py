@@ -6,15 +6,15 @@ Background traffic is not asked for brake checks: SUMO's drivers brake for a rea
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from risk_sac.records import ConflictType
-from risk_sac.types import Floats, Kind, Role
+from risk_sac.types import Bools, Floats, Kind, Role
 from risk_sac.verdicts.along import WANDER_M, Along
 from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.course import HORIZON_S, at, time_to_touch, with_margin
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.offences import RECENT_S, STANDING_MPS, took_crossing
-from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.recorded import ego_path, recorded_motion, recorded_size, seen_along
 
 INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
@@ -30,40 +30,39 @@ WALKING_MPS = 0.3  # below it the direction of a pedestrian is noise
 
 def endangered_ego(evidence: Evidence, striker: int, conflict: Conflict) -> tuple[str, ...]:
     """Lists how the striker endangered the ego: unsafe_lane_change, brake_check, turned_into_path."""
+    if conflict.type is ConflictType.PEDESTRIAN:  # one that the ego has to let cross may turn
+        turned = not took_crossing(evidence, striker) and turns_into_path(evidence, striker)
+        return ("turned_into_path",) if turned else ()
+    if conflict.type not in (ConflictType.CUT_IN, ConflictType.LEADER):
+        return ()
+    seen = seen_along(ego_path(evidence), evidence, striker)
     rules = {
-        "unsafe_lane_change": conflict.type is ConflictType.CUT_IN and changes_lane_unsafely(evidence, striker),
-        "brake_check": conflict.type in (ConflictType.CUT_IN, ConflictType.LEADER)
-        and evidence.role[striker] == Role.ADVERSARY
-        and checks_brakes(evidence, striker, conflict.frame),
-        "turned_into_path": conflict.type is ConflictType.PEDESTRIAN
-        and not took_crossing(evidence, striker)  # one that the ego has to let cross may turn
-        and turns_into_path(evidence, striker),
+        "unsafe_lane_change": conflict.type is ConflictType.CUT_IN and changes_lane_unsafely(evidence, striker, seen),
+        "brake_check": evidence.role[striker] == Role.ADVERSARY
+        and checks_brakes(evidence, striker, seen, conflict.frame),
     }
     return tuple(name for name, did in rules.items() if did)
 
 
-def changes_lane_unsafely(evidence: Evidence, striker: int) -> bool:
+def changes_lane_unsafely(evidence: Evidence, striker: int, seen: Along[Floats]) -> bool:
     """Whether a vehicle came over into the ego's lane beside the ego, or with less room than UN R157 allows."""
-    path = ego_path(evidence)
-    across_m = seen_along(path, evidence, striker).across_m[evidence.since(RECENT_S) :]
-    if np.ptp(across_m) <= WANDER_M:  # it kept its place
+    if np.ptp(seen.across_m[evidence.since(RECENT_S) :]) <= WANDER_M:  # it kept its place
         return False
-    return not enters_safely(evidence, path, striker, R157_GAP_M)
+    return not enters_safely(evidence, striker, seen, R157_GAP_M)
 
 
-def enters_safely(evidence: Evidence, path: Path, striker: int, least_gap_m: float = 0.0) -> bool:
+def enters_safely(evidence: Evidence, striker: int, seen: Along[Floats], least_gap_m: float = 0.0) -> bool:
     """Whether a cut-in leaves the ego room to brake, by UN R157, 5.2.5.2.
 
     When it intrudes by 0.3 m into the ego's lane, it is that far ahead and TTC > v_rel / (2 · 6 m/s²) + 0.35 s.
     """
-    seen = seen_along(path, evidence, striker)
     t = _intrusion(evidence, striker, seen)
     closing = evidence.speed_mps[t, 0] - seen.speed_mps[t]
     needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_DELAY_S
     return bool(seen.gap_m[t] > least_gap_m and seen.ttc_s[t] > needed_s)
 
 
-def checks_brakes(evidence: Evidence, striker: int, began: int) -> bool:
+def checks_brakes(evidence: Evidence, striker: int, seen: Along[Floats], began: int) -> bool:
     """Whether a vehicle before the ego braked harder than 4 m/s² for 0.5 s without a reason on record.
 
     It is asked of the last 3 s, or from frame `began` of the conflict on. A reason is a road user within 30 m ahead of
@@ -71,12 +70,11 @@ def checks_brakes(evidence: Evidence, striker: int, began: int) -> bool:
     """
     e = evidence
     first = min(began, e.since(RECENT_S))
-    seen = seen_along(ego_path(e), e, striker)
     behind = (seen.gap_m > 0.0) & (seen.gap_m <= HORIZON_S * e.speed_mps[:, 0])
     behind &= np.abs(seen.across_m) <= e.ground.lane_width_m / 2
     braked = behind & (e.accel_mps2[:, striker] < -CHECKS_MPS2) & ~np.isin(e.link[:, striker], STOPPING_LETTERS)
-    checked = [t for t in np.flatnonzero(braked[first:]) if not _any_ahead(e, striker, first + int(t))]
-    return len(checked) >= CHECKS_STEPS
+    frames = first + np.flatnonzero(braked[first:])
+    return bool(np.count_nonzero(~_any_ahead(e, striker, frames)) >= CHECKS_STEPS)
 
 
 def turns_into_path(evidence: Evidence, striker: int) -> bool:
@@ -109,13 +107,14 @@ def _intrusion(evidence: Evidence, striker: int, seen: Along[Floats]) -> int:
     return min(int(outside[-1]) + 1, len(intrudes) - 1) if len(outside) else 0
 
 
-def _any_ahead(evidence: Evidence, vehicle: int, t: int) -> bool:
-    """Whether any other road user is within 30 m before a vehicle, in its way or stepping into it."""
+def _any_ahead(evidence: Evidence, vehicle: int, frames: NDArray[np.int64]) -> Bools:
+    """Whether any other road user is within 30 m before a vehicle, in its way or stepping into it, in these frames."""
     e = evidence
-    dx, dy = e.x_m[t] - e.x_m[t, vehicle], e.y_m[t] - e.y_m[t, vehicle]
-    cos, sin = math.cos(e.heading_rad[t, vehicle]), math.sin(e.heading_rad[t, vehicle])
-    ahead = dx * cos + dy * sin - (e.length_m + e.length_m[vehicle]) / 2
-    aside = np.abs(dy * cos - dx * sin) - (e.width_m + e.width_m[vehicle]) / 2
-    aside -= np.where(e.kind == Kind.PEDESTRIAN, STEPS_ASIDE_M, 0.0)
-    near = (ahead > 0.0) & (ahead <= CLEAR_M) & (aside <= 0.0)
-    return bool(near[np.arange(len(e.ids)) != vehicle].any())
+    others = np.delete(np.arange(len(e.ids)), vehicle)
+    dx, dy = (each[np.ix_(frames, others)] - each[frames, vehicle, None] for each in (e.x_m, e.y_m))
+    cos, sin = (of(e.heading_rad[frames, vehicle, None]) for of in (np.cos, np.sin))
+    ahead = dx * cos + dy * sin - (e.length_m[others] + e.length_m[vehicle]) / 2
+    aside = np.abs(dy * cos - dx * sin) - (e.width_m[others] + e.width_m[vehicle]) / 2
+    aside -= np.where(e.kind[others] == Kind.PEDESTRIAN, STEPS_ASIDE_M, 0.0)
+    found: Bools = ((ahead > 0.0) & (ahead <= CLEAR_M) & (aside <= 0.0)).any(axis=1)
+    return found

@@ -16,7 +16,7 @@ from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
 from risk_sac.verdicts.endangering import enters_safely
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path
-from risk_sac.verdicts.recorded import ego_path, keeps_lane, lane_path, recorded_motion, recorded_size
+from risk_sac.verdicts.recorded import ego_path, keeps_lane, lane_path, recorded_motion, recorded_size, seen_along
 from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, drive
 
 # The driver, and how long after the conflict began it perceives. Choice: fsm and rss look out from the beginning of the
@@ -107,6 +107,6 @@ def _by_ttc(evidence: Evidence, path: Path, striker: int) -> ReferenceOutcome:
 
     Its impact speed is the recorded ego's: the rule knows no driver.
     """
-    if enters_safely(evidence, path, striker):
+    if enters_safely(evidence, striker, seen_along(path, evidence, striker)):
         return AVOIDED
     return ReferenceOutcome(avoids=False, impact_speed_mps=float(evidence.speed_mps[-1, 0]))
