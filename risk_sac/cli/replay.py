@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 
 from risk_sac.cli.console import FAILED, OK, Commands, add_command, counted
-from risk_sac.errors import SimulationError
+from risk_sac.errors import ConfigError, SimulationError
 from risk_sac.machine import cores
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import TIMES, distinct_failures
@@ -35,6 +35,8 @@ def _bundle(options: argparse.Namespace) -> int:
     results = read_results(options.results)
     folder = options.results if options.results.is_dir() else options.results.parent
     one = None if options.failure is None else results.failure(options.failure).episode
+    if one is not None and options.out.is_dir():
+        raise ConfigError("--out", f"{options.out}, a folder", "the file for one bundle, such as failure.npz")
     from risk_sac.failures.bundle import write_bundle  # here, because loading the simulator takes a second
     from risk_sac.failures.collect import bundles
 
