@@ -9,7 +9,7 @@ from risk_sac.records import Adjustment
 from risk_sac.scenario.environment import VISIBILITY, with_environment
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
-from risk_sac.scenario.odd import TINY, field, intersect, narrow, paths, text_of, widest
+from risk_sac.scenario.odd import TINY, field, intersect, narrow, paths, requirements_from_odd, text_of, widest
 
 
 def adjustments(spec: RunSpec | CampaignSpec) -> tuple[Adjustment, ...]:
@@ -20,14 +20,15 @@ def adjustments(spec: RunSpec | CampaignSpec) -> tuple[Adjustment, ...]:
     found: dict[Adjustment, list[str]] = {}
     for name in (spec.family,) if isinstance(spec, RunSpec) else spec.families:
         try:
-            for each in _of_family(family_named(name), spec.odd, spec.ego):
+            for each in _of_family(family_named(name), spec):
                 found.setdefault(each, []).append(name)
         except ConfigError:
             continue
     return tuple(each.model_copy(update={"families": tuple(names)}) for each, names in found.items())
 
 
-def _of_family(family: Family, odd: Odd, ego: EgoConfig) -> Iterator[Adjustment]:
+def _of_family(family: Family, spec: RunSpec | CampaignSpec) -> Iterator[Adjustment]:
+    odd, ego = spec.odd, spec.ego
     whole, supported = intersect(family.odd, odd), widest(family.odd)
     space = narrow(with_environment(family.space, odd, whole), whole)
     for path in paths(odd):
@@ -43,6 +44,11 @@ def _of_family(family: Family, odd: Odd, ego: EgoConfig) -> Iterator[Adjustment]
             if parameter.odd == path and isinstance(used, Interval) and _beyond(used, bounds):
                 yield _adjusted(path, used, bounds, f"scenes begin with {parameter.name} in {text_of(bounds)}")
     yield from _of_sensor(whole, ego, stated=VISIBILITY in space.names)
+    shipped = {each.name for each in requirements_from_odd(whole, ego.response_s)}
+    for i, requirement in enumerate(spec.requirements):
+        if not requirement.formula and requirement.name not in shipped:
+            why = f"there is no {requirement.name}"
+            yield Adjustment(families=(), field=f"requirements[{i}]", asked=requirement.counts, used="nothing", why=why)
 
 
 def _of_sensor(odd: Odd, ego: EgoConfig, *, stated: bool) -> Iterator[Adjustment]:

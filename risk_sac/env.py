@@ -9,7 +9,7 @@ Source: RISK-SAC, Alg. 1, l. 5 and 8.
 """
 
 from collections.abc import Mapping
-from typing import Any, Never
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -19,15 +19,14 @@ from risk_sac.config import FamilyName, RewardConfig, RunSpec, method_of
 from risk_sac.egos.pilot import EgoPilot
 from risk_sac.egos.registry import load
 from risk_sac.errors import InfeasibleScene, SimulationError
-from risk_sac.geometry import overlapping_pairs, relative_view
+from risk_sac.geometry import relative_view
 from risk_sac.observation import Encoder
 from risk_sac.observation_layout import LIMIT
 from risk_sac.problem import Problem
 from risk_sac.process_state import c_numbers
 from risk_sac.records import Collision, RequirementResult, Violation
 from risk_sac.risk.measures import Gauge, Measures
-from risk_sac.risk.publish import worst_rss_margin
-from risk_sac.risk.realism import HardRule, broken_hard_rule, soft_cost
+from risk_sac.risk.realism import refuse_danger, refuse_overlap, soft_cost
 from risk_sac.risk.reward import Violated, risk_reward, worth
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.carriageway import carriageway_of
@@ -42,7 +41,7 @@ from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import collision_of
-from risk_sac.verdicts.keeping import Played
+from risk_sac.verdicts.keeping import History
 from risk_sac.verdicts.online import CarefulReflex, conflicts_now
 from risk_sac.verdicts.path import Path, polyline
 from risk_sac.verdicts.validity import EpisodeFacts
@@ -207,7 +206,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._lead_in(self._sim.reset(layout, sumo_seed), scene)
         self._released_s = self._frame.time_s
         self._adversaries = Adversaries(self.problem.family, limits, self._frame)
-        self._check_feasible(scene)
+        refuse_danger(self._measures.assessment, scene, in_conflict=self._careful_driver_in_conflict())
         self._violated.begin(self._measures.robustness)
         self._sim.hand_over_ego()
         if self._controlled:
@@ -221,38 +220,16 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._frame = start
         self._measures = self._measure(None)
         self.trace.append(start, self._measures, None)
-        self._refuse_overlap(scene)
+        refuse_overlap(self._frame, scene)
         for _ in range(round(LEAD_IN_S / STEP_S)):
             self._sim.walk_on()
             before, self._frame = self._frame, self._sim.step()
             self._measures = self._measure(before)
             self.trace.append(self._frame, self._measures, None)
-            self._refuse_overlap(scene)
-
-    def _refuse_overlap(self, scene: Scene) -> None:
-        """C_hard of Eq. 5, in every frame up to the release: no two bodies overlap."""
-        if pairs := overlapping_pairs(self._frame.state):
-            first, second = (self._frame.ids[i] for i in pairs[0])
-            self._refuse(scene, "initial_overlap", f" by {first!r} and {second!r}")
+            refuse_overlap(self._frame, scene)
 
     def _measure(self, before: Frame | None, struck: int = 0) -> Measures:
         return self._gauge.measure(self._frame, before, self._perception.seen, struck)
-
-    def _check_feasible(self, scene: Scene) -> None:
-        """C_hard of Eq. 5, when the adversaries are released."""
-        assessment = self._measures.assessment
-        rule = broken_hard_rule(
-            float(assessment.gap_m.min()),
-            assessment.least.ttc_s,
-            worst_rss_margin(assessment),
-            in_conflict=self._careful_driver_in_conflict(),
-        )
-        if rule is not None:
-            self._refuse(scene, rule)
-
-    def _refuse(self, scene: Scene, rule: HardRule, details: str = "") -> Never:
-        message = f"scene of {scene.family!r} breaks {rule}{details}: {dict(scene.values)}"
-        raise InfeasibleScene(message, reason=rule)
 
     def _careful_driver_in_conflict(self) -> bool:
         # Wary: the policy is not handed a vehicle that hangs over beside the ego already.
@@ -299,10 +276,10 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def violations(self, results: Mapping[str, RequirementResult]) -> tuple[Violation, ...]:
         """Violations without contact of the requirements that count; see `violations_of`."""
-        return violations_of(self.problem.requirements, results, self._played, self._gauge, self._artefacts)
+        return violations_of(self.problem.requirements, results, self._history, self._gauge, self._artefacts)
 
-    def _played(self) -> Played:
-        return Played(self.trace.frames, self.trace.measures, self.evidence())
+    def _history(self) -> History:
+        return History(self.trace.frames, self.trace.measures, self.evidence())
 
     def evidence(self) -> Evidence:
         """What a judge may look at, of the episode so far."""

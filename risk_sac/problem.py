@@ -15,12 +15,12 @@ from risk_sac.errors import ConfigError, OddError
 from risk_sac.observation_layout import observation_size
 from risk_sac.records import NO_CONTACT
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.risk.stl import check_requirements
+from risk_sac.risk.stl import parsed
 from risk_sac.scenario.environment import with_environment
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import GRAVITY_MPS2, limits_from_odd
-from risk_sac.scenario.odd import intersect, narrow, requirements_from_odd
+from risk_sac.scenario.odd import SHIPPED, intersect, narrow, requirements_from_odd
 from risk_sac.scenario.space import SceneSpace
 from risk_sac.types import STEP_S
 
@@ -60,14 +60,18 @@ class Problem:
                 f"{sorted(missing)} too, which every scene of the {family.name!r} family has",
             )
         shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
-        own = [_own(f"requirements[{i}]", each, shipped) for i, each in enumerate(spec.requirements)]
-        check_requirements(own, STEP_S, family.horizon_steps)
+        own = {}
+        for i, requirement in enumerate(spec.requirements):
+            wanted = _own(f"requirements[{i}]", requirement, shipped)
+            if wanted is not None:
+                parsed(i, wanted, STEP_S, family.horizon_steps)
+                own[wanted.name] = wanted
         problem = cls(
             family=family,
             odd=odd,
             space=narrow(with_environment(family.space, spec.odd, odd), odd),
             ego=ego,
-            requirements=tuple((shipped | {each.name: each for each in own}).values()),
+            requirements=tuple((shipped | own).values()),
             rss=_rss_parameters(odd),
         )
         problem.check_demand(spec)
@@ -104,11 +108,13 @@ class Problem:
         return float("inf") if limit is None else limit.high
 
 
-def _own(field: str, requirement: Requirement, shipped: Mapping[str, Requirement]) -> Requirement:
-    """A user's requirement; where it only says what a shipped one counts as, that one."""
+def _own(field: str, requirement: Requirement, shipped: Mapping[str, Requirement]) -> Requirement | None:
+    """A user's requirement; where it only says what a shipped one counts as, that one, if this ODD has it."""
     name = requirement.name
     if name not in shipped:
         if not requirement.formula:
+            if name in SHIPPED:
+                return None
             raise ConfigError(f"{field}.formula", "none", f"one, or a shipped requirement's name: {', '.join(shipped)}")
         return requirement
     if requirement.formula:

@@ -10,13 +10,16 @@ Source: RISK-SAC, Sec. III-B.
 """
 
 import math
-from typing import Literal
+from typing import Literal, Never
 
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.errors import InfeasibleScene
+from risk_sac.geometry import overlapping_pairs
 from risk_sac.jit import compiled
-from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, STEP_S, Floats, Kind
+from risk_sac.risk.publish import Assessment, worst_rss_margin
+from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, STEP_S, Floats, Frame, Kind, Scene
 
 BUILD_UP_S = 0.4  # in which an emergency braking builds up from nothing to an actor's limit
 ORDINARY_JERK = 0.75  # share of the jerk that this takes, up to which a driver counts as ordinary
@@ -123,6 +126,26 @@ def soft_cost(
         excess = max(excess, acceleration_term(accel, across, limit))
         closeness = max(closeness, closeness_term(gap_m[row - 1], previous_gap_m[row - 1]))
     return jerk / 2.0 + (excess + closeness) / 4.0
+
+
+def refuse_overlap(frame: Frame, scene: Scene) -> None:
+    """C_hard of (5) for every frame up to the release: no two bodies overlap; raises `InfeasibleScene`."""
+    if pairs := overlapping_pairs(frame.state):
+        first, second = (frame.ids[i] for i in pairs[0])
+        _refuse(scene, "initial_overlap", f" by {first!r} and {second!r}")
+
+
+def refuse_danger(assessment: Assessment, scene: Scene, *, in_conflict: bool) -> None:
+    """C_hard of (5) for the frame of the release; raises `InfeasibleScene`."""
+    least_gap_m, margin_m = float(assessment.gap_m.min()), worst_rss_margin(assessment)
+    rule = broken_hard_rule(least_gap_m, assessment.least.ttc_s, margin_m, in_conflict=in_conflict)
+    if rule is not None:
+        _refuse(scene, rule)
+
+
+def _refuse(scene: Scene, rule: HardRule, details: str = "") -> Never:
+    message = f"scene of {scene.family!r} breaks {rule}{details}: {dict(scene.values)}"
+    raise InfeasibleScene(message, reason=rule)
 
 
 def broken_hard_rule(gap_m: float, ttc_s: float, rss_margin: float, *, in_conflict: bool) -> HardRule | None:

@@ -65,7 +65,7 @@ class Monitor:
         self.names = tuple(requirement.name for requirement in requirements)
         self.shapes = np.array([requirement.shapes for requirement in requirements])  # M; which are part of φ
         self._operators: list[Any] = []  # of rtamt, to be reset
-        trees = [_parse(index, requirement, step_s, horizon_steps) for index, requirement in enumerate(requirements)]
+        trees = [parsed(index, requirement, step_s, horizon_steps) for index, requirement in enumerate(requirements)]
         self._signals = sorted(set[str]().union(*map(signals_of, trees)))
         self._outputs = [
             (self._compile(tree), 1.0 / each.scale) for tree, each in zip(trees, requirements, strict=True)
@@ -112,12 +112,12 @@ class Monitor:
         return lambda signals: update(left(signals), right(signals))
 
 
-def check_requirements(requirements: Sequence[Requirement], step_s: float, horizon_steps: int) -> None:
-    """Raises `FormulaError`, with its `field`, for requirements that cannot be monitored online."""
-    Monitor(requirements, step_s, horizon_steps)
+def parsed(index: int, requirement: Requirement, step_s: float, horizon_steps: int) -> Node:
+    """The syntax tree of the requirement at an index.
 
-
-def _parse(index: int, requirement: Requirement, step_s: float, horizon_steps: int) -> Node:
+    Raises:
+      FormulaError: it cannot be monitored online; the `field` is `requirements[index].formula`.
+    """
     try:
         return parse(requirement.formula, step_s, horizon_steps)
     except FormulaError as error:

@@ -134,6 +134,18 @@ def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
     return space.narrow(bounds)
 
 
+# Names of all that `requirements_from_odd` makes of one ODD or another.
+SHIPPED = (
+    NO_CONTACT,
+    "on_carriageway",
+    "safe_ttc",
+    "rss_margin",
+    "pedestrian_gap",
+    "no_red_light_entry",
+    "bounded_braking",
+)
+
+
 def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...]:
     """The STL requirements that an ego has to meet in this ODD, thresholds included.
 

@@ -34,8 +34,8 @@ EASES_MPS2 = 2.0  # how a driver that is too fast slows down to the limit
 AFTER_CONTACT_STEPS = 40
 
 
-class Played(NamedTuple):
-    """A played episode, `T` frames."""
+class History(NamedTuple):
+    """Frames and measures of an episode, `T`, and the evidence made of them."""
 
     frames: Sequence[Frame]
     measures: Sequence[Measures]
@@ -50,7 +50,7 @@ class MetActor(NamedTuple):
 
 
 def kept_by(
-    requirement: Requirement, gauge: Gauge, played: Played, index: int, met: MetActor | None
+    requirement: Requirement, gauge: Gauge, history: History, index: int, met: MetActor | None
 ) -> Mapping[str, bool]:
     """Reference driver → whether it keeps a requirement that the ego first violated in frame `index`.
 
@@ -59,30 +59,30 @@ def kept_by(
     if requirement.name == ON_CARRIAGEWAY:
         return dict.fromkeys(DRIVERS, True)
     if requirement.name == NO_RED_LIGHT_ENTRY:
-        return {name: _stops_at_red(driver, played, index) for name, (driver, _) in DRIVERS.items()}
-    return {name: _keeps(name, gauge, played, index, met) for name in DRIVERS}
+        return {name: _stops_at_red(driver, history, index) for name, (driver, _) in DRIVERS.items()}
+    return {name: _keeps(name, gauge, history, index, met) for name in DRIVERS}
 
 
-def _stops_at_red(driver: int, played: Played, index: int) -> bool:
+def _stops_at_red(driver: int, history: History, index: int) -> bool:
     """Whether a driver could stop at the line from when its signal turned yellow or red."""
     first = index
-    while first > 0 and played.frames[first - 1].signal in (Signal.YELLOW, Signal.RED):
-        if first < index and played.frames[first - 1].stop_line_m < played.frames[first].stop_line_m - 1.0:
+    while first > 0 and history.frames[first - 1].signal in (Signal.YELLOW, Signal.RED):
+        if first < index and history.frames[first - 1].stop_line_m < history.frames[first].stop_line_m - 1.0:
             break  # of the signal before
         first -= 1
-    frame = played.frames[first]
-    grip = played.evidence.ground.friction * GRAVITY_MPS2
+    frame = history.frames[first]
+    grip = history.evidence.ground.friction * GRAVITY_MPS2
     return stopping_distance(driver, frame.ego_speed_mps, grip) <= frame.stop_line_m
 
 
-def _keeps(name: str, gauge: Gauge, played: Played, index: int, met: MetActor | None) -> bool:
+def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor | None) -> bool:
     """Whether the requirement holds on what a driver drives, measured again."""
-    e = played.evidence
+    e = history.evidence
     left = left_its_place(e.until(index))
     in_lane = left - 1 if left is not None else index if met is None else met.conflict.frame
     stays = left is None and keeps_lane(e, in_lane)
     path = ego_path(e) if stays else lane_path(e, in_lane)
-    s, acts = _driven(name, e, path, met, after_steps=AFTER_CONTACT_STEPS * played.measures[-1].assessment.touched)
+    s, acts = _driven(name, e, path, met, after_steps=AFTER_CONTACT_STEPS * history.measures[-1].assessment.touched)
     fast = np.flatnonzero(e.speed_mps[e.time_s > -STEP_S / 2, 0] > e.ground.speed_limit_mps + 1e-6)
     if len(fast):
         first = int(np.searchsorted(e.time_s, -STEP_S / 2)) + int(fast[0])
@@ -90,7 +90,7 @@ def _keeps(name: str, gauge: Gauge, played: Played, index: int, met: MetActor | 
     acts = acts if stays else min(acts, in_lane)
     if acts >= index:  # it acts when it is too late
         return False
-    return _holds(gauge, played, path, s, acts)
+    return _holds(gauge, history, path, s, acts)
 
 
 def _driven(name: str, e: Evidence, path: Path, met: MetActor | None, after_steps: int) -> tuple[Floats, int]:
@@ -120,17 +120,17 @@ def _within_limit(s: Floats, first: int, most_m: float) -> Floats:
     return driven
 
 
-def _holds(gauge: Gauge, played: Played, path: Path, s: Floats, acts: int) -> bool:
+def _holds(gauge: Gauge, history: History, path: Path, s: Floats, acts: int) -> bool:
     """Measures whether the requirement holds on `s` along a path from frame `acts` on, until the driver stands."""
     gauge.reset(gauge.carriageway)
-    for frame, measures in zip(played.frames[: acts + 1], played.measures, strict=False):
+    for frame, measures in zip(history.frames[: acts + 1], history.measures, strict=False):
         gauge.remember(frame, measures.signals)
-    followers = _followers(played, acts)
-    before = played.frames[acts]
+    followers = _followers(history, acts)
+    before = history.frames[acts]
     for t in range(acts + 1, len(s)):
         if math.isnan(s[t]):
             break
-        frame, seen = placed(played, path, s, t, followers, before)
+        frame, seen = placed(history, path, s, t, followers, before)
         measured = gauge.measure(frame, before, seen)
         if measured.assessment.touched or measured.robustness[0] < 0.0:
             return False
@@ -138,15 +138,15 @@ def _holds(gauge: Gauge, played: Played, path: Path, s: Floats, acts: int) -> bo
     return True
 
 
-def _followers(played: Played, t: int) -> frozenset[str]:
+def _followers(history: History, t: int) -> frozenset[str]:
     """The actors that follow the ego in frame `t`, by id: behind it, and driving its way."""
-    frame, others = played.frames[t], played.measures[t].assessment.others
+    frame, others = history.frames[t], history.measures[t].assessment.others
     behind = others[AHEAD] + (frame.length_m[1:] + frame.length_m[0]) / 2 < 0.0
     return frozenset(np.array(frame.ids[1:])[behind & (others[COS] > 0.5)].tolist())
 
 
 def placed(
-    played: Played, path: Path, s: Floats, t: int, without: frozenset[str], before: Frame
+    history: History, path: Path, s: Floats, t: int, without: frozenset[str], before: Frame
 ) -> tuple[Frame, Bools]:
     """Places the ego `s[t]` along the path in frame `t`; returns the frame and what the ego sees.
 
@@ -154,8 +154,8 @@ def placed(
 
     After the last frame others go on as they move in it. `without` lists actors that are left out.
     """
-    last = len(played.frames) - 1
-    recorded, measures = played.frames[min(t, last)], played.measures[min(t, last)]
+    last = len(history.frames) - 1
+    recorded, measures = history.frames[min(t, last)], history.measures[min(t, last)]
     stays = np.array([id_ not in without for id_ in recorded.ids])
     state = recorded.state[:, stays].copy()
     beyond_s = max(t - last, 0) * STEP_S

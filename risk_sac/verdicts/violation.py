@@ -14,7 +14,7 @@ from risk_sac.types import STEP_S, Frame, Kind, Role
 from risk_sac.verdicts.conflict import SAME_WAY_COS, find_conflict
 from risk_sac.verdicts.definitions import DEFINITIONS
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.keeping import NO_RED_LIGHT_ENTRY, ON_CARRIAGEWAY, MetActor, Played, kept_by
+from risk_sac.verdicts.keeping import NO_RED_LIGHT_ENTRY, ON_CARRIAGEWAY, History, MetActor, kept_by
 from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, manoeuvre
 from risk_sac.verdicts.offences import ego_offences
 from risk_sac.verdicts.overlap import overlaps_before_contact
@@ -54,7 +54,7 @@ def requirement_results(
 def violations_of(
     requirements: Sequence[Requirement],
     results: Mapping[str, RequirementResult],
-    gather: Callable[[], Played],
+    gather: Callable[[], History],
     gauge: Gauge,
     artefacts: Mapping[str, float],
 ) -> tuple[Violation, ...]:
@@ -71,27 +71,27 @@ def violations_of(
     violated = [(each, time_s) for each in counting if (time_s := results[each.name].violated_s) is not None]
     if not violated:
         return ()
-    played, found = gather(), []
-    overlap_s = min((each.time_s for each in overlaps_before_contact(played.evidence)), default=math.inf)
-    released = int(np.searchsorted(played.evidence.time_s, -STEP_S / 2))
+    history, found = gather(), []
+    overlap_s = min((each.time_s for each in overlaps_before_contact(history.evidence)), default=math.inf)
+    released = int(np.searchsorted(history.evidence.time_s, -STEP_S / 2))
     for requirement, time_s in violated:
         index = released + round(time_s / STEP_S)
-        verdicts = {rule: artefacts.get(rule, math.inf) > played.frames[index].time_s for rule in RULES}
+        verdicts = {rule: artefacts.get(rule, math.inf) > history.frames[index].time_s for rule in RULES}
         verdicts["solid_bodies"] = time_s < overlap_s
-        found.append(_violation(requirement, results[requirement.name], played, gauge, index, verdicts))
+        found.append(_violation(requirement, results[requirement.name], history, gauge, index, verdicts))
     return tuple(sorted(found, key=lambda violation: violation.time_s))
 
 
 def _violation(
     requirement: Requirement,
     result: RequirementResult,
-    played: Played,
+    history: History,
     gauge: Gauge,
     index: int,
     verdicts: Mapping[str, bool],
 ) -> Violation:
     """The record of a violation that began in frame `index`."""
-    frame, measures, evidence = played.frames[index], played.measures[index], played.evidence.until(index)
+    frame, measures, evidence = history.frames[index], history.measures[index], history.evidence.until(index)
     nearest = _soonest_met(measures)
     met = None
     if nearest is not None:
@@ -101,7 +101,7 @@ def _violation(
     if requirement.name == NO_RED_LIGHT_ENTRY:  # it may be violated before the line, when the ego cannot stop any more
         broke = tuple(dict.fromkeys(("red_light", *broke)))
     hidden = met is not None and met.conflict.hidden
-    drivers = kept_by(requirement, gauge.of(requirement), played, index, met) if all(verdicts.values()) else {}
+    drivers = kept_by(requirement, gauge.of(requirement), history, index, met) if all(verdicts.values()) else {}
     actor = "nobody near" if nearest is None else _actor(frame, measures, nearest, evidence) + ", hidden" * hidden
     violated = VIOLATED.get(requirement.name, f"{requirement.name} violated")
     others = tuple(name for name in broke if name not in SAME_OFFENCES.get(requirement.name, ()))

@@ -6,7 +6,7 @@ import pytest
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.records import Grade, Violation
-from risk_sac.verdicts.keeping import Played, placed
+from risk_sac.verdicts.keeping import History, placed
 from risk_sac.verdicts.recorded import ego_path
 
 EPISODES = 12
@@ -40,7 +40,7 @@ def test_an_ego_that_leaves_the_road_would_have_been_kept_on_it_by_its_lane() ->
 def test_what_the_ego_drove_is_measured_again_as_it_was(family: str) -> None:
     env = RiskSacEnv.of(RunSpec.model_validate({"family": family, "method": "random", "seed": 0}))
     play(env, 3, undisturbed=True)
-    played = Played(env.trace.frames, env.trace.measures, env.evidence())
+    played = History(env.trace.frames, env.trace.measures, env.evidence())
     env.close()
     path = ego_path(played.evidence)
     gauge = env._gauge

@@ -3,7 +3,8 @@
 import pytest
 
 from risk_sac.adjustments import adjustments
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, Requirement
+from risk_sac.problem import checked_campaign
 
 
 def said(families: tuple[str, ...] = ("low", "mixed", "dense"), ego: object = None, **odd: object) -> list[str]:
@@ -66,3 +67,11 @@ def test_a_sensor_beyond_the_default_visibility_is_said_to_be_shortened() -> Non
     assert (
         said(("low",), ego={"sensor": {"range_m": 150}}, environment={"visibility_m": {"low": 90, "high": 150}}) == []
     )
+
+
+def test_a_shipped_requirement_that_a_family_lacks_is_said_and_counts_where_there_is_one() -> None:
+    spec = CampaignSpec(families=("low", "mixed"), requirements=(Requirement(name="pedestrian_gap"),))
+    checked_campaign(spec)
+    (adjustment,) = adjustments(spec)
+    assert (adjustment.families, adjustment.field, adjustment.used) == (("low",), "requirements[0]", "nothing")
+    assert "pedestrian_gap" in adjustment.why

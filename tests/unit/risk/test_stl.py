@@ -14,7 +14,7 @@ from risk_sac.errors import FormulaError, NotFinite
 from risk_sac.risk.formula import parse
 from risk_sac.risk.measures import soft_min
 from risk_sac.risk.signals import SIGNALS
-from risk_sac.risk.stl import Monitor, check_requirements
+from risk_sac.risk.stl import Monitor
 from risk_sac.scenario.odd import requirements_from_odd
 
 STEP_S, HORIZON = 0.1, 150
@@ -342,7 +342,7 @@ BAD: list[tuple[str, int | None, str]] = [  # formula, position, reason
 @pytest.mark.parametrize(("formula", "position", "reason"), BAD, ids=[formula[:40] for formula, *_ in BAD])
 def test_bad_formulas_are_refused_with_position_and_reason(formula: str, position: int | None, reason: str) -> None:
     with pytest.raises(FormulaError, match=reason) as caught:
-        check_requirements([requirement(TTC), requirement(formula)], STEP_S, HORIZON)
+        Monitor([requirement(TTC), requirement(formula)], STEP_S, HORIZON)
     assert caught.value.field == "requirements[1].formula"
     assert caught.value.position is not None
     assert position is None or caught.value.position == position

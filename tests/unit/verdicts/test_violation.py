@@ -13,7 +13,7 @@ from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.scenario.carriageway import Carriageway
 from risk_sac.types import Kind, Role, Signal
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
-from risk_sac.verdicts.keeping import Played
+from risk_sac.verdicts.keeping import History
 from risk_sac.verdicts.violation import requirement_results, violations_of
 from tests.builders import frame_of
 from tests.unit.verdicts.staged import CAR_M, LANE_M, Motion, mirrored, sideways, stage, straight
@@ -51,7 +51,7 @@ def played(
         frames.append(frame)
     released = int(np.searchsorted(e.time_s, -1e-6))
     results = requirement_results((requirement,), e.time_s[released:].tolist(), measures[released:], None)
-    return list(violations_of((requirement,), results, lambda: Played(frames, measures, e), gauge, artefacts or {}))
+    return list(violations_of((requirement,), results, lambda: History(frames, measures, e), gauge, artefacts or {}))
 
 
 def violated(
