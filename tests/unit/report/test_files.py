@@ -219,6 +219,14 @@ def test_sliding_pcr_by_hand(comparison):
     np.testing.assert_allclose(window_pcr(run), [1, 1, 2 / 3, 2 / 4])
 
 
+def test_sliding_rates_are_of_contacts_and_end_where_the_metrics_do(spec, finished):
+    run = finished(spec.runs()[0], "vfFkd")  # its first failure is no contact
+    np.testing.assert_allclose(window_ecr(run), [0, 1 / 2, 2 / 3, 2 / 4, 2 / 5])
+    np.testing.assert_allclose(window_pcr(run), [0, 1 / 2, 1 / 3, 1 / 4, 1 / 5])
+    metrics = run.metrics["search"]
+    assert (metrics.window_ecr, metrics.window_pcr) == (0.4, 0.2)
+
+
 def test_unknown_figure_names_those_there_are(comparison):
     with pytest.raises(ConfigError, match="got 'pie'; wanted one of ecr_low, "):
         figure_bytes(comparison, "pie", "png")
