@@ -28,9 +28,9 @@ def played_here(bundle: Bundle) -> Bundle:
     manifest = bundle.manifest
     with closing(RiskSacEnv.of(manifest.spec)) as env:
         played = replay(env, manifest.episode, bundle.series)
-    if played.collision is None:
+    episode = played.record(manifest.episode)
+    if not episode.valid_violations:
         raise SimulationError(f"{manifest.id} is no failure here any more; wanted another example")
-    episode = manifest.episode.model_copy(update={"collision": played.collision})
     return make_bundle(manifest.spec, episode, played.series, played.signal_heads, bundle.policy)
 
 
