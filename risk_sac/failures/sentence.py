@@ -10,7 +10,7 @@ from risk_sac.records import Collision, Violation
 from risk_sac.types import STEP_S, Floats, Kind
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
-from risk_sac.verdicts.labels import ONCOMING_COS
+from risk_sac.verdicts.labels import ONCOMING_COS, RESPONSES
 from risk_sac.verdicts.offences import IN_WORDS, STANDING_MPS
 
 IN_LANE_M = 1.5  # who is nearer to the ego's axis leads it, or follows
@@ -31,7 +31,7 @@ def sentence(series: Series, collision: Collision) -> str:
     who = _who(series, striker, first, _broke(judged.broke))
     what = does[1] if does else f"goes on at {series['speed_mps'][first, striker]:.0f} m/s"
     ego = f"ego at {series['speed_mps'][began, 0]:.0f} m/s{_broke(judged.ego_broke)}"
-    return f"{who}, {what}; {ego} {_response(series, began)}"
+    return f"{who}, {what}; {ego} {_response(series, began, judged.ego_response)}"
 
 
 def story(series: Series, violation: Collision | Violation) -> str:
@@ -101,12 +101,16 @@ def _lasting(values: Floats, limit: float) -> list[int]:
     return next((frames for frames in reversed(stretches) if len(frames) >= 2), [])
 
 
-def _response(series: Series, began: int) -> str:
-    speed, accel = series["speed_mps"][began:, 0], series["accel_mps2"][began:, 0]
-    if speed.max() < STANDING_MPS:
-        return "stands"
-    braked = np.flatnonzero(accel <= -BRAKES_MPS2)
-    if len(braked) == 0:
-        return "does not brake"
-    late_s = braked[0] * STEP_S - CAREFUL_PERCEIVES_S - CAREFUL_DELAY_S
-    return f"brakes {late_s:.1f} s late" if late_s > STEP_S / 2 else "brakes, and touches it still"
+def _response(series: Series, began: int, response: str) -> str:
+    """Returns the recorded response in words, with how late it is, or what was before it."""
+    braked = np.flatnonzero(series["accel_mps2"][began:, 0] <= -BRAKES_MPS2)
+    if response == "late_braking":
+        late_s = (int(braked[0]) if len(braked) else 0) * STEP_S - CAREFUL_PERCEIVES_S - CAREFUL_DELAY_S
+        return f"brakes {late_s:.1f} s late" if late_s >= STEP_S / 2 else RESPONSES[response]
+    if response == "braking":
+        return "brakes, and touches it still"
+    if response == "standing" and series["speed_mps"][began, 0] >= STANDING_MPS:
+        return "has stopped"
+    if response == "none" and len(braked):
+        return "brakes no longer"
+    return RESPONSES[response]

@@ -15,9 +15,10 @@ from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
 from risk_sac.failures.from_above import CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, draw_from_above, legend
 from risk_sac.failures.recording import Recording
-from risk_sac.records import Collision, Grade, Violation
+from risk_sac.records import Collision, Violation
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.types import STEP_S, Floats
+from risk_sac.verdicts.words import began, known, prevented_by
 
 CAPTION_WIDTH = 120  # characters
 SEEN_COLOUR, RELEASE_COLOUR, HIDDEN_COLOUR, ALSO_COLOUR = "tab:green", "tab:purple", "0.9", "tab:brown"
@@ -28,11 +29,6 @@ WIDTH_IN, PANEL_IN, DPI = 11.0, 1.5, 110
 PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
 LABEL_IN = 0.25  # what a label needs on the page
 VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
-PREVENTED = {
-    Grade.CAREFUL: "a careful driver would have prevented it",
-    Grade.IDEAL: "only full braking at once would have prevented it",
-    Grade.UNAVOIDABLE: "not even full braking at once would have prevented it",
-}
 
 
 def caption(family: FamilyName, recording: Recording) -> str:
@@ -49,18 +45,16 @@ def caption(family: FamilyName, recording: Recording) -> str:
 
 
 def _contact(collision: Collision) -> Iterator[str]:
-    seen_s, judgement = collision.visible_for_s, collision.judgement
-    seen = f"which it had seen for {seen_s:.1f} s" if seen_s > 0 else "which it had not seen"
+    judgement = collision.judgement
     yield (
         f"the ego's {collision.ego_zone}, at {collision.ego_speed_mps:.1f} m/s, touched the {collision.other_zone} of "
-        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {seen}"
+        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {known(collision)}"
     )
     if judgement is not None:
-        before_s = collision.time_s - judgement.conflict_s
         yield judgement.signature
         if collision.severity_in_words:
             yield collision.severity_in_words
-        yield f"the conflict began {before_s:.1f} s before the contact{_grade(judgement.grade)}"
+        yield f"{began(collision, judgement)}{_grade(collision)}"
         yield (
             f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'} · "
             f"by the ego: {_words(', '.join(judgement.ego_broke)) or 'nothing'}"
@@ -70,16 +64,17 @@ def _contact(collision: Collision) -> Iterator[str]:
 def _violation(violation: Violation) -> Iterator[str]:
     met = "nothing was in its way"
     if violation.other_id is not None:
-        unseen = ", which it did not see" if violation.hidden else ""
+        unseen = ", of which it did not know" if violation.hidden else ""
         met = f"it would have met {violation.other_role} {violation.other_id!r} first{unseen}"
     yield f"the ego, at {violation.ego_speed_mps:.1f} m/s, violated {violation.requirement}; {met}"
     yield violation.signature
-    yield f"least robustness: {violation.robustness:.2f}{_grade(violation.grade)}"
+    yield f"least robustness: {violation.robustness:.2f}{_grade(violation)}"
     yield f"the ego's offences: {_words(', '.join(violation.broke)) or 'none'}"
 
 
-def _grade(grade: Grade | None) -> str:
-    return "" if grade is None else f" · grade {grade}: {PREVENTED[grade]}"
+def _grade(violation: Collision | Violation) -> str:
+    prevented = prevented_by(violation)
+    return f" · grade {violation.graded}: {prevented}" if prevented else ""
 
 
 def _words(names: str) -> str:

@@ -64,7 +64,7 @@ class ReferenceOutcome(Record):
     avoids: bool
     """No contact, or it stands when it is struck, or is struck from behind; false if it passed the striker before."""
     impact_speed_mps: Real
-    """Of the reference driver at its contact, or where it has passed the ego; 0 if it avoids."""
+    """The reference driver's speed at its contact, or where it has passed the ego; 0 if it avoids."""
 
 
 class Judgement(Record):
@@ -89,7 +89,7 @@ class Judgement(Record):
     ego_manoeuvre: str
     """straight | left_turn | right_turn | lane_change"""
     ego_response: str
-    """none | late_braking | braking | standing | starting"""
+    """In the last second before the contact: none | late_braking | braking | standing | starting | accelerating"""
     ground: str
     """lane | junction | crossing | beside_crossing: where the striker was struck."""
     broke: tuple[str, ...]
@@ -256,13 +256,13 @@ class Collision(Violated):
 
     @property
     def severity_in_words(self) -> str:
-        """Such as "severe: they close at 11.0 m/s, the risk of death is 3.5 %"; empty in older records."""
+        """Such as "severe: closing speed 11.0 m/s, risk of death 3.5 %"; empty in older records."""
         if self.judgement is None or self.judgement.severity is None:
             return ""
         risk = "death" if self.other_kind == "pedestrian" else "serious injury"
         return (
-            f"{self.judgement.severity}: they close at {self.relative_speed_mps:.1f} m/s, "
-            f"the risk of {risk} is {100 * (self.judgement.injury_risk or 0.0):.1f} %"
+            f"{self.judgement.severity}: closing speed {self.relative_speed_mps:.1f} m/s, "
+            f"risk of {risk} {100 * (self.judgement.injury_risk or 0.0):.1f} %"
         )
 
     @property

@@ -12,6 +12,8 @@ from risk_sac.verdicts.evidence import Evidence, inside
 from risk_sac.verdicts.offences import IN_WORDS, RECENT_S, STANDING_MPS
 from risk_sac.verdicts.recorded import front_moved_across
 
+RESPONSE_S = 1.0  # before the contact: what the ego does then is its response
+SPEEDS_UP_MPS2 = 1.5  # more than Krauss's drivers dawdle with, as `BRAKES_MPS2`
 BESIDE_M = 3.0  # a pedestrian this near to a crossing means to use it
 RECENT_M = 12.0  # a quarter of a circle of 8 m: an ego that creeps through its turn is turning
 TURN_RAD = math.radians(20.0)  # more than a lane change takes
@@ -35,6 +37,7 @@ RESPONSES = {
     "braking": "brakes",
     "standing": "stands",
     "starting": "starts",
+    "accelerating": "speeds up",
 }
 GROUNDS = {
     "lane": "in a lane",
@@ -71,10 +74,11 @@ def manoeuvre(evidence: Evidence) -> str:
 
 
 def response(evidence: Evidence, conflict: Conflict) -> str:
-    """none, late_braking, braking, standing or starting: what the ego did from the conflict's beginning on.
+    """none, late_braking, braking, standing, starting or accelerating: what the ego did in the last second.
 
-    Late is later than the careful driver. An ego that stood within the last 3 s and gains speed at the contact is
-    starting.
+    Of what came before the conflict nothing counts. Of braking and speeding up, the later counts. Late is an ego that
+    first braked in the conflict later than the careful driver. One that stood within the last 3 s and gains speed at
+    the contact is starting.
     """
     speed = evidence.speed_mps[:, 0]
     if speed[-1] < STANDING_MPS:
@@ -82,10 +86,14 @@ def response(evidence: Evidence, conflict: Conflict) -> str:
     recent = speed[evidence.since(RECENT_S) :]
     if recent.min() < STANDING_MPS and recent[-1] >= recent.max() - STANDING_MPS:
         return "starting"
-    braked = np.flatnonzero(evidence.accel_mps2[conflict.frame :, 0] <= -BRAKES_MPS2)
-    if len(braked) == 0:
+    accel = evidence.accel_mps2[:, 0]
+    latest = accel[max(conflict.frame, evidence.since(RESPONSE_S)) :]
+    acts = latest[(latest <= -BRAKES_MPS2) | (latest >= SPEEDS_UP_MPS2)]
+    if len(acts) == 0:
         return "none"
-    after_s = braked[0] * evidence.step_s
+    if acts[-1] > 0.0:
+        return "accelerating"
+    after_s = np.flatnonzero(accel[conflict.frame :] <= -BRAKES_MPS2)[0] * evidence.step_s
     return "late_braking" if after_s > CAREFUL_PERCEIVES_S + CAREFUL_DELAY_S else "braking"
 
 

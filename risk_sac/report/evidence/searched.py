@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from risk_sac.config import FamilyName
 from risk_sac.failures.clusters import Cluster
 from risk_sac.metrics import COLUMNS, requirement_cells
-from risk_sac.records import Collision, EpisodeRecord, Grade, Violation
+from risk_sac.records import Collision, EpisodeRecord, Violation
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Section, Table
 from risk_sac.report.evidence.origin import Origin, draw
@@ -13,14 +13,9 @@ from risk_sac.report.evidence.words import ego_in_words
 from risk_sac.report.markdown import verified
 from risk_sac.report.page import DASH
 from risk_sac.report.runs import FinishedRun
+from risk_sac.verdicts.words import began, known, prevented_by
 
 MOST_CARDS = 12  # of a family
-GRADES = {
-    Grade.CAREFUL: "a careful driver would have prevented it",
-    Grade.IDEAL: "only full braking at once would have prevented it",
-    Grade.UNAVOIDABLE: "nobody would have prevented it",
-    None: "not judged",
-}
 FUNNEL = [
     *("family", "method", "runs", "episodes", "refused", "contacts", "valid contacts"),
     *("failures", "distinct", "preventable", "verified"),
@@ -133,12 +128,19 @@ def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Ori
         title=cluster.name,
         lines=[
             f"{_counted(cluster.failures, 'failure')}, {cluster.distinct} distinct, {cluster.preventable} preventable",
-            f"grade: {GRADES[cluster.grade]}",
+            f"grade: {_grade(cluster, record)}",
             *_told(run, record),
         ],
         command=origin.show(run, cluster.representative),
         drawing=draw(run, origin.folders.get(run.spec.digest), record.index),
     )
+
+
+def _grade(cluster: Cluster, record: EpisodeRecord) -> str:
+    """Returns the grade of the pictured failure and who would have prevented it."""
+    pictured = next((each for each in record.valid_violations if each.signature == cluster.name), None)
+    prevented = pictured and prevented_by(pictured)
+    return f"{cluster.grade}: {prevented}" if prevented else "not judged"
 
 
 def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
@@ -159,11 +161,10 @@ def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
 
 
 def _contact(hit: Collision) -> str:
-    conflict_s = hit.judgement.conflict_s if hit.judgement else hit.time_s
+    conflict = f"; {began(hit, hit.judgement)}" if hit.judgement else ""
     bad = f"; {hit.severity_in_words}" if hit.severity_in_words else ""
     return (
-        f"touches {hit.other_id} at {hit.ego_speed_mps:.1f} m/s, {hit.time_s - conflict_s:.1f} s after the conflict "
-        f"began; it was in view for {hit.visible_for_s:.1f} s{bad}"
+        f"touches {hit.other_id}, {known(hit)}{conflict}; ego's speed at the contact {hit.ego_speed_mps:.1f} m/s{bad}"
     )
 
 

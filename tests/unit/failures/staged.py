@@ -7,7 +7,7 @@ from risk_sac.records import ConflictType, Judgement, Outcome
 from risk_sac.run_folder.results import RecordedFailure
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.space import SceneSpace
-from tests.builders import collision, episode_record, judgement
+from tests.builders import AVOIDS, TOUCHES, collision, episode_record, judgement
 
 JUDGED = judgement(
     conflict_type=ConflictType.PEDESTRIAN,
@@ -15,6 +15,7 @@ JUDGED = judgement(
     conflict_x_m=302.0,
     conflict_y_m=-3.25,
     broke=("pedestrian_on_red",),
+    drivers={"careful": AVOIDS, "rss": TOUCHES, "ideal": AVOIDS},
 )
 
 

@@ -37,13 +37,13 @@ def during(first_s: float, last_s: float, value: float) -> np.ndarray:
     return np.where((time_s > first_s - 0.05) & (time_s < last_s - 0.05), value, 0.0)
 
 
-def said(conflict_s: float = 1.0, broke: tuple[str, ...] = (), ego_broke: tuple[str, ...] = (), **changes: Any) -> str:
-    hit = collision(time_s=3.5, judgement=judgement(conflict_s=conflict_s, broke=broke, ego_broke=ego_broke))
-    return sentence(series(**changes), hit)
+def said(response: str = "none", broke: tuple[str, ...] = (), ego_broke: tuple[str, ...] = (), **changes: Any) -> str:
+    judged = judgement(conflict_s=1.0, broke=broke, ego_broke=ego_broke, ego_response=response)
+    return sentence(series(**changes), collision(time_s=3.5, judgement=judged))
 
 
 def test_a_neighbour_that_moves_over_while_the_ego_brakes_late() -> None:
-    late = said(lateral_mps=during(1.0, 2.5, -1.1), ego_accel_mps2=during(2.65, 3.5, -3.0))
+    late = said("late_braking", lateral_mps=during(1.0, 2.5, -1.1), ego_accel_mps2=during(2.65, 3.5, -3.0))
     assert late == "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.6 s late"
 
 
@@ -87,7 +87,16 @@ def test_what_it_does_is_told_in_the_order_in_which_it_begins() -> None:
 
 
 def test_who_brakes_in_time_is_not_called_late() -> None:
-    assert said(ego_accel_mps2=during(1.5, 3.5, -6.0)).endswith("ego at 14 m/s brakes, and touches it still")
+    braking = said("braking", ego_accel_mps2=during(1.5, 3.5, -6.0))
+    assert braking.endswith("ego at 14 m/s brakes, and touches it still")
+
+
+@pytest.mark.parametrize(
+    ("response", "told"),
+    [("none", "brakes no longer"), ("accelerating", "speeds up"), ("starting", "starts"), ("standing", "has stopped")],
+)
+def test_an_ego_that_braked_is_told_by_what_it_did_last(response: str, told: str) -> None:
+    assert said(response, ego_accel_mps2=during(1.0, 2.0, -6.0)).endswith(f"; ego at 14 m/s {told}")
 
 
 def test_a_violation_without_contact_tells_what_the_nearest_actor_did_until_then() -> None:

@@ -9,7 +9,7 @@ from risk_sac.failures.recording import Recording
 from risk_sac.failures.show import CAPTION_WIDTH, caption, draw, draw_recording
 from risk_sac.records import Grade, Outcome
 from risk_sac.run_folder.results import RecordedFailure
-from tests.builders import episode_record, violation
+from tests.builders import TOUCHES, episode_record, violation
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 
 
@@ -58,7 +58,7 @@ def test_earlier_places_of_a_body_that_stands_are_labelled_together() -> None:
 def test_a_contact_that_nobody_judged_is_drawn_without_a_conflict() -> None:
     figure = draw_recording("mixed", Recording(synthetic_contact(None), synthetic_series()))
     view, *panels = figure.axes
-    assert len(figure.get_suptitle().splitlines()) == 2
+    assert "conflict" not in figure.get_suptitle()
     assert not [line for line in view.lines if line.get_marker() == "D"]
     assert "conflict begins" not in [text.get_text() for text in panels[0].texts]
 
@@ -102,18 +102,20 @@ def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke()
     assert lines() == [
         "mixed · episode low-random-0-train-7 · failure",
         "the ego's front, at 10.0 m/s, touched the left of adversary 'pedestrian', at 1.0 m/s, "
-        "which it had seen for 1.0 s",
+        "of which it had known for 1.0 s",
         JUDGED.signature,
-        "the conflict began 1.2 s before the contact · grade careful: a careful driver would have prevented it",
+        "the conflict began 1.2 s before the contact · grade careful: the careful driver and full braking at once would "
+        "have",
+        "prevented it",
         "broken by the other: pedestrian on red · by the ego: nothing",
     ]
-    assert lines(grade=None, broke=())[-2:] == [
+    assert lines(grade=None, drivers={}, broke=())[-2:] == [
         "the conflict began 1.2 s before the contact",
         "broken by the other: nothing · by the ego: nothing",
     ]
     assert lines(broke=(), ego_broke=("red_light",))[-1] == "broken by the other: nothing · by the ego: red light"
-    assert lines(grade=Grade.UNAVOIDABLE)[-2].endswith(
-        "grade unavoidable: not even full braking at once would have prevented it"
+    assert " ".join(lines(grade=Grade.UNAVOIDABLE, drivers={"careful": TOUCHES, "ideal": TOUCHES})[-3:-1]).endswith(
+        "grade unavoidable: none of the reference drivers would have prevented it"
     )
 
 
@@ -129,7 +131,8 @@ def test_rules_that_the_contact_failed_are_named_in_full_on_lines_that_the_page_
 @pytest.mark.parametrize("other_id", ["pedestrian", None])
 def test_a_violation_without_contact_is_marked_while_the_episode_goes_on(other_id: str | None) -> None:
     near = {"other_id": other_id, "other_kind": "pedestrian", "other_role": "adversary"} if other_id else {}
-    broken = violation(requirement="safe_ttc", time_s=1.0, grade=Grade.CAREFUL, **near)
+    drivers = {"careful": True, "ideal": False}
+    broken = violation(requirement="safe_ttc", time_s=1.0, grade=Grade.CAREFUL, drivers=drivers, **near)
     episode = episode_record(7, Outcome.FAILURE, scene=synthetic_contact().episode.scene, violations=(broken,))
     recording = Recording(RecordedFailure.of("low-random-0", episode), with_release())
     figure = draw_recording("mixed", recording)
@@ -147,7 +150,7 @@ def test_a_violation_without_contact_is_marked_while_the_episode_goes_on(other_i
     title = figure.get_suptitle()
     assert "the ego, at 9.0 m/s, violated safe_ttc" in title
     assert ("'pedestrian' first" in title) == (other_id is not None)
-    assert "grade careful: a careful driver would have prevented it" in title
+    assert "grade careful: the careful driver would have prevented it" in title
 
 
 def test_other_violations_of_the_episode_are_marked_and_named() -> None:

@@ -102,6 +102,11 @@ def test_a_background_striker_is_named_so() -> None:
         (((3.0, -2.0),), "braking"),  # t0 is 2.0 s before the contact, about 2.4
         (((4.1, -2.0),), "late_braking"),
         (((-1.5, -2.0), (0.0, 0.0)), "none"),
+        (((2.5, -2.0), (3.0, 0.0)), "none"),  # it let go of the brake long before the last second
+        (((2.5, -2.0), (3.0, 2.0)), "accelerating"),
+        (((3.0, 2.0),), "accelerating"),
+        (((3.5, 2.0), (4.2, -2.0)), "late_braking"),  # the later counts
+        (((3.5, 1.0),), "none"),
     ],
 )
 def test_what_the_ego_did_about_it(accel: tuple[tuple[float, float], ...], response: str) -> None:

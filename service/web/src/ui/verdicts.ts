@@ -1,6 +1,7 @@
-/** Grades and rules in words; the rules are those of `risk_sac/verdicts/README.md`. */
+/** Verdicts in words, from the facts on record: grades, reference drivers, sight, rules of `risk_sac/verdicts/README.md`. */
 
-import { words } from "./text";
+import { number, words } from "./text";
+import { driversOf, type Collision, type Violation } from "./violations";
 
 export const GRADES = ["careful", "ideal", "unavoidable", "none"] as const;
 export type GradeName = (typeof GRADES)[number];
@@ -11,11 +12,49 @@ interface GradeWords {
 }
 
 export const GRADE_WORDS: Record<GradeName, GradeWords> = {
-  careful: { short: "preventable", long: "A careful driver would have prevented it" },
-  ideal: { short: "only by full braking", long: "Only full braking at once would have prevented it" },
-  unavoidable: { short: "unavoidable", long: "Not even full braking at once would have prevented it" },
+  careful: { short: "preventable", long: "The careful driver would have prevented it" },
+  ideal: { short: "by full braking", long: "Full braking at once would have prevented it, the careful driver would not" },
+  unavoidable: { short: "unavoidable", long: "Neither the careful driver nor full braking at once would have prevented it" },
   none: { short: "not graded", long: "No reference driver was asked" },
 };
+
+const FULL_BRAKING = "ideal";
+/** It drives nowhere, so it has no impact speed. */
+export const TTC_RULE = "r157_ttc";
+
+export const DRIVERS: Record<string, string> = {
+  careful: "the careful driver",
+  fsm: "the fuzzy safety model",
+  rss: "the RSS driver",
+  [FULL_BRAKING]: "full braking at once",
+  [TTC_RULE]: "R157's time-to-collision rule",
+};
+
+export function driverWords(name: string): string {
+  return Object.hasOwn(DRIVERS, name) ? DRIVERS[name]! : `the ${words(name)} driver`;
+}
+
+/** Every reference driver that would have prevented it, by name; null where none was asked. */
+export function preventedBy(violation: Collision | Violation): string | null {
+  const drivers = driversOf(violation);
+  if (drivers.length === 0) return null;
+  const names = drivers.flatMap(([name, prevents]) => (prevents ? [name] : []));
+  if (names.length === 1 && names[0] === FULL_BRAKING) return `only ${DRIVERS[FULL_BRAKING]} would have prevented it`;
+  const told = names.length > 0 ? names.map(driverWords) : ["none of the reference drivers"];
+  const last = told.pop()!;
+  return `${told.length > 0 ? `${told.join(", ")} and ${last}` : last} would have prevented it`;
+}
+
+/** Since when the ego knew of the striker. */
+export function knownOf({ visible_for_s, other_id, judgement }: Collision): string {
+  const seen_s = visible_for_s ?? 0;
+  if (judgement?.hidden) {
+    if (seen_s > 0) return `The ego came to know of ${other_id} only ${number(seen_s, 1)} s before the contact.`;
+    return `The ego did not know of ${other_id} when the conflict began, nor at the contact.`;
+  }
+  if (seen_s > 0) return `The ego had known of ${other_id} for ${number(seen_s, 1)} s without a break.`;
+  return `The ego did not know of ${other_id} at the contact${judgement ? ", but when the conflict began" : ""}.`;
+}
 
 /** Why a violation was refused: what a rule found. */
 const RULES: Record<string, string> = {

@@ -35,6 +35,12 @@ export function gradeOf(violation: Collision | Violation): Body<"Grade"> | null 
   return isContact(violation) ? (violation.judgement?.grade ?? null) : violation.grade;
 }
 
+/** Each reference driver, and whether it would have prevented the violation. */
+export function driversOf(violation: Collision | Violation): [string, boolean][] {
+  if (!isContact(violation)) return Object.entries(violation.drivers);
+  return Object.entries(violation.judgement?.drivers ?? {}).map(([name, { avoids }]) => [name, avoids]);
+}
+
 /** Null of a contact that was stored before contacts were judged. */
 export function signatureOf(violation: Collision | Violation): string | null {
   return isContact(violation) ? (violation.judgement?.signature ?? null) : violation.signature;

@@ -28,6 +28,6 @@ function described(found: Found): string {
   const worst = worstOf(found);
   if (worst === null) return "failure";
   const kind = signatureOf(worst)?.split(";")[0] ?? words(worst.other_kind ?? "failure");
-  const mps = isContact(worst) ? worst.relative_speed_mps : worst.ego_speed_mps;
-  return [kind, mps === null ? "" : `${Math.round(3.6 * mps)} km/h`, gradeOf(worst)].filter(Boolean).join(", ");
+  const [named, mps] = isContact(worst) ? ["closing speed", worst.relative_speed_mps] : ["ego's speed", worst.ego_speed_mps];
+  return [kind, mps === null ? "" : `${named} ${Math.round(3.6 * mps)} km/h`, gradeOf(worst)].filter(Boolean).join(", ");
 }

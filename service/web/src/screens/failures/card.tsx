@@ -44,12 +44,12 @@ export function Card({ campaign, table, at, often, triage }: Props) {
       <dl class="measures">
         {table.requirement[at] === NO_CONTACT ? (
           <>
-            <Measure name="closing" value={number(table.relative_speed_mps[at], 1)} unit="m/s" />
+            <Measure name="closing speed" value={number(table.relative_speed_mps[at], 1)} unit="m/s" />
             <Measure name="from conflict" value={number(reactionOf(table, at), 1)} unit="s" />
           </>
         ) : (
           <>
-            <Measure name="ego" value={number(table.ego_speed_mps[at], 1)} unit="m/s" />
+            <Measure name="ego's speed" value={number(table.ego_speed_mps[at], 1)} unit="m/s" />
             <Measure name="after release" value={number(table.time_s[at], 1)} unit="s" />
           </>
         )}

@@ -1,7 +1,8 @@
 /** The verdicts in words: who would have prevented it, what happened, and whether it holds. */
 
 import type { Body } from "../../api/types";
-import { number, words } from "../../ui/text";
+import { capital, number } from "../../ui/text";
+import { TTC_RULE, driverWords, knownOf } from "../../ui/verdicts";
 import { gradeOf, isContact, requirementOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import * as say from "./words";
 
@@ -40,9 +41,9 @@ function OfContact({ collision }: { collision: Collision }) {
   if (judgement === null) return null;
   return (
     <>
-      <p>{say.conflictOf(judgement, collision.time_s)}</p>
+      <p>{say.conflictOf(judgement, collision)}</p>
       <p>
-        {say.responseOf(judgement, collision.ego_peak_braking_mps2)} {say.knownOf(collision)}
+        {say.responseOf(judgement, collision.ego_peak_braking_mps2)} {knownOf(collision)}
       </p>
       <p class={judgement.broke.length + judgement.ego_broke.length > 0 ? "verdict-broke" : ""}>{say.brokeOf(judgement)}</p>
       <Drivers drivers={judgement.drivers} />
@@ -68,7 +69,7 @@ function OfViolation({ violation }: { violation: Violation }) {
           <tbody>
             {rows.map(([name, keeps]) => (
               <tr key={name}>
-                <th scope="row">{say.DRIVERS[name] ?? words(name)}</th>
+                <th scope="row">{capital(driverWords(name))}</th>
                 <td>{keeps ? <span class="good">✓ keep the requirement</span> : <span class="bad">✗ violate it</span>}</td>
               </tr>
             ))}
@@ -90,16 +91,16 @@ function Drivers({ drivers }: { drivers: Record<string, Body<"ReferenceOutcome">
           <th scope="col">Driver</th>
           <th scope="col">Would</th>
           <th scope="col" class="number">
-            At impact
+            Its impact speed
           </th>
         </tr>
       </thead>
       <tbody>
         {rows.map(([name, { avoids, impact_speed_mps }]) => (
           <tr>
-            <th scope="row">{say.DRIVERS[name] ?? words(name)}</th>
+            <th scope="row">{capital(driverWords(name))}</th>
             <td>{avoids ? <span class="good">✓ prevent it</span> : <span class="bad">✗ strike</span>}</td>
-            <td class="number">{avoids ? "–" : `${number(impact_speed_mps, 1)} m/s`}</td>
+            <td class="number">{avoids || name === TTC_RULE ? "–" : `${number(impact_speed_mps, 1)} m/s`}</td>
           </tr>
         ))}
       </tbody>

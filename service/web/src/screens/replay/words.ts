@@ -1,9 +1,9 @@
 /** What the verdicts say, in plain words; the rules are those of `risk_sac/verdicts/README.md`. */
 
 import type { Body } from "../../api/types";
-import { number, words } from "../../ui/text";
-import { GRADE_WORDS, refusal } from "../../ui/verdicts";
-import { gradeOf, isContact, worstOf, type Collision, type Violation } from "../../ui/violations";
+import { capital, number, words } from "../../ui/text";
+import { preventedBy, refusal } from "../../ui/verdicts";
+import { isContact, worstOf, type Collision, type Violation } from "../../ui/violations";
 
 type Failure = Body<"Failure">;
 type Judgement = Body<"Judgement">;
@@ -16,15 +16,16 @@ const CONFLICTS: Record<string, string> = {
   crossing_vehicle: "a crossing vehicle",
 };
 
-export const DRIVERS: Record<string, string> = {
-  careful: "Careful driver",
-  fsm: "Fuzzy safety model",
-  rss: "RSS driver",
-  ideal: "Full braking at once",
-  r157_ttc: "By R157's time to collision",
-};
-
 const MANOEUVRES: Record<string, string> = { straight: "goes straight", left_turn: "turns left", right_turn: "turns right", lane_change: "changes lanes" };
+
+const RESPONSES: Record<string, string> = {
+  none: "does not brake",
+  late_braking: "brakes late",
+  braking: "brakes",
+  standing: "stands",
+  starting: "starts",
+  accelerating: "speeds up",
+};
 
 const BROKE: Record<string, string> = {
   red_light: "ran a red light",
@@ -47,8 +48,8 @@ const EGO_BROKE: Record<string, string> = {
 export function verdictOf(failure: Failure): string {
   const { outcome } = failure;
   const violation = worstOf(failure);
-  const grade = violation && gradeOf(violation);
-  if (grade) return `${GRADE_WORDS[grade].long}.`;
+  const prevented = violation && preventedBy(violation);
+  if (prevented) return `${capital(prevented)}.`;
   return outcome === "failure" ? "It counts as a failure; no reference driver was asked." : "It is refused as a failure.";
 }
 
@@ -79,29 +80,25 @@ export function othersOf({ requirements }: Failure, named: string): string[] {
 function contactOf(collision: Collision): string {
   const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, other_speed_mps } = collision;
   return (
-    `The ego's ${ego_zone}, at ${number(ego_speed_mps, 1)} m/s, touched the ${other_zone} of the ${other_role} ${other_id}, ` +
-    `at ${number(other_speed_mps, 1)} m/s. ${severityOf(collision)}`
+    `The ego's ${ego_zone} touched the ${other_zone} of the ${other_role} ${other_id}. At the contact the ego's speed was ` +
+    `${number(ego_speed_mps, 1)} m/s, the striker's ${number(other_speed_mps, 1)} m/s. ${severityOf(collision)}`
   );
 }
 
 /** How fast the bodies closed, and how bad that is. */
 function severityOf({ relative_speed_mps, other_kind, judgement }: Collision): string {
-  const closing = `They closed at ${number(relative_speed_mps, 1)} m/s`;
+  const closing = `The closing speed was ${number(relative_speed_mps, 1)} m/s`;
   if (judgement?.severity == null || judgement.injury_risk == null) return `${closing}.`;
   const harm = other_kind === "pedestrian" ? "death" : "serious injury";
   return `${closing}: ${judgement.severity}, with a risk of ${harm} of ${number(100 * judgement.injury_risk, 1)} %.`;
 }
 
-export function knownOf({ visible_for_s, other_id }: Collision): string {
-  if (visible_for_s === null || visible_for_s <= 0) return `The ego did not know of ${other_id}.`;
-  return `The ego had known of ${other_id} for ${number(visible_for_s, 1)} s without a break.`;
-}
-
-export function conflictOf({ conflict_type, conflict_s, hidden, position }: Judgement, contact_s: number | null): string {
-  const before = conflict_s === null || contact_s === null ? "" : `, which began ${number(contact_s - conflict_s, 1)} s before the contact`;
+export function conflictOf({ conflict_type, conflict_s, position, hidden }: Judgement, { time_s, visible_for_s }: Collision): string {
+  let before = "";
+  if (hidden && !visible_for_s) before = ", which was hidden until the contact";
+  else if (conflict_s !== null && time_s !== null) before = `, which ${hidden ? "began in hiding and came into sight" : "began"} ${number(time_s - conflict_s, 1)} s before the contact`;
   const where = position === "alongside" ? "alongside" : "ahead";
-  const sight = hidden ? ", and the ego knew nothing of it" : "";
-  return `The conflict is ${CONFLICTS[conflict_type] ?? words(conflict_type)}${before}; the striker was ${where} then${sight}.`;
+  return `The conflict is ${CONFLICTS[conflict_type] ?? words(conflict_type)}${before}; the striker was ${where} then.`;
 }
 
 export function manoeuvreOf(name: string): string {
@@ -109,12 +106,11 @@ export function manoeuvreOf(name: string): string {
 }
 
 export function responseOf(judgement: Judgement, peak: number | null): string {
-  const response = { none: "does not brake", late_braking: "brakes late", braking: "brakes", standing: "stands", starting: "starts" };
   const goes = manoeuvreOf(judgement.ego_manoeuvre);
-  const does = response[judgement.ego_response as keyof typeof response] ?? words(judgement.ego_response);
-  const hardest = peak === null || peak < 0.05 ? "" : `; its hardest braking was ${number(peak, 1)} m/s²`;
+  const does = RESPONSES[judgement.ego_response] ?? words(judgement.ego_response);
+  const hardest = peak === null || peak < 0.05 ? "" : `; its hardest braking since the release was ${number(peak, 1)} m/s²`;
   const never = judgement.unresponsive ? " It saw a collision course for 1.5 s or more, and never braked." : "";
-  return `The ego ${goes} and ${does}${hardest}.${never}`;
+  return `The ego ${goes}, and in the last second ${does}${hardest}.${never}`;
 }
 
 export function brokeOf({ broke, ego_broke }: Judgement): string {

@@ -1,0 +1,56 @@
+"""Sentences of a verdict that are made from the facts of its record; the page's `ui/verdicts.ts` says the same."""
+
+from collections.abc import Mapping
+
+from risk_sac.records import Collision, Judgement, Violation
+
+FULL_BRAKING = "ideal"
+DRIVERS = {
+    "careful": "the careful driver",
+    "fsm": "the fuzzy safety model",
+    "rss": "the RSS driver",
+    FULL_BRAKING: "full braking at once",
+    "r157_ttc": "R157's time-to-collision rule",
+}
+
+
+def prevented_by(violation: Collision | Violation) -> str | None:
+    """Returns, e.g., "the RSS driver would have prevented it"; None where no reference driver was asked."""
+    preventing = _preventing(violation)
+    if not preventing:
+        return None
+    names = [name for name, prevents in preventing.items() if prevents]
+    if names == [FULL_BRAKING]:
+        return f"only {DRIVERS[FULL_BRAKING]} would have prevented it"
+    told = [DRIVERS.get(name, f"the {name.replace('_', ' ')} driver") for name in names]
+    *first, last = told or ["none of the reference drivers"]
+    who = f"{', '.join(first)} and {last}" if first else last
+    return f"{who} would have prevented it"
+
+
+def _preventing(violation: Collision | Violation) -> Mapping[str, bool]:
+    if isinstance(violation, Violation):
+        return violation.drivers
+    return {name: each.avoids for name, each in violation.judgement.drivers.items()} if violation.judgement else {}
+
+
+def known(collision: Collision) -> str:
+    """Returns since when the ego knew of the striker, to follow its name: "of which it had known for 1.0 s"."""
+    seen_s, judged = collision.visible_for_s, collision.judgement
+    if judged is not None and judged.hidden:
+        if seen_s > 0.0:
+            return f"of which it came to know only {seen_s:.1f} s before"
+        return "of which it did not know when the conflict began, nor then"
+    if seen_s > 0.0:
+        return f"of which it had known for {seen_s:.1f} s"
+    return "of which it did not know then" + (", but when the conflict began" if judged else "")
+
+
+def began(collision: Collision, judged: Judgement) -> str:
+    """Returns when the conflict began; one that began hidden counts from when the ego could know of it."""
+    before_s = collision.time_s - judged.conflict_s
+    if not judged.hidden:
+        return f"the conflict began {before_s:.1f} s before the contact"
+    if collision.visible_for_s <= 0.0:
+        return "the conflict was hidden until the contact"
+    return f"the conflict began in hiding and came into sight {before_s:.1f} s before the contact"

@@ -1,0 +1,129 @@
+"""Sentences about the failures of a campaign, read back and compared with their tables and time series."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from risk_sac.cli import main
+from risk_sac.config import FamilyName
+from risk_sac.failures.recording import Recording
+from risk_sac.failures.sentence import story
+from risk_sac.failures.show import caption
+from risk_sac.records import Collision, Judgement, Violation
+from risk_sac.run_folder.results import read_results
+from risk_sac.run_folder.series import read_series
+
+EPISODES, SEED = 40, 5
+NAMES = {
+    "the careful driver": "careful",
+    "the fuzzy safety model": "fsm",
+    "the RSS driver": "rss",
+    "full braking at once": "ideal",
+    "R157's time-to-collision rule": "r157_ttc",
+}
+BRAKES_MPS2, STANDS_MPS = 1.5, 0.5
+
+
+class Told(NamedTuple):
+    """A failure with what is said of it."""
+
+    violation: Collision | Violation
+    series: Mapping[str, Any]
+    title: str
+    sentence: str
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> list[Told]:
+    """All recorded failures of a small campaign per family, refused ones included."""
+    return [each for family in ("low", "mixed", "dense") for each in _told(family, tmp_path_factory.mktemp(family))]
+
+
+def _told(family: FamilyName, folder: Path) -> list[Told]:
+    asked = {"family": family, "method": "archive", "episodes": EPISODES, "seed": SEED, "out": folder / "run"}
+    assert main(["run", *(str(word) for name, value in asked.items() for word in (f"--{name}", value))]) == 0
+    found = []
+    for failure in read_results(folder / "run").failures:
+        series = read_series(folder / "run" / failure.series)
+        recording = Recording(failure, series)
+        title = " ".join(caption(family, recording).split())
+        found.append(Told(recording.violation, series, title, story(series, recording.violation)))
+    return found
+
+
+@pytest.fixture(scope="module")
+def contacts(told: list[Told]) -> list[tuple[Told, Collision, Judgement]]:
+    """The judged contacts among them; of every family at least one."""
+    found = [(each, each.violation) for each in told if isinstance(each.violation, Collision)]
+    assert len(found) >= 3
+    return [(each, hit, hit.judgement) for each, hit in found if hit.judgement is not None]
+
+
+def test_exactly_the_drivers_of_the_table_that_prevent_it_are_named(told: list[Told]) -> None:
+    graded = [each for each in told if each.violation.graded is not None]
+    assert graded
+    for each in graded:
+        table = each.violation.drivers if isinstance(each.violation, Violation) else outcomes(each.violation)
+        said = re.search(r"grade \w+: (only )?(.*?) would have prevented it", each.title)
+        assert said
+        names = {NAMES[name] for name in re.split(", | and ", said[2]) if name != "none of the reference drivers"}
+        assert names == {name for name, prevents in table.items() if prevents}
+        assert not said[1] or names == {"ideal"}
+
+
+def outcomes(hit: Collision) -> dict[str, bool]:
+    assert hit.judgement is not None
+    return {name: each.avoids for name, each in hit.judgement.drivers.items()}
+
+
+def test_what_the_ego_knew_and_when_agrees_with_the_series(
+    contacts: list[tuple[Told, Collision, Judgement]],
+) -> None:
+    for each, hit, judged in contacts:
+        striker = [str(name) for name in each.series["ids"]].index(hit.other_id)
+        known = each.series["visible"][:, striker] == 1.0
+        knew = re.search(r"of which it (had known for|came to know only) ([\d.]+) s", each.title)
+        assert bool(knew) == bool(known[-1])
+        hidden = "came to know" in each.title or "nor then" in each.title
+        assert hidden == judged.hidden == ("from hiding" in each.title)
+        began = re.search(r"the conflict began (?:in hiding and came into sight )?([\d.]+) s before", each.title)
+        if knew:
+            gone_s = len(known) / 10 if known.all() else np.argmin(known[::-1]) / 10
+            assert float(knew[2]) == pytest.approx(gone_s, abs=0.15) or known.all()
+            assert began
+            if hidden:
+                assert float(began[1]) <= float(knew[2]) + 0.05
+        if began:
+            assert float(began[1]) == pytest.approx(hit.time_s - judged.conflict_s, abs=0.051)
+
+
+def test_what_the_ego_does_is_what_it_did_in_the_last_second(
+    contacts: list[tuple[Told, Collision, Judgement]],
+) -> None:
+    for each, hit, judged in contacts:
+        ego = each.sentence.rpartition("; ")[2]
+        speed, accel = (each.series[name][:, 0] for name in ("speed_mps", "accel_mps2"))
+        conflict = min(round((hit.time_s - judged.conflict_s) * 10) + 1, len(accel))
+        latest, since = accel[-min(11, conflict) :], accel[-conflict:]
+        if re.search(r" (brakes, and touches it still|brakes [\d.]+ s late|brakes late)$", ego):
+            assert latest.min() <= -BRAKES_MPS2
+            assert speed[-1] >= STANDS_MPS
+        elif ego.endswith(" speeds up"):
+            assert latest.max() >= BRAKES_MPS2
+        elif ego.endswith((" does not brake", " brakes no longer")):
+            assert accel[-min(9, conflict - 1) :].min(initial=0.0) > -BRAKES_MPS2
+            assert ego.endswith("no longer") == bool((since <= -BRAKES_MPS2).any())
+        elif ego.endswith((" stands", " has stopped")):
+            assert speed[-1] < STANDS_MPS
+        else:
+            assert ego.endswith(" starts")
+            assert speed[-31:].min() < STANDS_MPS <= speed[-1]
+        late = re.search(r"brakes ([\d.]+) s late", ego)
+        if late:
+            first = np.flatnonzero(since <= -BRAKES_MPS2)[0] / 10
+            assert float(late[1]) == pytest.approx(first - 0.4 - 0.75, abs=0.151)
+            assert ", brakes late" in each.title

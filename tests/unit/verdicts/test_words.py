@@ -1,0 +1,55 @@
+from collections.abc import Mapping
+
+import pytest
+
+from risk_sac.records import ReferenceOutcome
+from risk_sac.verdicts.words import began, known, prevented_by
+from tests.builders import collision, judgement, violation
+
+NONE = {"careful": False, "fsm": False, "rss": False, "ideal": False}
+
+
+def contact(drivers: Mapping[str, bool]) -> str | None:
+    outcomes = {name: ReferenceOutcome(avoids=avoids, impact_speed_mps=0.0) for name, avoids in drivers.items()}
+    return prevented_by(collision(judgement=judgement(drivers=outcomes)))
+
+
+@pytest.mark.parametrize(
+    ("who", "preventing"),
+    [
+        ("none of the reference drivers", []),
+        ("only full braking at once", ["ideal"]),
+        ("the careful driver", ["careful"]),
+        ("the RSS driver and full braking at once", ["rss", "ideal"]),
+        ("the careful driver, the fuzzy safety model and full braking at once", ["careful", "fsm", "ideal"]),
+        ("R157's time-to-collision rule", ["r157_ttc"]),
+        ("full braking at once and the far sighted driver", ["ideal", "far_sighted"]),
+    ],
+)
+def test_all_drivers_that_would_have_prevented_it_are_named(who: str, preventing: list[str]) -> None:
+    drivers = NONE | dict.fromkeys(preventing, True)
+    assert contact(drivers) == prevented_by(violation(drivers=drivers)) == f"{who} would have prevented it"
+
+
+def test_nothing_is_said_where_no_driver_was_asked() -> None:
+    assert contact({}) is prevented_by(violation(drivers={})) is prevented_by(collision(judgement=None)) is None
+
+
+@pytest.mark.parametrize(
+    ("hidden", "visible_for_s", "told", "when"),
+    [
+        (False, 3.0, "of which it had known for 3.0 s", "began 1.1 s before the contact"),
+        (
+            True,
+            1.2,
+            "of which it came to know only 1.2 s before",
+            "began in hiding and came into sight 1.1 s before the contact",
+        ),
+        (True, 0.0, "of which it did not know when the conflict began, nor then", "was hidden until the contact"),
+        (False, 0.0, "of which it did not know then, but when the conflict began", "began 1.1 s before the contact"),
+    ],
+)
+def test_what_the_ego_knew_is_said_once(hidden: bool, visible_for_s: float, told: str, when: str) -> None:
+    judged = judgement(hidden=hidden, conflict_s=2.4)
+    hit = collision(time_s=3.5, visible_for_s=visible_for_s, judgement=judged)
+    assert (known(hit), began(hit, judged)) == (told, f"the conflict {when}")
