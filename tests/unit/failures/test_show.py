@@ -104,8 +104,8 @@ def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke()
         "the ego's front, at 10.0 m/s, touched the left of adversary 'pedestrian', at 1.0 m/s, "
         "of which it had known for 1.0 s",
         JUDGED.signature,
-        "the conflict began 1.2 s before the contact · grade careful: the careful driver and full braking at once would "
-        "have",
+        "the conflict began 1.2 s before the contact · grade careful: the careful driver and full braking at once "
+        "would have",
         "prevented it",
         "broken by the other: pedestrian on red · by the ego: nothing",
     ]
