@@ -7,7 +7,7 @@ import pytest
 from risk_sac.errors import ConfigError
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.show import CAPTION_WIDTH, caption, draw, draw_recording
-from risk_sac.records import Grade, Outcome
+from risk_sac.records import Grade, Outcome, Severity
 from risk_sac.run_folder.results import RecordedFailure
 from tests.builders import TOUCHES, episode_record, violation
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
@@ -117,6 +117,12 @@ def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke()
     assert " ".join(lines(grade=Grade.UNAVOIDABLE, drivers={"careful": TOUCHES, "ideal": TOUCHES})[-3:-1]).endswith(
         "grade unavoidable: none of the reference drivers would have prevented it"
     )
+
+
+def test_the_title_says_how_bad_the_contact_is() -> None:
+    said = "severe: they close at 10.1 m/s, the risk of death is 2.6 %"
+    assert said not in lines()
+    assert said in lines(severity=Severity.SEVERE, injury_risk=0.026)
 
 
 def test_rules_that_the_contact_failed_are_named_in_full_on_lines_that_the_page_holds() -> None:
