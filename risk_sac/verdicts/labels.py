@@ -76,7 +76,7 @@ def manoeuvre(evidence: Evidence) -> str:
 def response(evidence: Evidence, conflict: Conflict) -> str:
     """none, late_braking, braking, standing, starting or accelerating: what the ego did in the last second.
 
-    Of what came before the conflict nothing counts. Of braking and speeding up, the later counts. Late is an ego that
+    Of what came before the conflict nothing counts. Of braking and speeding up, the longer counts. Late is an ego that
     first braked in the conflict later than the careful driver. One that stood within the last 3 s and gains speed at
     the contact is starting.
     """
@@ -91,7 +91,7 @@ def response(evidence: Evidence, conflict: Conflict) -> str:
     acts = latest[(latest <= -BRAKES_MPS2) | (latest >= SPEEDS_UP_MPS2)]
     if len(acts) == 0:
         return "none"
-    if acts[-1] > 0.0:
+    if (acts > 0.0).sum() > len(acts) / 2:
         return "accelerating"
     after_s = np.flatnonzero(accel[conflict.frame :] <= -BRAKES_MPS2)[0] * evidence.step_s
     return "late_braking" if after_s > CAREFUL_PERCEIVES_S + CAREFUL_DELAY_S else "braking"

@@ -105,7 +105,8 @@ def test_a_background_striker_is_named_so() -> None:
         (((2.5, -2.0), (3.0, 0.0)), "none"),  # it let go of the brake long before the last second
         (((2.5, -2.0), (3.0, 2.0)), "accelerating"),
         (((3.0, 2.0),), "accelerating"),
-        (((3.5, 2.0), (4.2, -2.0)), "late_braking"),  # the later counts
+        (((3.5, 2.0), (3.7, -2.0)), "late_braking"),  # the longer counts
+        (((2.5, -3.0), (5.0, 2.0)), "braking"),  # it let go of the brake just before
         (((3.5, 1.0),), "none"),
     ],
 )
