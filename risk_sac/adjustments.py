@@ -1,4 +1,4 @@
-"""What becomes of an ODD where a family or an ego does not support it as it is written."""
+"""Names the settings that a family or an ego does not support as they are written."""
 
 from collections.abc import Iterator
 from typing import Any

@@ -102,9 +102,10 @@ def _measured(
 
 @compiled
 def nearest_lane(lanes: Floats, x: float, y: float, heading: float) -> tuple[float, float]:
-    """Distance to the middle of the nearest lane of the ego's direction, inf without one, and the limit there.
+    """Finds the distance to the nearest lane of the ego's direction, and its limit.
 
-    The limit where there is none is that of the nearest lane of any direction; inf without one.
+    The distance is to the lane's middle, inf without one; the limit is then that of the nearest lane of any direction,
+    inf without one.
     """
     cos, sin = math.cos(heading), math.sin(heading)
     least2, least2_any, limit, limit_any = math.inf, math.inf, math.inf, math.inf
@@ -151,7 +152,9 @@ def depth(edges: Floats, x: float, y: float) -> float:
 
 @compiled
 def overtakes(edges: Floats, state: Floats) -> bool:
-    """Whether an actor stands, or is slower than the ego, on the carriageway of the ego's direction beside or ahead.
+    """Tells whether the ego passes an actor that stands or is slower.
+
+    The actor is on the carriageway of the ego's direction, beside the ego or ahead.
 
     Choice: from `PASSED_M` behind the ego's rear, room to come back, to `PASSING_M` ahead of its centre.
     """
@@ -169,7 +172,7 @@ def overtakes(edges: Floats, state: Floats) -> bool:
 
 @compiled
 def headway(state: Floats, kind: NDArray[np.int8], curvature: float) -> float:
-    """Time gap to the vehicle ahead that the ego follows, s: from bumper to body, at the ego's speed.
+    """Computes the time gap to the vehicle that the ego follows, s: from bumper to body, at the ego's speed.
 
     The corridor is as wide as the ego, along the arc that it drives now (ISO 15622 predicts the way alike). Vehicles
     that come towards it or cross at more than 60° are not followed.

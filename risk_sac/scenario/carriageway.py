@@ -91,7 +91,7 @@ def sector_of(heading_rad: float) -> int:
 
 
 def _lanes(net: Net) -> Iterator[tuple[Lane, float]]:
-    """Lanes for cars with their speed limits; SUMO's own of lanes inside junctions say how fast one can turn."""
+    """Finds lanes for cars and their speed limits; SUMO's limits inside junctions are turning speeds."""
     entered: dict[str, float] = {}
     for link in (link for links in net.onward.values() for link in links):
         for lane in link.inside:

@@ -34,7 +34,7 @@ VISIBILITY, NIGHT = "visibility_m", "night"
 
 
 class Conditions(NamedTuple):
-    """How far can be seen in an episode, whatever the sensor."""
+    """Visibility in an episode, which bounds every sensor."""
 
     visibility_m: float
     unlit_m: float  # the same of a body without lights

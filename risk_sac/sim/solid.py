@@ -44,7 +44,7 @@ def drives_into(
     braking: tuple[float, float, float],
     hardest_mps2: float,
 ) -> int:
-    """Where a vehicle that takes a step and then brakes to a stand meets another body than the ego's.
+    """Finds where a vehicle that takes a step and then brakes meets another body than the ego's.
 
     Args:
       state: of a frame, `rows x n`.
@@ -132,9 +132,9 @@ def _segment(path: Floats, first: int, station_m: float) -> int:
 
 @compiled
 def _foresee(state: Floats, own: int, speed: float, brake_mps2: float) -> Floats:
-    """What the others are expected to do, `rows x n`; `rows x 0` if none can be met before the adversary has stopped.
+    """Foresees the others, `rows x n`; `rows x 0` if none can be met before the adversary has stopped.
 
-    One that the adversary is inside of is left out.
+    A body that the adversary is inside of is left out.
     """
     stops_s, cos, sin = speed / brake_mps2 + BUILD_UP_S, math.cos(state[HEADING, own]), math.sin(state[HEADING, own])
     foreseen = np.full((3, state.shape[1]), np.nan)
@@ -160,9 +160,9 @@ def _foresee(state: Floats, own: int, speed: float, brake_mps2: float) -> Floats
 def _meets(
     state: Floats, foreseen: Floats, pose: Pose, size: Size, after_s: float, hardest_mps2: float, side: int
 ) -> int:
-    """Where the adversary, at `pose` after a time, meets another for the first time.
+    """Finds where the adversary, at `pose` after a time, meets another for the first time.
 
-    What comes from behind keeps its own distance, unless it is on the side to which the adversary moves.
+    A vehicle that comes from behind keeps its own distance, unless it is on the side to which the adversary moves.
     """
     found = CLEAR
     for other in range(1, state.shape[1]):

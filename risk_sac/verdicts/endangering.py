@@ -1,4 +1,4 @@
-"""What a striker did that endangered the ego: an unsafe lane change, a brake check, a turn into the ego's way.
+"""Offences of a striker that endangered the ego: unsafe lane change, brake check, turn into the ego's way.
 
 Background traffic is not asked for brake checks: SUMO's drivers brake for a reason, which is not always on record.
 """
@@ -45,7 +45,7 @@ def endangered_ego(evidence: Evidence, striker: int, conflict: Conflict) -> tupl
 
 
 def changes_lane_unsafely(evidence: Evidence, striker: int, seen: Along[Floats]) -> bool:
-    """Whether a vehicle came over into the ego's lane beside the ego, or with less room than UN R157 allows."""
+    """Tells whether a vehicle came into the ego's lane beside it, or with less room than UN R157 allows."""
     if np.ptp(seen.across_m[evidence.since(RECENT_S) :]) <= WANDER_M:  # it kept its place
         return False
     return not enters_safely(evidence, striker, seen, R157_GAP_M)
@@ -63,7 +63,7 @@ def enters_safely(evidence: Evidence, striker: int, seen: Along[Floats], least_g
 
 
 def checks_brakes(evidence: Evidence, striker: int, seen: Along[Floats], began: int) -> bool:
-    """Whether a vehicle before the ego braked harder than 4 m/s² for 0.5 s without a reason on record.
+    """Tells whether a vehicle before the ego braked by over 4 m/s² for 0.5 s without a reason on record.
 
     It is asked of the last 3 s, or from frame `began` of the conflict on. A reason is a road user within 30 m ahead of
     it, or a signal at which it may have to stop.
@@ -78,7 +78,7 @@ def checks_brakes(evidence: Evidence, striker: int, seen: Along[Floats], began: 
 
 
 def turns_into_path(evidence: Evidence, striker: int) -> bool:
-    """Whether a pedestrian turned by 30° or more, and so came on a collision course with an ego that it could see.
+    """Tells whether a pedestrian turned by 30° or more into the way of an ego that it could see.
 
     It is asked of the last 4 s. What the ego sees can see the ego.
     """
@@ -97,7 +97,7 @@ def turns_into_path(evidence: Evidence, striker: int) -> bool:
 
 
 def _intrusion(evidence: Evidence, striker: int, seen: Along[Floats]) -> int:
-    """The frame in which the striker last came 0.3 m into the ego's lane; the contact's if it did not."""
+    """Finds the frame in which the striker last came 0.3 m into the ego's lane; the contact's if it did not."""
     e = evidence
     reach = (
         np.abs(np.sin(seen.turn_rad)) * e.length_m[striker] + np.abs(np.cos(seen.turn_rad)) * e.width_m[striker]
@@ -108,7 +108,7 @@ def _intrusion(evidence: Evidence, striker: int, seen: Along[Floats]) -> int:
 
 
 def _any_ahead(evidence: Evidence, vehicle: int, frames: NDArray[np.int64]) -> Bools:
-    """Whether any other road user is within 30 m before a vehicle, in its way or stepping into it, in these frames."""
+    """Tells whether another road user is within 30 m before a vehicle and in its way, or about to be."""
     e = evidence
     others = np.delete(np.arange(len(e.ids)), vehicle)
     dx, dy = (each[np.ix_(frames, others)] - each[frames, vehicle, None] for each in (e.x_m, e.y_m))

@@ -94,7 +94,7 @@ def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor 
 
 
 def _driven(name: str, e: Evidence, path: Path, met: MetActor | None, after_steps: int) -> tuple[Floats, int]:
-    """Returns metres along the path per frame, NaN once the driver stands, and the frame from which it brakes."""
+    """Drives along the path: metres per frame, NaN once the driver stands, and the frame from which it brakes."""
     last = len(e.time_s) - 1
     if met is None:
         return path.s.copy(), last
@@ -112,7 +112,7 @@ def _driven(name: str, e: Evidence, path: Path, met: MetActor | None, after_step
 
 
 def _within_limit(s: Floats, first: int, most_m: float) -> Floats:
-    """Drives the same no faster than the limit from frame `first` on; `most_m` is the limit's way in a step."""
+    """Limits the speed from frame `first` on; `most_m` is the limit's way in a step."""
     steps = np.diff(s, prepend=s[:1])
     for t in range(first, len(steps)):
         steps[t] = min(steps[t], max(most_m, steps[t - 1] - EASES_MPS2 * STEP_S**2))

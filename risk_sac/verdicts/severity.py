@@ -1,4 +1,4 @@
-"""How bad a contact is: the risk of injury at its closing speed, and the class that follows.
+"""Severity of a contact: the risk of injury at its closing speed, and the class that follows.
 
 Both curves are logistic, P = 1 / (1 + exp(a - b v)). They hold for a population, not for the one contact, and neither
 knows where the body was struck.
@@ -35,7 +35,7 @@ def fatality_risk(closing_mps: float) -> float:
 
 
 def serious_injury_risk(delta_v_mps: float) -> float:
-    """Returns the risk that an occupant is injured by MAIS 3 or more when its car's velocity changes by that much."""
+    """Computes an occupant's risk of an injury of MAIS 3 or more for a change of velocity."""
     return _logistic(MAIS3, delta_v_mps * MILES_PER_H)
 
 

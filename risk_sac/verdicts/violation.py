@@ -30,7 +30,7 @@ SAME_OFFENCES = {NO_RED_LIGHT_ENTRY: ("red_light",), ON_CARRIAGEWAY: ("off_road"
 def requirement_results(
     requirements: Sequence[Requirement], time_s: Sequence[float], measures: Sequence[Measures], contact_s: float | None
 ) -> dict[str, RequirementResult]:
-    """How far each requirement was kept in an episode.
+    """Finds how far each requirement was kept in an episode.
 
     Args:
       requirements: `M`.
@@ -125,7 +125,7 @@ def _violation(
 
 
 def _soonest_met(measures: Measures) -> int | None:
-    """The column in the frame of the actor that the ego would meet soonest; None if it would meet none."""
+    """Finds the column of the actor that the ego would meet soonest; None if it would meet none."""
     encounter_s = measures.assessment.others[ENCOUNTER]
     nearest = int(encounter_s.argmin())
     return nearest + 1 if encounter_s[nearest] < ENCOUNTER_CAP_S else None

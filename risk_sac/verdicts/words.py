@@ -1,4 +1,4 @@
-"""Sentences of a verdict that are made from the facts of its record; the page's `ui/verdicts.ts` says the same."""
+"""Makes the sentences of a verdict from its record; the page's `ui/verdicts.ts` says the same."""
 
 from collections.abc import Mapping
 
