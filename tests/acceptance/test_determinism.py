@@ -16,6 +16,7 @@ from risk_sac.config import (
     Iid,
     LearnerConfig,
     ReplayConfig,
+    Requirement,
     RunSpec,
     SceneOptimizerConfig,
     WarmStartConfig,
@@ -116,7 +117,7 @@ def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
 
 def test_a_resumed_i_i_d_phase_draws_on_and_no_search_meets_its_scenes(tmp_path: Path) -> None:
     drawn = CampaignSpec(families=("mixed",), iid=Iid(episodes=4), learner=LEARNER).drawn()[1]
-    whole, first, rest, searched = Listener(), Listener(2), Listener(), Listener()
+    whole, first, rest, searched = Listener(), Listener(2), Listener(10**9), Listener(10**9)
     expected = train(drawn, tmp_path / "whole", whole)
     train(drawn, tmp_path / "parts", first)
     resumed = train(drawn, tmp_path / "parts", rest)
@@ -176,11 +177,17 @@ def test_a_run_with_damaged_checkpoints_equals_one_never_interrupted(
 
 
 def test_a_damaged_series_is_reported_as_it_was_written(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    _, told = run(tmp_path, seed=20, method="random")
-    lost, changed = [file for file in told.series if file is not None]
+    slow = Requirement(name="slow", formula="ego_speed_mps <= 1")  # which the ego violates in each episode
+    failing, told, again = (
+        spec(method="random").model_copy(update={"requirements": (slow,)}),
+        Listener(10**9),
+        Listener(10**9),
+    )
+    train(failing, tmp_path, told)
+    lost, changed, *_ = [file for file in told.series if file is not None]
     (tmp_path / FAILURES / lost.name).unlink()
     (tmp_path / FAILURES / changed.name).write_bytes(b"PK")
-    _, again = run(tmp_path, seed=20, method="random")
+    train(failing, tmp_path, again)
     assert again.series == told.series
     assert {lost.name, changed.name} == {Path(record.args[0]).name for record in caplog.records if record.args}
 
