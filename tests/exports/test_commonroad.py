@@ -72,7 +72,7 @@ def test_its_checker_finds_what_ego_and_striker_drove_feasible(
     family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
 ) -> None:
     recorded = failure(family)
-    striker = [actor.id for actor in recorded.actors].index(recorded.collision.other_id)
+    striker = [actor.id for actor in recorded.actors].index(recorded.violation.other_id)
     vehicles = [ACTORS] + [ACTORS + striker] * (not recorded.actors[striker].pedestrian)
     file = exported(family, FormatName.COMMONROAD) / "failure-as-recorded.xml"
     told = json.loads(ask_checkers("ask_commonroad.py", file, *map(str, vehicles)))
