@@ -23,7 +23,7 @@ EGOS = '[far]\naddress = "127.0.0.1:9"\nversion = "ä"\nresponse_time_s = 0.3\n'
 
 
 def read_known(file: Path) -> object:
-    names = ("max_ecr", "max_pcr", "max_preventable")
+    names = ("max_ecr", "max_pcr", "max_preventable", "max_rate")
     return Bounds.of(argparse.Namespace(**dict.fromkeys(names), no_new_failures=file, judge_by="rate")).known
 
 

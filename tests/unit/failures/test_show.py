@@ -120,7 +120,7 @@ def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke()
 
 
 def test_the_title_says_how_bad_the_contact_is() -> None:
-    said = "severe: they close at 10.1 m/s, the risk of death is 2.6 %"
+    said = "severe: closing speed 10.1 m/s, risk of death 2.6 %"
     assert said not in lines()
     assert said in lines(severity=Severity.SEVERE, injury_risk=0.026)
 
