@@ -27,7 +27,7 @@ from risk_sac.process_state import c_numbers
 from risk_sac.records import Collision, RequirementResult, Violation
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.realism import refuse_danger, refuse_overlap, soft_cost
-from risk_sac.risk.reward import Violated, risk_reward, worth
+from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.carriageway import carriageway_of
 from risk_sac.scenario.environment import conditions
@@ -76,7 +76,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._pilot = None if ego is None else EgoPilot(ego)
         self._sim = SumoSimulation(problem.ego, self._perception, self._pilot)
         self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, reward.softmin_sharpness)
-        self._violated = Violated(problem.requirements)
+        self._violated = ViolationDepth(problem.requirements)
         self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
         self.observation_size = self._encoder.size
         self.action_size = problem.action_size

@@ -45,7 +45,7 @@ def risk_reward(
       rss_margin: the smallest after the step of the larger of both RSS margins, scaled; below 0 both are violated.
       valid_collision: what the valid collision is worth in which the step ended, in (0, 1]; else 0.
       degenerate_collision: 1 if it ended in contact that a validity rule refuses.
-      violated: scales by which other requirements that count were violated for the first time; see `Violated`.
+      violated: scales by which other requirements that count were violated for the first time; see `ViolationDepth`.
       config: sizes of the four terms.
 
     Source of the third term: Shalev-Shwartz et al., "On a formal model of safe and scalable self-driving cars", 2017.
@@ -57,11 +57,11 @@ def risk_reward(
     return reward
 
 
-class Violated:
-    """How far an episode has violated the requirements that count, without contact.
+class ViolationDepth:
+    """Measures how deeply an episode has violated requirements without contact.
 
-    Choice: each pays for its depth, up to a scale and once, so that nothing is gained by staying in a violation, and
-    nothing for what was violated before the adversaries were released.
+    Choice: each requirement that counts pays for its depth, up to a scale and once, so that nothing is gained by
+    staying in a violation, and nothing for what was violated before the adversaries were released.
     """
 
     def __init__(self, requirements: Sequence[Requirement]) -> None:

@@ -30,7 +30,9 @@ def test_degenerate_contact_never_pays_more_than_no_contact() -> None:
 
 def test_a_violation_is_paid_once_by_its_depth_and_only_after_the_release() -> None:
     counts = {"no_contact": "failure", "on_red": "failure", "gap": "report", "slow": "failure"}
-    violated = reward.Violated([Requirement(name=name, formula="1 > 0", counts=how) for name, how in counts.items()])
+    violated = reward.ViolationDepth(
+        [Requirement(name=name, formula="1 > 0", counts=how) for name, how in counts.items()]
+    )
     violated.begin(np.array([1.0, 1.0, 1.0, -0.25]))
     steps = [[0.0, 0.4, -2.0, -0.25], [0.0, -0.3, -2.0, 1.0], [0.0, 0.5, 1.0, -0.5], [-1.0, -3.0, 1.0, -0.5]]
     gained = [violated.gained(np.array(robustness)) for robustness in steps]
