@@ -20,7 +20,7 @@ from risk_sac.scenario.environment import with_environment
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import GRAVITY_MPS2, limits_from_odd
-from risk_sac.scenario.odd import SHIPPED, intersect, narrow, requirements_from_odd
+from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS, intersect, narrow, requirements_from_odd
 from risk_sac.scenario.space import SceneSpace
 from risk_sac.types import STEP_S
 
@@ -113,7 +113,7 @@ def _own(field: str, requirement: Requirement, shipped: Mapping[str, Requirement
     name = requirement.name
     if name not in shipped:
         if not requirement.formula:
-            if name in SHIPPED:
+            if name in SHIPPED_REQUIREMENTS:
                 return None
             raise ConfigError(f"{field}.formula", "none", f"one, or a shipped requirement's name: {', '.join(shipped)}")
         return requirement

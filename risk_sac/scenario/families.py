@@ -8,7 +8,6 @@ from risk_sac.config import SHIPPED
 from risk_sac.scenario import car_following, hidden_pedestrian, junction
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.library import kept
-from risk_sac.scenario.odd import requirements_from_odd
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Place, Stretch
 
 
@@ -28,12 +27,6 @@ def _shipped(name: str) -> Family:
 
 
 FAMILIES: dict[str, Family] = {name: _shipped(name) for name in SHIPPED}
-
-
-def shipped_requirements() -> tuple[str, ...]:
-    """Names of the requirements that the shipped families have."""
-    found = (requirements_from_odd(family.odd, response_s=0.0) for family in FAMILIES.values())
-    return tuple(dict.fromkeys(requirement.name for each in found for requirement in each))
 
 
 def family_named(name: str) -> Family:

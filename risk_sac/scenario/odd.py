@@ -135,7 +135,7 @@ def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
 
 
 # Names of all that `requirements_from_odd` makes of one ODD or another.
-SHIPPED = (
+SHIPPED_REQUIREMENTS = (
     NO_CONTACT,
     "on_carriageway",
     "safe_ttc",

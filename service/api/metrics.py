@@ -14,7 +14,7 @@ from pydantic_core import from_json
 
 from risk_sac.execution.executor import Cluster, Node
 from risk_sac.records import State
-from service.api.requirements import SHIPPED
+from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS
 from service.errors import StorageError
 from service.runs.manager import Manager
 from service.store.reading import Store
@@ -84,7 +84,7 @@ class CampaignMetrics(Collector):
         self._manager = manager
         self._counters = {name: _Monotone(SEARCH) for name in COUNTERS}
         self._of_requirements = {step: _Monotone(REQUIREMENT) for step in OF_REQUIREMENTS}
-        self._labelled = set(SHIPPED)
+        self._labelled = set(SHIPPED_REQUIREMENTS)
 
     def collect(self) -> Iterator[Metric]:
         """All families; without those of the database while it cannot be read."""
@@ -123,7 +123,7 @@ class CampaignMetrics(Collector):
     def _requirements(self, statistics: Statistics) -> Iterator[Metric]:
         """The funnel of each requirement; of users' requirements only so many names become labels, and stay labels."""
         for row in statistics.requirements:
-            if len(self._labelled) < len(SHIPPED) + MOST_OWN:
+            if len(self._labelled) < len(SHIPPED_REQUIREMENTS) + MOST_OWN:
                 self._labelled.add(row.name)
         for step, (name, meaning) in OF_REQUIREMENTS.items():
             sums = Counts[tuple[str, ...]]()

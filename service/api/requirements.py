@@ -1,23 +1,12 @@
 """The names of requirements that a filter takes and that metrics are labelled with."""
 
-from collections.abc import Sequence
 from typing import Annotated
 
 from fastapi import Depends, Query
 
-from risk_sac.config import EgoConfig
-from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.odd import requirements_from_odd
+from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS
 from service.api.answers.problems import invalid_field
 from service.api.context import CurrentCaller, Service
-
-SHIPPED: Sequence[str] = tuple(
-    dict.fromkeys(
-        requirement.name
-        for family in FAMILIES.values()
-        for requirement in requirements_from_odd(family.odd, EgoConfig().response_s)
-    )
-)
 
 
 def _known(
@@ -35,7 +24,7 @@ def _known(
     """The requirement asked for; a 422 that names the campaign's unless it has this one."""
     if requirement is None:
         return None
-    known = dict.fromkeys([*SHIPPED, *service.store.own_requirements(campaign_id, caller.sees)])
+    known = dict.fromkeys([*SHIPPED_REQUIREMENTS, *service.store.own_requirements(campaign_id, caller.sees)])
     if requirement not in known:
         raise invalid_field("requirement", requirement, f"one of: {', '.join(known)}")
     return requirement

@@ -64,9 +64,9 @@ def _prepare(options: argparse.Namespace) -> Bounds:
 def _check_names(bounds: Bounds, spec: CampaignSpec) -> None:
     """Refuses a bound of a requirement that no campaign ships and this one does not add."""
     if bounds.requirements:
-        from risk_sac.scenario.families import shipped_requirements  # here, because loading families takes a while
+        from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS  # here, because loading it takes a while
 
-        bounds.check_names([*shipped_requirements(), *(each.name for each in spec.requirements)])
+        bounds.check_names([*SHIPPED_REQUIREMENTS, *(each.name for each in spec.requirements)])
 
 
 def _follow(client: Client, campaign_id: str, options: argparse.Namespace) -> int:

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from risk_sac.config import DynamicElements, Environment, Interval, Odd, Scenery
 from risk_sac.errors import OddError
 from risk_sac.risk.stl import Monitor
-from risk_sac.scenario.odd import SHIPPED, intersect, narrow, requirements_from_odd, widest
+from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS, intersect, narrow, requirements_from_odd, widest
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 
@@ -199,7 +199,7 @@ def test_requirements_follow_the_odd() -> None:
         "no_red_light_entry",
         "bounded_braking",
     }
-    assert everything == set(SHIPPED)
+    assert everything == set(SHIPPED_REQUIREMENTS)
     motorway = Odd(scenery=Scenery(signal_types=("none",)), dynamic=DynamicElements(actor_kinds=("vehicle",)))
     left_out = everything - {r.name for r in requirements_from_odd(intersect(DEFAULT, motorway), 0.5)}
     assert left_out == {"pedestrian_gap", "no_red_light_entry"}
