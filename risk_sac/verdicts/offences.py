@@ -102,7 +102,7 @@ def took_priority(evidence: Evidence, taker: int, other: int) -> bool:
         return True
     ahead = evidence.link[evidence.since(JUNCTION_S) :, other]
     shown = ahead[ahead != 0]
-    return bool(len(shown) and shown[-1] in MAJOR)
+    return bool(len(shown) and int(shown[-1]) in MAJOR)
 
 
 def reverses(evidence: Evidence, striker: int) -> bool:

@@ -112,7 +112,7 @@ def stage(
         lateral_mps=vy * np.cos(heading) - vx * np.sin(heading),
         accel_mps2=np.diff(speed, axis=0, prepend=speed[:1]) / STEP_S,
         lane_offset_m=offset,
-        link=np.zeros((len(times), n), dtype=np.uint8),
+        link=np.zeros((len(times), n)),  # as `Trace.series` has it, which needs NaN
         known=np.repeat((times >= seen_from_s - 1e-9)[:, None], n, axis=1) | (np.arange(n) == 0),
         ground=ground,
     )
