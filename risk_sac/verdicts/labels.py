@@ -84,7 +84,8 @@ def response(evidence: Evidence, conflict: Conflict) -> str:
     if speed[-1] < STANDING_MPS:
         return "standing"
     recent = speed[evidence.since(RECENT_S) :]
-    if recent.min() < STANDING_MPS and recent[-1] >= recent.max() - STANDING_MPS:
+    stood = np.flatnonzero(recent < STANDING_MPS)
+    if len(stood) and recent[-1] >= recent[stood[-1] :].max() - STANDING_MPS:
         return "starting"
     accel = evidence.accel_mps2[:, 0]
     latest = accel[max(conflict.frame, evidence.since(RESPONSE_S)) :]

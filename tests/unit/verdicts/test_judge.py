@@ -120,6 +120,11 @@ def test_an_ego_that_has_just_set_off_is_starting() -> None:
     assert judged(evidence).ego_response == "starting"
 
 
+def test_an_ego_that_sets_off_again_where_it_has_just_stopped_is_starting() -> None:
+    ego = straight(0.0, 0.0, 0.0, 6.0, (0.5, -6.0), (1.6, 2.0))
+    assert judged(stage(ego, straight(23.0, 0.0, 0.0, 0.0))).ego_response == "starting"
+
+
 def test_an_ego_that_stands_is_struck() -> None:
     evidence = stage(straight(0.0, 0.0, 0.0, 0.0), straight(60.0, 0.0, np.pi, 10.0))
     assert judged(evidence).ego_response == "standing"

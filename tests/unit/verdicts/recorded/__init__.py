@@ -1,0 +1,21 @@
+"""Recorded contacts that verdicts were once wrong about: an archive search of 300 episodes per family, seed 901."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from risk_sac.config import RunSpec
+from risk_sac.problem import Problem
+from risk_sac.verdicts.evidence import Evidence, Ground
+
+
+def recorded(name: str) -> tuple[Evidence, str]:
+    """Reads a contact, such as "dense_267", and returns its evidence and the striker's id."""
+    family, _ = name.split("_")
+    with np.load(Path(__file__).with_name(f"{name}.npz")) as file:
+        series = dict(file)
+    problem = Problem.from_spec(RunSpec.model_validate({"family": family, "method": "archive", "seed": 901}))
+    layout = problem.family.layout(json.loads(str(series["scene"])))
+    ground = Ground.of(layout, problem.speed_limit_mps)
+    return Evidence.from_series(series, ground, float(series["released_s"])), str(series["striker"])
