@@ -42,7 +42,7 @@ from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import collision_of
 from risk_sac.verdicts.keeping import History
-from risk_sac.verdicts.online import CarefulReflex, conflicts_now
+from risk_sac.verdicts.online import R157Reflex, conflicts_now
 from risk_sac.verdicts.path import Path, polyline
 from risk_sac.verdicts.validity import EpisodeFacts
 from risk_sac.verdicts.violation import requirement_results, violations_of
@@ -194,7 +194,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         limits = limits_from_odd(self.problem.odd, layout.friction)
         self._ground = Ground.of(layout, self.problem.speed_limit_mps)
         sumo_seed = int(self.np_random.integers(2**31 - 1))
-        self._reflex = CarefulReflex(self._ground) if self.problem.ego.profile == "careful" else None
+        self._reflex = R157Reflex(self._ground) if self.problem.ego.profile == "careful" else None
         self._gauge.reset(carriageway_of(layout.net))
         self.trace = Trace(self._gauge.names)
         sensor = self.problem.ego.sensor
@@ -206,7 +206,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._lead_in(self._sim.reset(layout, sumo_seed), scene)
         self._released_s = self._frame.time_s
         self._adversaries = Adversaries(self.problem.family, limits, self._frame)
-        refuse_danger(self._measures.assessment, scene, in_conflict=self._careful_driver_in_conflict())
+        refuse_danger(self._measures.assessment, scene, in_conflict=self._r157_driver_in_conflict())
         self._violated.begin(self._measures.robustness)
         self._sim.hand_over_ego()
         if self._controlled:
@@ -231,7 +231,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _measure(self, before: Frame | None, struck: int = 0) -> Measures:
         return self._gauge.measure(self._frame, before, self._perception.seen, struck)
 
-    def _careful_driver_in_conflict(self) -> bool:
+    def _r157_driver_in_conflict(self) -> bool:
         # Wary: the policy is not handed a vehicle that hangs over beside the ego already.
         return bool(conflicts_now(self._frame, self._ego_path(), self._in_sight(), self._ground, wary=True).any())
 

@@ -174,7 +174,7 @@ def conclude(campaign: Campaign) -> int:
     if progress.distinct_failures == 0:
         console.print("no valid failure was found; try more --episodes or another --seeds", style="bold red")
         return 1
-    preventable = f"a careful driver would have prevented: {progress.distinct_preventable}"
+    preventable = f"a reference driver would have prevented: {progress.distinct_preventable}"
     console.print(f"distinct failures: {progress.distinct_failures}; {preventable}", style="bold green")
     return 0
 

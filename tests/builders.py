@@ -114,7 +114,7 @@ class Told:
         return self.tell(frame, self._frames - 1)
 
 
-def judgement(grade: Grade | None = Grade.CAREFUL, conflict_s: float = 2.5, **changes: Any) -> Judgement:
+def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, **changes: Any) -> Judgement:
     """Of a vehicle that cuts in while the ego drives straight; the drivers' outcomes follow from the grade."""
     values: dict[str, Any] = {
         "definitions": 1,
@@ -129,7 +129,7 @@ def judgement(grade: Grade | None = Grade.CAREFUL, conflict_s: float = 2.5, **ch
         "broke": ("red_light", "speeding"),
         "unresponsive": False,
         "drivers": {
-            "careful": AVOIDS if grade is Grade.CAREFUL else TOUCHES,
+            "r157": AVOIDS if grade is Grade.PREVENTABLE else TOUCHES,
             "bound": TOUCHES if grade is Grade.UNAVOIDABLE else AVOIDS,
         },
         "signature": "cut-in, straight",

@@ -32,8 +32,8 @@ class SensorConfig(Settings):
 class EgoConfig(Settings):
     """SUMO's default driver with a driver's delay and view, or a driver that the operator has registered.
 
-    The profile `perfect` reacts within one simulation step and sees everything; `careful` adds the braking of the
-    careful driver, which decides what is preventable. A registered driver takes over at the adversaries' release
+    The profile `perfect` reacts within one simulation step and sees everything; `careful` adds the braking of UN
+    R157's driver. A registered driver takes over at the adversaries' release
     and has the same view.
     """
 

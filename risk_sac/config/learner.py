@@ -85,7 +85,7 @@ class RewardConfig(Settings):
     """R_risk (terms of Eq. 1) and the shaping potential (Eq. 6-8)."""
 
     valid_collision: Weight = 20.0
-    """Bonus for a valid collision that the careful driver would have prevented."""
+    """Bonus for a valid collision that a reference driver would have prevented."""
     violation: Weight = 10.0
     """Bonus for each scale by which a requirement that counts is violated without contact, up to one."""
     unpreventable: Fraction = 0.5

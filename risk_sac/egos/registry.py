@@ -27,7 +27,7 @@ from risk_sac.errors import ConfigError, EgoFailed
 
 GROUP, FILE = "risk_sac.egos", "RISK_SAC_EGOS"
 SHIPPED = {
-    "r157": "risk_sac.egos.careful:Careful",
+    "r157": "risk_sac.egos.r157:R157",
     "rss": "risk_sac.egos.rss_responder:RssResponder",
     "idm-aeb": "risk_sac.egos.idm_aeb:IdmAeb",
     "broken": "risk_sac.egos.broken:Broken",

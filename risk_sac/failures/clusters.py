@@ -32,7 +32,7 @@ class Cluster(Record):
     failures: int
     distinct: int
     preventable: int
-    """That the careful driver would have prevented."""
+    """That a reference driver would have prevented."""
     representative: str
     """Id of the one to look at first: the most preventable, and of those the shortest."""
     grade: Grade | None
@@ -85,12 +85,12 @@ def _cluster(name: str, members: Sequence[_Member], distinct: int) -> Cluster:
 
 
 def _rank(member: _Member) -> tuple[int, float, int]:
-    """Returns what orders failures: grade, impact speed of the careful driver, length."""
+    """Returns what orders failures: grade, impact speed of R157's driver, length."""
     violation = member.violation
     grade = list(Grade).index(violation.graded) if violation.graded else len(Grade)
     judged = violation.judgement if isinstance(violation, Collision) else None
-    careful = judged and judged.drivers.get("careful")
-    return grade, careful.impact_speed_mps if careful else math.inf, member.episode.steps
+    r157 = judged and judged.drivers.get("r157")
+    return grade, r157.impact_speed_mps if r157 else math.inf, member.episode.steps
 
 
 def _features(violation: Collision | Violation) -> Floats:

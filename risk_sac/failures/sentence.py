@@ -9,7 +9,7 @@ from risk_sac.failures.recording import Series
 from risk_sac.records import Collision, Violation
 from risk_sac.types import STEP_S, Floats, Kind
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
-from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
+from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
 from risk_sac.verdicts.labels import ONCOMING_COS, RESPONSES
 from risk_sac.verdicts.offences import IN_WORDS, STANDING_MPS
 
@@ -105,7 +105,7 @@ def _response(series: Series, began: int, response: str) -> str:
     """Returns the recorded response in words, with how late it is, or what was before it."""
     braked = np.flatnonzero(series["accel_mps2"][began:, 0] <= -BRAKES_MPS2)
     if response == "late_braking":
-        late_s = (int(braked[0]) if len(braked) else 0) * STEP_S - CAREFUL_PERCEIVES_S - CAREFUL_DELAY_S
+        late_s = (int(braked[0]) if len(braked) else 0) * STEP_S - R157_PERCEIVES_S - R157_DELAY_S
         return f"brakes {late_s:.1f} s late" if late_s >= STEP_S / 2 else RESPONSES[response]
     if response == "braking":
         return "brakes, and touches it still"

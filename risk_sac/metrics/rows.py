@@ -92,7 +92,7 @@ METRICS = (
     Metric(
         name="pcr",
         symbol="PCR",
-        meaning="preventable contacts / episodes: valid ones that the careful driver would have prevented",
+        meaning="preventable contacts / episodes: valid ones that a reference driver would have prevented",
         formula=preventable_collision_rate,
         field="pcr",
         trials=lambda counts: counts.driven,
@@ -100,7 +100,7 @@ METRICS = (
     Metric(
         name="acr",
         symbol="ACR",
-        meaning="avoidable contacts / episodes: valid ones that the careful driver, or full braking at once, would "
+        meaning="avoidable contacts / episodes: valid ones that a reference driver, or full braking at once, would "
         "have prevented",
         formula=lambda counts: _share(counts.avoidable, counts.driven),
         trials=lambda counts: counts.driven,

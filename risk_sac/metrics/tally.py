@@ -18,7 +18,7 @@ WINDOW = 100  # episodes of the sliding ECR and PCR
 
 
 def preventable(record: EpisodeRecord) -> bool:
-    """Whether the episode has a valid violation that the careful driver would have prevented.
+    """Whether the episode has a valid violation that a reference driver would have prevented.
 
     A violation that was never judged counts as not preventable.
     """
@@ -43,7 +43,7 @@ class Tally(Counts):
     newest_failures: int = 0
     """Valid contacts among them."""
     newest_preventable: int = 0
-    """Those that the careful driver would have prevented."""
+    """Those that a reference driver would have prevented."""
     signatures: Counter[str] = Field(default_factory=Counter)
     """Signature → valid violations."""
     kinds: set[FailureKind] = Field(default_factory=set)

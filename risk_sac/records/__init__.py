@@ -36,6 +36,8 @@ from risk_sac.records.violation import (
     REPEATS,
     Collision,
     ConflictType,
+    EgoPart,
+    Fault,
     Grade,
     Judgement,
     ReferenceOutcome,

@@ -23,7 +23,7 @@ class Progress(Record):
     distinct_failures: int
     """Sum over the runs; what two runs found alike counts twice."""
     preventable: int
-    """Failures that the careful driver would have prevented, repetitions included."""
+    """Failures that a reference driver would have prevented, repetitions included."""
     distinct_preventable: int
     """The distinct ones among them; sum over the runs."""
     window_ecr: Real

@@ -27,7 +27,7 @@ class Counts(Record):
     distinct_failures: int = 0
     """Valid violations that resemble no earlier one of their run."""
     preventable: int = 0
-    """Failures that the careful driver would have prevented."""
+    """Failures that a reference driver would have prevented."""
     preventable_collisions: int = 0
     """Valid contacts that it would have prevented."""
     avoidable: int = 0
@@ -68,7 +68,7 @@ class RequirementCounts(Record):
     """Of these, the valid ones of a requirement that counts."""
     distinct: int = 0
     preventable: int = 0
-    """Distinct violations that the careful driver would have prevented."""
+    """Distinct violations that a reference driver would have prevented."""
     rate: Real = 0.0
     """`valid` / episodes; `violated` / episodes where it is reported only."""
     rate_low: Real = 0.0
@@ -93,7 +93,7 @@ class RunMetrics(Counts):
     window_ecr: Real
     """ECR over the newest 100 episodes."""
     pcr: Real = 0.0
-    """Preventable collision rate: valid contacts that the careful driver would have prevented / episodes."""
+    """Preventable collision rate: valid contacts that a reference driver would have prevented / episodes."""
     pcr_low: Real = 0.0
     pcr_high: Real = 1.0
     window_pcr: Real = 0.0
@@ -133,7 +133,7 @@ class Funnel(Record):
     """Failures."""
     distinct: int
     preventable: int
-    """Distinct violations that the careful driver would have prevented."""
+    """Distinct violations that a reference driver would have prevented."""
 
     @classmethod
     def of(cls, metrics: RunMetrics) -> "Funnel":

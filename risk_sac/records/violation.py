@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import AliasChoices, Field
+from pydantic import AliasChoices, BeforeValidator, Field
 
 from risk_sac.records.base import Least, Real, Record
 
@@ -38,11 +38,24 @@ class ConflictType(StrEnum):
 
 
 class Grade(StrEnum):
-    """Which reference driver would have prevented a valid failure; PCR counts `CAREFUL`."""
+    """Whether a reference driver would have prevented a valid failure; PCR counts `PREVENTABLE`."""
 
-    CAREFUL = "careful"  # the careful driver would not have touched: preventable
-    IDEAL = "ideal"  # full braking at once alone would not have
+    PREVENTABLE = "preventable"  # by at least one of `risk_sac.verdicts.reference.PREVENTING`
+    FULL_BRAKING = "full_braking"  # only by full braking at once
     UNAVOIDABLE = "unavoidable"
+
+    @classmethod
+    def _missing_(cls, value: object) -> "Grade | None":
+        """Reads what definitions 6 and older called them."""
+        return {"careful": cls.PREVENTABLE, "ideal": cls.FULL_BRAKING}.get(str(value))
+
+
+class Fault(StrEnum):
+    """Which party caused a valid failure; see `risk_sac.verdicts`, README.md."""
+
+    EGO = "ego"
+    SHARED = "shared"
+    OTHER = "other"
 
 
 class Severity(StrEnum):
@@ -58,6 +71,12 @@ def _early(name: str) -> Any:
     return Field(validation_alias=AliasChoices(f"early_{name}", name), serialization_alias=f"early_{name}")
 
 
+def _renamed(drivers: Any) -> Any:
+    """Reads what definitions 6 and older called the reference drivers."""
+    names = {"careful": "r157", "ideal": "full_braking"}
+    return {names.get(name, name): each for name, each in drivers.items()} if isinstance(drivers, Mapping) else drivers
+
+
 class ReferenceOutcome(Record):
     """How a reference driver fares in the ego's place."""
 
@@ -65,6 +84,28 @@ class ReferenceOutcome(Record):
     """No contact, or it stands when it is struck, or is struck from behind; false if it passed the striker before."""
     impact_speed_mps: Real
     """The reference driver's speed at its contact, or where it has passed the ego; 0 if it avoids."""
+
+
+class EgoPart(Record):
+    """What the ego did about the striker: facts, from the frames up to the contact."""
+
+    seen_s: Real
+    """How long it had seen the striker without a break."""
+    braked_after_s: float | None
+    """From the beginning of the conflict to its first braking of 1.5 m/s² or more; null if it never braked so."""
+    braking_mps2: Real
+    """Its hardest braking in the conflict."""
+    possible_mps2: Real
+    """The hardest that car and road allow."""
+    gained_mps: Real
+    """Speed that it gained during the conflict while it saw the striker; 0 if none."""
+    started: bool
+    """Whether it stood, and started while it saw the striker."""
+    sight_mps: float | None
+    """The speed from which it could have stopped within its sight when the striker came into view; null where the
+    striker was in view before."""
+    left_first: str | None
+    """ego | striker: which first left RSS's proper response; null if neither did."""
 
 
 class Judgement(Record):
@@ -104,9 +145,13 @@ class Judgement(Record):
     unresponsive: bool
     """A visible collision course of 1.5 s or more during which the ego never braked."""
     grade: Grade | None
-    """careful | ideal | unavoidable: the driver that would have prevented it; null where it is not valid."""
-    drivers: Mapping[str, ReferenceOutcome]
+    """preventable | full_braking (by that only) | unavoidable; null where it is not valid."""
+    drivers: Annotated[Mapping[str, ReferenceOutcome], BeforeValidator(_renamed)]
     """Reference driver → how it fares; empty where the contact is not valid."""
+    ego_part: EgoPart | None = None
+    """What the ego did about the striker. Null where the contact is not valid, and in older records."""
+    fault: Fault | None = None
+    """ego | shared | other. Null where the contact is not valid, and in older records."""
     signature: str
     """The class of failures it belongs to, in words; what differs in it is distinct."""
 
@@ -138,14 +183,19 @@ class Violated(Record):
         raise NotImplementedError
 
     @property
+    def blamed(self) -> Fault | None:
+        """Which party caused it; None where it is not valid, or was never judged."""
+        raise NotImplementedError
+
+    @property
     def preventable(self) -> bool:
-        """Whether it is valid and the careful driver would have prevented it."""
-        return self.valid and self.graded is Grade.CAREFUL
+        """Whether it is valid and a reference driver would have prevented it."""
+        return self.valid and self.graded is Grade.PREVENTABLE
 
     @property
     def avoidable(self) -> bool:
-        """Whether it is valid, and the careful driver or full braking at once would have prevented it."""
-        return self.valid and self.graded in (Grade.CAREFUL, Grade.IDEAL)
+        """Whether it is valid, and a reference driver or full braking at once would have prevented it."""
+        return self.valid and self.graded in (Grade.PREVENTABLE, Grade.FULL_BRAKING)
 
 
 class Violation(Violated):
@@ -171,9 +221,11 @@ class Violation(Violated):
     broke: tuple[str, ...]
     """The ego's own offences up to that time."""
     grade: Grade | None
-    """careful | ideal | unavoidable: the driver that would have kept the requirement; null where it is not valid."""
-    drivers: Mapping[str, bool]
+    """preventable | full_braking (by that only) | unavoidable; null where it is not valid."""
+    drivers: Annotated[Mapping[str, bool], BeforeValidator(_renamed)]
     """Reference driver → whether it keeps the requirement in the same encounter; empty where it is not valid."""
+    fault: Fault | None = None
+    """ego | shared | other. Null where it is not valid, and in older records."""
     signature: str
     """The class of failures it belongs to, in words; what differs in it is distinct."""
     definitions: int
@@ -183,6 +235,11 @@ class Violation(Violated):
     def graded(self) -> Grade | None:
         """See `Violated.graded`."""
         return self.grade
+
+    @property
+    def blamed(self) -> Fault | None:
+        """See `Violated.blamed`."""
+        return self.fault
 
     @property
     def event(self) -> str:
@@ -248,6 +305,11 @@ class Collision(Violated):
     def graded(self) -> Grade | None:
         """See `Violated.graded`."""
         return None if self.judgement is None else self.judgement.grade
+
+    @property
+    def blamed(self) -> Fault | None:
+        """See `Violated.blamed`."""
+        return None if self.judgement is None else self.judgement.fault
 
     @property
     def severity(self) -> Severity | None:

@@ -151,7 +151,7 @@ def _refuse(scene: Scene, rule: HardRule, details: str = "") -> Never:
 def broken_hard_rule(gap_m: float, ttc_s: float, rss_margin: float, *, in_conflict: bool) -> HardRule | None:
     """C_hard of (5): the rule that the frame of the release breaks, or None.
 
-    `in_conflict` holds for the careful driver in the ego's place; the rest are the ego's smallest measures. The rule
+    `in_conflict` holds for R157's driver in the ego's place; the rest are the ego's smallest measures. The rule
     of `initial_overlap` is asked of every frame up to the release.
     """
     if gap_m < MIN_INITIAL_GAP_M:

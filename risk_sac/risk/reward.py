@@ -35,8 +35,8 @@ def risk_reward(
     R_risk(s, a) = bonus · valid - penalty · [degenerate] + w_v · violated
                    + w_ttc · exp(-TTC / scale) + w_rss · [RSS violated]                                            (1)
 
-    Deviation: the paper pays all valid collisions alike. Which of them a careful driver would have prevented is what a
-    user wants to know.
+    Deviation: the paper pays all valid collisions alike. A user wants to know which of them a reference driver would
+    have prevented.
     Choice: the paper only filters degenerate contacts out. Without a price on them the policy settles for sideswipes,
     which are far easier to reach than a failure of the ego.
 

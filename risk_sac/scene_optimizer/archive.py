@@ -24,7 +24,7 @@ DEVIATIONS = (0.05, 0.15, 0.4)  # of a mutation
 SHARES = (0.2, 0.5, 1.0)  # of the coordinates that it changes
 CROSSED, CROSSING_DEVIATION = 0.5, 0.2  # how often, and how far, it also moves along the line to another elite
 PREVENTABLE_WORTH = 1.0
-ALMOST_WORTH, IMPACT_MPS = 0.4, 5.0  # where the careful driver only just touches; a third of it where at 5.5 m/s
+ALMOST_WORTH, IMPACT_MPS = 0.4, 5.0  # where R157's driver only just touches; a third of it where at 5.5 m/s
 LEAST_WORTH = 0.02  # of a failure
 NEAR_MISS_WORTH = 0.1
 NEAR_MARGIN = 0.3  # of a requirement, in scales: what undisturbed traffic keeps is about 1
@@ -128,15 +128,15 @@ def _elite(plain: State) -> Elite:
 
 
 def _worth(violation: Collision | Violation) -> float:
-    """1 for what is preventable; of other contacts the more, the slower the careful driver would have touched."""
+    """1 for what is preventable; of other contacts the more, the slower R157's driver would have touched."""
     if violation.preventable:
         return PREVENTABLE_WORTH
     if isinstance(violation, Violation):
         return ALMOST_WORTH * min(-violation.robustness, 1.0) + LEAST_WORTH
     judged = violation.judgement
-    if judged is None or "careful" not in judged.drivers:
+    if judged is None or "r157" not in judged.drivers:
         return LEAST_WORTH
-    return ALMOST_WORTH * math.exp(-judged.drivers["careful"].impact_speed_mps / IMPACT_MPS) + LEAST_WORTH
+    return ALMOST_WORTH * math.exp(-judged.drivers["r157"].impact_speed_mps / IMPACT_MPS) + LEAST_WORTH
 
 
 class ArchiveOptimizer(SceneOptimizer):

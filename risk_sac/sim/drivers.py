@@ -21,7 +21,7 @@ from risk_sac.types import STEP_S, Bools, Floats, Role
 ASKEW_M = 0.1  # by which a corner of the ego may be beside where SUMO's models have it
 
 NORMAL_DECEL_MPS2 = 4.5  # what SUMO assumes of a leader, and its default for passenger cars
-JERK_MPS3 = 12.65  # at which a braking builds up (UN R157, the careful driver)
+JERK_MPS3 = 12.65  # at which a braking builds up (UN R157's driver)
 BUILD_UP_S = NORMAL_DECEL_MPS2 / JERK_MPS3  # which its model, whose braking steps, does not reckon with
 OWN_CHOICE_MPS = -1.0  # SUMO's word for the speed that its models choose
 SAFE_MODE = 31  # all of SUMO's checks; told speeds are then held to the normal deceleration

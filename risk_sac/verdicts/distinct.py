@@ -20,11 +20,11 @@ KMH = 1 / 3.6
 EDGES = {
     "ego_speed_mps": (30 * KMH,),
     "other_speed_mps": (30 * KMH,),
-    "from_conflict_s": (2.0,),  # what the careful driver needs to be at full braking
+    "from_conflict_s": (2.0,),  # what R157's driver needs to be at full braking
 }
 Cell = tuple[int, ...]
 Niche = tuple[str, str, Cell]  # requirement, signature, cell
-# Choice: seen too late for any driver (0.6 s), too late for a careful one (2 s), or in time.
+# Choice: seen too late for any driver (0.6 s), too late for R157's driver (2 s), or in time.
 VISIBLE_S = (0.6, 2.0)
 CLOSING_MPS = (5.0, 10.0)
 BRAKED_MPS2 = 3.0  # more than a driver does for comfort

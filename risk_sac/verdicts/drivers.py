@@ -1,6 +1,6 @@
 """The reference drivers: when each perceives a conflict, and how it brakes from then on.
 
-Sources: UN Regulation 157, Annex 3, for the careful and competent human driver; `risk_sac.verdicts.fuzzy` for the
+Sources: UN Regulation 157, Annex 3, for its competent and careful human driver; `risk_sac.verdicts.fuzzy` for the
 JRC's model; Shalev-Shwartz et al. 2017 for RSS, with the parameters of Mattas et al. 2022, "Driver models for the
 definition of safety requirements of automated vehicles in international regulations", Accident Analysis & Prevention
 174.
@@ -17,12 +17,12 @@ from risk_sac.verdicts.along import Along
 from risk_sac.verdicts.course import CORRIDOR_M
 from risk_sac.verdicts.fuzzy import REACTION_S, braking
 
-CAREFUL_PERCEIVES_S = 0.4
-CAREFUL_DELAY_S = 0.75
+R157_PERCEIVES_S = 0.4
+R157_DELAY_S = 0.75
 RELEASE_MPS2 = 0.4  # the drag of the released pedal during the delay
 FULL_MPS2 = 0.774 * GRAVITY_MPS2
 JERK_MPS3 = 12.65
-IDEAL_MPS2 = 8.0
+FULL_BRAKING_MPS2 = 8.0
 RSS = RssParameters(
     response_s=0.75,
     accel_mps2=3.0,
@@ -46,21 +46,21 @@ class Situation(NamedTuple):
 
 
 @compiled
-def careful(since_s: float, grip: float) -> float:
-    """Braking of the careful driver, m/s², `since_s` after it perceived the conflict.
+def r157(since_s: float, grip: float) -> float:
+    """Braking of R157's driver, m/s², `since_s` after it perceived the conflict.
 
     0.75 s of released pedal, then a rise at 12.65 m/s³ to 0.774 g or what the road bears.
     """
-    braked_s = since_s - CAREFUL_DELAY_S
+    braked_s = since_s - R157_DELAY_S
     if braked_s <= 0.0:
         return min(RELEASE_MPS2, grip)
     return min(RELEASE_MPS2 + JERK_MPS3 * braked_s, FULL_MPS2, grip)
 
 
 @compiled
-def ideal(grip: float) -> float:
+def full_braking(grip: float) -> float:
     """Braking of the bound, m/s²: in full, at once."""
-    return min(IDEAL_MPS2, grip)
+    return min(FULL_BRAKING_MPS2, grip)
 
 
 @compiled

@@ -3,7 +3,7 @@
 Choices:
 - A reference driver keeps its lane, and so it stays on the carriageway: without contact nothing pushes it off.
 - It obeys signals: it does not enter on red if it could stop at the line from when the signal turned yellow or red.
-  It needs its own reaction time and braking for that, R157's of `careful`: 1.15 s and up to 0.774 g. Signals are timed
+  It needs its own reaction time and braking for that, `r157`'s: 1.15 s and up to 0.774 g. Signals are timed
   for 1 s and 3.05 m/s² (Institute of Transportation Engineers).
 - It keeps the speed limit.
 - Any other requirement is measured again, on the path of its lane and with what the driver brakes in the conflict with

@@ -7,7 +7,7 @@ import numpy as np
 from risk_sac.records import ConflictType
 from risk_sac.types import Kind, Role
 from risk_sac.verdicts.conflict import BRAKES_MPS2, Conflict
-from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S
+from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence, inside
 from risk_sac.verdicts.offences import IN_WORDS, RECENT_S, STANDING_MPS
 from risk_sac.verdicts.recorded import front_moved_across
@@ -77,7 +77,7 @@ def response(evidence: Evidence, conflict: Conflict) -> str:
     """none, late_braking, braking, standing, starting or accelerating: what the ego did in the last second.
 
     Of what came before the conflict nothing counts. Of braking and speeding up, the longer counts. Late is an ego that
-    first braked in the conflict later than the careful driver. One that stood within the last 3 s and gains speed at
+    first braked in the conflict later than R157's driver. One that stood within the last 3 s and gains speed at
     the contact is starting.
     """
     speed = evidence.speed_mps[:, 0]
@@ -95,7 +95,7 @@ def response(evidence: Evidence, conflict: Conflict) -> str:
     if (acts > 0.0).sum() > len(acts) / 2:
         return "accelerating"
     after_s = np.flatnonzero(accel[conflict.frame :] <= -BRAKES_MPS2)[0] * evidence.step_s
-    return "late_braking" if after_s > CAREFUL_PERCEIVES_S + CAREFUL_DELAY_S else "braking"
+    return "late_braking" if after_s > R157_PERCEIVES_S + R157_DELAY_S else "braking"
 
 
 def signature(

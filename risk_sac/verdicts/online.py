@@ -1,4 +1,4 @@
-"""Whether the careful driver is in a conflict with anybody right now, for who drives and who starts scenes.
+"""Finds conflicts of the present frame, for egos that drive and for scenes that begin.
 
 The measures are those of `risk_sac.verdicts.conflict`; only what a record knows of the future is foreseen here: the
 ego's path is given, and everybody else goes on straight.
@@ -14,7 +14,7 @@ from risk_sac.types import Bools, Frame, Kind
 from risk_sac.verdicts.along import along, lane_conflict
 from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_COS, YIELDING_MPS2
 from risk_sac.verdicts.course import HORIZON_S, Body, entry_distance, time_to_touch, with_margin
-from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S, careful
+from risk_sac.verdicts.drivers import R157_PERCEIVES_S, r157
 from risk_sac.verdicts.evidence import Ground, soon_inside
 from risk_sac.verdicts.path import Path
 
@@ -26,7 +26,7 @@ YIELDS = frozenset(b"ruyg")  # signals at which a driver is expected to stop, or
 
 
 def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, wary: bool = False) -> Bools:
-    """With whom of `frame.ids` the careful driver in the ego's place is in a conflict.
+    """Which of `frame.ids` a driver in the ego's place is in a conflict with.
 
     A crossing vehicle that has to stop or to yield, and still can at 3.4 m/s², is expected to: in a record the contact
     tells that it did not.
@@ -99,10 +99,10 @@ def _both_come(
     )
 
 
-class CarefulReflex:
-    """The careful driver in the closed loop; one for each episode.
+class R157Reflex:
+    """R157's driver in the closed loop; one for each episode.
 
-    It drives as the ego does, and brakes as `careful` says from the moment it perceives a conflict, if that is harder.
+    It drives as the ego does, and brakes as `r157` says from the moment it perceives a conflict, if that is harder.
     """
 
     def __init__(self, ground: Ground) -> None:
@@ -117,6 +117,6 @@ class CarefulReflex:
             self._since_s, self._last_s = (now if self._since_s is None else self._since_s), now
         elif self._since_s is not None and now - self._last_s > OVER_S:
             self._since_s = None
-        if self._since_s is None or now - self._since_s < CAREFUL_PERCEIVES_S:
+        if self._since_s is None or now - self._since_s < R157_PERCEIVES_S:
             return 0.0
-        return careful(now - self._since_s - CAREFUL_PERCEIVES_S, self._ground.friction * GRAVITY_MPS2)
+        return r157(now - self._since_s - R157_PERCEIVES_S, self._ground.friction * GRAVITY_MPS2)

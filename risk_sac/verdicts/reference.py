@@ -12,16 +12,23 @@ from risk_sac.records import ConflictType, Grade, ReferenceOutcome
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import HEADING, LENGTH, WIDTH, X, Y
 from risk_sac.verdicts.conflict import Conflict
-from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S
+from risk_sac.verdicts.drivers import R157_PERCEIVES_S
 from risk_sac.verdicts.endangering import enters_safely
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.recorded import ego_path, keeps_lane, lane_path, recorded_motion, recorded_size, seen_along
-from risk_sac.verdicts.rollout import CAREFUL, FUZZY, HORIZON_S, IDEAL, RSS, STANDING_MPS, Ending, drive
+from risk_sac.verdicts.rollout import FULL_BRAKING, FUZZY, HORIZON_S, R157, RSS, STANDING_MPS, Ending, drive
 
 # The driver, and how long after the conflict began it perceives. Choice: fsm and rss look out from the beginning of the
 # conflict on, not before, and perceive what they themselves hold to be dangerous: all drivers judge the same conflict.
-DRIVERS = {"careful": (CAREFUL, CAREFUL_PERCEIVES_S), "fsm": (FUZZY, 0.0), "rss": (RSS, 0.0), "ideal": (IDEAL, 0.0)}
+DRIVERS = {
+    "r157": (R157, R157_PERCEIVES_S),
+    "fsm": (FUZZY, 0.0),
+    "rss": (RSS, 0.0),
+    "full_braking": (FULL_BRAKING, 0.0),
+}
+# What one of these avoids is preventable; full braking at once is a bound, and R157's rule for cut-ins knows no driver.
+PREVENTING = frozenset({"r157", "fsm", "rss", "defensive"})
 # Choice: a driver that was further along than the ego at the contact, and so is missed, avoids it by being faster and
 # not by care. Such is one that brakes later than the ego did for a pedestrian that then runs into the ego's flank.
 LEAD_M = 0.1
@@ -65,10 +72,10 @@ def _met(evidence: Evidence, path: Path, striker: int) -> list[int]:
 
 
 def grade(keeps: Mapping[str, bool]) -> Grade:
-    """Returns which reference driver would have prevented a violation: the same rule for contacts and all others."""
-    if keeps["careful"]:
-        return Grade.CAREFUL
-    return Grade.IDEAL if keeps["ideal"] else Grade.UNAVOIDABLE
+    """Grades a violation, with or without contact, by which reference drivers would have prevented it."""
+    if any(keeps.get(name, False) for name in PREVENTING):
+        return Grade.PREVENTABLE
+    return Grade.FULL_BRAKING if keeps["full_braking"] else Grade.UNAVOIDABLE
 
 
 def _outcome(

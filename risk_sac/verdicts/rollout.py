@@ -15,21 +15,21 @@ from risk_sac.types import Floats
 from risk_sac.verdicts.along import along
 from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.drivers import (
-    CAREFUL_PERCEIVES_S,
     FUZZY_DELAY_S,
+    R157_PERCEIVES_S,
     RSS_BRAKES_MPS2,
     RSS_DELAY_S,
     Situation,
-    careful,
+    full_braking,
     fuzzy,
-    ideal,
+    r157,
     rss,
     towards_command,
 )
 from risk_sac.verdicts.fuzzy import HARDEST_MPS2
 from risk_sac.verdicts.path import Path, pose_at
 
-CAREFUL, IDEAL, FUZZY, RSS = range(4)
+R157, FULL_BRAKING, FUZZY, RSS = range(4)
 FINE_S = 0.01  # between two box tests; at 30 m/s of closing 0.3 m
 LOOK = 10  # fine steps, 0.1 s, between two looks of a driver that goes by what it sees
 HORIZON_S = 8.0  # from the beginning of the conflict
@@ -63,7 +63,7 @@ def drive(
     """Lets a driver brake for the striker until it stands, touches it, or the horizon is over.
 
     Args:
-      driver: CAREFUL, IDEAL, FUZZY or RSS.
+      driver: R157, FULL_BRAKING, FUZZY or RSS.
       path: the recorded ego's, a point per frame.
       size: of the ego.
       track: the striker's recorded motion, its heading without jumps of 2π; it goes on with its last velocity.
@@ -94,10 +94,10 @@ def drive(
             wanted = _wanted(driver, path, s, speed, braking, size, striker)
             if wanted > 0.0:
                 danger_s = min(danger_s, since)
-        if driver == CAREFUL:
-            braking = careful(since + FINE_S / 2, grip)
-        elif driver == IDEAL:
-            braking = ideal(grip)
+        if driver == R157:
+            braking = r157(since + FINE_S / 2, grip)
+        elif driver == FULL_BRAKING:
+            braking = full_braking(grip)
         else:
             delay = FUZZY_DELAY_S if driver == FUZZY else RSS_DELAY_S
             if since >= danger_s + delay:
@@ -144,15 +144,15 @@ def _wanted(driver: int, path: Path, s: float, speed: float, braking: float, siz
 def stopping_distance(driver: int, speed: float, grip: float) -> float:
     """Metres in which a driver stops for what it has to perceive first, m.
 
-    Its reaction and braking are those of its reference model; CAREFUL perceives before it reacts.
+    Its reaction and braking are those of its reference model; R157 perceives before it reacts.
     """
     gone, braking, since = 0.0, 0.0, 0.0
     while speed > STANDING_MPS:
         since += FINE_S
-        if driver == CAREFUL:
-            braking = careful(since - CAREFUL_PERCEIVES_S, grip)
-        elif driver == IDEAL:
-            braking = ideal(grip)
+        if driver == R157:
+            braking = r157(since - R157_PERCEIVES_S, grip)
+        elif driver == FULL_BRAKING:
+            braking = full_braking(grip)
         elif since > (FUZZY_DELAY_S if driver == FUZZY else RSS_DELAY_S):
             braking = towards_command(braking, HARDEST_MPS2 if driver == FUZZY else RSS_BRAKES_MPS2, grip, FINE_S)
         speed -= braking * FINE_S

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 from risk_sac.records import Collision, Judgement, Violation
 
-FULL_BRAKING = "ideal"
+FULL_BRAKING = "full_braking"
 DRIVERS = {
-    "careful": "the careful driver",
+    "r157": "R157's driver",
     "fsm": "the fuzzy safety model",
     "rss": "the RSS driver",
     FULL_BRAKING: "full braking at once",

@@ -31,10 +31,10 @@ COUNTERS = {
     "raw_collisions": ("risk_sac_contacts", "Episodes in which the ego touched something."),
     "failures": ("risk_sac_failures", "Episodes with a valid violation of a requirement that counts."),
     "distinct_failures": ("risk_sac_distinct_failures", "Valid violations that resemble no earlier one of their run."),
-    "preventable": ("risk_sac_preventable_failures", "Failures that the careful driver would have prevented."),
+    "preventable": ("risk_sac_preventable_failures", "Failures that a reference driver would have prevented."),
     "distinct_preventable": (
         "risk_sac_distinct_preventable_failures",
-        "Distinct violations that the careful driver would have prevented.",
+        "Distinct violations that a reference driver would have prevented.",
     ),
 }
 # The funnel of each requirement; by the column that is summed up.
@@ -44,7 +44,7 @@ OF_REQUIREMENTS = {
     "distinct": ("risk_sac_requirement_distinct", "Valid violations that resemble no earlier one of their run."),
     "preventable": (
         "risk_sac_requirement_preventable",
-        "Distinct violations that the careful driver would have prevented.",
+        "Distinct violations that a reference driver would have prevented.",
     ),
 }
 NODE_GAUGES: tuple[tuple[str, str, Callable[[Node], float]], ...] = (

@@ -68,6 +68,8 @@ def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
     judgement = contact.judgement if contact is not None else None
     unjudged = worst is None or (isinstance(worst, Collision) and judgement is None)
     row.grade = None if worst is None or not failed else worst.graded
+    row.severity = None if contact is None or not failed else contact.severity
+    row.fault = None if worst is None or not failed else worst.blamed
     row.signature = None if worst is None or unjudged else worst.signature
     row.broke = None if judgement is None else listed(judgement.broke)
 

@@ -145,6 +145,8 @@ class EpisodeRow(Base):
     violated: Mapped[str | None]  # requirements that were, between commas: ",safe_ttc,no_contact,"
     failed: Mapped[str | None]  # of these, those that make it a failure
     grade: Mapped[str | None]  # of a valid failure
+    severity: Mapped[str | None]  # of its contact
+    fault: Mapped[str | None]  # of a valid failure
     signature: Mapped[str | None]  # of the violation that names the episode
     broke: Mapped[str | None]  # what its striker broke, between commas: ",red_light,"
     funnel: Mapped[str | None] = mapped_column(Text)  # of the run's phase, this episode included

@@ -37,7 +37,7 @@ class RunCurves(Record):
     distinct: list[int]
     """Distinct violations so far, of all requirements that count."""
     preventable: list[int]
-    """Failures so far that the careful driver would have prevented, repetitions included."""
+    """Failures so far that a reference driver would have prevented, repetitions included."""
     distinct_preventable: list[int]
     """The distinct ones among them."""
     dual_variable: list[Real]

@@ -56,7 +56,7 @@ class FailureKind(Record):
     distinct: int
     """Those that are distinct in their run and phase; what two runs found alike counts twice."""
     preventable: int
-    """Valid ones that the careful driver would have prevented."""
+    """Valid ones that a reference driver would have prevented."""
 
 
 class FamilyScenes(Record):
@@ -169,8 +169,8 @@ def violations_of(outcome: str, record: Plain) -> tuple[list[Plain], list[Plain]
 
 
 def is_preventable(violation: Plain) -> bool:
-    """Whether the careful driver would have prevented a valid violation."""
-    return bool(_judged(violation)["grade"] == Grade.CAREFUL)
+    """Whether a reference driver would have prevented a valid violation."""
+    return bool(_judged(violation)["grade"] == Grade.PREVENTABLE)
 
 
 def _judged(violation: Plain) -> Plain:
@@ -265,7 +265,7 @@ def _kinds(naming: Sequence[Plain], rows: Sequence[Plain]) -> list[FailureKind]:
         kind = kinds.setdefault(key, said | dict.fromkeys(COUNTED, 0))
         kind["failures"] += row["valid"]
         kind["distinct"] += row["distinct"]
-        kind["preventable"] += row["valid"] and row["grade"] == Grade.CAREFUL
+        kind["preventable"] += row["valid"] and row["grade"] == Grade.PREVENTABLE
     ordered = sorted(kinds.values(), key=lambda kind: (-kind["preventable"], -kind["failures"], kind["name"]))
     return [FailureKind(**kind) for kind in ordered]
 

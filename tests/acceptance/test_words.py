@@ -19,10 +19,10 @@ from risk_sac.run_folder.series import read_series
 
 EPISODES, SEED = 40, 5
 NAMES = {
-    "the careful driver": "careful",
+    "R157's driver": "r157",
     "the fuzzy safety model": "fsm",
     "the RSS driver": "rss",
-    "full braking at once": "ideal",
+    "full braking at once": "full_braking",
     "R157's time-to-collision rule": "r157_ttc",
 }
 BRAKES_MPS2, STANDS_MPS = 1.5, 0.5
@@ -72,7 +72,7 @@ def test_exactly_the_drivers_of_the_table_that_prevent_it_are_named(told: list[T
         assert said
         names = {NAMES[name] for name in re.split(", | and ", said[2]) if name != "none of the reference drivers"}
         assert names == {name for name, prevents in table.items() if prevents}
-        assert not said[1] or names == {"ideal"}
+        assert not said[1] or names == {"full_braking"}
 
 
 def outcomes(hit: Collision) -> dict[str, bool]:

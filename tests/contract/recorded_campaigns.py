@@ -42,12 +42,12 @@ def hit(judged: Judgement | None = None, broken: str = "", least_ttc_s: float = 
 
 
 OWN = {"name": "never_fast", "formula": "ego_speed_mps <= 5", "scale": 10.0}
-SLOW = violation(grade=Grade.CAREFUL, broke=("speeding",))
+SLOW = violation(grade=Grade.PREVENTABLE, broke=("speeding",))
 OUTCOMES = {
     ".": (Outcome.SAFE, "", None),
     "r": (Outcome.REJECTED, "sim_crash", None),
     "f": (Outcome.FAILURE, "", hit(judgement())),
-    "F": (Outcome.FAILURE, "", hit(judgement(Grade.IDEAL, -0.5, unresponsive=True, signature="leader"))),
+    "F": (Outcome.FAILURE, "", hit(judgement(Grade.FULL_BRAKING, -0.5, unresponsive=True, signature="leader"))),
     "a": (Outcome.DEGENERATE, "inside_limits", hit(broken="inside_limits", least_ttc_s=math.inf)),
     "d": (Outcome.DEGENERATE, "ego_moving", hit(broken="ego_moving")),
     "v": (Outcome.FAILURE, "", None),  # with `SLOW`

@@ -16,7 +16,9 @@ def record(index: int) -> EpisodeRecord:
     if index % 2 == 0:
         return _record(index)
     preventable = index % 6 == 1
-    judged = judgement(Grade.CAREFUL if preventable else Grade.IDEAL, broke=("red_light",) if preventable else ())
+    judged = judgement(
+        Grade.PREVENTABLE if preventable else Grade.FULL_BRAKING, broke=("red_light",) if preventable else ()
+    )
     hit = collision(time_s=3.9, min_ttc_s=0.4, verdicts={"inside_grip": True}, judgement=judged)
     return episode_record(index, Outcome.FAILURE, scene=LOW_SCENE, min_ttc_s=float("inf"), collision=hit)
 

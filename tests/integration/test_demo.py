@@ -50,6 +50,6 @@ def test_it_offers_to_draw_a_preventable_failure_where_there_is_one():
         return Episode.model_validate(record | {"id": f"r-train-{index}", "run_id": "r", "wall_s": 1.0})
 
     searched = campaign().model_copy(update={"runs": [Run.model_construct(id="r")]})
-    failures = [failure(3, None), failure(5, Grade.IDEAL), failure(8, Grade.CAREFUL)]
+    failures = [failure(3, None), failure(5, Grade.FULL_BRAKING), failure(8, Grade.PREVENTABLE)]
     assert draw_command(searched, failures, Path()).endswith(" r-train-8 --out failure.png")
     assert draw_command(searched, failures[:2], Path()).endswith(" r-train-3 --out failure.png")

@@ -24,7 +24,7 @@ from risk_sac.sim.placing import STEERED
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Frame
 from risk_sac.verdicts.conflict import Conflict, find_conflict
-from risk_sac.verdicts.drivers import CAREFUL_PERCEIVES_S, careful, ideal
+from risk_sac.verdicts.drivers import R157_PERCEIVES_S, full_braking, r157
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.reference import LEAD_M, reference_outcomes
 from risk_sac.verdicts.rollout import STANDING_MPS
@@ -67,14 +67,14 @@ def contacts(env: RiskSacEnv, episodes: int) -> Iterator[Struck]:
 def speeds(struck: Struck, driver: str) -> list[float]:
     """Of the reference driver, step by step: as recorded until it perceives, then its own."""
     evidence = struck.evidence
-    perceives_s = CAREFUL_PERCEIVES_S if driver == "careful" else 0.0
+    perceives_s = R157_PERCEIVES_S if driver == "r157" else 0.0
     grip = evidence.ground.friction * GRAVITY_MPS2
     driven = evidence.speed_mps[: struck.conflict.frame + round(perceives_s / STEP_S) + 1, 0].tolist()
     tick = STEP_S / 100
     for step in range(80):
         speed = driven[-1]
         for k in range(100):
-            braking = careful(step * STEP_S + (k + 0.5) * tick, grip) if driver == "careful" else ideal(grip)
+            braking = r157(step * STEP_S + (k + 0.5) * tick, grip) if driver == "r157" else full_braking(grip)
             speed = max(speed - braking * tick, 0.0)
         driven.append(speed)
     return driven
@@ -118,7 +118,7 @@ def avoids(sim: SumoSimulation, struck: Struck, driver: str) -> bool:
     """
     evidence = struck.evidence
     driven, last = speeds(struck, driver), len(evidence.time_s) - 1
-    if struck.conflict.frame + round(CAREFUL_PERCEIVES_S / STEP_S) >= last and driver == "careful":
+    if struck.conflict.frame + round(R157_PERCEIVES_S / STEP_S) >= last and driver == "r157":
         return bool(evidence.speed_mps[-1, 0] <= STANDING_MPS)  # struck before it perceives
     frame = sim.reset(replace(struck.layout, vehicles=(), pedestrians=()), 1)
     libsumo.vehicle.setSpeedMode("ego", 0)
@@ -167,6 +167,6 @@ def test_verdicts_are_those_of_the_driver_at_the_wheel(family: FamilyName) -> No
                 reference_outcomes(struck.evidence, struck.striker, struck.conflict)[driver].avoids,
             )
             for struck in found
-            for driver in ("careful", "ideal")
+            for driver in ("r157", "full_braking")
         ]
     assert sum(here == there for here, there in pairs) >= AGREE * len(pairs) - 1, pairs

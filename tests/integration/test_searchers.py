@@ -83,9 +83,9 @@ def shares(*findings: tuple[int, str, Grade]) -> list[float]:
 
 def test_turns_go_to_the_searcher_that_finds_what_is_new() -> None:
     first, repeated, preventable = shares(
-        (GUIDE, "one", Grade.CAREFUL), (OWN, "one", Grade.CAREFUL), (OWN, "another", Grade.CAREFUL)
+        (GUIDE, "one", Grade.PREVENTABLE), (OWN, "one", Grade.PREVENTABLE), (OWN, "another", Grade.PREVENTABLE)
     )
-    unpreventable = shares((GUIDE, "one", Grade.CAREFUL), (OWN, "another", Grade.IDEAL))[-1]
+    unpreventable = shares((GUIDE, "one", Grade.PREVENTABLE), (OWN, "another", Grade.FULL_BRAKING))[-1]
     assert max(first, repeated) < unpreventable < preventable
 
 

@@ -336,7 +336,11 @@ def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low: Ri
             bonus = 0.0
             if terminated and collision is not None:
                 assert collision.judgement is not None
-                shares = {Grade.CAREFUL: 1.0, Grade.IDEAL: config.unpreventable, Grade.UNAVOIDABLE: config.unavoidable}
+                shares = {
+                    Grade.PREVENTABLE: 1.0,
+                    Grade.FULL_BRAKING: config.unpreventable,
+                    Grade.UNAVOIDABLE: config.unavoidable,
+                }
                 worth = shares[collision.judgement.grade]
                 bonus = worth * config.valid_collision if collision.valid else -config.degenerate_collision
             at = LEAD_IN_STEPS + step

@@ -19,7 +19,7 @@ CAMPAIGN = {
     "seeds": [601],
     "budget": {"episodes": 150},
 }
-WORTH = ("careful", "ideal", "unavoidable")
+WORTH = ("preventable", "full_braking", "unavoidable")
 
 
 def main(folder: Path) -> None:

@@ -67,7 +67,7 @@ def test_cards_match_the_api(screen: Callable[..., Page], table: dict[str, Any],
     expect(card).to_contain_text(table["striker"][newest].replace("_", " "))
     often = Counter(table["kind"][i] for i in valid_of(table))
     expect(card.locator("dd").nth(2)).to_have_text(str(often[table["kind"][newest]]))
-    words = {"careful": "preventable", "ideal": "by full braking", "unavoidable": "unavoidable"}
+    words = {"preventable": "preventable", "full_braking": "by full braking", "unavoidable": "unavoidable"}
     expect(card).to_contain_text(words[table["grade"][newest]])
 
     page.get_by_label("every failure").check()

@@ -29,9 +29,7 @@ FILTERS = {
 def add(commands: Commands) -> None:
     """Add the commands."""
     parser = add_campaign_command(commands, "list", _list, "a campaign's failures, in the order they were found")
-    parser.add_argument(
-        "--grade", choices=[grade.value for grade in Grade], help="only of this grade; careful: preventable"
-    )
+    parser.add_argument("--grade", choices=[grade.value for grade in Grade], help="only of this grade")
     for name, which in FILTERS.items():
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only those {which}")
     parser.add_argument("--raw", action="store_true", help="contacts and violations too that a rule refused")

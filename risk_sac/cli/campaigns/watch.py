@@ -123,7 +123,7 @@ def _report(client: Client, results: Results, bounds: Bounds, file: Path) -> Non
 def _first_failures(client: Client, campaign_id: str, run_id: str) -> list[Episode]:
     """Of a run, the preventable ones first."""
     found: dict[str, Episode] = {}
-    for grade in (Grade.CAREFUL, None):
+    for grade in (Grade.PREVENTABLE, None):
         failures = client.failures(campaign_id, run=run_id, grade=grade, page=NAMED_FAILURES)
         found |= {failure.id: failure for failure in itertools.islice(failures, NAMED_FAILURES)}
     return list(found.values())[:NAMED_FAILURES]

@@ -53,7 +53,7 @@ class Drawn(Record):
     failures: Bound
     """Of any requirement that counts."""
     preventable: Bound
-    """By the careful driver."""
+    """By a reference driver."""
     requirements: Mapping[str, RequirementBound]
     """Empty for older runs."""
 

@@ -26,7 +26,7 @@ LIMITS = (
     "Of the environment, scenes know friction, visibility, and where the ODD states it night; drops on a sensor, and "
     "other road users than vehicles and pedestrians, are not in them.",
     "Coverage counts where scenes begin. What unfolds from one beginning differs with what the others do.",
-    "Preventable is judged by a model of a careful driver in the ego's place; the striker's motion is kept as it was.",
+    "Preventable is judged by models of drivers in the ego's place; the striker's motion is kept as it was.",
     "Numbers are those of one kind of processor; on another one the same commands give other digits.",
 )
 

@@ -68,7 +68,7 @@ def funnel(comparison: Comparison) -> Section:
             "Refused: the scene was infeasible, and nothing was played. Valid: no artefact of the simulator, and the "
             "ego had a part in it. Failures: episodes with a valid violation of a requirement that counts, contacts "
             "among them. Distinct: violations that resemble no earlier one of the same run; an episode may have "
-            "several. Preventable: the distinct ones that a careful driver in the ego's place would have prevented. "
+            "several. Preventable: the distinct ones that a reference driver in the ego's place would have prevented. "
             "Verified: of the first failures of each kind, those that were the same to the bit each time they were "
             "replayed; a dash where none was. The search chose these scenes: no share of these numbers is a rate of "
             "crashes."

@@ -10,7 +10,7 @@ from risk_sac.scenario.odd import field, intersect, paths
 PROFILES = {
     "default": "SUMO's driver with a delay and a line of sight",
     "perfect": "SUMO's driver, who reacts at once and sees everything",
-    "careful": "the default with the careful driver's braking on top",
+    "careful": "the default with the braking of R157's driver on top",
 }
 # Field of the ODD → what it is called, and its unit.
 FIELDS: Mapping[str, tuple[str, str]] = {

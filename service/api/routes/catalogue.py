@@ -121,7 +121,7 @@ class Methods(Record):
 PROFILES = {
     "default": "SUMO's default driver, with a driver's delay and a driver's view.",
     "perfect": "The same, that reacts within a step and sees everything.",
-    "careful": "The default, with the braking of UN R157's careful driver on top.",
+    "careful": "The default, with the braking of UN R157's driver on top.",
 }
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 

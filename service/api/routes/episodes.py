@@ -71,7 +71,7 @@ def list_failures(
         str | None, Query(description="Only failures of this run. Without it, none of an i.i.d. phase.")
     ] = None,
     requirement: AskedRequirement = None,
-    grade: Annotated[Grade | None, Query(description="Only failures of this grade; `careful`: preventable.")] = None,
+    grade: Annotated[Grade | None, Query(description="Only failures of this grade.")] = None,
     broke: Annotated[
         str | None, Query(max_length=40, pattern="^[a-z_]+$", description="Only those whose striker broke this.")
     ] = None,

@@ -1,4 +1,4 @@
-/** Where the page is: the address's fragment, `#/campaigns/c1/failures?grade=careful`, so that any link can be kept. */
+/** Where the page is: the address's fragment, `#/campaigns/c1/failures?grade=preventable`, so that any link can be kept. */
 
 import { useEffect, useState } from "preact/hooks";
 

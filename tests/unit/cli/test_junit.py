@@ -150,7 +150,7 @@ def test_a_requirement_over_its_bound_fails_and_names_the_failures_that_violate_
     both = requirements(no_contact=(0.0, 0.06), never_fast=(0.2, 0.32))
     bounds = Bounds(requirements={"never_fast": 0.1, "no_contact": 0.1})
     broken = FAILURES["low-sac-0"][0].model_copy(update={"id": "low-sac-0-train-5", "collision": None})
-    broken = broken.model_copy(update={"violations": (violation(requirement="never_fast", grade=Grade.CAREFUL),)})
+    broken = broken.model_copy(update={"violations": (violation(requirement="never_fast", grade=Grade.PREVENTABLE),)})
     found = {"low-sac-0": [*FAILURES["low-sac-0"], broken]}
     root = report({}, bounds=bounds, totals=[{"episodes": 60, "requirements": both}], failures=found)
     (failure,) = root.iter("failure")

@@ -15,7 +15,7 @@ JUDGED = judgement(
     conflict_x_m=302.0,
     conflict_y_m=-3.25,
     broke=("pedestrian_on_red",),
-    drivers={"careful": AVOIDS, "rss": TOUCHES, "ideal": AVOIDS},
+    drivers={"r157": AVOIDS, "rss": TOUCHES, "full_braking": AVOIDS},
 )
 
 

@@ -16,11 +16,14 @@ def found(*collisions: Collision) -> list[tuple[str, EpisodeRecord]]:
 
 
 def test_failures_of_a_signature_are_a_cluster_with_the_most_preventable_and_shortest_first() -> None:
-    cut_in = [failure("cut-in", grade) for grade in (Grade.UNAVOIDABLE, Grade.CAREFUL, Grade.IDEAL, Grade.CAREFUL)]
-    overviewed = overview(found(*cut_in, *[failure("leader", Grade.IDEAL)] * 9))
+    cut_in = [
+        failure("cut-in", grade)
+        for grade in (Grade.UNAVOIDABLE, Grade.PREVENTABLE, Grade.FULL_BRAKING, Grade.PREVENTABLE)
+    ]
+    overviewed = overview(found(*cut_in, *[failure("leader", Grade.FULL_BRAKING)] * 9))
     first, second = overviewed.clusters
     assert (first.name, first.failures, first.preventable, first.distinct) == ("cut-in", 4, 2, 1)
-    assert (first.representative, first.grade) == ("e3", Grade.CAREFUL)
+    assert (first.representative, first.grade) == ("e3", Grade.PREVENTABLE)
     assert (second.name, second.failures, second.preventable) == ("leader", 9, 0)
     assert overviewed.covered == 1  # the signature is no part of the taxonomy
     assert overviewed.cells == 1872
@@ -34,16 +37,16 @@ def test_contacts_that_are_no_failures_are_left_out() -> None:
 
 
 def test_the_vendi_score_counts_what_has_nothing_in_common() -> None:
-    one = failure("cut-in", Grade.CAREFUL)
+    one = failure("cut-in", Grade.PREVENTABLE)
     assert vendi([]) == 0.0
     assert vendi([[one] * 7]) == pytest.approx(1.0)
     assert vendi([[one], [one], [one]]) == pytest.approx(3.0)
-    near, far = (failure("cut-in", Grade.CAREFUL, relative_speed_mps=speed) for speed in (7.5, 20.0))
+    near, far = (failure("cut-in", Grade.PREVENTABLE, relative_speed_mps=speed) for speed in (7.5, 20.0))
     assert 1.0 < vendi([[one, near]]) < vendi([[one, far]]) < 2.0
 
 
 def test_violations_without_contact_are_clusters_of_their_own() -> None:
-    hit, slow, fast = failure("cut-in", Grade.CAREFUL), violation(ego_speed_mps=5.0), violation(ego_speed_mps=20.0)
+    hit, slow, fast = failure("cut-in", Grade.PREVENTABLE), violation(ego_speed_mps=5.0), violation(ego_speed_mps=20.0)
     both = episode_record(0, Outcome.FAILURE, collision=hit, violations=(slow,))
     overviewed = overview([("e0", both), ("e1", episode_record(1, Outcome.FAILURE, violations=(fast,)))])
     assert [(each.name, each.failures, each.distinct) for each in overviewed.clusters] == [

@@ -15,7 +15,7 @@ def case(verdict: Verdict, name: str = "a", *, found: str = "", known: bool = Fa
         id="same",
         digest=name,
         name=f"cut-in {name}",
-        grade=Grade.CAREFUL,
+        grade=Grade.PREVENTABLE,
         verdict=verdict,
         reason="why \x01",
         found=found,

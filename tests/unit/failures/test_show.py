@@ -104,7 +104,7 @@ def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke()
         "the ego's front, at 10.0 m/s, touched the left of adversary 'pedestrian', at 1.0 m/s, "
         "of which it had known for 1.0 s",
         JUDGED.signature,
-        "the conflict began 1.2 s before the contact · grade careful: the careful driver and full braking at once "
+        "the conflict began 1.2 s before the contact · grade preventable: R157's driver and full braking at once "
         "would have",
         "prevented it",
         "broken by the other: pedestrian on red · by the ego: nothing",
@@ -114,7 +114,7 @@ def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke()
         "broken by the other: nothing · by the ego: nothing",
     ]
     assert lines(broke=(), ego_broke=("red_light",))[-1] == "broken by the other: nothing · by the ego: red light"
-    assert " ".join(lines(grade=Grade.UNAVOIDABLE, drivers={"careful": TOUCHES, "ideal": TOUCHES})[-3:-1]).endswith(
+    assert " ".join(lines(grade=Grade.UNAVOIDABLE, drivers={"r157": TOUCHES, "full_braking": TOUCHES})[-3:-1]).endswith(
         "grade unavoidable: none of the reference drivers would have prevented it"
     )
 
@@ -137,8 +137,8 @@ def test_rules_that_the_contact_failed_are_named_in_full_on_lines_that_the_page_
 @pytest.mark.parametrize("other_id", ["pedestrian", None])
 def test_a_violation_without_contact_is_marked_while_the_episode_goes_on(other_id: str | None) -> None:
     near = {"other_id": other_id, "other_kind": "pedestrian", "other_role": "adversary"} if other_id else {}
-    drivers = {"careful": True, "ideal": False}
-    broken = violation(requirement="safe_ttc", time_s=1.0, grade=Grade.CAREFUL, drivers=drivers, **near)
+    drivers = {"r157": True, "full_braking": False}
+    broken = violation(requirement="safe_ttc", time_s=1.0, grade=Grade.PREVENTABLE, drivers=drivers, **near)
     episode = episode_record(7, Outcome.FAILURE, scene=synthetic_contact().episode.scene, violations=(broken,))
     recording = Recording(RecordedFailure.of("low-random-0", episode), with_release())
     figure = draw_recording("mixed", recording)
@@ -156,7 +156,7 @@ def test_a_violation_without_contact_is_marked_while_the_episode_goes_on(other_i
     title = figure.get_suptitle()
     assert "the ego, at 9.0 m/s, violated safe_ttc" in title
     assert ("'pedestrian' first" in title) == (other_id is not None)
-    assert "grade careful: the careful driver would have prevented it" in title
+    assert "grade preventable: R157's driver would have prevented it" in title
 
 
 def test_other_violations_of_the_episode_are_marked_and_named() -> None:

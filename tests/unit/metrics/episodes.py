@@ -100,14 +100,16 @@ RUN = [
 JUDGED = [
     # Contact at 3.9 s, and the same again, which is not distinct.
     *[episode(Outcome.FAILURE, 39, hit=contact(time_s=3.9, judgement=judgement(conflict_s=2.5)))] * 2,
-    episode(Outcome.FAILURE, 60, hit=contact(time_s=6.0, other_id="adv_1", judgement=judgement(Grade.IDEAL, 3.0))),
+    episode(
+        Outcome.FAILURE, 60, hit=contact(time_s=6.0, other_id="adv_1", judgement=judgement(Grade.FULL_BRAKING, 3.0))
+    ),
     episode(
         Outcome.FAILURE,
         150,
         hit=contact(
             time_s=15.0,
             other_id="adv_2",
-            judgement=judgement(Grade.CAREFUL, -0.4, signature="pedestrian, straight", unresponsive=True),
+            judgement=judgement(Grade.PREVENTABLE, -0.4, signature="pedestrian, straight", unresponsive=True),
         ),
     ),
     episode(Outcome.FAILURE, 20, hit=contact(time_s=2.0, other_id="adv_3")),  # from before contacts were judged

@@ -47,7 +47,7 @@ def test_each_requirement_has_a_funnel_and_records_from_before_have_none():
         return {name: RequirementResult(**kept, violated_s=time_s) for name, time_s in violated_s.items()}
 
     struck = contact(judgement=judgement())
-    slow = violation(grade=Grade.CAREFUL)
+    slow = violation(grade=Grade.PREVENTABLE)
     refused = violation(verdicts={"no_teleport": False})
     metrics = feed(
         [
@@ -169,7 +169,7 @@ def test_incremental_equals_batch(records):
     assert metrics.window_pcr == preventable_collision_rate(counted(records[-WINDOW:]))
     assert metrics.distinct_preventable == len(distinct_failures([hit for hit in hits if hit.preventable]))
     judged = [hit for hit in hits if hit.judgement is not None]
-    assert metrics.avoidable == sum(hit.judgement.grade in (Grade.CAREFUL, Grade.IDEAL) for hit in judged)
+    assert metrics.avoidable == sum(hit.judgement.grade in (Grade.PREVENTABLE, Grade.FULL_BRAKING) for hit in judged)
     assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(judged)
     assert sum(metrics.signatures.values()) == len(hits)
     assert metrics.covered == len({kind_of(hit, hit.judgement) for hit in judged})

@@ -21,7 +21,7 @@ OUTCOMES = {
     # Another failure than f, which no careful driver would have prevented.
     "F": (
         Outcome.FAILURE,
-        hit(speed=20.0, judged=judgement(Grade.IDEAL, -0.5, unresponsive=True, signature="leader, straight")),
+        hit(speed=20.0, judged=judgement(Grade.FULL_BRAKING, -0.5, unresponsive=True, signature="leader, straight")),
     ),
     "a": (Outcome.DEGENERATE, hit(broken="inside_limits")),
     "d": (Outcome.DEGENERATE, hit(broken="ego_moving")),
@@ -46,7 +46,7 @@ NEWER = {
     "k": {"requirements": results(no_contact=None, safe_ttc=None, never_fast=None)},
     "v": {
         "requirements": results(no_contact=None, safe_ttc=0.5, never_fast=1.5),
-        "violations": (violation(grade=Grade.CAREFUL),),
+        "violations": (violation(grade=Grade.PREVENTABLE),),
         "failed": ("never_fast",),
     },
 }

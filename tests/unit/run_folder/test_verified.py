@@ -27,7 +27,7 @@ def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not(
     records = [
         failure(0),
         failure(1),  # like it, and not replayed
-        failure(2, judgement=judgement(Grade.IDEAL)),  # like it, and the same when it was replayed
+        failure(2, judgement=judgement(Grade.FULL_BRAKING)),  # like it, and the same when it was replayed
         failure(3, other_speed_mps=20.0),  # of another kind
         failure(4, phase="evaluate"),
         episode_record(5),

@@ -15,21 +15,21 @@ HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)
 
 
 def failure(grade: Grade, kind: str = "cut-in", impact_mps: float = 5.0, striker: str = "left") -> Collision:
-    careful = ReferenceOutcome(avoids=grade is Grade.CAREFUL, impact_speed_mps=impact_mps)
-    return collision(other_id=striker, judgement=judgement(grade, signature=kind, drivers={"careful": careful}))
+    careful = ReferenceOutcome(avoids=grade is Grade.PREVENTABLE, impact_speed_mps=impact_mps)
+    return collision(other_id=striker, judgement=judgement(grade, signature=kind, drivers={"r157": careful}))
 
 
 def test_a_niche_keeps_what_the_careful_driver_came_nearest_to_preventing():
     elites = Elites()
     for point, grade, impact_mps in (
         (HERE, Grade.UNAVOIDABLE, 9.0),
-        (THERE, Grade.IDEAL, 2.0),
-        (HERE, Grade.IDEAL, 4.0),
+        (THERE, Grade.FULL_BRAKING, 2.0),
+        (HERE, Grade.FULL_BRAKING, 4.0),
     ):
         elites.add_failure(point, failure(grade, impact_mps=impact_mps), None)
     (almost,) = elites.pool()
     np.testing.assert_array_equal(almost.point, THERE)
-    elites.add_failure(HERE, failure(Grade.CAREFUL), None)
+    elites.add_failure(HERE, failure(Grade.PREVENTABLE), None)
     (preventable,) = elites.pool()
     np.testing.assert_array_equal(preventable.point, HERE)
     assert preventable.worth > almost.worth
@@ -37,15 +37,15 @@ def test_a_niche_keeps_what_the_careful_driver_came_nearest_to_preventing():
 
 def test_a_parent_is_credited_with_what_was_new_and_most_with_what_was_preventable():
     elites = Elites()
-    elites.add_failure(HERE, failure(Grade.IDEAL), None)
+    elites.add_failure(HERE, failure(Grade.FULL_BRAKING), None)
     (parent,) = elites.pool()
-    elites.add_failure(THERE, failure(Grade.IDEAL), parent)
+    elites.add_failure(THERE, failure(Grade.FULL_BRAKING), parent)
     assert parent.credit == 0.0
-    elites.add_failure(THERE, failure(Grade.CAREFUL), parent)
+    elites.add_failure(THERE, failure(Grade.PREVENTABLE), parent)
     assert parent.credit == NEW_PREVENTABLE
-    elites.add_failure(THERE, failure(Grade.IDEAL, "leader"), parent)
+    elites.add_failure(THERE, failure(Grade.FULL_BRAKING, "leader"), parent)
     assert parent.credit == NEW_PREVENTABLE + NEW
-    elites.add_failure(THERE, failure(Grade.CAREFUL), parent)
+    elites.add_failure(THERE, failure(Grade.PREVENTABLE), parent)
     assert parent.credit == NEW_PREVENTABLE + NEW
 
 
@@ -54,7 +54,7 @@ def test_near_misses_stand_in_for_who_has_struck_nobody():
     elites.add_misses(HERE, Encounter(encounters_s={"left": 3.0, "right": 2.0}))
     elites.add_misses(THERE, Encounter(encounters_s={"left": 1.0, "right": 5.0}))
     assert {e.target: e.point[0] for e in elites.pool()} == {"left": 0.75, "right": 0.25}
-    elites.add_failure(HERE, failure(Grade.IDEAL, striker="left"), None)
+    elites.add_failure(HERE, failure(Grade.FULL_BRAKING, striker="left"), None)
     assert [e.kind for e in elites.pool()] == ["cut-in", "near miss of right"]
 
 
@@ -71,7 +71,7 @@ def test_a_requirement_is_aimed_at_once_it_is_nearly_violated_and_until_it_is():
 
 def test_preventable_failures_are_built_on_most_often():
     elites, random = Elites(), np.random.default_rng(0)
-    for kind, grade in (("a", Grade.CAREFUL), ("b", Grade.IDEAL), ("c", Grade.UNAVOIDABLE)):
+    for kind, grade in (("a", Grade.PREVENTABLE), ("b", Grade.FULL_BRAKING), ("c", Grade.UNAVOIDABLE)):
         elites.add_failure(HERE, failure(grade, kind, impact_mps=10.0), None)
     drawn = [elites.draw(elites.pool(), random).kind for _ in range(60)]
     assert drawn.count("a") > drawn.count("b") + drawn.count("c")
@@ -92,7 +92,7 @@ def found(seed: int, episodes: int, *, told: bool) -> int:
         u = optimizer.ask()
         in_corner = (u[:2] < 0.3).all() and u[2] > 0.4
         kind = f"{int(10 * u[3])} {int(4 * u[4])}"
-        hit = failure(Grade.CAREFUL, kind) if in_corner else None
+        hit = failure(Grade.PREVENTABLE, kind) if in_corner else None
         kinds |= {kind} if in_corner else set()
         optimizer.tell(u, 0.0, Encounter(collision=hit if told else None))
     return len(kinds)
@@ -105,7 +105,7 @@ def test_it_finds_more_kinds_of_failure_than_chance(seed):
 
 def test_a_failure_that_a_rule_refuses_is_not_built_on():
     optimizer = ArchiveOptimizer(2, SceneOptimizerConfig(), 0)
-    refused = failure(Grade.CAREFUL).model_copy(update={"verdicts": {"inside_limits": False}})
+    refused = failure(Grade.PREVENTABLE).model_copy(update={"verdicts": {"inside_limits": False}})
     for _ in range(INITIAL):
         optimizer.tell(optimizer.ask(), 0.0, Encounter(collision=refused))
     assert optimizer.state()["elites"]["failures"] == {}

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.verdicts.along import Along
-from risk_sac.verdicts.drivers import FULL_MPS2, Situation, careful, fuzzy, ideal, rss, towards_command
+from risk_sac.verdicts.drivers import FULL_MPS2, Situation, full_braking, fuzzy, r157, rss, towards_command
 
 DRY, WET = 9.81, 0.6 * 9.81
 
@@ -16,19 +16,19 @@ DRY, WET = 9.81, 0.6 * 9.81
     [(0.0, 0.4), (0.75, 0.4), (0.95, 0.4 + 2.53), (1.30, 7.3575), (1.32, 7.59294), (9.0, 7.59294)],
 )
 def test_careful_brakes_as_r157_says(since_s: float, braking: float) -> None:
-    assert careful(since_s, DRY) == pytest.approx(braking)
+    assert r157(since_s, DRY) == pytest.approx(braking)
 
 
 def test_no_driver_brakes_harder_than_the_road_bears() -> None:
-    assert careful(3.0, WET) == pytest.approx(5.886)
-    assert ideal(WET) == pytest.approx(5.886)
-    assert ideal(DRY) == 8.0
+    assert r157(3.0, WET) == pytest.approx(5.886)
+    assert full_braking(WET) == pytest.approx(5.886)
+    assert full_braking(DRY) == 8.0
     assert towards_command(5.8, 6.0, WET, 0.1) == pytest.approx(5.886)
 
 
 @given(st.floats(0, 10), st.floats(0.5, 12))
 def test_the_bound_never_brakes_less_than_careful(since_s: float, grip: float) -> None:
-    assert ideal(grip) >= careful(since_s, grip)
+    assert full_braking(grip) >= r157(since_s, grip)
 
 
 def test_a_command_builds_up_at_its_jerk() -> None:

@@ -79,13 +79,13 @@ def test_what_is_not_valid_gets_no_grade() -> None:
 
 
 def test_grades_of_a_pedestrian_that_comes_into_sight() -> None:
-    assert judged(pedestrian_crosses(seen_from_s=3.0)).grade is Grade.CAREFUL
-    assert judged(pedestrian_crosses(seen_from_s=7.0)).grade is Grade.IDEAL
+    assert judged(pedestrian_crosses(seen_from_s=3.0)).grade is Grade.PREVENTABLE
+    assert judged(pedestrian_crosses(seen_from_s=7.0)).grade is Grade.FULL_BRAKING
     assert judged(pedestrian_crosses(seen_from_s=8.0)).grade is Grade.UNAVOIDABLE
 
 
 def test_more_time_in_sight_never_makes_the_grade_worse() -> None:
-    order = [Grade.CAREFUL, Grade.IDEAL, Grade.UNAVOIDABLE]
+    order = [Grade.PREVENTABLE, Grade.FULL_BRAKING, Grade.UNAVOIDABLE]
     grades = [order.index(judged(pedestrian_crosses(seen_from_s=at / 10)).grade) for at in range(30, 82, 4)]  # type: ignore[arg-type]
     assert grades == sorted(grades)
 

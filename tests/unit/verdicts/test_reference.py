@@ -55,7 +55,7 @@ def standing_in_the_way(distance_m: float, speed: float = 15.0, friction: float 
 # fsm: PFS and CFS of something that stands 0.75 s of 15 m/s away are 1 long before: 11.25 m, then 6 m/s² with its jerk.
 @pytest.mark.parametrize(
     ("driver", "friction", "needs_m"),
-    [("careful", 1.0, 35.21), ("careful", 0.5, 41.54), ("ideal", 1.0, 14.06), ("ideal", 0.5, 22.94)],
+    [("r157", 1.0, 35.21), ("r157", 0.5, 41.54), ("full_braking", 1.0, 14.06), ("full_braking", 0.5, 22.94)],
 )
 def test_a_driver_needs_its_stopping_distance(driver: str, friction: float, needs_m: float) -> None:
     assert outcomes(standing_in_the_way(needs_m + 0.1, friction=friction))[driver].avoids
@@ -76,11 +76,13 @@ def test_fsm_avoids_what_it_sees_in_time_and_not_what_it_does_not() -> None:
 
 def test_impact_speed_of_the_bound() -> None:
     # 225 − 2 · 8 · 10 = 65
-    assert outcomes(standing_in_the_way(10.0))["ideal"].impact_speed_mps == pytest.approx(math.sqrt(65.0), abs=0.2)
+    assert outcomes(standing_in_the_way(10.0))["full_braking"].impact_speed_mps == pytest.approx(
+        math.sqrt(65.0), abs=0.2
+    )
 
 
 def test_a_driver_that_does_not_perceive_in_time_strikes_as_the_ego_did() -> None:
-    found = outcomes(standing_in_the_way(5.0))["careful"]  # 0.33 s
+    found = outcomes(standing_in_the_way(5.0))["r157"]  # 0.33 s
     assert (found.avoids, found.impact_speed_mps) == (False, pytest.approx(15.0))
 
 
@@ -88,16 +90,16 @@ def test_a_driver_counts_on_its_own_where_the_ego_braked_harder() -> None:
     # The ego brakes with 9 m/s² from 0.2 s after the conflict began: careful takes over 0.2 s later, at 13.2 m/s.
     ego = straight(-1.5 * 15.0, 0.0, 0.0, 15.0, (0.2, -9.0))
     walker = straight(CAR_M[0] / 2 + 14.0 + 0.25, 0.0, 0.0, 0.0)
-    found = outcomes(stage(ego, walker, kinds=WALKING, seen_from_s=0.0))["careful"]
+    found = outcomes(stage(ego, walker, kinds=WALKING, seen_from_s=0.0))["r157"]
     assert found.impact_speed_mps == pytest.approx(13.2, abs=0.6)
 
 
 def test_who_stands_when_it_is_struck_has_avoided() -> None:
     # A head-on driver: everybody is struck in the end, the bound after it has come to a stand.
     evidence = stage(straight(0.0, 0.0, 0.0, 8.0), straight(60.0, 0.0, math.pi, 8.0))
-    assert outcomes(evidence)["ideal"].avoids
+    assert outcomes(evidence)["full_braking"].avoids
     slow_ego = stage(straight(0.0, 0.0, 0.0, 0.0, (1.0, 1.0)), straight(60.0, 0.0, math.pi, 10.0))
-    assert outcomes(slow_ego)["careful"].avoids
+    assert outcomes(slow_ego)["r157"].avoids
 
 
 def test_who_is_struck_from_behind_has_avoided() -> None:
@@ -105,8 +107,8 @@ def test_who_is_struck_from_behind_has_avoided() -> None:
     beside = straight(-2.0, LANE_M, 0.0, 13.0)
     evidence = stage(straight(0.0, 0.0, 0.0, 12.0), sideways(beside, 1.0, -1.0, LANE_M))
     behind = stage(straight(0.0, 0.0, 0.0, 12.0), straight(-20.0, 0.0, 0.0, 14.0))
-    assert all(found.avoids for name, found in outcomes(behind).items() if name in ("careful", "ideal"))
-    assert set(outcomes(evidence)) == {"careful", "fsm", "rss", "ideal", "r157_ttc"}
+    assert all(found.avoids for name, found in outcomes(behind).items() if name in ("r157", "full_braking"))
+    assert set(outcomes(evidence)) == {"r157", "fsm", "rss", "full_braking", "r157_ttc"}
 
 
 def test_who_has_passed_by_then_has_not_avoided() -> None:
@@ -117,7 +119,7 @@ def test_who_has_passed_by_then_has_not_avoided() -> None:
     evidence = stage(ego, walker, kinds=WALKING, seen_from_s=0.0)
     assert evidence.time_s[-1] == pytest.approx(1.4)
     for seen in (evidence, mirrored(evidence)):
-        found = outcomes(seen)["careful"]
+        found = outcomes(seen)["r157"]
         assert not found.avoids
         assert found.impact_speed_mps == pytest.approx(10.6, abs=0.1)  # as it passes
 
@@ -129,7 +131,7 @@ def test_who_stands_before_the_ego_comes_past_has_avoided() -> None:
     walker = straight(CAR_M[0] / 2 + 15.5 + 0.25, 0.0, 0.0, 0.0)
     evidence = stage(ego, walker, kinds=WALKING, seen_from_s=0.0)
     assert evidence.time_s[-1] > 2.5
-    assert outcomes(evidence)["ideal"].avoids
+    assert outcomes(evidence)["full_braking"].avoids
 
 
 # v_rel 5: 5/12 + 0.35 = 0.767 s, 3.83 m. It intrudes by 0.3 m when its side is 1.35 m from the ego's middle: 1.025 m
@@ -142,20 +144,20 @@ def test_r157_measures_a_cut_in_at_the_intrusion(gap: float, avoids: bool, side:
 
 def test_r157_ttc_speaks_of_cut_ins_only() -> None:
     for evidence in (leader_brakes(), crossing_car(), pedestrian_crosses()):
-        assert set(outcomes(evidence)) == {"careful", "fsm", "rss", "ideal"}
+        assert set(outcomes(evidence)) == {"r157", "fsm", "rss", "full_braking"}
 
 
 @pytest.mark.parametrize(
-    ("careful", "ideal", "expected"),
+    ("r157", "full_braking", "expected"),
     [
-        (True, True, Grade.CAREFUL),
-        (True, False, Grade.CAREFUL),
-        (False, True, Grade.IDEAL),
+        (True, True, Grade.PREVENTABLE),
+        (True, False, Grade.PREVENTABLE),
+        (False, True, Grade.FULL_BRAKING),
         (False, False, Grade.UNAVOIDABLE),
     ],
 )
-def test_grades(careful: bool, ideal: bool, expected: Grade) -> None:
-    found = {"careful": careful, "ideal": ideal}
+def test_grades(r157: bool, full_braking: bool, expected: Grade) -> None:
+    found = {"r157": r157, "full_braking": full_braking}
     assert grade(found) is expected
 
 
@@ -183,15 +185,15 @@ speeds = st.floats(3.0, 20.0)
 @given(speeds, st.floats(1.0, 60.0), st.sampled_from([0.4, 0.7, 1.0]))
 def test_the_bound_avoids_what_careful_avoids(speed: float, distance: float, friction: float) -> None:
     found = outcomes(standing_in_the_way(distance, speed, friction))
-    assert found["ideal"].avoids >= found["careful"].avoids
-    assert found["ideal"].impact_speed_mps <= found["careful"].impact_speed_mps + 0.2
+    assert found["full_braking"].avoids >= found["r157"].avoids
+    assert found["full_braking"].impact_speed_mps <= found["r157"].impact_speed_mps + 0.2
 
 
 @settings(deadline=None, max_examples=30)
 @given(speeds, st.floats(1.0, 40.0), st.floats(0.5, 20.0))
 def test_more_room_never_makes_it_worse(speed: float, distance: float, more: float) -> None:
     near, far = outcomes(standing_in_the_way(distance, speed)), outcomes(standing_in_the_way(distance + more, speed))
-    for driver in ("careful", "ideal", "rss", "fsm"):
+    for driver in ("r157", "full_braking", "rss", "fsm"):
         assert far[driver].avoids >= near[driver].avoids
 
 
@@ -208,7 +210,7 @@ def test_the_bound_avoids_what_careful_avoids_before_a_pedestrian(
     except AssertionError:  # the ego braked enough
         reject()
     found = outcomes(evidence)
-    assert found["ideal"].avoids >= found["careful"].avoids
+    assert found["full_braking"].avoids >= found["r157"].avoids
 
 
 def test_a_moved_and_turned_scene_has_the_same_outcomes() -> None:

@@ -74,7 +74,7 @@ def test_an_ego_that_comes_over_to_its_neighbour_merges_into_it() -> None:
     # 0.375 m off its lane's centre 0.31 s after it began, at 2 s.
     found = judged(merge())
     assert found.signature == "neighbour, alongside, in a lane; ego changes lanes, does not brake"
-    assert (found.conflict_type, found.grade) == (ConflictType.MERGE, Grade.CAREFUL)
+    assert (found.conflict_type, found.grade) == (ConflictType.MERGE, Grade.PREVENTABLE)
     assert found.conflict_s == found.noticed_s == pytest.approx(2.4, abs=0.06)
     assert "r157_ttc" not in found.drivers
 
@@ -109,8 +109,8 @@ def test_a_reference_driver_keeps_its_lane_and_looks_out_for_who_is_there() -> N
     alone = judged(stage(ego, neighbour))
     behind_leader = stage(ego, neighbour, leader, kinds=kinds)
     assert behind_leader.time_s[-1] == pytest.approx(2.8)
-    assert alone.grade is Grade.CAREFUL
-    assert judged(behind_leader).grade is Grade.IDEAL
+    assert alone.grade is Grade.PREVENTABLE
+    assert judged(behind_leader).grade is Grade.FULL_BRAKING
 
 
 def bend(t: float, radius_m: float = 60.0, speed: float = 10.0) -> tuple[float, float, float]:
@@ -158,13 +158,13 @@ def leaves_the_road(walker_y: float = -9.0) -> Evidence:
 def test_a_pedestrian_beside_the_road_is_struck_by_an_ego_that_left_it() -> None:
     found = judged(leaves_the_road())
     assert found.conflict_s == pytest.approx(2.2, abs=0.11)
-    assert (found.hidden, found.grade) == (False, Grade.CAREFUL)
+    assert (found.hidden, found.grade) == (False, Grade.PREVENTABLE)
 
 
 def test_an_unseen_pedestrian_beside_the_road_would_not_have_been_struck_from_the_lane() -> None:
     evidence = leaves_the_road()
     unseen = replace(evidence, known=evidence.known & (np.arange(2) == 0))
-    assert judged(unseen).grade is Grade.CAREFUL
+    assert judged(unseen).grade is Grade.PREVENTABLE
 
 
 @pytest.mark.parametrize("speed", [8.0, 12.0])
@@ -172,4 +172,4 @@ def test_an_ego_that_drifts_into_oncoming_traffic_is_avoided_by_keeping_the_lane
     ego = sideways(straight(0.0, 0.0, 0.0, speed), 3.0, 1.5, LANE_M)
     found = judged(stage(ego, straight(120.0, LANE_M, math.pi, 10.0)))
     assert found.conflict_s >= 3.0
-    assert (found.conflict_type, found.grade) == (ConflictType.CROSSING, Grade.CAREFUL)
+    assert (found.conflict_type, found.grade) == (ConflictType.CROSSING, Grade.PREVENTABLE)

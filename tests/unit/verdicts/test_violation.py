@@ -75,8 +75,8 @@ KEEPS_APART = own("vehicle_gap_m >= 4")
 
 def test_a_careful_driver_keeps_a_distance_that_the_ego_did_not() -> None:
     found = violated(closes_in(), KEEPS_APART)
-    assert found.grade is Grade.CAREFUL
-    assert set(found.drivers) == {"careful", "fsm", "rss", "ideal"}
+    assert found.grade is Grade.PREVENTABLE
+    assert set(found.drivers) == {"r157", "fsm", "rss", "full_braking"}
     assert (found.other_id, found.other_kind, found.other_role) == ("actor_1", "vehicle", "adversary")
     assert found.signature == "own violated; ego goes straight, vehicle ahead"
     assert found.time_s == pytest.approx(3.75, abs=0.15)  # it stands 10 m ahead at 3.15 s
@@ -90,7 +90,7 @@ def test_a_distance_that_nobody_could_keep_is_unavoidable() -> None:
 
 def test_followers_would_have_kept_their_distance() -> None:
     tailgater = straight(-CAR_M[0] - 3.0, 0.0, 0.0, 14.0, (3.1, -8.0))
-    assert violated(closes_in(25.0, 2.0, tailgater), own("vehicle_gap_m >= 2.5")).drivers["careful"]
+    assert violated(closes_in(25.0, 2.0, tailgater), own("vehicle_gap_m >= 2.5")).drivers["r157"]
 
 
 def test_a_driver_acts_too_late_if_it_acts_after_the_violation() -> None:
@@ -103,7 +103,7 @@ def test_a_driver_acts_too_late_if_it_acts_after_the_violation() -> None:
 def test_a_reference_driver_keeps_the_limit() -> None:
     speeds_up = staged(straight(0.0, 0.0, 0.0, 13.0, (2.0, 1.5)), straight(900.0, 0.0, 0.0, 13.0))
     found = violated(speeds_up, own("ego_speed_mps <= 15.5"))
-    assert (found.grade, found.broke) == (Grade.CAREFUL, ("speeding",))
+    assert (found.grade, found.broke) == (Grade.PREVENTABLE, ("speeding",))
     assert found.signature == "own violated; ego goes straight speeding, nobody near"
 
 
@@ -111,7 +111,7 @@ def test_an_ego_that_passes_a_pedestrian_too_closely_would_have_had_room_in_its_
     swerves = sideways(straight(0.0, 0.0, 0.0, 10.0), 2.0, 1.0, 2.0)
     evidence = staged(swerves, straight(60.0, 4.2, 0.0, 0.0), kinds=WALKING)
     found = violated(evidence, own("pedestrian_gap_m >= 1.5"))
-    assert (found.grade, found.ego_manoeuvre) == (Grade.CAREFUL, "lane_change")
+    assert (found.grade, found.ego_manoeuvre) == (Grade.PREVENTABLE, "lane_change")
     straight_on = staged(
         sideways(straight(0.0, 0.0, 0.0, 10.0), -1.5, 2.0, 2.0), straight(60.0, 4.2, 0.0, 0.0), kinds=WALKING
     )
@@ -135,10 +135,10 @@ NO_RED = own("historically[0,1] (red_light_braking_mps2 <= 9)", "no_red_light_en
 @pytest.mark.parametrize(
     ("yellow_m", "red_m", "grade"),
     [
-        (200.0, 200.0, Grade.CAREFUL),
-        (40.0, 10.0, Grade.CAREFUL),
-        (26.0, 26.0, Grade.CAREFUL),  # 12 m/s: 13.8 m in 1.15 s, then 0.6 s to 7.6 m/s², about 12 m more
-        (15.0, 15.0, Grade.IDEAL),  # 12² / (2 · 8) = 9 m
+        (200.0, 200.0, Grade.PREVENTABLE),
+        (40.0, 10.0, Grade.PREVENTABLE),
+        (26.0, 26.0, Grade.PREVENTABLE),  # 12 m/s: 13.8 m in 1.15 s, then 0.6 s to 7.6 m/s², about 12 m more
+        (15.0, 15.0, Grade.FULL_BRAKING),  # 12² / (2 · 8) = 9 m
         (8.0, 8.0, Grade.UNAVOIDABLE),
     ],
 )
@@ -156,7 +156,7 @@ def test_a_reference_driver_stops_at_red_where_it_can(yellow_m: float, red_m: fl
 def test_a_reference_driver_stays_on_the_carriageway() -> None:
     evidence = staged(straight(0.0, 0.0, 0.0, 12.0), straight(500.0, 0.0, 0.0, 12.0))
     found = violated(evidence, own("ego_speed_mps <= 5", "on_carriageway"))
-    assert found.grade is Grade.CAREFUL
+    assert found.grade is Grade.PREVENTABLE
     assert found.signature == "carriageway left; ego goes straight, nobody near"
 
 

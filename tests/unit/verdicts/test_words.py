@@ -6,7 +6,7 @@ from risk_sac.records import ReferenceOutcome
 from risk_sac.verdicts.words import began, known, prevented_by
 from tests.builders import collision, judgement, violation
 
-NONE = {"careful": False, "fsm": False, "rss": False, "ideal": False}
+NONE = {"r157": False, "fsm": False, "rss": False, "full_braking": False}
 
 
 def contact(drivers: Mapping[str, bool]) -> str | None:
@@ -18,12 +18,12 @@ def contact(drivers: Mapping[str, bool]) -> str | None:
     ("who", "preventing"),
     [
         ("none of the reference drivers", []),
-        ("only full braking at once", ["ideal"]),
-        ("the careful driver", ["careful"]),
-        ("the RSS driver and full braking at once", ["rss", "ideal"]),
-        ("the careful driver, the fuzzy safety model and full braking at once", ["careful", "fsm", "ideal"]),
+        ("only full braking at once", ["full_braking"]),
+        ("R157's driver", ["r157"]),
+        ("the RSS driver and full braking at once", ["rss", "full_braking"]),
+        ("R157's driver, the fuzzy safety model and full braking at once", ["r157", "fsm", "full_braking"]),
         ("R157's time-to-collision rule", ["r157_ttc"]),
-        ("full braking at once and the far sighted driver", ["ideal", "far_sighted"]),
+        ("full braking at once and the far sighted driver", ["full_braking", "far_sighted"]),
     ],
 )
 def test_all_drivers_that_would_have_prevented_it_are_named(who: str, preventing: list[str]) -> None:

@@ -12,7 +12,7 @@ const COLUMNS = [
   ["violated", "Episodes in which it was violated after the adversaries' release"],
   ["valid", "Of these, failures: it counts, and no rule refused the violation"],
   ["distinct", "The first of their kind in their run"],
-  ["preventable", "Distinct, and a careful driver would have prevented them"],
+  ["preventable", "Distinct, and a reference driver would have prevented them"],
 ] as const;
 
 /** Those that count first. */

@@ -3,7 +3,7 @@
 import { number, words } from "./text";
 import { driversOf, type Collision, type Violation } from "./violations";
 
-export const GRADES = ["careful", "ideal", "unavoidable", "none"] as const;
+export const GRADES = ["preventable", "full_braking", "unavoidable", "none"] as const;
 export type GradeName = (typeof GRADES)[number];
 
 interface GradeWords {
@@ -12,18 +12,18 @@ interface GradeWords {
 }
 
 export const GRADE_WORDS: Record<GradeName, GradeWords> = {
-  careful: { short: "preventable", long: "The careful driver would have prevented it" },
-  ideal: { short: "by full braking", long: "Full braking at once would have prevented it, the careful driver would not" },
-  unavoidable: { short: "unavoidable", long: "Neither the careful driver nor full braking at once would have prevented it" },
+  preventable: { short: "preventable", long: "A reference driver would have prevented it" },
+  full_braking: { short: "by full braking", long: "Only full braking at once would have prevented it" },
+  unavoidable: { short: "unavoidable", long: "Neither a reference driver nor full braking at once would have prevented it" },
   none: { short: "not graded", long: "No reference driver was asked" },
 };
 
-const FULL_BRAKING = "ideal";
+const FULL_BRAKING = "full_braking";
 /** It drives nowhere, so it has no impact speed. */
 export const TTC_RULE = "r157_ttc";
 
 export const DRIVERS: Record<string, string> = {
-  careful: "the careful driver",
+  r157: "R157's driver",
   fsm: "the fuzzy safety model",
   rss: "the RSS driver",
   [FULL_BRAKING]: "full braking at once",

@@ -126,7 +126,7 @@ def test_runs_that_are_missing_are_named_with_the_reason(told, spec):
 
 def test_what_users_write_is_shown_and_is_no_markup(told):
     spec = CampaignSpec.model_validate(told.spec.model_dump() | {"label": HOSTILE})
-    case = Case(id="x", digest="d", name=HOSTILE, grade=Grade.CAREFUL, verdict=Verdict.FIXED, reason=HOSTILE)
+    case = Case(id="x", digest="d", name=HOSTILE, grade=Grade.PREVENTABLE, verdict=Verdict.FIXED, reason=HOSTILE)
     regression = Regression(ego=EgoConfig(), cases=(case,))
     reasons = {run.digest: HOSTILE for run in spec.runs()}
     page, text = both(compare(spec, [], HOSTILE, reasons=reasons), regression=regression)

@@ -39,7 +39,7 @@ def test_a_database_of_the_version_before_is_brought_up_to_date(tmp_path):
     assert [each.collision is not None for each in episodes] == [False, True, True]
     assert (episodes[0].min_ttc_s, episodes[1].collision.min_ttc_s) == (math.inf, math.inf)
     assert (episodes[1].repetition.same, episodes[1].funnel.contacts) == (3, 1)
-    assert [each.id for each in store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.CAREFUL)).items] == [
+    assert [each.id for each in store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.PREVENTABLE)).items] == [
         "low-random-0-train-1"
     ]
     assert store.triage(campaign.id, "low-random-0-train-1").comment == "seen"

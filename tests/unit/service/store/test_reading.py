@@ -111,9 +111,9 @@ def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, 
     numbers = [start(store, ledger) for _ in range(2)]
     kinds = [
         judgement(),
-        judgement(Grade.IDEAL, broke=()),
+        judgement(Grade.FULL_BRAKING, broke=()),
         judgement(Grade.UNAVOIDABLE, broke=("wrong_direction",), signature="crossing, 50 % hidden"),
-        judgement(Grade.CAREFUL, broke=("speeding",)),
+        judgement(Grade.PREVENTABLE, broke=("speeding",)),
         None,
     ]
     for number in numbers:
@@ -128,16 +128,16 @@ def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, 
         return [item.index for item in page.items]
 
     assert found() == [0, 1, 2, 3, 4, 5] * 2
-    assert found(grade=Grade.CAREFUL) == [0, 3] * 2
-    assert found(grade=Grade.CAREFUL, run_id="low-random-3") == [0, 3]
+    assert found(grade=Grade.PREVENTABLE) == [0, 3] * 2
+    assert found(grade=Grade.PREVENTABLE, run_id="low-random-3") == [0, 3]
     assert found(grade=Grade.UNAVOIDABLE) == [2, 2]
     assert found(broke="speeding") == [0, 3, 5] * 2
-    assert found(broke="red_light", grade=Grade.CAREFUL) == [0, 0]
+    assert found(broke="red_light", grade=Grade.PREVENTABLE) == [0, 0]
     assert found(broke="red-light") == found(broke="redXlight") == found(broke="red") == []
     assert found(signature="crossing, 50 % hidden") == [2, 2]
     assert found(signature="crossing") == []
-    first = store.episodes(campaign.id, limit=1, judged=Judged(grade=Grade.CAREFUL))
-    rest = store.episodes(campaign.id, limit=9, after=first.last, judged=Judged(grade=Grade.CAREFUL))
+    first = store.episodes(campaign.id, limit=1, judged=Judged(grade=Grade.PREVENTABLE))
+    rest = store.episodes(campaign.id, limit=9, after=first.last, judged=Judged(grade=Grade.PREVENTABLE))
     assert [item.index for item in (*first.items, *rest.items)] == [0, 3] * 2
 
 

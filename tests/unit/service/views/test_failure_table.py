@@ -87,7 +87,7 @@ def test_distinct_are_those_that_the_run_counted(ledger):
         collision(judgement=judgement(), ego_speed_mps=5.0),
         collision(judgement=judgement(), ego_speed_mps=6.0),
         collision(judgement=judgement(), ego_speed_mps=9.0),
-        collision(judgement=judgement(Grade.IDEAL, signature="leader"), ego_speed_mps=9.0),
+        collision(judgement=judgement(Grade.FULL_BRAKING, signature="leader"), ego_speed_mps=9.0),
         collision(judgement=judgement(conflict_s=0.5), ego_speed_mps=9.0),
         collision(),
     ]
@@ -113,7 +113,7 @@ def test_distinct_are_those_that_the_run_counted(ledger):
 
 def test_a_violation_without_contact_has_what_is_known_of_it(ledger):
     campaign = ledger.create(SPEC)
-    fast = violation(grade=Grade.CAREFUL, broke=("speeding",))
+    fast = violation(grade=Grade.PREVENTABLE, broke=("speeding",))
     near = violation(other_id="lead", other_kind="vehicle", other_role="adversary", ego_speed_mps=3.0)
     hit, touched = collision(verdicts={"ego_moving": False}), collision(judgement=judgement())
     other = violation(requirement="gap", signature="gap")

@@ -102,7 +102,7 @@ test("a trailing mean weighs points by their episodes, and forgets what lies too
 
 test("events go on where the snapshot ends; those before it fill the window alone", () => {
   const live = new LiveCurves([curve([1, 2], [0, 0])]);
-  const failed = { outcome: "failure", collision: { verdicts: {}, judgement: { grade: "careful" } } };
+  const failed = { outcome: "failure", collision: { verdicts: {}, judgement: { grade: "preventable" } } };
   live.apply([told(0), told(1, failed), told(2), { id: "s", event: "state", data: "{}" }, told(3, { phase: "evaluate" })]);
   expect(live.runs[0]).toMatchObject({ episodes: [1, 2, 3], distinct: [1, 2, 7], dual_variable: [0.2, 0.2, 0.4], mean_cost: [0, 0, 0.5] });
   expect(live.runs[0]!.window_ecr[2]).toBeCloseTo(1 / 3);

@@ -125,7 +125,7 @@ export class LiveCurves {
     this.sliding.set(curve.run_id, sliding);
     const valid = episode.outcome === "failure" && episode.collision !== null && isValid(episode.collision);
     const episodes = episode.index + 1;
-    sliding.add(episodes, valid, valid && episode.collision?.judgement?.grade === "careful");
+    sliding.add(episodes, valid, valid && episode.collision?.judgement?.grade === "preventable");
     extend(curve, {
       episodes,
       window_ecr: sliding.rate("valid"),

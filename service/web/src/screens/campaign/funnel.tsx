@@ -11,7 +11,7 @@ export interface Counts {
 const STEPS = [
   ["failures", "failures", "Episodes with a valid violation of a requirement that counts; a contact violates one, too."],
   ["distinct_failures", "distinct", "Violations of each kind once, per run."],
-  ["distinct_preventable", "preventable", "Distinct ones that the careful driver would have prevented."],
+  ["distinct_preventable", "preventable", "Distinct ones that a reference driver would have prevented."],
 ] as const;
 
 /** @param most what the longest bar stands for, where several funnels are to be compared. */

@@ -21,7 +21,7 @@ const HEADS: { column: Column; title: string; number?: boolean; hint?: string }[
     column: "preventable",
     title: "Prevent\u00adable",
     number: true,
-    hint: "the distinct failures that a careful driver would have prevented",
+    hint: "the distinct failures that a reference driver would have prevented",
   },
   { column: "eta", title: "ETA", number: true, hint: "time until it ends at its present pace" },
   { column: "created", title: "Created", number: true },

@@ -114,7 +114,7 @@ const MEASURES: [string, string, (row: Row) => string][] = [
   ["OFD", "mean distance between two valid contacts, 0 to 1", (row) => measured(row.more.dispersion)],
   ["steps / distinct", "environment steps per distinct failure", (row) => whole(row.more.steps_per_distinct_failure)],
   ["CPU s / distinct", "processor seconds per distinct failure", (row) => number(row.more.cpu_s_per_distinct_failure, 1)],
-  ["preventable, repeats too", "failures that the careful driver would have prevented", (row) => count(row.more.preventable)],
+  ["preventable, repeats too", "failures that a reference driver would have prevented", (row) => count(row.more.preventable)],
   ["contacts", "episodes in which the ego touched something", (row) => count(row.raw_collisions)],
   ["artefacts", "contacts that the simulator or the control made", (row) => count(row.more.artefacts)],
   ["unresponsive", "valid contacts with a visible collision course of 1.5 s in which the ego never braked", (row) => percent(row.more.unresponsive_share)],

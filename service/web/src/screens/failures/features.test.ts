@@ -4,7 +4,7 @@ import { sample } from "./sample";
 
 const table = sample(6);
 
-test("the time from conflict to contact is the careful driver's", () => {
+test("the time from conflict to contact is R157's driver's", () => {
   expect(reactionOf(table, 3)).toBe(4);
   expect(reactionOf(table, 2)).toBe(null);
 });

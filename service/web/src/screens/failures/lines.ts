@@ -28,7 +28,7 @@ export interface Ink {
   brush: string;
 }
 
-const ORDER: readonly (Grade | null)[] = [null, "unavoidable", "ideal", "careful"]; // what matters most lies on top
+const ORDER: readonly (Grade | null)[] = [null, "unavoidable", "full_braking", "preventable"]; // what matters most lies on top
 const COVER = { least: 0.05, most: 0.85 };
 
 /** Lines of failures, each grade with a pen of its own; the more lines, the fainter. */

@@ -5,8 +5,8 @@ import type { GradeName } from "../../ui/verdicts";
 type Outline = (context: CanvasRenderingContext2D | Path2D, r: number) => void;
 
 export const OUTLINES: Record<GradeName, Outline> = {
-  careful: (c, r) => c.arc(0, 0, r, 0, 2 * Math.PI),
-  ideal: (c, r) => {
+  preventable: (c, r) => c.arc(0, 0, r, 0, 2 * Math.PI),
+  full_braking: (c, r) => {
     const reach = r * 1.25;
     c.moveTo(0, -reach);
     c.lineTo(reach, 0);
@@ -24,7 +24,7 @@ export const OUTLINES: Record<GradeName, Outline> = {
 };
 
 /** Only what a person should look at is filled. */
-export const FILLED: Record<GradeName, boolean> = { careful: true, ideal: true, unavoidable: false, none: false };
+export const FILLED: Record<GradeName, boolean> = { preventable: true, full_braking: true, unavoidable: false, none: false };
 
 /** The mark as a picture of its own: thousands of stamps are drawn in the time of a hundred outlines. */
 export function stamp(grade: GradeName, colour: string, ground: string, r: number, ratio: number): HTMLCanvasElement {
@@ -45,8 +45,8 @@ export function stamp(grade: GradeName, colour: string, ground: string, r: numbe
 
 /** The same outlines as the data of an SVG path, around (8, 8) of a 16 px square: for legends and cards. */
 export const PATHS: Record<GradeName, string> = {
-  careful: "M3 8a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z",
-  ideal: "M8 1.8L14.2 8L8 14.2L1.8 8z",
+  preventable: "M3 8a5 5 0 1 0 10 0a5 5 0 1 0 -10 0z",
+  full_braking: "M8 1.8L14.2 8L8 14.2L1.8 8z",
   unavoidable: "M3.6 3.6h8.8v8.8h-8.8z",
   none: "M4 4L12 12M12 4L4 12",
 };

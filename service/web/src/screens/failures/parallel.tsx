@@ -14,7 +14,7 @@ import type { FailureTable } from "./wire";
 export const PITCH_PX = 30; // from one axis to the next
 const INSET_PX = 10;
 const CLICK_PX = 4; // a drag shorter than this is a click, which takes the brush away
-const COLOURS = ["--surface", "--text", "--faint", "--line", "--accent", "--careful", "--ideal", "--unavoidable"] as const;
+const COLOURS = ["--surface", "--text", "--faint", "--line", "--accent", "--preventable", "--full_braking", "--unavoidable"] as const;
 
 interface Props {
   table: FailureTable;
@@ -143,8 +143,8 @@ function inkOf(colours: Record<(typeof COLOURS)[number], string>): Omit<Ink, "br
   return {
     hidden: { colour: colours["--line"], width: 1 },
     grades: {
-      careful: { colour: colours["--careful"], width: 1.8 },
-      ideal: { colour: colours["--ideal"], width: 1.1 },
+      preventable: { colour: colours["--preventable"], width: 1.8 },
+      full_braking: { colour: colours["--full_braking"], width: 1.1 },
       unavoidable: { colour: colours["--unavoidable"], width: 0.8 },
       none: { colour: colours["--faint"], width: 0.8 },
     },

@@ -15,7 +15,7 @@ export function sample(size: number, changed: Partial<FailureTable> = {}): Failu
     valid: column((i) => i % 4 !== 3),
     requirement: column(() => "no_contact"),
     failed: column((i) => (i % 4 === 3 ? [] : ["no_contact"])),
-    grade: column((i) => (i % 4 === 3 ? null : (["careful", "ideal", "unavoidable"] as const)[i % 3]!)),
+    grade: column((i) => (i % 4 === 3 ? null : (["preventable", "full_braking", "unavoidable"] as const)[i % 3]!)),
     severity: column((i) => (["minor", "moderate", "severe"] as const)[i % 3]!),
     distinct: column((i) => i % 4 === 0),
     kind: column((i) => i % 2),

@@ -12,7 +12,7 @@ import { Mark } from "./grade";
 import { domain, linear, ticks, tickText, type Scale } from "./scale";
 import type { FailureTable } from "./wire";
 
-const COLOURS = ["--surface", "--text", "--faint", "--line", "--grid", "--careful", "--ideal", "--unavoidable"] as const;
+const COLOURS = ["--surface", "--text", "--faint", "--line", "--grid", "--preventable", "--full_braking", "--unavoidable"] as const;
 const MARGIN = { left: 46, right: 12, top: 10, bottom: 38 };
 const REACH_PX = 14; // how near the pointer has to come to a mark
 

@@ -79,7 +79,7 @@ function funnelOf({ valid, distinct, grade }: FailureTable): [string, number, st
   return [
     ["failures", among((i) => valid[i]!), "A requirement that counts was violated, and no rule refused it"],
     ["distinct", among((i) => distinct[i]!), "The first of their kind in their run"],
-    ["preventable", among((i) => distinct[i]! && grade[i] === "careful"), "Distinct, and a careful driver would have prevented them"],
+    ["preventable", among((i) => distinct[i]! && grade[i] === "preventable"), "Distinct, and a reference driver would have prevented them"],
   ];
 }
 

@@ -13,8 +13,8 @@ test("every order holds every failure once", () => {
 
 test("preventable ones come first, among them the fastest", () => {
   expect(by("grade").map((i) => table.grade[i])).toEqual([
-    ...["careful", "careful", "careful"],
-    ...["ideal", "ideal", "ideal"],
+    ...["preventable", "preventable", "preventable"],
+    ...["full_braking", "full_braking", "full_braking"],
     ...["unavoidable", "unavoidable", "unavoidable"],
     ...[null, null, null],
   ]);

@@ -21,7 +21,7 @@ export const SORTS_OF: Record<"failures" | "refused", readonly Sort[]> = {
   refused: ["closing", "reaction", "newest"],
 };
 
-const RANKS: Record<string, number> = { careful: 0, ideal: 1, unavoidable: 2 };
+const RANKS: Record<string, number> = { preventable: 0, full_braking: 1, unavoidable: 2 };
 const UNGRADED = 3;
 
 /** The failures in that order: a new list; who has no value comes last, the earlier one first among equals. */

@@ -1,11 +1,11 @@
-"""The careful and competent human driver of UN Regulation 157, Annex 3: late by 1.15 s, and then braking in full."""
+"""The competent and careful human driver of UN Regulation 157, Annex 3: late by 1.15 s, and then braking in full."""
 
 from risk_sac.egos.driving import Driver, needed_braking, time_to_collision
 from risk_sac.egos.seam import Control, Episode, Perceived
 from risk_sac.types import SPEED
 from risk_sac.verdicts.along import LEADER_BRAKES_MPS2
 from risk_sac.verdicts.course import HORIZON_S
-from risk_sac.verdicts.drivers import CAREFUL_DELAY_S, CAREFUL_PERCEIVES_S, careful
+from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S, r157
 
 HEADWAY_S = 2.0  # which the regulation's driver keeps
 RISK_TTC_S = 2.0  # below which the regulation's driver perceives a risk
@@ -13,8 +13,8 @@ RISK_BRAKING_MPS2 = 3.4  # Choice: or where a gentle braking no longer does
 OVER_S = 1.0  # a risk that has been gone for so long is over
 
 
-class Careful(Driver):
-    """Follows by IDM and brakes as UN R157's careful driver: 0.4 s to perceive, 0.75 s to respond, then 0.774 g."""
+class R157(Driver):
+    """Follows by IDM and brakes as UN R157's human driver: 0.4 s to perceive, 0.75 s to respond, then 0.774 g."""
 
     version = "1.0"
     response_time_s = 1.15
@@ -40,7 +40,7 @@ class Careful(Driver):
         accel = self.follow(perceived, ahead, HEADWAY_S)
         if self._since_s is not None:
             # Until it has perceived the risk, it drives on; what it then does is the regulation's.
-            braked_s = now - self._since_s - CAREFUL_PERCEIVES_S
-            reflex = careful(braked_s, self.vehicle.brake_mps2) if braked_s >= 0.0 else 0.0
-            accel = min(max(accel, -RISK_BRAKING_MPS2), -reflex) if braked_s < CAREFUL_DELAY_S else min(accel, -reflex)
+            braked_s = now - self._since_s - R157_PERCEIVES_S
+            reflex = r157(braked_s, self.vehicle.brake_mps2) if braked_s >= 0.0 else 0.0
+            accel = min(max(accel, -RISK_BRAKING_MPS2), -reflex) if braked_s < R157_DELAY_S else min(accel, -reflex)
         return self.keeping_lane(perceived, accel)

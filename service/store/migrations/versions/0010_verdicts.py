@@ -1,0 +1,38 @@
+"""Severity and fault of failures; other names of grades and of reference drivers."""
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0010"
+down_revision = "0009"
+
+GRADES = {"careful": "preventable", "ideal": "full_braking"}
+DRIVERS = {"careful": "r157", "ideal": "full_braking"}
+NAMES = {f'"grade":"{old}"': f'"grade":"{new}"' for old, new in GRADES.items()} | {
+    f'"{old}":{value}': f'"{new}":{value}' for old, new in DRIVERS.items() for value in ("{", "true", "false")
+}
+
+
+def upgrade() -> None:
+    """Adds the columns, and renames in rows and records."""
+    for name in ("severity", "fault"):
+        op.add_column("episodes", sa.Column(name, sa.String))
+    for severity in ("minor", "moderate", "severe"):
+        update = "UPDATE episodes SET severity = :severity WHERE outcome = 'failure' AND record LIKE :written"
+        op.execute(sa.text(update).bindparams(severity=severity, written=f'%"severity":"{severity}"%'))
+    _rename(GRADES, NAMES)
+
+
+def downgrade() -> None:
+    """Drops them, and goes back to the names of before."""
+    _rename(*({new: old for old, new in names.items()} for names in (GRADES, NAMES)))
+    for name in ("fault", "severity"):
+        op.drop_column("episodes", name)
+
+
+def _rename(grades: dict[str, str], names: dict[str, str]) -> None:
+    for old, new in grades.items():
+        op.execute(sa.text("UPDATE episodes SET grade = :new WHERE grade = :old").bindparams(old=old, new=new))
+    for old, new in names.items():
+        update = sa.text("UPDATE episodes SET record = replace(record, :old, :new) WHERE violated IS NOT NULL")
+        op.execute(update.bindparams(old=old, new=new))
