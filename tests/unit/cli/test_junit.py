@@ -115,9 +115,9 @@ def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_
 def test_failures_are_named_with_their_kind_how_to_look_at_them_and_how_to_have_them_again() -> None:
     told = [
         "low-sac-0: 10 valid failures, of which the first 2:",
-        "low-sac-0-train-3: cut-in, ahead, in a lane; ego goes straight, brakes; grade careful",
+        "low-sac-0-train-3: cut-in, ahead, in a lane; ego goes straight, brakes; grade preventable",
         "  risk-sac campaigns failures show c1 low-sac-0-train-3 --url http://host",
-        "low-sac-0-train-9: cut-in, ahead, in a lane; ego goes straight, brakes; grade careful",
+        "low-sac-0-train-9: cut-in, ahead, in a lane; ego goes straight, brakes; grade preventable",
         "  risk-sac campaigns failures show c1 low-sac-0-train-9 --url http://host",
         f"To have them again without the service: save {URL}/spec?format=yaml as spec.yaml, then",
         "  risk-sac run --spec spec.yaml --family low --method sac --seed 0 --out low-sac-0",
@@ -156,7 +156,7 @@ def test_a_requirement_over_its_bound_fails_and_names_the_failures_that_violate_
     (failure,) = root.iter("failure")
     assert failure.attrib["message"].startswith("never_fast above 0.1: 0.200, 95 % interval up to 0.320")
     assert (failure.text or "").splitlines() == [
-        "low-sac-0-train-5: never_fast violated; straight; grade careful",
+        "low-sac-0-train-5: never_fast violated; straight; grade preventable",
         "  risk-sac campaigns failures show c1 low-sac-0-train-5 --url http://host",
         "All: risk-sac campaigns failures list c1 --requirement never_fast --url http://host",
     ]
